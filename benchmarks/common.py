@@ -24,18 +24,8 @@ Found = TypeVar("Found")
 class Row:
     """One line of reports/benchmarks.csv.
 
-    Attributes
-    ----------
-    benchmark : str
-        Its first word is the module that measures it.
-    ours_s, theirs_s : float or None
-        Seconds; none where the benchmark does not compare times.
-    ratio : float
-    target : str
-        What the ratio should be; empty for a row that informs only.
-    holds : bool or None
-    how : str
-        One sentence.
+    `benchmark`: its first word is the module that measures it. `ours_s`, `theirs_s`: seconds; none where the benchmark does not
+    compare times. `target`: what the ratio should be; empty for a row that informs only. `how`: one sentence.
     """
 
     benchmark: str

@@ -26,15 +26,7 @@ SOURCES = ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src")
 def copy_study(folder: Path) -> Path:
     """Copy the sources of the study, without anything that it has made.
 
-    Parameters
-    ----------
-    folder : Path
-        Created.
-
-    Returns
-    -------
-    Path
-        `folder`.
+    `folder`: created. Returns `folder`.
     """
     folder.mkdir()
     for name in SOURCES:
@@ -48,10 +40,7 @@ def copy_study(folder: Path) -> Path:
 def reduce_to_imports(folder: Path) -> None:
     """Rewrite the scripts of a copy: they import what they import and touch their outputs.
 
-    Parameters
-    ----------
-    folder : Path
-        From `copy_study`.
+    `folder`: from `copy_study`.
     """
     for script in _scripts(folder):
         tree = ast.parse(script.read_text(encoding="utf-8"))
@@ -62,10 +51,7 @@ def reduce_to_imports(folder: Path) -> None:
 def reduce_to_records(folder: Path) -> None:
     """Rewrite the scripts of a copy: they import nothing of ours, touch their outputs and record their job in ``jobs/``.
 
-    Parameters
-    ----------
-    folder : Path
-        From `copy_study`.
+    `folder`: from `copy_study`.
     """
     (folder / "jobs").mkdir()
     for script in _scripts(folder):
@@ -83,21 +69,7 @@ def _scripts(folder: Path) -> list[Path]:
 def snakemake(folder: Path, *arguments: str) -> tuple[float, str]:
     """Run Snakemake in a copy, with the package of the copy.
 
-    Parameters
-    ----------
-    folder : Path
-    *arguments : str
-
-    Returns
-    -------
-    seconds : float
-    output : str
-        What it printed.
-
-    Raises
-    ------
-    SystemExit
-        Where it fails; with what it printed.
+    Returns `output`: what it printed. Raises `SystemExit` where it fails; with what it printed.
     """
     environment = os.environ | {"PYTHONPATH": str(folder / "src")}
     command = [sys.executable, "-m", "snakemake", *arguments]

@@ -32,17 +32,7 @@ def rows(work: Path, setting: Setting) -> list[Row]:
 
 
 def pinocchio_model(chain: Chain) -> tuple[pin.Model, int]:
-    """Model of a chain whose joints turn in the positive sense, and the index of its end-effector frame.
-
-    Parameters
-    ----------
-    chain : Chain
-
-    Returns
-    -------
-    model : pinocchio.Model
-    frame : int
-    """
+    """Model of a chain whose joints turn in the positive sense, and the index of its end-effector frame."""
     joints = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
     model, parent, placement = pin.Model(), 0, pin.SE3.Identity()
     for transform in chain.transforms:

@@ -88,11 +88,7 @@ FULL, SMALL = Setting(48, 6, None, 1_000_000, (20_000, 40_000)), Setting(1, 1, 6
 def rows(work: Path, setting: Setting) -> Iterator[Row]:
     """Rows of the report.
 
-    Parameters
-    ----------
-    work : Path
-        Temporary folder.
-    setting : Setting
+    `work`: temporary folder.
     """
     yield from _proof(work, setting.cases)
     yield from _old_engine(work, setting.old_cases)

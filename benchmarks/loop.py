@@ -42,11 +42,7 @@ SMALL = Setting(8, "results/loop/bench/diagnosis.json", "data/campaigns/ur10_ser
 def rows(work: Path, setting: Setting) -> Iterator[Row]:
     """Rows of the report.
 
-    Parameters
-    ----------
-    work : Path
-        Temporary folder.
-    setting : Setting
+    `work`: temporary folder.
     """
     folder = copy_study(work / "loop")
     own = _campaign(folder / "campaigns" / "bench", setting.poses)

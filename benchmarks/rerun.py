@@ -14,11 +14,7 @@ TARGET = 3
 def rows(work: Path, setting: Setting) -> list[Row]:
     """Row of the report.
 
-    Parameters
-    ----------
-    work : Path
-        Temporary folder; the study that the benchmark of that name left there serves here too.
-    setting : Setting
+    `work`: temporary folder; the study that the benchmark of that name left there serves here too.
     """
     folder = work / "study"
     if not folder.is_dir():

@@ -48,11 +48,7 @@ FULL, SMALL = Setting((1000, 10_000), 2), Setting((10, 10), 1)
 def rows(work: Path, setting: Setting) -> list[Row]:
     """Rows of the report, for time and for memory.
 
-    Parameters
-    ----------
-    work : Path
-        Temporary folder.
-    setting : Setting
+    `work`: temporary folder.
     """
     sizes, repetitions = setting.data_sets, setting.repetitions
     folders = {size: _copy_that_notes_peaks(work / f"scale-{size}") for size in dict.fromkeys(sizes)}

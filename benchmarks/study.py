@@ -42,11 +42,7 @@ for record in sorted(Path("jobs").iterdir()):
 def rows(work: Path, setting: Setting) -> list[Row]:
     """Rows of the report.
 
-    Parameters
-    ----------
-    work : Path
-        Temporary folder; the finished study stays there.
-    setting : Setting
+    `work`: temporary folder; the finished study stays there.
     """
     empty, importing = copy_study(work / "empty"), copy_study(work / "importing")
     reduce_to_records(empty)
@@ -86,13 +82,7 @@ def rows(work: Path, setting: Setting) -> list[Row]:
 
 
 def finished_study(work: Path, setting: Setting) -> tuple[Path, float]:
-    """Make the whole study, clean, in the folder ``study`` of `work`.
-
-    Returns
-    -------
-    folder : Path
-    seconds : float
-    """
+    """Make the whole study, clean, in the folder ``study`` of `work`."""
     folder = copy_study(work / "study")
     seconds, _ = snakemake(folder, *setting.jobs)
     print(f"  the study: {seconds:.1f} s", flush=True)

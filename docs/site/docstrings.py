@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-# A reference of numpydoc: its number, and its text on this line and on those that are indented below.
-_REFERENCE = re.compile(r"^\.\. \[(\d+)\] (.*(?:\n {3}.*)*)", re.MULTILINE)
+# A reference: its number in brackets, and its text on this line and on those that are indented below.
+_REFERENCE = re.compile(r"^(?:\.\. )?\[(\d+)\] ([A-Z].*(?:\n {3}.*)*)", re.MULTILINE)
 
 
 def with_plain_references(text: str) -> str:

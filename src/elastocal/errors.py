@@ -20,16 +20,8 @@ _LONGEST_SOURCE, _LONGEST_KEY, _LONGEST_FOUND = 160, 100, 120
 class InputError(ValueError):
     """Something that a user gave cannot be used; the message is one line of `LONGEST_MESSAGE` characters at most.
 
-    Parameters
-    ----------
-    source : str
-        The file, or the name of the thing, that holds the fault.
-    key : str
-        The key, row or column inside it; empty where the whole file is meant.
-    found : str
-        What stands there.
-    allowed : str
-        What may stand there.
+    `source`: the file, or the name of the thing, that holds the fault. `key`: the key, row or column inside it; empty where the
+    whole file is meant. `found`: what stands there. `allowed`: what may stand there.
     """
 
     def __init__(self, source: str | Path, key: str, found: str, allowed: str) -> None:

@@ -19,18 +19,7 @@ if TYPE_CHECKING:
 def stream(seed: int, robot: str, purpose: str, data_set: int) -> np.random.Generator:
     """Generator for one purpose in one data set.
 
-    Parameters
-    ----------
-    seed : int
-    robot : str
-        Name of the robot's file.
-    purpose : str
-        Such as ``configurations``.
-    data_set : int
-
-    Returns
-    -------
-    numpy.random.Generator
+    `robot`: name of the robot's file. `purpose`: such as ``configurations``.
     """
     key, use = _names(seed, robot, purpose)
     return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, data_set, use]))
@@ -41,17 +30,8 @@ def draw(
 ) -> np.ndarray:
     """One array for each data set, stacked.
 
-    Parameters
-    ----------
-    seed, robot, purpose
-        As in `stream`.
-    data_sets : iterable of int
-    sampler : callable
-        Takes a Generator, returns an array of fixed shape.
-
-    Returns
-    -------
-    ndarray (sets, ...)
+    `seed`, `robot`, `purpose`: as in `stream`. `sampler`: takes a Generator, returns an array of fixed shape. Returns (sets,
+    ...).
     """
     generator = stream(seed, robot, purpose, 0)
     start = generator.bit_generator.state

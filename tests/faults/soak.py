@@ -87,13 +87,7 @@ def ended_by_itself(study):
 def killed(study, victim, files, draws):
     """Start a run, kill a part of it once there are so many files; False where none is there by then, or it had ended.
 
-    Parameters
-    ----------
-    study : Study
-    victim : {"job", "snakemake", "group"}
-    files : int
-    draws : random.Random
-        Chooses the job.
+    `victim`: one of "job", "snakemake", "group". `draws`: chooses the job.
     """
     run = started(study, files)
     hit = run.poll() is None

@@ -27,10 +27,7 @@ _PLAN = replace(PLAN, poses=27)
 def certified_checkout(top, name="made", offset=3e-4):
     """A checkout with a campaign that was diagnosed and judged.
 
-    Returns
-    -------
-    Path
-        Folder of the campaign, in `top`.
+    Returns folder of the campaign, in `top`.
     """
     if not (top / "config").exists():
         (top / "config").mkdir()

@@ -50,14 +50,7 @@ class _Job:
 def run_loop(folder, robots, out, steps=STEPS):
     """Run every step from a campaign's folder to its report; results stand in `out`.
 
-    Parameters
-    ----------
-    folder, robots, out : Path
-
-    Returns
-    -------
-    Path
-        `out`, with ``verdict.json`` and ``report.pdf``.
+    Returns `out`, with ``verdict.json`` and ``report.pdf``.
     """
     out.mkdir(parents=True, exist_ok=True)
     for script in steps:

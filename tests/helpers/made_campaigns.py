@@ -16,18 +16,9 @@ POINTS = ("2DoF", "3DoF", "4DoF", "6DoF")
 class Plan:
     """How a campaign is measured.
 
-    Attributes
-    ----------
-    poses, loads, repeats : int
-        `loads` without the unloaded one.
-    tracker : bool
-        Whether the base stands somewhere in the tracker's frame and the targets anywhere on their points.
-    oriented : bool
-        Whether orientations are measured.
-    noise : float
-        Standard deviation, m and rad.
-    force : float
-        N.
+    `poses`, `loads`, `repeats`: `loads` without the unloaded one. `tracker`: whether the base stands somewhere in the tracker's
+    frame and the targets anywhere on their points. `oriented`: whether orientations are measured. `noise`: standard deviation,
+    m and rad. `force`: N.
     """
 
     poses: int = 30
@@ -42,24 +33,9 @@ class Plan:
 def made(robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, moving=None):
     """A campaign of a robot, measured as planned.
 
-    Parameters
-    ----------
-    robot : Robot
-        What the campaign takes it for.
-    seed : int
-    plan : Plan
-    true_robot : Robot, optional
-        What it is; `robot` without.
-    true_offset : array_like
-        Added to the joint angles, rad.
-    sag : float
-        Turn of joint 2 for each unit of the cosine of its angle, rad.
-    moving : dict of int to int, optional
-        Joints, from 0, that stand at zero in all but so many poses.
-
-    Returns
-    -------
-    Campaign
+    `robot`: what the campaign takes it for. `true_robot`: what it is; `robot` without. `true_offset`: added to the joint
+    angles, rad. `sag`: turn of joint 2 for each unit of the cosine of its angle, rad. `moving`: joints, from 0, that stand at
+    zero in all but so many poses.
     """
     rng = np.random.default_rng(seed)
     true_robot = true_robot or robot

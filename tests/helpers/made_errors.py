@@ -17,11 +17,7 @@ _MANY = 400_000
 def made_errors(kind, campaigns, poses, rng):
     """Errors before and after an effect of 1.5 noises is found but for a tenth, and after one that is none was added.
 
-    Returns
-    -------
-    cluster : ndarray (M,)
-        The same in all campaigns.
-    before, after, false : ndarray (campaigns, M)
+    Returns `cluster` (M,): the same in all campaigns; `before`, `after`, `false` (campaigns, M).
     """
     # Sizes that go round have the same share in any number of poses divisible by three.
     sizes = np.resize([2, 6, 10], poses) if kind == "uneven" else np.full(poses, INTERPRETATIONS)

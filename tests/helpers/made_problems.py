@@ -17,14 +17,8 @@ from elastocal.fitting.factored import Displacements, Factored
 class Rows:
     """Whitened rows of a made campaign; `white` has them as `products_of` takes them.
 
-    Attributes
-    ----------
-    declared, candidates : ndarray (R, P), (R, K)
-    residual : ndarray (R,)
-    jacobian : ndarray (R, n)
-    pose : ndarray of int (R,)
-    prior_std, present : ndarray (P,)
-    joint_rad : ndarray (n,)
+    `declared`, `candidates` (R, P), (R, K), `residual` (R,), `jacobian` (R, n), `pose` (R,) of int, `prior_std`, `present`
+    (P,), `joint_rad` (n,).
     """
 
     declared: np.ndarray

@@ -20,12 +20,7 @@ ELBOW_AND_HAND = (Target("elbow", "3DoF", (0.0, 0.1, 0.05)), *HAND)
 class Planted:
     """A campaign whose ground truth is known.
 
-    Attributes
-    ----------
-    declared : Fit
-        Of the model that lacks what was planted.
-    observations : Observations
-    candidates : dict of str to Candidate
+    `declared`: of the model that lacks what was planted.
     """
 
     declared: Fit
@@ -55,21 +50,7 @@ def two_loads_a_pose(joints, poses, seed, force=800.0):
 def planted(robot, sizes, seed=0, poses=25, targets=ELBOW_AND_HAND, states=None, **model):
     """A campaign of positions and, by default, identified compliances.
 
-    Parameters
-    ----------
-    robot : Robot
-    sizes : dict of str to sequence of float
-        What is planted: parameters by the key of a candidate.
-    seed : int
-    poses : int
-    targets : sequence of Target
-    states : States, optional
-    **model
-        As in `synthetic.made_model`.
-
-    Returns
-    -------
-    Planted
+    `sizes`: what is planted: parameters by the key of a candidate. `**model`: as in `synthetic.made_model`.
     """
     settings = {"fitted_frames": False, "identified": True, "compliance": robot.compliance} | model
     declared = made_model(robot.chain, targets, **settings)

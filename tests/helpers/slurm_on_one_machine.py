@@ -66,10 +66,7 @@ def missing():
 def slurm_on_one_machine(cores=4):
     """Start the daemons, yield the environment of their clients, stop the daemons.
 
-    Parameters
-    ----------
-    cores : int
-        That jobs may have on each node, whatever the machine has.
+    `cores`: that jobs may have on each node, whatever the machine has.
     """
     with ExitStack() as stack:
         # Names of sockets must be short, and munge asks for a folder that others can read and nobody else can write.

@@ -15,19 +15,8 @@ NOT_READ = ("results/logs/", "results/timings/")
 def altered_bytes(folder, flips, seed):
     """Alter bytes of every file, one at a time; the numbers of those that were found, that say the same, and that were missed.
 
-    Parameters
-    ----------
-    folder : Path
-        Of a finished run; the working directory.
-    flips : int
-        For each file, at random places.
-    seed : int
-
-    Returns
-    -------
-    dict of str to int
-    list of str
-        Files and places of those that were missed.
+    `folder`: of a finished run; the working directory. `flips`: for each file, at random places. Returns files and places of
+    those that were missed.
     """
     draws, counts, missed = random.Random(seed), {"found": 0, "harmless": 0, "missed": 0}, []
     paths = [path for top in ("data", "results") for path in sorted((folder / top).rglob("*")) if path.is_file()]

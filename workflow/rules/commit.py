@@ -10,17 +10,9 @@ UNKNOWN = "unknown"
 def commit_of(folder: Path, sources: Iterable[str]) -> str:
     """The commit of a checkout.
 
-    Parameters
-    ----------
-    folder : Path
-        Top of the checkout.
-    sources : iterable of str
-        What the results are made from: edits elsewhere, such as in a page, change no result.
-
-    Returns
-    -------
-    str
-        The commit, with ``-dirty`` behind it where sources differ from it; ``unknown`` without a checkout or without git.
+    `folder`: top of the checkout. `sources`: what the results are made from: edits elsewhere, such as in a page, change no
+    result. Returns the commit, with ``-dirty`` behind it where sources differ from it; ``unknown`` without a checkout or
+    without git.
     """
     # A copy of the sources inside of another repository is not that repository's commit.
     if not (folder / ".git").exists():

@@ -16,22 +16,8 @@ PACKAGE = "elastocal"
 def closure(script: Path, source: Path) -> list[Path]:
     """Source files that a script imports, directly or not.
 
-    Parameters
-    ----------
-    script : Path
-        Imports modules of the package and of its own folder.
-    source : Path
-        Folder of the package.
-
-    Returns
-    -------
-    list of Path
-        Sorted, without the script itself.
-
-    Raises
-    ------
-    InputError
-        A source file that is no Python, such as an effect that is being written.
+    `script`: imports modules of the package and of its own folder. `source`: folder of the package. Returns sorted, without the
+    script itself. Raises `InputError`: a source file that is no Python, such as an effect that is being written.
     """
     files, left, modules = set(), [script], set()
     while left:

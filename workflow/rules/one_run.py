@@ -17,22 +17,9 @@ RUNS, JOBS = "runs.lock", "jobs.lock"
 def begin(snakemake_folder: Path, written: list[str]) -> IO[str]:
     """Take away the locks of a run that was killed and what it was writing, once its jobs have ended.
 
-    Parameters
-    ----------
-    snakemake_folder : Path
-        Snakemake's own, of the working directory.
-    written : list of str
-        Folders that jobs write to.
-
-    Returns
-    -------
-    file
-        To be kept open while the run lasts.
-
-    Raises
-    ------
-    InputError
-        A folder that cannot be written to or that holds something else than files and folders, or a full disk.
+    `snakemake_folder`: Snakemake's own, of the working directory. `written`: folders that jobs write to. Returns to be kept
+    open while the run lasts. Raises `InputError`: a folder that cannot be written to or that holds something else than files
+    and folders, or a full disk.
     """
     for folder in (*written, snakemake_folder.as_posix()):
         try:

@@ -10,16 +10,7 @@ _REPORTS = {"reports/study.pdf": "the study", "reports/blind/blind.pdf": "the bl
 
 
 def outcome(made: Iterable[str]) -> list[str]:
-    """Lines about the reports among the files that a run has made.
-
-    Parameters
-    ----------
-    made : iterable of str
-
-    Returns
-    -------
-    list of str
-    """
+    """Lines about the reports among the files that a run has made."""
     # Only a run that has made a report needs what makes its sentences.
     from elastocal.report.first_page import sentences, worth_sentence
 

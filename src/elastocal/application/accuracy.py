@@ -7,13 +7,11 @@ ascribes to effects that no command contains, such as a step of the set-up, for 
 Nothing of the tracker's noise is in it.
 
 It is stated in a frame. `BASE`, that of the declared base, where measurements were taken in it. `ROBOT`, the robot's own, is
-after the best rigid placement of the base over the campaign's poses [1]_. In both, where the offset of the target on the end
+after the best rigid placement of the base over the campaign's poses [1]. In both, where the offset of the target on the end
 effector was fitted, a constant offset there is no error. Data and use have these freedoms in common: what the data cannot say
 of them costs the use nothing. They are taken up over the campaign's poses, so that a single new pose has an error too.
 
-References
-----------
-.. [1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta Crystallographica A32, 1976.
+[1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta Crystallographica A32, 1976.
 """
 
 from __future__ import annotations
@@ -49,28 +47,12 @@ FRAMES = {ROBOT: "in the robot's own frame (after the best placement of its base
 class Accuracy:
     """Whose error, how large, how sure; lengths in m.
 
-    Attributes
-    ----------
-    frame : {"robot", "base"}
-    kind : {"predicted", "measured"}
-    rms_m, worst_m : float
-        Root mean square over the poses, and at the worst of them.
-    rms_bound_m, worst_bound_m : float
-        Below which they are with one-sided confidence; None where nothing says so.
-    noise : str
-        What became of the tracker's noise.
-    poses : int
-    region : str
-        Which poses these are.
-    offset_removed : bool
-        Whether a constant offset at the end effector counts as no error.
-    left_out : tuple of str
-        Effects of the fit that no command contains: what they were fitted to counts as error.
-    left_out_m, form_m : float
-        Of `rms_m`, by those, and by what the form of the model leaves open.
-    contradicted : bool
-        Whether held-out poses showed that the form leaves more open than the fitted poses say.
-    confidence : float
+    `frame`: one of "robot", "base". `kind`: one of "predicted", "measured". `rms_m`, `worst_m`: root mean square over the
+    poses, and at the worst of them. `rms_bound_m`, `worst_bound_m`: below which they are with one-sided confidence; None where
+    nothing says so. `noise`: what became of the tracker's noise. `region`: which poses these are. `offset_removed`: whether a
+    constant offset at the end effector counts as no error. `left_out`: effects of the fit that no command contains: what they
+    were fitted to counts as error. `left_out_m`, `form_m`: of `rms_m`, by those, and by what the form of the model leaves open.
+    `contradicted`: whether held-out poses showed that the form leaves more open than the fitted poses say.
     """
 
     frame: str
@@ -103,27 +85,14 @@ def accuracy_from(document: Mapping[str, Any]) -> Accuracy:
 class Scope:
     """In which frame errors are stated, and what of them is none there.
 
-    Attributes
-    ----------
-    frame : {"robot", "base"}
-    origin : ndarray (3,)
-        About which the placement turns, m.
-    absorbed : ndarray (12, P)
-        Motion of the base (m, rad), constant offset and constant turn of the end effector that take up each parameter.
-    absorbed_before : ndarray (12,)
-        The same of the nominal robot less the calibrated one.
-    offset_removed : bool
-    left_out : tuple of str
-    left_out_m, left_out_worst_m : float
-        What effects that are not commanded contribute at the campaign's poses: RMS, and at the worst.
-    unstated : tuple of (str, float, float)
-        The same of effects that go with something that a command may not state: "time", "temperature" or "approach".
-    form_m : float
-        What the form of the model leaves open there, RMS: other models predict otherwise, and so may the robot.
-    contradicted : bool
-        Whether held-out poses showed that to be more than other models say.
-    repeated_freedom : float
-        Degrees of freedom of the square of the joints' repeatability; 0 where it is taken as known.
+    `frame`: one of "robot", "base". `origin` (3,): about which the placement turns, m. `absorbed` (12, P): motion of the base
+    (m, rad), constant offset and constant turn of the end effector that take up each parameter. `absorbed_before` (12,): the
+    same of the nominal robot less the calibrated one. `left_out_m`, `left_out_worst_m`: what effects that are not commanded
+    contribute at the campaign's poses: RMS, and at the worst. `unstated` (str, float, float): the same of effects that go with
+    something that a command may not state: "time", "temperature" or "approach". `form_m`: what the form of the model leaves
+    open there, RMS: other models predict otherwise, and so may the robot. `contradicted`: whether held-out poses showed that to
+    be more than other models say. `repeated_freedom`: degrees of freedom of the square of the joints' repeatability; 0 where it
+    is taken as known.
     """
 
     frame: str
@@ -157,19 +126,10 @@ def scope_from(document: Mapping[str, Any]) -> Scope:
 class Prediction:
     """Predicted errors at N poses.
 
-    Attributes
-    ----------
-    parameters_m, repeated_m : ndarray (N,)
-        Root mean square by the uncertainty of the parameters, and by what each approach and each pose has of its own.
-    std_rad : ndarray (N,)
-        Of orientation, by both.
-    error_m : ndarray (N,)
-        By both, by the form of the model and by what is not commanded.
-    bound_m : ndarray (N,)
-        Below which each error is with `CONFIDENCE`.
-    rms_m, worst_m : ndarray (draws,)
-        Over the poses, of robots that the fit leaves possible.
-    scope : Scope
+    `parameters_m`, `repeated_m` (N,): root mean square by the uncertainty of the parameters, and by what each approach and each
+    pose has of its own. `std_rad` (N,): of orientation, by both. `error_m` (N,): by both, by the form of the model and by what
+    is not commanded. `bound_m` (N,): below which each error is with `CONFIDENCE`. `rms_m`, `worst_m` (draws,): over the poses,
+    of robots that the fit leaves possible.
     """
 
     parameters_m: np.ndarray
@@ -322,11 +282,9 @@ def without_rigid_motion(displacement: np.ndarray, position: np.ndarray, rotatio
 def quantile_of_length(covariance: np.ndarray) -> np.ndarray:
     """95 % quantile of the length of normal vectors of some covariances (N, 3, 3), ndarray (N,).
 
-    By the gamma distribution that has the first two moments of the square [1]_.
+    By the gamma distribution that has the first two moments of the square [1].
 
-    References
-    ----------
-    .. [1] Satterthwaite, F. E., An approximate distribution of estimates of variance components, Biometrics Bulletin 2, 1946.
+    [1] Satterthwaite, F. E., An approximate distribution of estimates of variance components, Biometrics Bulletin 2, 1946.
     """
     mean = np.trace(covariance, axis1=1, axis2=2)
     variance = 2.0 * (covariance**2).sum(axis=(1, 2))

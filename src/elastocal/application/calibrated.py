@@ -37,21 +37,12 @@ REFERENCE_C = 20.0
 class CalibratedRobot:
     """A robot and what a campaign found of it.
 
-    Attributes
-    ----------
-    robot : Robot
-        As its file declares it; `robot.model_angles(reported)` gives the angles of the chain.
-    model : Model
-        The final model with the effects that move the robot. Its one target is the end effector's measuring point.
-    estimate : Estimate
-        Its values; the frame is the robot's base.
-    covariance : ndarray (P, P)
-        Of the parameters of the effects (linear, then shapes, effect by effect), marginal over frames, targets and all effects
-        that are left out; zero where held.
-    noise : Noise
-        Of the campaign, with the repeatability of the joints.
-    scope : Scope or None
-        What its errors mean: see `accuracy`; the base's frame, with every effect commanded, without.
+    `robot`: as its file declares it; `robot.model_angles(reported)` gives the angles of the chain. `model`: the final model
+    with the effects that move the robot. Its one target is the end effector's measuring point. `estimate`: its values; the
+    frame is the robot's base. `covariance` (P, P): of the parameters of the effects (linear, then shapes, effect by effect),
+    marginal over frames, targets and all effects that are left out; zero where held. `noise`: of the campaign, with the
+    repeatability of the joints. `scope`: what its errors mean: see `accuracy`; the base's frame, with every effect commanded,
+    without.
     """
 
     robot: Robot
@@ -66,16 +57,10 @@ class CalibratedRobot:
 class OperatingConditions:
     """Under what the robot works, row for row as the joint angles, or one row for all of them.
 
-    Attributes
-    ----------
-    wrench : ndarray (N, 6) or None
-        N, N m, at the last measuring point's origin, base axes, beside the weights that the robot file declares; None for none.
-    approach : ndarray (N, n) or None
-        Sense in which each joint comes to rest as the controller reports it, -1, 0 or +1; None for unknown, 0.
-    time_s : ndarray (N,) or None
-        On the clock of the campaign; None for its start.
-    temperature_c : ndarray (N,) or None
-        None for the 20 °C at which dimensions are stated.
+    `wrench` (N, 6): N, N m, at the last measuring point's origin, base axes, beside the weights that the robot file declares;
+    None for none. `approach` (N, n): sense in which each joint comes to rest as the controller reports it, -1, 0 or +1; None
+    for unknown, 0. `time_s` (N,): on the clock of the campaign; None for its start. `temperature_c` (N,): None for the 20 °C at
+    which dimensions are stated.
     """
 
     wrench: np.ndarray | None = None
@@ -114,18 +99,7 @@ def calibrated_from(fit: Fit, robot: Robot) -> CalibratedRobot:
 def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
     """A calibrated robot from a fitted model.
 
-    Parameters
-    ----------
-    robot : Robot
-    model : Model
-    estimate : Estimate
-    covariance : ndarray (P, P)
-        Of all `parameters` of the model.
-    noise : Noise
-
-    Returns
-    -------
-    CalibratedRobot
+    `covariance` (P, P): of all `parameters` of the model.
     """
     kept = [number for number, effect in enumerate(model.effects) if moves_robot(effect)]
     keys = {model.effects[number].key for number in kept}
@@ -209,16 +183,8 @@ def coordinates_at_rest(
 ) -> np.ndarray:
     """Where the robot yields to, as coordinates of its sites.
 
-    Parameters
-    ----------
-    calibrated, reported_angles, operating
-        As in `forward`.
-    near : ndarray (N, C), optional
-        Coordinates at which the loads are taken, of states that differ little; by fixed-point iteration without.
-
-    Returns
-    -------
-    ndarray (N, C)
+    `calibrated`, `reported_angles`, `operating`: as in `forward`. `near` (N, C): coordinates at which the loads are taken, of
+    states that differ little; by fixed-point iteration without. Returns (N, C).
     """
     model, estimate = calibrated.model, calibrated.estimate
     return displaced_coordinates(
@@ -280,14 +246,7 @@ def pose_sensitivities(
 def states_of(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> States:
     """Reported joint angles and operating conditions as states of the model, with the neutral ones for what is not given.
 
-    Parameters
-    ----------
-    calibrated, reported_angles, operating
-        As in `forward`.
-
-    Returns
-    -------
-    States
+    `calibrated`, `reported_angles`, `operating`: as in `forward`.
     """
     robot, count = calibrated.robot, len(reported_angles)
 
@@ -323,13 +282,7 @@ def square_root(covariance: np.ndarray) -> np.ndarray:
 
     By the eigenvectors of the correlations: parameters in kilograms would drown those in radians per newton metre.
 
-    Parameters
-    ----------
-    covariance : ndarray (P, P)
-
-    Returns
-    -------
-    ndarray (P, P)
+    `covariance` (P, P). Returns (P, P).
     """
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0, deviation, 1.0)

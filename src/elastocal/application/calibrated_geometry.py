@@ -28,12 +28,8 @@ FOLDED = (OFFSET, RATIO, GEOMETRY, SPRINGS, declared_weight.EFFECT)
 class Folded:
     """A calibrated robot as a robot file has it, and what that leaves out.
 
-    Attributes
-    ----------
-    robot : Robot
-        Its reference: rigid or with its springs, under its weight.
-    left_out : tuple of int
-        Places in the model of the effects that it does not have.
+    `robot`: its reference: rigid or with its springs, under its weight. `left_out`: places in the model of the effects that it
+    does not have.
     """
 
     robot: Robot
@@ -43,14 +39,7 @@ class Folded:
 def folded(calibrated: CalibratedRobot) -> Folded:
     """Put into the robot what its file can say.
 
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
-
-    Returns
-    -------
-    Folded
-        Poses of its robot are those of the calibrated one without the effects left out, exactly.
+    Returns poses of its robot are those of the calibrated one without the effects left out, exactly.
     """
     robot, model, estimate = calibrated.robot, calibrated.model, calibrated.estimate
     offset, ratio = np.zeros(robot.joints), np.eye(robot.joints)

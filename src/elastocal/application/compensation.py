@@ -1,13 +1,11 @@
 """Corrected joint targets: what to command so that the loaded, sagging, imperfect robot comes to rest at the wanted poses.
 
 Newton's method on the forward model of the calibrated robot. The Jacobian is that of the rigid chain, a simplified Newton
-method [1]_: it errs by what the robot deviates over its reach, some 1 / 500, and each step leaves so much less. The error of a
-target that is commanded as the rigid robot of the file would have it is predicted beside it [2]_.
+method [1]: it errs by what the robot deviates over its reach, some 1 / 500, and each step leaves so much less. The error of a
+target that is commanded as the rigid robot of the file would have it is predicted beside it [2].
 
-References
-----------
-.. [1] Deuflhard, P., Newton Methods for Nonlinear Problems, section 2.1.2, Springer, 2011.
-.. [2] Mooring, B. W., Roth, Z. S. and Driels, M. R., Fundamentals of Manipulator Calibration, chapter 7, Wiley, 1991.
+[1] Deuflhard, P., Newton Methods for Nonlinear Problems, section 2.1.2, Springer, 2011.
+[2] Mooring, B. W., Roth, Z. S. and Driels, M. R., Fundamentals of Manipulator Calibration, chapter 7, Wiley, 1991.
 """
 
 from __future__ import annotations
@@ -48,17 +46,10 @@ _LARGEST_CORRECTION = 0.1
 class Correction:
     """Joint targets for N wanted poses; lengths in m, angles in rad.
 
-    Attributes
-    ----------
-    joint_angles : ndarray (N, n)
-        To command, as the controller counts them.
-    uncorrected : ndarray (N, n)
-        What the rigid robot of the file would be commanded.
-    error_before, error_after : ndarray (N, 6)
-        Wanted less predicted pose, displacement and rotation vector in base axes: uncorrected, and with the correction. How far
-        both are from the truth `accuracy` says.
-    status : ndarray of str (N,)
-        "ok", "outside limits", "unreachable" or "singular".
+    `joint_angles` (N, n): to command, as the controller counts them. `uncorrected` (N, n): what the rigid robot of the file
+    would be commanded. `error_before`, `error_after` (N, 6): wanted less predicted pose, displacement and rotation vector in
+    base axes: uncorrected, and with the correction. How far both are from the truth `accuracy` says. `status` (N,) of str:
+    "ok", "outside limits", "unreachable" or "singular".
     """
 
     joint_angles: np.ndarray
@@ -78,23 +69,11 @@ def corrected(
 ) -> Correction:
     """Joint targets that bring the end effector to wanted poses.
 
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
-        Of six joints or more; of more, joints move as little as possible from where the rigid robot would have them.
-    position, rotation : ndarray (N, 3), (N, 3, 3)
-        Wanted pose of the last measuring point, m, base axes.
-    operating : OperatingConditions
-        Under which each target is reached.
-    start : ndarray (N, n), optional
-        Joint angles near which each target lies, as the controller reports them, rad: they choose the posture. Without, the
-        posture is chosen for the path as a whole, see `along_path`.
-    progress : callable, optional
-        Called with the number of targets that are done.
-
-    Returns
-    -------
-    Correction
+    `calibrated`: of six joints or more; of more, joints move as little as possible from where the rigid robot would have them.
+    `position`, `rotation` (N, 3), (N, 3, 3): wanted pose of the last measuring point, m, base axes. `operating`: under which
+    each target is reached. `start` (N, n): joint angles near which each target lies, as the controller reports them, rad: they
+    choose the posture. Without, the posture is chosen for the path as a whole, see `along_path`. `progress`: called with the
+    number of targets that are done.
     """
     robot = calibrated.robot
     if start is None:

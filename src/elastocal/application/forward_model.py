@@ -51,18 +51,7 @@ class ForwardModel:
     def read(cls, folder: str | Path) -> ForwardModel:
         """The model of a folder that `elastocal export` wrote.
 
-        Parameters
-        ----------
-        folder : str or Path
-
-        Returns
-        -------
-        ForwardModel
-
-        Raises
-        ------
-        InputError
-            A file that is not there or not readable, an effect that the catalogue does not have on this robot.
+        Raises `InputError`: a file that is not there or not readable, an effect that the catalogue does not have on this robot.
         """
         path = Path(folder) / SIDECAR
         document = read_json(path)
@@ -100,16 +89,7 @@ class ForwardModel:
 
 
 def model_document(calibrated: CalibratedRobot) -> dict[str, Any]:
-    """A calibrated robot as JSON, from which `calibrated_in` makes the same.
-
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
-
-    Returns
-    -------
-    dict
-    """
+    """A calibrated robot as JSON, from which `calibrated_in` makes the same."""
     model, estimate = calibrated.model, calibrated.estimate
     values = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
     return {

@@ -24,24 +24,11 @@ _ERRORS = tuple(f"d{name}" for name in _POSE)
 def forward_table(calibrated: CalibratedRobot, rows: int, operating: OperatingConditions, seed: int) -> pd.DataFrame:
     """Nominal poses and errors of a robot over its joint limits.
 
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
-    rows : int
-        About so many: the next power of two, at points of a scrambled Sobol sequence [1]_.
-    operating : OperatingConditions
-        One row, for all.
-    seed : int
+    `rows`: about so many: the next power of two, at points of a scrambled Sobol sequence [1]. `operating`: one row, for all.
+    Returns ``q1..qn`` (rad, as the controller reports them), ``x..rz`` (m, rotation vector in rad: where the robot file has the
+    end effector, base axes), ``dx..drz``: where it is less where the file has it, displacement and rotation vector.
 
-    Returns
-    -------
-    pandas.DataFrame
-        ``q1..qn`` (rad, as the controller reports them), ``x..rz`` (m, rotation vector in rad: where the robot file has the
-        end effector, base axes), ``dx..drz``: where it is less where the file has it, displacement and rotation vector.
-
-    References
-    ----------
-    .. [1] Owen, A. B., Scrambling Sobol' and Niederreiter-Xing points, Journal of Complexity 14, 1998.
+    [1] Owen, A. B., Scrambling Sobol' and Niederreiter-Xing points, Journal of Complexity 14, 1998.
     """
     low, high = calibrated.robot.joint_limits.T
     points = qmc.Sobol(len(low), rng=np.random.default_rng(seed)).random_base2(int(np.ceil(np.log2(max(rows, 2)))))
@@ -53,23 +40,12 @@ def interpolation_error_m(
 ) -> tuple[float, float]:
     """By how much interpolation in a table misses the displacement of the model.
 
-    By thin plate splines of the nearest rows, in angles over their range [1]_, at fresh random angles.
+    By thin plate splines of the nearest rows, in angles over their range [1], at fresh random angles.
 
-    Parameters
-    ----------
-    calibrated, operating
-        As in `forward_table`.
-    table : pandas.DataFrame
-    seed : int
+    `calibrated`, `operating`: as in `forward_table`. Returns `interpolated`, `nothing`: RMS position error of the
+    interpolation, and of no correction at all, m.
 
-    Returns
-    -------
-    interpolated, nothing : float
-        RMS position error of the interpolation, and of no correction at all, m.
-
-    References
-    ----------
-    .. [1] Fasshauer, G. E., Meshfree Approximation Methods with MATLAB, World Scientific, 2007.
+    [1] Fasshauer, G. E., Meshfree Approximation Methods with MATLAB, World Scientific, 2007.
     """
     low, high = calibrated.robot.joint_limits.T
     angles = calibrated.robot.reported_angles(np.random.default_rng(seed).uniform(low, high, (_TRIED, len(low))))

@@ -1,14 +1,12 @@
 """Joint angles of the rigid robot for wanted poses: damped least squares from several starts, and a path without jumps.
 
-Each step is that of Levenberg and Marquardt [1]_ on the pose error, whose rotations count at the reach of the arm as lengths;
+Each step is that of Levenberg and Marquardt [1] on the pose error, whose rotations count at the reach of the arm as lengths;
 batched over targets and starts. Of the solutions of all rows those are taken that move the joints least from row to row, by
-dynamic programming (Viterbi's algorithm [2]_).
+dynamic programming (Viterbi's algorithm [2]).
 
-References
-----------
-.. [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, section 3.7,
-   Springer, 2009.
-.. [2] Forney, G. D., The Viterbi algorithm, Proceedings of the IEEE 61, 1973.
+[1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, section 3.7, Springer,
+    2009.
+[2] Forney, G. D., The Viterbi algorithm, Proceedings of the IEEE 61, 1973.
 """
 
 from __future__ import annotations
@@ -45,20 +43,9 @@ def reach_m(robot: Robot) -> float:
 def refined(robot: Robot, position: np.ndarray, rotation: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles by damped least squares from one start for each target.
 
-    Parameters
-    ----------
-    robot : Robot
-    position, rotation : ndarray (N, 3), (N, 3, 3)
-        Wanted, of the end effector's measuring point, m, base axes.
-    start : ndarray (N, n)
-        Angles of the chain, rad.
-
-    Returns
-    -------
-    angles : ndarray (N, n)
-        Of the chain, rad; the best that was found.
-    error_m : ndarray (N,)
-        What is left, rotations as lengths at the reach.
+    `position`, `rotation` (N, 3), (N, 3, 3): wanted, of the end effector's measuring point, m, base axes. `start` (N, n):
+    angles of the chain, rad. Returns `angles` (N, n): of the chain, rad; the best that was found; `error_m` (N,): what is left,
+    rotations as lengths at the reach.
     """
     angles, length = start.copy(), reach_m(robot)
     scale = np.array([1.0, 1.0, 1.0, length, length, length])
@@ -95,17 +82,7 @@ def _damped(jacobian: np.ndarray, off: np.ndarray, damping: np.ndarray) -> np.nd
 def within_turns(robot: Robot, angles: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
     """The same postures with each joint that turns as near as whole turns bring it to somewhere.
 
-    Parameters
-    ----------
-    robot : Robot
-    angles : ndarray (..., n)
-        Of the chain, rad.
-    near : ndarray (..., n), optional
-        The middle of the limits without.
-
-    Returns
-    -------
-    ndarray (..., n)
+    `angles` (..., n): of the chain, rad. `near` (..., n): the middle of the limits without. Returns (..., n).
     """
     middle = robot.joint_limits.mean(axis=1) if near is None else near
     turns = np.round((angles - middle) / (2 * np.pi)) * ~np.array(robot.chain.prismatic)
@@ -121,15 +98,7 @@ def beyond_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
 def along_path(robot: Robot, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles for the poses of a path, within the limits where there are such, moving as little as possible.
 
-    Parameters
-    ----------
-    robot, position, rotation
-        As in `refined`.
-
-    Returns
-    -------
-    angles, error_m : ndarray (N, n), (N,)
-        As by `refined`.
+    `robot`, `position`, `rotation`: as in `refined`. Returns `angles`, `error_m` (N, n), (N,): as by `refined`.
     """
     count, joints = len(position), robot.joints
     low, high = robot.joint_limits.T

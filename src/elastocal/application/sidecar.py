@@ -33,19 +33,7 @@ CONVENTIONS = {
 def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accuracy) -> dict[str, Any]:
     """Contents of the sidecar.
 
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
-    name : str
-        Of the campaign.
-    date : str
-        Of the export, ISO 8601.
-    accuracy : Accuracy
-        Of the corrected robot.
-
-    Returns
-    -------
-    dict
+    `name`: of the campaign. `date`: of the export, ISO 8601. `accuracy`: of the corrected robot.
     """
     deviations = np.sqrt(np.diag(calibrated.covariance))
     kept = folded(calibrated).left_out
@@ -80,10 +68,7 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
 def left_out_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
     """How far the effects that a robot file cannot hold move the end effector, ndarray (N,), m.
 
-    Parameters
-    ----------
-    calibrated, reported_angles, operating
-        As in `calibrated.forward`.
+    `calibrated`, `reported_angles`, `operating`: as in `calibrated.forward`.
     """
     kept = set(folded(calibrated).left_out)
     values = tuple(0.0 * v if number in kept else v for number, v in enumerate(calibrated.estimate.coefficients))

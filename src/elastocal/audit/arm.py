@@ -25,15 +25,7 @@ _JOINTS = {
 class Step:
     """One word of a chain: fixed by `amount`, moved by a coordinate, or a measuring point.
 
-    Attributes
-    ----------
-    kind : {"T", "R", "point"}
-    axis : int
-    amount : float
-        m or rad.
-    coordinate : int or None
-    sign : float
-    point : str
+    `kind`: one of "T", "R", "point". `amount`: m or rad.
     """
 
     kind: str
@@ -47,15 +39,8 @@ class Step:
 def steps_of(document: Mapping[str, Any]) -> list[Step]:
     """Words of a robot file's chain; behind each rigid stretch of an arm with elastic links six springs (equation 5).
 
-    Parameters
-    ----------
-    document : mapping
-        Keys as in the robot schema: chain, lengths_m, compliance_urad_per_Nm, links.
-
-    Returns
-    -------
-    list of Step
-        Coordinates 0 to n - 1 are the joints, then come six for each link.
+    `document`: keys as in the robot schema: chain, lengths_m, compliance_urad_per_Nm, links. Returns coordinates 0 to n - 1 are
+    the joints, then come six for each link.
     """
     elastic, joints = "links" in document, _joints(document["chain"])
     found: list[Step] = []
@@ -95,14 +80,8 @@ def steps_of(document: Mapping[str, Any]) -> list[Step]:
 class Arm:
     """An arm with a spring in each joint and, where its file has tubes, at the end of each link.
 
-    Parameters
-    ----------
-    document : mapping
-        A robot file.
-    tool_offset_m : sequence of float
-        From each measuring point to its target, in the frame of the point.
-    diameter : float
-        By which the tubes' outer diameter is another one.
+    `document`: a robot file. `tool_offset_m`: from each measuring point to its target, in the frame of the point. `diameter`:
+    by which the tubes' outer diameter is another one.
     """
 
     def __init__(

@@ -26,17 +26,7 @@ _FIXED = re.compile(r"T([xyz])\((-?)([^()]+)\)")
 
 
 def geometry(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Noise and leak of every estimator, mean over all data sets.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Noise and leak of every estimator, mean over all data sets."""
     frame, expected = run.table(file).set_index("estimator"), qualities(run, robot)
     missing = sorted(set(frame.index) ^ set(expected))
     found = [held(file, "estimators", "counting", not missing, f"{missing}", len(expected))]
@@ -50,17 +40,7 @@ def geometry(run: Audited, file: str, robot: str) -> list[Finding]:
 
 @cache
 def qualities(run: Audited, robot: str) -> dict[str, dict[str, float]]:
-    """Columns of the geometry table by the names of estimators.
-
-    Parameters
-    ----------
-    run : Audited
-    robot : str
-
-    Returns
-    -------
-    dict of str to dict of str to float
-    """
+    """Columns of the geometry table by the names of estimators."""
     arm, longer, settings = run.arm(robot), stretched(run, robot), run.configuration
     noise, errors = 1e-6 * settings["tables"]["noise_um"], settings["questions"]["geometry_errors"]
     lengths = longer.joints - arm.joints

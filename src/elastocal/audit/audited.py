@@ -26,16 +26,8 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 class Audited:
     """A finished run; files, arms and regressors are kept once they have been read or worked out.
 
-    Parameters
-    ----------
-    folder : Path
-        With data/, results/ and reports/.
-    configuration : mapping
-        As in config.yaml.
-    robots, strategies : mapping of str to mapping
-        The files of these names.
-    sample : int
-        Rows of each file that are recomputed.
+    `folder`: with data/, results/ and reports/. `configuration`: as in config.yaml. `robots`, `strategies`: the files of these
+    names. `sample`: rows of each file that are recomputed.
     """
 
     def __init__(

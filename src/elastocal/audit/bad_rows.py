@@ -17,17 +17,7 @@ _TOGETHER = ["robot", "seed"]
 
 
 def cases(run: Audited, file: str) -> list[Finding]:
-    """Every slip is there once, and verdicts count as the same that are.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Every slip is there once, and verdicts count as the same that are."""
     stated = run.table(file)
     robots = list(dict.fromkeys(stated["robot"]))
     slips = pd.concat([run.table(f"results/bad_rows/{robot}.parquet").assign(robot=robot) for robot in robots])
@@ -48,17 +38,7 @@ def cases(run: Audited, file: str) -> list[Finding]:
 
 
 def rates(run: Audited, file: str) -> list[Finding]:
-    """The rates that have a target, with their intervals.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """The rates that have a target, with their intervals."""
     stated, slips = run.table(file), run.table(file.replace("summary.csv", "cases.csv"))
     one = slips.groupby(_TOGETHER).first()
     large = slips[slips["size"] >= 10.0]

@@ -55,10 +55,7 @@ _COMPARABLE = dict.fromkeys(
 class Proof:
     """A finished blind proof.
 
-    Attributes
-    ----------
-    truths, verdicts, oracles : dict of str to mapping
-        By the name of the case; verdicts and oracles of those that are sealed.
+    `truths`, `verdicts`, `oracles`: by the name of the case; verdicts and oracles of those that are sealed.
     """
 
     truths: dict[str, Mapping[str, Any]]
@@ -90,17 +87,7 @@ def _manifest(run: Audited) -> list[tuple[str, str]]:
 
 
 def seals(run: Audited, file: str) -> list[Finding]:
-    """Every ground truth is what was sealed, and every sealed one is there.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Every ground truth is what was sealed, and every sealed one is there."""
     there = {path.name: path for path in (run.folder / "data/sealed").glob("*/*.json")}
     listed = _manifest(run)
     off = [
@@ -114,19 +101,8 @@ def columns(
 ) -> list[Finding]:
     """A table beside the same made again, column by column.
 
-    Parameters
-    ----------
-    file : str
-    stated, expected : DataFrame
-        Rows in the same order; what the second lacks is not compared.
-    by : str
-    digits : float
-        Allowed relative difference of each number.
-
-    Returns
-    -------
-    list of Finding
-        One for each column; the last says how many cells were followed.
+    `stated`, `expected`: rows in the same order; what the second lacks is not compared. `digits`: allowed relative difference
+    of each number. Returns one for each column; the last says how many cells were followed.
     """
     if len(stated) != len(expected):
         return [held(file, "rows", "counting", False, f"found {len(stated)}, expected {len(expected)}")]
@@ -156,17 +132,7 @@ def _word(value: Any) -> str:
 
 
 def cases(run: Audited, file: str) -> list[Finding]:
-    """Every row of the cases: what the verdict is worth, sizes, errors, the oracle.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Every row of the cases: what the verdict is worth, sizes, errors, the oracle."""
     # Joints are words, such as 2-3, although one alone looks like a number.
     proof, stated = proof_of(run), pd.read_csv(run.folder / file, dtype={"joints": str})
     every = sorted(stated["case"]) == sorted(proof.truths)
@@ -211,16 +177,7 @@ def _of_oracle(oracle: Mapping[str, Any] | None) -> dict[str, float]:
 
 
 def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """What a verdict is worth.
-
-    Parameters
-    ----------
-    truth, verdict : mapping
-
-    Returns
-    -------
-    dict
-    """
+    """What a verdict is worth."""
     case = truth["case"]
     word, effects = _apart_from_setup(truth, verdict)
     true, names = list(case["effects"]), [effect["name"] for effect in effects]
@@ -291,17 +248,7 @@ def _errors(verdict: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def probabilities(run: Audited, file: str) -> list[Finding]:
-    """What was stated of each case, and whether it is so.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """What was stated of each case, and whether it is so."""
     proof, stated = proof_of(run), run.table(file)
     reported = [name for name in proof.truths if (proof.verdicts[name].get("probabilities") or {}).get("sets")]
     every = sorted(stated["case"]) == sorted(reported)
@@ -360,16 +307,7 @@ def _is_so(mechanisms: Sequence[str], truth: Mapping[str, Any]) -> bool:
 
 
 def intervals(proof: Proof) -> pd.DataFrame:
-    """Every interval of a verdict that has a true value to hold, and whether it does.
-
-    Parameters
-    ----------
-    proof : Proof
-
-    Returns
-    -------
-    DataFrame
-    """
+    """Every interval of a verdict that has a true value to hold, and whether it does."""
     rows = []
     for name, truth in proof.truths.items():
         case, verdict = truth["case"], proof.verdicts[name]

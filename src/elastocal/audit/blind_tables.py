@@ -81,17 +81,7 @@ def _probabilities(run: Audited, file: str) -> pd.DataFrame:
 
 
 def summary(run: Audited, file: str) -> list[Finding]:
-    """Every figure of the proof beside its target.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Every figure of the proof beside its target."""
     stated, cases, statements = run.table(file), _cases(run, file), _probabilities(run, file)
     spans, rows = intervals(proof_of(run)), []
     for robots in ("proof", "tuned"):
@@ -220,17 +210,7 @@ def _of_intervals(spans: pd.DataFrame) -> Iterator[_Row]:
 
 
 def reliability(run: Audited, file: str) -> list[Finding]:
-    """What is stated against how often it is so, by bins.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """What is stated against how often it is so, by bins."""
     statements, rows = _probabilities(run, file), []
     statements = statements.assign(bin=np.minimum((statements["stated"] * _BINS).astype(int), _BINS - 1))
     for robots in ("proof", "tuned"):
@@ -245,17 +225,7 @@ def reliability(run: Audited, file: str) -> list[Finding]:
 
 
 def settings(run: Audited, file: str) -> list[Finding]:
-    """What hard settings do to the verdicts.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """What hard settings do to the verdicts."""
     cases = _cases(run, file)
     mine = cases[cases["group"].isin(["setting", "none"])].copy()
     mine["kind"] = np.where(mine["truth"] == "none", "no effect", np.where(mine["hidden"], "hidden effect", "effect"))
@@ -268,17 +238,7 @@ def settings(run: Audited, file: str) -> list[Finding]:
 
 
 def coverage(run: Audited, file: str) -> list[Finding]:
-    """How often intervals hold the true value, by effect, parameter and level.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """How often intervals hold the true value, by effect, parameter and level."""
     spans = intervals(proof_of(run)).query("setting == 'usual'")
     found = np.where(spans["right"], "compliance, effect found", "compliance, effect not found")
     kind = np.where(spans["truth"] == "none", "compliance, no effect", found)
@@ -294,17 +254,7 @@ def coverage(run: Audited, file: str) -> list[Finding]:
 
 
 def power(run: Audited, file: str) -> list[Finding]:
-    """Detection by effect and size.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Detection by effect and size."""
     cases = _cases(run, file)
     parts = cases[cases["group"].isin(["single", "outside"])]
     visible = parts[parts["level_of"] == "retained"].assign(truth="all")
@@ -323,17 +273,7 @@ def power(run: Audited, file: str) -> list[Finding]:
 
 
 def confusion(run: Audited, file: str) -> list[Finding]:
-    """Ground truth against verdict, as counts.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Ground truth against verdict, as counts."""
     stated, cases = run.table(file), _cases(run, file)
     apart = cases["group"].isin(["sweep", *_OF_THEIR_OWN])
     usual = np.where(cases["setting"] == "usual", "usual", "hard")

@@ -26,15 +26,7 @@ _DIGITS = 1e-10
 def simulated(run: Audited, file: str, campaign: str) -> list[Finding]:
     """Every measurement of a simulated campaign.
 
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-        Nothing of campaigns that people have measured.
+    Returns nothing of campaigns that people have measured.
     """
     source = _document(run.folder / f"config/campaigns/{campaign}.yaml")
     if source.get("source") != "simulated":

@@ -25,17 +25,7 @@ _DATED = {"frame_drift", "setup_step", "temperature_gradient", "thermal_growth"}
 
 
 def measurements(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Fitted and held-out measurements are those of the campaign's file, each once, and share no pose.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Fitted and held-out measurements are those of the campaign's file, each once, and share no pose."""
     held_out = run.table(file.replace("training", "held_out"))
     fitted, source = run.table(file), f"data/campaigns/{campaign}/measurements.parquet"
     # Poses of another campaign are numbered anew; measurements of it are others all the same.
@@ -64,17 +54,7 @@ def measurements(run: Audited, file: str, campaign: str) -> list[Finding]:
 
 
 def kept_back(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Held-out measurements are those of the campaign's file, by their rows.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Held-out measurements are those of the campaign's file, by their rows."""
     source = f"data/campaigns/{campaign}/measurements.parquet"
     if not run.there(source) or _document(run, campaign).get("held_out") is not None:
         return []
@@ -85,17 +65,7 @@ def kept_back(run: Audited, file: str, campaign: str) -> list[Finding]:
 
 
 def confounding(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Angles between every two candidates that were tested, each pair once.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Angles between every two candidates that were tested, each pair once."""
     frame = run.table(file)
     tested = sorted({*frame["one"], *frame["other"]})
     pairs = {frozenset(pair) for pair in zip(frame["one"], frame["other"], strict=True)}
@@ -108,17 +78,7 @@ def confounding(run: Audited, file: str, campaign: str) -> list[Finding]:
 
 
 def diagnosis(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Probabilities of mechanisms are sums over the models; correlations lie within one.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Probabilities of mechanisms are sums over the models; correlations lie within one."""
     document = run.document(file)["document"]
     models = run.table(f"results/loop/{campaign}/models.parquet")
     probability = models["probability"].to_numpy()
@@ -140,17 +100,7 @@ def diagnosis(run: Audited, file: str, campaign: str) -> list[Finding]:
 
 
 def models(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Probabilities of the models follow from their odds; each model's mechanisms are those of its parts.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Probabilities of the models follow from their odds; each model's mechanisms are those of its parts."""
     frame = run.table(file)
     odds = np.exp(frame["log_odds"] - frame["log_odds"].max())
     expected = odds * frame["probability"].sum() / odds.sum()
@@ -164,17 +114,7 @@ def models(run: Audited, file: str, campaign: str) -> list[Finding]:
 
 
 def residuals(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Errors before and after from the residuals; residuals of the declared model from pinocchio where it is springs alone.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Errors before and after from the residuals; residuals of the declared model from pinocchio where it is springs alone."""
     frame, model, found = run.table(file).query("not gross_error"), sagging(run, campaign), []
     if not _session(run, campaign):
         table = f"reports/loop/{campaign}/before_after.csv"

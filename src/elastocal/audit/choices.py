@@ -38,17 +38,7 @@ _RIDGE = 1e-10
 
 
 def designs(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Random designs of every size, chosen ones and the bound of some sizes.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Random designs of every size, chosen ones and the bound of some sizes."""
     frame, questions = run.table(file), run.configuration["questions"]
     sizes = questions["design_sizes"]
     found = [held(file, "sizes", "counting", set(frame["configurations"]) == set(sizes), f"{set(frame['configurations'])}")]
@@ -146,17 +136,7 @@ def _best_weights(products: np.ndarray, size: int, weight: np.ndarray) -> float:
 
 
 def ladder(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Models with more and more link springs in sampled data sets: what comes next, where to stop, what is left.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Models with more and more link springs in sampled data sets: what comes next, where to stop, what is left."""
     frame, questions = run.table(file), run.configuration["questions"]
     cells = frame.groupby(["noise", "length", "data_set"])
     count = len(questions["ladder_noise_um"]) * len(questions["ladder_lengths"]) * run.configuration["data_sets"]

@@ -25,17 +25,7 @@ _KEY = ["robot", "effect", "seed", "part"]
 
 
 def moved(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Every pose of a case is commanded by every model.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Every pose of a case is commanded by every model."""
     frame = run.table(file)
     each = pd.crosstab([frame[name] for name in ("effect", "seed", "part", "pose")], frame["model"])
     right = set(each) == set(_MODELS) and bool((each == 1).to_numpy().all())
@@ -46,17 +36,7 @@ def moved(run: Audited, file: str, robot: str) -> list[Finding]:
 
 
 def cases(run: Audited, file: str) -> list[Finding]:
-    """Errors of each case and part, from all poses that every model could correct.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Errors of each case and part, from all poses that every model could correct."""
     stated = run.table(file)
     frame = _all_poses(run, stated)
     frame["kept"] = frame.groupby([*_KEY, "pose"])["corrected"].transform("min")
@@ -88,17 +68,7 @@ def _all_poses(run: Audited, stated: pd.DataFrame) -> pd.DataFrame:
 
 
 def together(run: Audited, file: str) -> list[Finding]:
-    """Errors of all cases together, by robot, part and model, with bootstrap intervals over cases.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Errors of all cases together, by robot, part and model, with bootstrap intervals over cases."""
     stated, errors = run.table(file), run.table(file.replace("closed_loop.csv", "cases.csv"))
     rows = []
     for robot in [*errors["robot"].unique(), "all"]:
@@ -139,17 +109,7 @@ def _of_model(errors: pd.DataFrame, chosen: np.ndarray, model: str) -> dict[str,
 
 
 def goals(run: Audited, file: str) -> list[Finding]:
-    """How many cases reach the goal, with Wilson's interval.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """How many cases reach the goal, with Wilson's interval."""
     stated, errors, rows = run.table(file), run.table(file.replace("goals.csv", "cases.csv")), []
     for part in _PARTS:
         for named in (True, False):
@@ -171,17 +131,7 @@ def goals(run: Audited, file: str) -> list[Finding]:
 
 
 def gains(run: Audited, file: str) -> list[Finding]:
-    """The table of plans says what the files of the robots say.
-
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """The table of plans says what the files of the robots say."""
     stated, found = run.table(file), []
     for row in stated.to_dict("records"):
         document = run.document(f"results/planning/{row['robot']}.json")

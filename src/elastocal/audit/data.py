@@ -24,16 +24,7 @@ _DIGITS = 1e-14
 def experiments(run: Audited, file: str, robot: str, test: str) -> list[Finding]:
     """Joint angles and wrenches of sampled data sets from their random streams, and counts.
 
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-    test : str
-        ``/test`` of the configurations that judge, else empty.
-
-    Returns
-    -------
-    list of Finding
+    `test`: ``/test`` of the configurations that judge, else empty.
     """
     settings, arm = run.configuration, run.arm(robot)
     frame, loading = run.table(file), settings["loading"]
@@ -69,15 +60,7 @@ def experiments(run: Audited, file: str, robot: str, test: str) -> list[Finding]
 def ideal(run: Audited, file: str, robot: str, test: str) -> list[Finding]:
     """Deflections of sampled rows by pinocchio's exact kinematics; their linear part by MuJoCo's Jacobians.
 
-    Parameters
-    ----------
-    run : Audited
-    file, robot, test : str
-        As in `experiments`.
-
-    Returns
-    -------
-    list of Finding
+    `file`, `robot`, `test`: as in `experiments`.
     """
     arm, (angles, wrench) = run.arm(robot), run.experiments(robot, bool(test))
     sets, count = angles.shape[:2]
@@ -101,17 +84,7 @@ def ideal(run: Audited, file: str, robot: str, test: str) -> list[Finding]:
 
 
 def measured(run: Audited, file: str, robot: str, noise_um: str) -> list[Finding]:
-    """Noise of sampled data sets from its stream; the noise of all rows by its distribution.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot, noise_um : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Noise of sampled data sets from its stream; the noise of all rows by its distribution."""
     scale, found = 1e-6 * float(noise_um), []
     for point in run.arm(robot).points:
         clean, noisy = (run.deflections(name, point) for name in (f"data/simulated/{robot}/ideal.parquet", file))
@@ -132,17 +105,7 @@ def measured(run: Audited, file: str, robot: str, noise_um: str) -> list[Finding
 
 
 def weights(run: Audited, file: str, robot: str) -> list[Finding]:
-    """How often data sets and test configurations count in sampled bootstrap replicates.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """How often data sets and test configurations count in sampled bootstrap replicates."""
     settings, frame = run.configuration, run.table(file)
     replicates = settings["evaluation"]["bootstrap_replicates"]
     members, tests = settings["data_sets"], settings["test_configurations"]
@@ -165,17 +128,7 @@ def weights(run: Audited, file: str, robot: str) -> list[Finding]:
 
 
 def initial(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Deflection before calibration of every data set, from the ideal deflections.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Deflection before calibration of every data set, from the ideal deflections."""
     frame = run.table(f"data/simulated/{robot}/ideal.parquet")
     rows = frame[frame["point"] == run.arm(robot).end_effector]
     size = np.sqrt((rows[list(COMPONENTS[:3])] ** 2).sum(axis=1))

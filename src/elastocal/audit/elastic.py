@@ -35,16 +35,9 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 class Averages:
     """Measurements with the repeats of a state averaged.
 
-    Attributes
-    ----------
-    states : DataFrame
-        One row for each state: session, pose, load, joint angles, wrench, and repeats, how many were averaged.
-    state, target : ndarray of int (M,)
-        Of each averaged measurement: row of `states`, number of the target.
-    position : ndarray (M, 3)
-        m.
-    rotation : tuple of ndarray (3, 3)
-        M of them, none where positions alone are measured.
+    `states`: one row for each state: session, pose, load, joint angles, wrench, and repeats, how many were averaged. `state`,
+    `target` (M,) of int: of each averaged measurement: row of `states`, number of the target. `position` (M, 3): m. `rotation`
+    (3, 3): M of them, none where positions alone are measured.
     """
 
     states: pd.DataFrame
@@ -67,16 +60,7 @@ class Averages:
 def averages(frame: pd.DataFrame, poses: bool) -> Averages:
     """Average the repeats of a table of measurements.
 
-    Parameters
-    ----------
-    frame : DataFrame
-        Of one approach to each state; without the approach in the key.
-    poses : bool
-        Whether orientations count.
-
-    Returns
-    -------
-    Averages
+    `frame`: of one approach to each state; without the approach in the key. `poses`: whether orientations count.
     """
     kept = frame[~far_off(frame)]
     angles = [name for name in map(str, kept) if name[0] == "q" and name[1:].isdigit()]
@@ -106,14 +90,7 @@ def good_rows(run: Audited, campaign: str, part: str) -> pd.DataFrame:
 def far_off(frame: pd.DataFrame) -> np.ndarray:
     """Measurements far from the median of at least three repeats, by the median distance of all repeats (Hampel).
 
-    Parameters
-    ----------
-    frame : DataFrame
-        Of measurements.
-
-    Returns
-    -------
-    ndarray of bool (N,)
+    `frame`: of measurements. Returns (N,) of bool.
     """
     approach = [name for name in map(str, frame) if name.startswith("approach")]
     group = frame.groupby([*STATE, "target", *approach], dropna=False)[list("xyz")]
@@ -134,14 +111,8 @@ def _mean_rotation(vectors: np.ndarray) -> np.ndarray:
 class Springs:
     """What yields in a robot.
 
-    Attributes
-    ----------
-    joints : ndarray (n,)
-        rad/(N m).
-    bending, torsion : float
-        1/EI and 1/GJ of every link at its near end, 1/(N m^2).
-    taper : float
-        Share by which the diameter falls along a link.
+    `joints` (n,): rad/(N m). `bending`, `torsion`: 1/EI and 1/GJ of every link at its near end, 1/(N m^2). `taper`: share by
+    which the diameter falls along a link.
     """
 
     joints: np.ndarray
@@ -153,12 +124,7 @@ class Springs:
 class Robot:
     """The robot that a campaign declares, its links able to bend.
 
-    Parameters
-    ----------
-    document : mapping
-        A robot file.
-    targets : sequence of mapping
-        With ``point`` and ``offset_m``.
+    `document`: a robot file. `targets`: with ``point`` and ``offset_m``.
     """
 
     def __init__(self, document: Mapping[str, Any], targets: Sequence[Mapping[str, Any]]) -> None:

@@ -50,20 +50,9 @@ class Stand:
 class Sagging:
     """The declared model of a campaign of known springs.
 
-    Attributes
-    ----------
-    arms : list of Arm
-        One for each target; of an unknown offset at its measuring point.
-    points : list of str
-    springs, slack : ndarray (n,)
-        Compliances and their standard errors, which are zero of springs that were not fitted, rad/(N m).
-    bodies : tuple of Body
-    gravity : ndarray (3,)
-        m/s^2, base axes.
-    noise_m : float
-        With which it was fitted.
-    complete : bool
-        Whether all masses that the file declares are among the bodies.
+    `arms`: one for each target; of an unknown offset at its measuring point. `springs`, `slack` (n,): compliances and their
+    standard errors, which are zero of springs that were not fitted, rad/(N m). `gravity` (3,): m/s^2, base axes. `noise_m`:
+    with which it was fitted. `complete`: whether all masses that the file declares are among the bodies.
     """
 
     arms: list[Arm]
@@ -105,15 +94,7 @@ class Sagging:
 def sagging(run: Audited, campaign: str) -> Sagging | None:
     """The declared model of a campaign, from its robot file and the estimates of its declared step.
 
-    Parameters
-    ----------
-    run : Audited
-    campaign : str
-
-    Returns
-    -------
-    Sagging or None
-        None where the springs are not known.
+    Returns None where the springs are not known.
     """
     described = run.document(f"results/loop/{campaign}/campaign.json")
     compliance = run.document(f"reports/loop/{campaign}/verdict.json").get("compliance_urad_per_Nm") or {}

@@ -31,20 +31,8 @@ def staged(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Compliances by the stages of a strategy, their covariance for unit variance, the worst condition number.
 
-    Parameters
-    ----------
-    strategy : mapping
-        A strategy file.
-    regressors : mapping of str to ndarray (rows, joints)
-        Of each measuring point.
-    deflections : mapping of str to ndarray (rows,)
-    joints : int
-
-    Returns
-    -------
-    compliance : ndarray (joints,)
-    covariance : ndarray (joints, joints)
-    condition : float
+    `strategy`: a strategy file. `regressors` (rows, joints): of each measuring point. `deflections` (rows,). Returns
+    `compliance` (joints,); `covariance` (joints, joints).
     """
     names = list(regressors)
     starts = np.cumsum([0, *(len(regressors[name]) for name in names)])
@@ -77,16 +65,7 @@ def points_of(strategy: Mapping[str, Any]) -> list[str]:
 def design(run: Audited, file: str, robot: str, key: str) -> list[Finding]:
     """Covariances and condition numbers of sampled data sets and lengths.
 
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-    key : str
-        Name of the strategy's file.
-
-    Returns
-    -------
-    list of Finding
+    `key`: name of the strategy's file.
     """
     frame, joints = run.table(file), run.arm(robot).joints
     found = [_numbered(run, file, frame)]
@@ -103,17 +82,7 @@ def design(run: Audited, file: str, robot: str, key: str) -> list[Finding]:
 
 
 def identified(run: Audited, file: str, robot: str, noise_um: str, key: str) -> list[Finding]:
-    """Compliances of sampled data sets and lengths; which of them there are.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot, noise_um, key : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Compliances of sampled data sets and lengths; which of them there are."""
     frame, strategy = run.table(file), run.strategies[key]
     found = [_numbered(run, file, frame)]
     missing = frame.filter(regex=r"^c\d+$").isna().any(axis=1).to_numpy()
@@ -138,17 +107,7 @@ def identified(run: Audited, file: str, robot: str, noise_um: str, key: str) -> 
 
 
 def solvers(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Both solvers side by side, in sampled rows.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Both solvers side by side, in sampled rows."""
     tables, frame = run.configuration["tables"], run.table(file)
     measured = f"data/simulated/{robot}/{tables['noise_um']:g}um/measured.parquet"
     start = 1e-6 * run.configuration["identification"]["start_urad_per_Nm"]

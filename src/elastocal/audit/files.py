@@ -39,17 +39,7 @@ _PLACES = (
 
 
 def intact(run: Audited, file: str, digest: str) -> Finding:
-    """Whether a file holds what its job wrote.
-
-    Parameters
-    ----------
-    run : Audited
-    file, digest : str
-
-    Returns
-    -------
-    Finding
-    """
+    """Whether a file holds what its job wrote."""
     path = run.folder / file
     if not path.is_file():
         return held(file, "the file is there", "its record", False, "it is missing")
@@ -62,15 +52,7 @@ def intact(run: Audited, file: str, digest: str) -> Finding:
 def described(run: Audited, file: str) -> list[Finding]:
     """What a Parquet file says of itself: schema, units, digests of its columns, provenance.
 
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-        Nothing of tables that are not the pipeline's own format.
+    Returns nothing of tables that are not the pipeline's own format.
     """
     facts = run.metadata(file)
     if "elastocal.table" not in facts:

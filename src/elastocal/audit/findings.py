@@ -16,19 +16,8 @@ SINGLE = 1e-5
 class Finding:
     """One check of one file.
 
-    Attributes
-    ----------
-    file : str
-    checked : str
-        What was looked at.
-    by : str
-        The independent path.
-    compared : int
-        How many values.
-    worst : float
-        Largest difference over what is allowed; a check holds up to 1.
-    note : str
-        Where a check does not hold: what was found and what was expected.
+    `checked`: what was looked at. `by`: the independent path. `compared`: how many values. `worst`: largest difference over
+    what is allowed; a check holds up to 1. `note`: where a check does not hold: what was found and what was expected.
     """
 
     file: str
@@ -56,21 +45,8 @@ def compared(
 ) -> Finding:
     """Values of a file beside those of an independent path.
 
-    Parameters
-    ----------
-    file, checked, by : str
-    found, expected : array_like
-        Not a number in both counts as equal.
-    relative : float
-        Allowed difference over the scale.
-    absolute : float
-        Allowed beside it.
-    scale : array_like, optional
-        The largest expected value where none is given.
-
-    Returns
-    -------
-    Finding
+    `found`, `expected`: not a number in both counts as equal. `relative`: allowed difference over the scale. `absolute`:
+    allowed beside it. `scale`: the largest expected value where none is given.
     """
     left, right = (np.asarray(each, float).ravel() for each in (found, expected))
     if left.shape != right.shape:
@@ -93,16 +69,6 @@ def compared(
 def held(file: str, checked: str, by: str, holds: bool, note: str, compared_values: int = 1) -> Finding:
     """A statement that holds or does not.
 
-    Parameters
-    ----------
-    file, checked, by : str
-    holds : bool
-    note : str
-        Said where it does not.
-    compared_values : int
-
-    Returns
-    -------
-    Finding
+    `note`: said where it does not.
     """
     return Finding(file, checked, by, compared_values, 0.0 if holds else np.inf, "" if holds else note)

@@ -47,14 +47,7 @@ _DIFFERENCE = 1e-4
 class Step:
     """One model of a campaign as its files have it.
 
-    Attributes
-    ----------
-    kind : str
-    parameters : DataFrame
-        Rows of steps.parquet.
-    noise : mapping
-        Of diagnosis.json.
-    springs : Springs
+    `parameters`: rows of steps.parquet. `noise`: of diagnosis.json.
     """
 
     kind: str
@@ -67,13 +60,8 @@ class Step:
 class Campaign:
     """A campaign whose models can be worked out again.
 
-    Attributes
-    ----------
-    robot : Robot
-    poses : bool
-        Whether orientations were measured.
-    steps : list of Step or None
-        In the order of the files; None where a step has what is not written down here.
+    `poses`: whether orientations were measured. `steps`: in the order of the files; None where a step has what is not written
+    down here.
     """
 
     robot: Robot
@@ -84,15 +72,7 @@ class Campaign:
 def campaign_of(run: Audited, name: str) -> Campaign | None:
     """A campaign's robot and models.
 
-    Parameters
-    ----------
-    run : Audited
-    name : str
-
-    Returns
-    -------
-    Campaign or None
-        None where frames or targets are fitted, the approach is recorded, or the robot file declares masses or no springs.
+    Returns None where frames or targets are fitted, the approach is recorded, or the robot file declares masses or no springs.
     """
     described = run.document(f"results/loop/{name}/campaign.json")
     asked, robot = described["campaign"], described["robot"]
@@ -125,17 +105,7 @@ def _step(stated: Mapping[str, Any], parameters: pd.DataFrame, nominal: np.ndarr
 
 
 def fits(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Noise, estimates and standard errors of every step.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Noise, estimates and standard errors of every step."""
     known = campaign_of(run, campaign)
     if known is None:
         return []
@@ -198,17 +168,7 @@ def _fit(file: str, number: int, step: Step, seen: Averages, robot: Robot) -> li
 
 
 def correlations(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Correlations of the estimates of the last step.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Correlations of the estimates of the last step."""
     known = campaign_of(run, campaign)
     step = known.steps[-1] if known else None
     if known is None or step is None or step.parameters["held"].all():
@@ -324,17 +284,7 @@ def _applied(blocks: Sequence[tuple[np.ndarray, np.ndarray]], values: np.ndarray
 
 
 def predictions(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Residuals of all measurements, fitted and held out, by the declared and by the final model.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Residuals of all measurements, fitted and held out, by the declared and by the final model."""
     known = campaign_of(run, campaign)
     if known is None:
         return []
@@ -360,15 +310,7 @@ def predictions(run: Audited, file: str, campaign: str) -> list[Finding]:
 def each_residual(known: Campaign, step: Step, measured: pd.DataFrame) -> np.ndarray:
     """Residual of every single measurement, in the order of the rows of a table.
 
-    Parameters
-    ----------
-    known : Campaign
-    step : Step
-    measured : DataFrame
-
-    Returns
-    -------
-    ndarray (N, 3 or 6)
+    Returns (N, 3 or 6).
     """
     approach = [*STATE, "repeat"]
     order = measured.reset_index(drop=True).sort_values([*approach, "target"])

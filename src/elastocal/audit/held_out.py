@@ -31,15 +31,7 @@ _BY = "numpy's Philox stream, jackknife"
 def before_after(run: Audited, file: str, campaign: str) -> list[Finding]:
     """Errors of every model on fitted and held-out poses, their intervals, and what is counted and divided.
 
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-        By pinocchio's predictions; of a model that is not written down there the intervals are left out.
+    Returns by pinocchio's predictions; of a model that is not written down there the intervals are left out.
     """
     known = campaign_of(run, campaign)
     if known is None or any(step is None for step in known.steps):
@@ -89,17 +81,7 @@ def _floor(known: Campaign, step: Step, seen: Averages) -> float:
 
 
 def verdict(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """The verdict says what the diagnosis reported, and of held-out poses what the residuals say.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """The verdict says what the diagnosis reported, and of held-out poses what the residuals say."""
     stated, diagnosed = run.document(file), run.document(f"results/loop/{campaign}/diagnosis.json")["document"]
     own = ("effects", "heldout", "remainder", "warnings")
     off = [name for name in diagnosed if name not in own and stated.get(name) != diagnosed[name]]
@@ -158,17 +140,7 @@ def _gains(run: Audited, file: str, campaign: str, stated: dict[str, Any]) -> Fi
 
 
 def splits(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Errors on the held-out poses with their intervals; of other splits what rows say of each other.
-
-    Parameters
-    ----------
-    run : Audited
-    file, campaign : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Errors on the held-out poses with their intervals; of other splits what rows say of each other."""
     table, found = run.table(file), []
     by = "pandas"
     ratio = 1 - table["after_rms_m"] / table["before_rms_m"]
@@ -223,15 +195,7 @@ def _errors(rows: pd.DataFrame) -> Errors:
 def summary(run: Audited, file: str) -> list[Finding]:
     """All campaigns on one page, from their verdicts and residuals.
 
-    Parameters
-    ----------
-    run : Audited
-    file : str
-
-    Returns
-    -------
-    list of Finding
-        Of campaigns that are pooled, as folds of one, nothing.
+    Returns of campaigns that are pooled, as folds of one, nothing.
     """
     # Without any campaign a table without columns.
     table = run.table(file) if (run.folder / file).read_text("utf-8").strip() else pd.DataFrame({"campaign": []})

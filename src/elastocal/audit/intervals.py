@@ -22,14 +22,8 @@ _NOTHING = 1e-12
 class Errors:
     """Position errors of several models for the same measurements.
 
-    Attributes
-    ----------
-    distances : tuple of ndarray (M,)
-        m, of each model.
-    pose : ndarray (M,)
-        By any name of the pose.
-    outside : ndarray of bool (M,)
-        Whether the pose is known to lie beyond those that were fitted.
+    `distances` (M,): m, of each model. `pose` (M,): by any name of the pose. `outside` (M,) of bool: whether the pose is known
+    to lie beyond those that were fitted.
     """
 
     distances: tuple[np.ndarray, ...]
@@ -58,16 +52,7 @@ def drawn(generator: np.random.Generator, poses: int) -> np.ndarray | None:
 def log_ratio(over: np.ndarray, under: np.ndarray, counts: np.ndarray | None) -> tuple[float, float, float]:
     """Interval of the logarithm of a ratio of totals, and its standard error.
 
-    Parameters
-    ----------
-    over, under : ndarray (P,)
-        Of each pose.
-    counts : ndarray (B, P) or None
-        From `drawn`.
-
-    Returns
-    -------
-    low, high, std_error : float
+    `over`, `under` (P,): of each pose. `counts` (B, P): from `drawn`.
     """
     poses = len(over)
     if poses < 2:
@@ -97,15 +82,7 @@ def _jackknifed(members: np.ndarray, over: np.ndarray, under: np.ndarray) -> tup
 def limits(errors: Errors, counts: np.ndarray | None, model: int) -> dict[str, tuple[float, float]]:
     """Intervals of mean, RMS, 95th percentile and maximum of a model's errors.
 
-    Parameters
-    ----------
-    errors : Errors
-    counts : ndarray (B, P) or None
-    model : int
-
-    Returns
-    -------
-    dict of str to (float, float)
+    `counts` (B, P). Returns (float, float).
     """
     number = errors.totals(model, 0)
     mean = log_ratio(errors.totals(model, 1), number, counts)

@@ -23,17 +23,7 @@ _BY = "numpy's Philox stream, jackknife"
 
 
 def folds(run: Audited, file: str, data: str) -> list[Finding]:
-    """Random folds of the configurations from their stream; blocks of joint space by their sizes.
-
-    Parameters
-    ----------
-    run : Audited
-    file, data : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Random folds of the configurations from their stream; blocks of joint space by their sizes."""
     frame = run.table(file)
     poses = run.table(f"results/league/{data}/measurements.parquet").groupby(["session", "pose"]).mean(numeric_only=True)
     expected = poses.index.to_frame().to_numpy()
@@ -49,17 +39,7 @@ def folds(run: Audited, file: str, data: str) -> list[Finding]:
 
 
 def entries(run: Audited, file: str, data: str, split: str) -> list[Finding]:
-    """Every pose is predicted in the fold that holds it out, and in no other.
-
-    Parameters
-    ----------
-    run : Audited
-    file, data, split : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Every pose is predicted in the fold that holds it out, and in no other."""
     frame = run.table(file)
     if split == "session":
         right = bool((frame["set"] >= 1).all() and (frame["fold"] == 1).all())
@@ -77,34 +57,14 @@ def entries(run: Audited, file: str, data: str, split: str) -> list[Finding]:
 
 
 def mechanisms(run: Audited, file: str, data: str, split: str) -> list[Finding]:
-    """Probabilities and shares of mechanisms, each once a fold.
-
-    Parameters
-    ----------
-    run : Audited
-    file, data, split : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Probabilities and shares of mechanisms, each once a fold."""
     frame = run.table(file)
     right = bool(frame["probability"].between(0, 1 + 1e-9).all() and not frame.duplicated(["fold", "mechanism"]).any())
     return [held(file, f"probabilities of {data}, {split}", "counting", right, "beyond 0 to 1, or twice", len(frame))]
 
 
 def table(run: Audited, file: str, league: str) -> list[Finding]:
-    """Every row of the table of methods, from their entries.
-
-    Parameters
-    ----------
-    run : Audited
-    file, league : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Every row of the table of methods, from their entries."""
     stated, settings = run.table(file), run.configuration["league"]
     robot_of = {data: robot for robot, names in settings["data"][league].items() for data in names}
     found = []
@@ -154,17 +114,7 @@ def _rows(run: Audited, data: str, split: str, methods: list[str], reference: st
 
 
 def mechanism_table(run: Audited, file: str, league: str) -> list[Finding]:
-    """Mechanisms over the folds of the random split: mean, least and largest; a fold that does not list one counts as zero.
-
-    Parameters
-    ----------
-    run : Audited
-    file, league : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Mechanisms over the folds of the random split: mean, least and largest; a fold that does not list one counts as zero."""
     stated, settings, found = run.table(file), run.configuration["league"], []
     robot_of = {data: robot for robot, names in settings["data"][league].items() for data in names}
     for data, rows in stated.groupby("data", sort=False):

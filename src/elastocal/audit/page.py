@@ -73,16 +73,7 @@ _FOLLOWED = re.compile(r"(\d+) of (\d+) cells followed(?:; not (.*))?")
 
 
 def kind_of(file: str) -> str:
-    """Files that are made alike, by the folder and what they are.
-
-    Parameters
-    ----------
-    file : str
-
-    Returns
-    -------
-    str
-    """
+    """Files that are made alike, by the folder and what they are."""
     parts = file.split("/")
     if parts[0] == "data" and len(parts) > 3:
         return f"data/{parts[1]}/*/{parts[-1]}"
@@ -94,16 +85,7 @@ def kind_of(file: str) -> str:
 def page(table: pd.DataFrame, facts: Mapping[str, str]) -> str:
     """audit.html, which asks nothing of the network.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `whole.as_table`.
-    facts : mapping of str to str
-        What heads the page, such as the seed.
-
-    Returns
-    -------
-    str
+    `table`: from `whole.as_table`. `facts`: what heads the page, such as the seed.
     """
     labelled = table.assign(kind=table["file"].map(kind_of))
     of_every_file = labelled["checked"].isin(OF_EVERY_FILE)

@@ -70,18 +70,8 @@ def expectations(run: Audited) -> pd.DataFrame:
 def further_one(values: np.ndarray, printed: float, digit: float) -> float:
     """Two-sided p value of one more study at a printed figure.
 
-    Parameters
-    ----------
-    values : ndarray (k,)
-        Of k studies of the same size.
-    printed : float
-        Rounded to a digit, which adds the variance of a uniform distribution.
-    digit : float
-
-    Returns
-    -------
-    float
-        By the incomplete beta function, which Student's distribution is.
+    `values` (k,): of k studies of the same size. `printed`: rounded to a digit, which adds the variance of a uniform
+    distribution. Returns by the incomplete beta function, which Student's distribution is.
     """
     count = len(values)
     if count < 2:
@@ -93,14 +83,7 @@ def further_one(values: np.ndarray, printed: float, digit: float) -> float:
 def stepped_down(p_values: pd.Series) -> pd.Series:
     """Holm's correction: the smallest of m times m, the next one times m - 1, and none below one before it.
 
-    Parameters
-    ----------
-    p_values : Series
-        Not a number where there is none.
-
-    Returns
-    -------
-    Series
+    `p_values`: not a number where there is none.
     """
     ordered = p_values.dropna().sort_values()
     return (ordered * np.arange(len(ordered), 0, -1)).cummax().clip(upper=1.0).reindex(p_values.index)

@@ -72,17 +72,7 @@ def mean_square(run: Audited, robot: str, compliance: np.ndarray) -> float:
 
 
 def budget(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Errors and bounds of sampled sets of points, data sets and lengths.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Errors and bounds of sampled sets of points, data sets and lengths."""
     frame, questions = run.table(file), run.configuration["questions"]
     there = {name: points for name, points in questions["point_sets"].items() if set(points) <= set(run.arm(robot).points)}
     sets, lengths = run.configuration["data_sets"], run.configuration["configurations"]
@@ -114,17 +104,7 @@ def budget(run: Audited, file: str, robot: str) -> list[Finding]:
 
 
 def observability(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Observability indices, bounds and errors of sampled data sets.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Observability indices, bounds and errors of sampled data sets."""
     frame, arm, tables = run.table(file), run.arm(robot), run.configuration["tables"]
     found = [
         compared(file, "data sets, each once", "counting", frame["data_set"], np.arange(run.configuration["data_sets"]), 0.0)
@@ -152,17 +132,7 @@ def observability(run: Audited, file: str, robot: str) -> list[Finding]:
 
 
 def uses(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Errors on the test configurations: of all data sets from the identified compliances, of sampled rows by statsmodels.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Errors on the test configurations: of all data sets from the identified compliances, of sampled rows by statsmodels."""
     frame, length = run.table(file), run.configuration["tables"]["length"]
     rows = len(run.strategies) * run.configuration["data_sets"]
     found = [compared(file, "strategies and data sets", "counting", [len(frame)], [rows], 0.0)]
@@ -212,17 +182,7 @@ def _pooled(errors: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def tubes(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Deflections of sampled data sets with tubes of other diameters, and what joint springs alone leave.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Deflections of sampled data sets with tubes of other diameters, and what joint springs alone leave."""
     frame, settings = run.table(file), run.configuration
     factors, outer = settings["questions"]["tube_factors"], run.robots[robot]["links"]["tubes"][0]["outer_diameter_m"]
     sets = settings["data_sets"]
@@ -243,17 +203,7 @@ def tubes(run: Audited, file: str, robot: str) -> list[Finding]:
 
 
 def weighting(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Equal weights against those of the noise, in a sampled row, by the sandwich over some data sets.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Equal weights against those of the noise, in a sampled row, by the sandwich over some data sets."""
     frame, settings, arm = run.table(file), run.configuration, run.arm(robot)
     length, tracker = settings["tables"]["length"], np.array(settings["questions"]["tracker_m"])
     noise, row = 1e-6 * settings["tables"]["noise_um"], frame.iloc[int(run.picked(file, len(frame), 1)[0])]
@@ -281,17 +231,7 @@ def weighting(run: Audited, file: str, robot: str) -> list[Finding]:
 
 
 def places(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Bounds of the end-effector alone, in sampled data sets; shares, and what a second target can do.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Bounds of the end-effector alone, in sampled data sets; shares, and what a second target can do."""
     frame, arm, tables = run.table(file), run.arm(robot), run.configuration["tables"]
     shares = frame[["turned", "fixed"]].to_numpy()
     found = [
@@ -330,17 +270,7 @@ def places(run: Audited, file: str, robot: str) -> list[Finding]:
 
 
 def studies(run: Audited, file: str, interpretation: str, robot: str) -> list[Finding]:
-    """Scores of a sampled further study at its shortest lengths, drawn, estimated and averaged again.
-
-    Parameters
-    ----------
-    run : Audited
-    file, interpretation, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Scores of a sampled further study at its shortest lengths, drawn, estimated and averaged again."""
     frame, arm, settings = run.table(file), run.arm(robot), run.configuration
     count = len(run.strategies) * settings["configurations"]
     sizes = frame.groupby("study").size()

@@ -38,15 +38,7 @@ _AVERAGED = {
 def scored(run: Audited, robot: str) -> dict[str, dict[str, tuple[float, np.ndarray, float]]]:
     """Value, relative deviations and their share in the standard error, by metric and strategy.
 
-    Parameters
-    ----------
-    run : Audited
-    robot : str
-
-    Returns
-    -------
-    dict of str to dict of str to tuple
-        The deviations are those of data sets, of which an error has one over the root of their number, or of replicates.
+    Returns the deviations are those of data sets, of which an error has one over the root of their number, or of replicates.
     """
     found: dict[str, dict[str, tuple[float, np.ndarray, float]]] = {}
     uses, length = run.table(f"results/uses/{robot}.parquet"), run.configuration["tables"]["length"]

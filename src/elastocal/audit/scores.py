@@ -28,13 +28,8 @@ _LENGTHS = 3
 def error_rows(run: Audited, robot: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What judges a model: on each test configuration the regressor of positions, its offset, and the deflection.
 
-    Returns
-    -------
-    slope : ndarray (tests, 3, n)
-        By which compliances move the predicted position, m per rad/(N m).
-    offset : ndarray (tests, 3)
-        Exact prediction at the true compliances less the true position, m.
-    deflection : ndarray (tests, 3)
+    Returns `slope` (tests, 3, n): by which compliances move the predicted position, m per rad/(N m); `offset` (tests, 3): exact
+    prediction at the true compliances less the true position, m; `deflection` (tests, 3).
     """
     arm, (angles, wrench) = run.arm(robot), run.experiments(robot, test=True)
     file = f"data/simulated/{robot}/test/ideal.parquet"
@@ -78,17 +73,7 @@ def averaged(compliance: np.ndarray, method: str, weights: np.ndarray | None = N
 
 
 def metrics(run: Audited, file: str, robot: str, noise_um: str, key: str) -> list[Finding]:
-    """Equations 12 to 15 at sampled lengths, from the identified compliances; standard errors from the replicates.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot, noise_um, key : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Equations 12 to 15 at sampled lengths, from the identified compliances; standard errors from the replicates."""
     frame, arm = run.table(file).set_index("length"), run.arm(robot)
     lengths, replicates = run.configuration["configurations"], run.configuration["evaluation"]["bootstrap_replicates"]
     found = [compared(file, "lengths, each once", "counting", frame.index, np.arange(1, lengths + 1), 0.0)]
@@ -138,17 +123,7 @@ def metrics(run: Audited, file: str, robot: str, noise_um: str, key: str) -> lis
 
 
 def replicates(run: Audited, file: str, robot: str, noise_um: str, key: str) -> list[Finding]:
-    """Scores of sampled bootstrap replicates.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot, noise_um, key : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Scores of sampled bootstrap replicates."""
     frame, arm, read = run.table(file), run.arm(robot), run.configuration["interpretations"]
     drawn, lengths = run.configuration["evaluation"]["bootstrap_replicates"], run.configuration["configurations"]
     expected_index = np.stack([np.repeat(np.arange(1, drawn + 1), lengths), np.tile(np.arange(1, lengths + 1), drawn)], axis=1)
@@ -180,17 +155,7 @@ def replicates(run: Audited, file: str, robot: str, noise_um: str, key: str) -> 
 
 
 def accuracy(run: Audited, file: str, robot: str, noise_um: str, key: str) -> list[Finding]:
-    """What one data set gives, at a sampled length.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot, noise_um, key : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """What one data set gives, at a sampled length."""
     frame, arm = run.table(file), run.arm(robot)
     lengths = run.configuration["evaluation"]["lengths"]
     found = [compared(file, "evaluated lengths", "counting", frame["length"], lengths, 0.0)]
@@ -223,17 +188,7 @@ def accuracy(run: Audited, file: str, robot: str, noise_um: str, key: str) -> li
 
 
 def bounds(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Cramér-Rao bounds of sampled sets of points and lengths, by pinocchio.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Cramér-Rao bounds of sampled sets of points and lengths, by pinocchio."""
     frame, sets = run.table(file), run.configuration["data_sets"]
     most = run.configuration["configurations"]
     names = {"+".join(sorted(points_of(strategy))) for strategy in run.strategies.values()}
@@ -257,17 +212,7 @@ _SHORT = 12
 
 
 def expected(run: Audited, file: str, robot: str, noise_um: str, key: str) -> list[Finding]:
-    """Expectations in closed form at sampled lengths, from the covariances of the design.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot, noise_um, key : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Expectations in closed form at sampled lengths, from the covariances of the design."""
     frame, arm, read = run.table(file), run.arm(robot), run.configuration["interpretations"]
     covariances, sets = run.table(f"results/design/{robot}/{key}.parquet"), run.configuration["data_sets"]
     found = [compared(file, "lengths, each once", "counting", frame["length"], np.arange(1, len(frame) + 1), 0.0)]

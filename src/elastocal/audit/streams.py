@@ -14,17 +14,7 @@ import numpy as np
 def numbers(seed: int, robot: str, purpose: str, data_set: int) -> np.random.Generator:
     """The stream of one purpose in one data set.
 
-    Parameters
-    ----------
-    seed : int
-    robot : str
-        Name of the robot's file.
-    purpose : str
-    data_set : int
-
-    Returns
-    -------
-    numpy.random.Generator
+    `robot`: name of the robot's file.
     """
     key = hashlib.sha256(f"{seed}/{robot}".encode()).digest()
     words = [int.from_bytes(key[start : start + 8], "little") for start in (0, 8)]

@@ -402,17 +402,7 @@ TABLES: Mapping[str, tuple[Any, tuple[str, ...]]] = {
 
 
 def table(run: Audited, file: str, name: str) -> list[Finding]:
-    """Every cell of a table that follows from files.
-
-    Parameters
-    ----------
-    run : Audited
-    file, name : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Every cell of a table that follows from files."""
     if name not in TABLES:
         return []
     make, keys = TABLES[name]
@@ -448,17 +438,7 @@ def table(run: Audited, file: str, name: str) -> list[Finding]:
 
 
 def printed(run: Audited, file: str, name: str, ending: str) -> list[Finding]:
-    """Values of a table for people against those of its CSV, to the digits that are printed.
-
-    Parameters
-    ----------
-    run : Audited
-    file, name, ending : str
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Values of a table for people against those of its CSV, to the digits that are printed."""
     source = run.table(f"reports/tables/{name}.csv")
     columns = [column for column in source.columns if not column.endswith("_std_error")]
     lines = (run.folder / file).read_text("utf-8").splitlines()

@@ -25,15 +25,7 @@ OTHERS = {
 def finished(folder: Path) -> dict[str, str]:
     """What jobs recorded of those that have finished.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the run.
-
-    Returns
-    -------
-    dict of str to str
-        Checksum of the last file by target.
+    `folder`: of the run. Returns checksum of the last file by target.
     """
     there = {target: file for target, file in OTHERS.items() if record_of(file, folder).is_file() and (folder / file).is_file()}
     return {target: read_record(file, folder)[1][file] for target, file in there.items()}

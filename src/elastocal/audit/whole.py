@@ -47,16 +47,8 @@ COLUMNS = ("file", "checked", "by", "compared", "worst", "holds", "note")
 def audit(run: Audited, only: Collection[str] | None = None) -> list[Finding]:
     """Check a finished run.
 
-    Parameters
-    ----------
-    run : Audited
-    only : collection of str, optional
-        These files; without it every file that a job has recorded.
-
-    Returns
-    -------
-    list of Finding
-        A check that cannot be carried out, for a file that cannot be read or lacks a column, does not hold.
+    `only`: these files; without it every file that a job has recorded. Returns a check that cannot be carried out, for a file
+    that cannot be read or lacks a column, does not hold.
     """
     found = []
     for file, digest in recorded(run.folder).items():
@@ -70,37 +62,15 @@ def audit(run: Audited, only: Collection[str] | None = None) -> list[Finding]:
 
 
 def as_table(findings: Iterable[Finding]) -> pd.DataFrame:
-    """Findings as rows of audit.csv.
-
-    Parameters
-    ----------
-    findings : iterable of Finding
-
-    Returns
-    -------
-    pandas.DataFrame
-    """
+    """Findings as rows of audit.csv."""
     return pd.DataFrame([{name: getattr(each, name) for name in COLUMNS} for each in findings], columns=[*COLUMNS])
 
 
 def require_all(table: pd.DataFrame, page: str) -> str:
     """One line on a run whose audit finds no fault with it.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `as_table`.
-    page : str
-        Where the findings stand.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        Some check does not hold; the first one is named.
+    `table`: from `as_table`. `page`: where the findings stand. Raises `InputError`: some check does not hold; the first one is
+    named.
     """
     wrong = table[~table["holds"].astype(bool)]
     if len(wrong):

@@ -57,17 +57,7 @@ _DRAWS = 8
 class MadeCampaign:
     """A campaign before anything slipped.
 
-    Attributes
-    ----------
-    name : str
-    robot : PhysicalRobot
-        With its defects.
-    design : Design
-    schedule : Schedule
-    declared : tuple of LinkMass
-    kind : str
-        Of `MIXTURE`.
-    defects : tuple of Defect
+    `robot`: with its defects. `kind`: of `MIXTURE`.
     """
 
     name: str
@@ -114,15 +104,7 @@ def draw_campaign(robot_file: str | Path, seed: int) -> MadeCampaign:
 def compare_verdicts(robot_file: str | Path, robots_folder: str | Path, seed: int) -> dict[str, np.ndarray]:
     """One case: the verdicts on a campaign clean, damaged and with fewer rows, and what became of the bad rows.
 
-    Parameters
-    ----------
-    robot_file, robots_folder : str or Path
-    seed : int
-
-    Returns
-    -------
-    dict of str to ndarray
-        One row for each slip, columns as `schemas.bad_rows` has them.
+    Returns one row for each slip, columns as `schemas.bad_rows` has them.
     """
     made = draw_campaign(robot_file, seed)
     table, _ = measured_table(made.robot, made.design, made.schedule)

@@ -23,10 +23,7 @@ _COLUMNS = ["quantity", "of", *rate([]), "target", "holds"]
 def judge_cases(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Every slip with whether the verdict on its case stayed the same.
 
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        Rows of `bad_rows.compare_verdicts` by robot.
+    `tables`: rows of `bad_rows.compare_verdicts` by robot.
     """
     frame = pd.concat([table.assign(robot=robot) for robot, table in tables.items()], ignore_index=True)
     for version in (DAMAGED, FEWER):
@@ -40,10 +37,7 @@ def judge_cases(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def summarize(slips: pd.DataFrame) -> pd.DataFrame:
     """Each rate with its interval of 95 %, of all cases and of parts of them, and with its target where it has one.
 
-    Parameters
-    ----------
-    slips : pandas.DataFrame
-        Of `judge_cases`.
+    `slips`: of `judge_cases`.
     """
     return pd.DataFrame(
         [row for part in (_of_cases(slips), _of_slips(slips), _of_errors(slips)) for row in part], columns=_COLUMNS

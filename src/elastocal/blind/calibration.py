@@ -33,20 +33,10 @@ _RELIABILITY = ["robots", "group", "from", "to", "stated", "hits", "cases", "rat
 def stated(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any] | None:
     """What was stated of a case, and whether it is so.
 
-    Parameters
-    ----------
-    truth : dict
-        A sealed document.
-    verdict : dict
-        As verdict.json.
-
-    Returns
-    -------
-    dict or None
-        ``stated``, probability of the most probable set of mechanisms; ``top``, that set; ``correct``, whether it is the true
-        one; ``held``, whether the smallest set of hypotheses that reaches 95 % holds the true one; ``set_size``, of how many
-        these are, and ``set_probability``, what they reach; ``nothing``; ``alarm_p_value``. None where nothing was stated, as
-        with a fault of the data.
+    `truth`: a sealed document. `verdict`: as verdict.json. Returns ``stated``, probability of the most probable set of
+    mechanisms; ``top``, that set; ``correct``, whether it is the true one; ``held``, whether the smallest set of hypotheses
+    that reaches 95 % holds the true one; ``set_size``, of how many these are, and ``set_probability``, what they reach;
+    ``nothing``; ``alarm_p_value``. None where nothing was stated, as with a fault of the data.
     """
     probabilities = verdict.get("probabilities")
     if not probabilities or not probabilities["sets"]:
@@ -78,15 +68,7 @@ def stated(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, An
 def is_true(mechanisms: Collection[str], truth: Mapping[str, Any]) -> bool:
     """Whether a set of mechanisms is what is true of a case.
 
-    Parameters
-    ----------
-    mechanisms : collection of str
-    truth : dict
-        A sealed document.
-
-    Returns
-    -------
-    bool
+    `truth`: a sealed document.
     """
     effects = truth["case"]["effects"]
     if any(effect.startswith(OUTSIDE) for effect in effects):
@@ -98,14 +80,7 @@ def is_true(mechanisms: Collection[str], truth: Mapping[str, Any]) -> bool:
 def credible(ranked: Sequence[tuple[frozenset[str], float]]) -> list[tuple[frozenset[str], float]]:
     """The smallest set of hypotheses that reaches 95 %, that of highest posterior probability; all of them where they do not.
 
-    Parameters
-    ----------
-    ranked : sequence of (frozenset, float)
-        The most probable first.
-
-    Returns
-    -------
-    list of (frozenset, float)
+    `ranked` (frozenset, float): the most probable first. Returns (frozenset, float).
     """
     reached = np.cumsum([probability for _, probability in ranked])
     return list(ranked[: int(np.searchsorted(reached, CREDIBLE)) + 1])
@@ -114,15 +89,7 @@ def credible(ranked: Sequence[tuple[frozenset[str], float]]) -> list[tuple[froze
 def statements(entries: Iterable[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> pd.DataFrame:
     """One row for each case of which something was stated.
 
-    Parameters
-    ----------
-    entries : iterable of (dict, dict)
-        Ground truth and verdict.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns as of `stated`.
+    `entries` (dict, dict): ground truth and verdict. Returns columns as of `stated`.
     """
     return pd.DataFrame([row for row in (stated(*entry) for entry in entries) if row], columns=_COLUMNS)
 
@@ -130,29 +97,15 @@ def statements(entries: Iterable[tuple[Mapping[str, Any], Mapping[str, Any]]]) -
 def expected_calibration_error(probability: np.ndarray, correct: np.ndarray, bins: int = _BINS) -> np.ndarray:
     """Mean distance between what is stated and how often it is so: sum over bins of n_b / n |mean stated - share correct|.
 
-    Parameters
-    ----------
-    probability : ndarray (..., n)
-        Stated, 0 to 1.
-    correct : ndarray of bool (..., n)
-    bins : int
-        Of equal width.
+    `probability` (..., n): stated, 0 to 1. `correct` (..., n) of bool. `bins`: of equal width. Returns (...,).
 
-    Returns
-    -------
-    ndarray (...,)
-
-    Notes
-    -----
-    As defined in [1]_ and [2]_. Even of verdicts that are calibrated it is not 0 but what `by_chance` gives, for the share of
+    As defined in [1] and [2]. Even of verdicts that are calibrated it is not 0 but what `by_chance` gives, for the share of
     few cases scatters.
 
-    References
-    ----------
-    .. [1] Naeini, M. P., Cooper, G. F. and Hauskrecht, M., Obtaining well calibrated probabilities using Bayesian binning, AAAI
-       Conference on Artificial Intelligence, 2015.
-    .. [2] Guo, C., Pleiss, G., Sun, Y. and Weinberger, K. Q., On calibration of modern neural networks, International
-       Conference on Machine Learning, 2017.
+    [1] Naeini, M. P., Cooper, G. F. and Hauskrecht, M., Obtaining well calibrated probabilities using Bayesian binning, AAAI
+        Conference on Artificial Intelligence, 2015.
+    [2] Guo, C., Pleiss, G., Sun, Y. and Weinberger, K. Q., On calibration of modern neural networks, International Conference
+        on Machine Learning, 2017.
     """
     probability, correct = np.broadcast_arrays(np.asarray(probability, float), np.asarray(correct, float))
     if probability.shape[-1] == 0:
@@ -164,11 +117,9 @@ def expected_calibration_error(probability: np.ndarray, correct: np.ndarray, bin
 def by_chance(probability: np.ndarray, draws: np.random.Generator, bins: int = _BINS) -> float:
     """Mean of `expected_calibration_error` of verdicts that are calibrated, at the same stated probabilities (n,), float.
 
-    Outcomes are drawn by what is stated, as in consistency resampling [1]_, where what is stated is drawn too.
+    Outcomes are drawn by what is stated, as in consistency resampling [1], where what is stated is drawn too.
 
-    References
-    ----------
-    .. [1] Bröcker, J. and Smith, L. A., Increasing the reliability of reliability diagrams, Weather and Forecasting 22, 2007.
+    [1] Bröcker, J. and Smith, L. A., Increasing the reliability of reliability diagrams, Weather and Forecasting 22, 2007.
     """
     probability = np.asarray(probability, float)
     so = draws.random((_RESAMPLES, len(probability))) < probability
@@ -176,23 +127,13 @@ def by_chance(probability: np.ndarray, draws: np.random.Generator, bins: int = _
 
 
 def calibration_error(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
-    """Expected calibration error with a basic bootstrap interval [1]_ of 95 % over cases.
+    """Expected calibration error with a basic bootstrap interval [1] of 95 % over cases.
 
-    Parameters
-    ----------
-    rows : pandas.DataFrame
-        Of `statements`.
-    seed : int
+    `rows`: of `statements`. Returns ``hits`` (None), ``cases``, ``rate``, ``low``, ``high`` as `rates.rate` has them, and
+    ``by_chance``.
 
-    Returns
-    -------
-    dict
-        ``hits`` (None), ``cases``, ``rate``, ``low``, ``high`` as `rates.rate` has them, and ``by_chance``.
-
-    References
-    ----------
-    .. [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 5.2, Cambridge University Press,
-       1997.
+    [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 5.2, Cambridge University Press,
+        1997.
     """
     probability, correct = rows.stated.to_numpy(float), rows.correct.to_numpy(bool)
     error = float(expected_calibration_error(probability, correct))
@@ -208,25 +149,14 @@ def calibration_error(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
 
 
 def reliability(rows: pd.DataFrame, bins: int = _BINS) -> pd.DataFrame:
-    """Data of the reliability diagram [1]_.
+    """Data of the reliability diagram [1].
 
-    Parameters
-    ----------
-    rows : pandas.DataFrame
-        Of `statements`.
-    bins : int
-        Of equal width.
+    `rows`: of `statements`. `bins`: of equal width. Returns one row for each kind of robots, group of cases (``all`` for all of
+    them) and bin that has a case: its ends, the mean of what was stated and the share that was so, with a Clopper-Pearson
+    interval.
 
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each kind of robots, group of cases (``all`` for all of them) and bin that has a case: its ends, the mean of
-        what was stated and the share that was so, with a Clopper-Pearson interval.
-
-    References
-    ----------
-    .. [1] Murphy, A. H. and Winkler, R. L., Reliability of subjective probability forecasts of precipitation and temperature,
-       Applied Statistics 26, 1977.
+    [1] Murphy, A. H. and Winkler, R. L., Reliability of subjective probability forecasts of precipitation and temperature,
+        Applied Statistics 26, 1977.
     """
     found = []
     for robots in (PROOF, TUNED):

@@ -26,16 +26,9 @@ if TYPE_CHECKING:
 def carry_out(case: Case, shown: np.ndarray, wrench: np.ndarray, folder: str | Path, robots_folder: str | Path) -> None:
     """Carry out a proposal and its random counterpart, and write the campaign of the case with what was read further.
 
-    Parameters
-    ----------
-    case : Case
-    shown : ndarray (E, n)
-        Angles as the controller shows them, rad, as in next_experiment.csv; each row another pose, the most informative first.
-    wrench : ndarray (E, 6)
-        N, N m; each is read at the shares `LADDER` of it, as the poses of the campaign were.
-    folder : str or Path
-        The campaign with the first of each number of `POSES` goes to ``<arm>_<poses>/<name>/``.
-    robots_folder : str or Path
+    `shown` (E, n): angles as the controller shows them, rad, as in next_experiment.csv; each row another pose, the most
+    informative first. `wrench` (E, 6): N, N m; each is read at the shares `LADDER` of it, as the poses of the campaign were.
+    `folder`: the campaign with the first of each number of `POSES` goes to ``<arm>_<poses>/<name>/``.
     """
     robot, design = specimen_of(case, robots_folder), design_of(case)
     bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])
@@ -59,20 +52,8 @@ def carry_out(case: Case, shown: np.ndarray, wrench: np.ndarray, folder: str | P
 def random_experiment(arm: Arm, design: Design, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Poses and loads drawn as those of the campaign were.
 
-    Parameters
-    ----------
-    arm : Arm
-    design : Design
-    count : int
-        Of poses, E.
-    seed : int
-        Of the case.
-
-    Returns
-    -------
-    shown : ndarray (E, n)
-    wrench : ndarray (E, 6)
-        The campaign's largest force, in a random direction for each pose.
+    `count`: of poses, E. `seed`: of the case. Returns `shown` (E, n); `wrench` (E, 6): the campaign's largest force, in a
+    random direction for each pose.
     """
     other = int(stream(seed, "random follow-up").integers(2**48))
     drawn = schedule_of(arm, replace(design, poses=count, held_out=0, ladder=(0.0, 1.0), repeats=1), other)

@@ -32,19 +32,7 @@ _COVARIATES = {need for kind in KINDS.values() for need in kind.needs}
 def case_row(truth: Mapping[str, Any], verdict: Mapping[str, Any], oracle: Mapping[str, Any] | None) -> dict[str, Any]:
     """Everything that the scores count of a case.
 
-    Parameters
-    ----------
-    truth : dict
-        A sealed document.
-    verdict : dict
-        As verdict.json.
-    oracle : dict or None
-        Of `oracle.oracle`.
-
-    Returns
-    -------
-    dict
-        One row of cases.csv.
+    `truth`: a sealed document. `verdict`: as verdict.json. Returns one row of cases.csv.
     """
     defects, unrecorded = truth["defects"], _COVARIATES - set(truth["design"]["covariates"])
     return (

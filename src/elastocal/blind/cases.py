@@ -136,24 +136,10 @@ _UNSEEN: dict[str, tuple[str, ...]] = {
 class Case:
     """One case, from which its campaign and its ground truth follow.
 
-    Attributes
-    ----------
-    key : str
-        What it is; sealed.
-    group : {"none", "single", "pair", "outside", "setting", "sweep", "several_joints", "gear_gravity", "moved",
-        "undeclared"}
-    robot : str
-        Robot file in config/robots.
-    effects : tuple of str
-        Keys of `defects.KINDS`.
-    levels : tuple of float
-        Non-centrality of each effect alone, on the poses that are not held out, after the compliances and the weights have
-        absorbed theirs; of one mechanism at several joints that of all together.
-    setting : str
-        Key of `SETTINGS`, or of `SWEEP_DESIGNS` in a sweep.
-    seed : int
-    alternative : str
-        In a sweep the near relative of the effect; otherwise empty.
+    `key`: what it is; sealed. `group`: "undeclared"}. `robot`: robot file in config/robots. `effects`: keys of `defects.KINDS`.
+    `levels`: non-centrality of each effect alone, on the poses that are not held out, after the compliances and the weights
+    have absorbed theirs; of one mechanism at several joints that of all together. `setting`: key of `SETTINGS`, or of
+    `SWEEP_DESIGNS` in a sweep. `alternative`: in a sweep the near relative of the effect; otherwise empty.
     """
 
     key: str
@@ -175,34 +161,14 @@ class Case:
 class Counts:
     """How many cases of each kind on each robot.
 
-    Attributes
-    ----------
-    none : int
-    single : int
-        Of each effect of the catalogue at each of `levels`.
-    outside : int
-        Of each effect that is not there at each of `outside_levels`.
-    pair : int
-        Of drawn pairs at each of `pair_levels`.
-    setting : int
-        Without an effect, of each hard setting; with one at non-centrality 50, of each setting; and of effects that a setting
-        hides, each.
-    sweep : int
-        Of each effect of each of `SWEEP_PAIRS` under each of `SWEEP_DESIGNS`.
-    hard : int
-        Without an effect, of each setting of `HARD`.
-    several_joints : int
-        Of each of `WIDESPREAD` at three and more joints.
-    gear_gravity : int
-        Of each of `OF_GEARS` on a joint that carries weight.
-    moved : int
-        Of set-ups that move between rows, by little and by a millimetre, with and without the time written down, each.
-    undeclared : int
-        Of arms whose robot file declares no weight of any link.
-    also : tuple of Counts
-        Of other robots.
-    purpose : str
-        Of cases that must be none of another size, whatever the seeds.
+    `single`: of each effect of the catalogue at each of `levels`. `outside`: of each effect that is not there at each of
+    `outside_levels`. `pair`: of drawn pairs at each of `pair_levels`. `setting`: without an effect, of each hard setting; with
+    one at non-centrality 50, of each setting; and of effects that a setting hides, each. `sweep`: of each effect of each of
+    `SWEEP_PAIRS` under each of `SWEEP_DESIGNS`. `hard`: without an effect, of each setting of `HARD`. `several_joints`: of each
+    of `WIDESPREAD` at three and more joints. `gear_gravity`: of each of `OF_GEARS` on a joint that carries weight. `moved`: of
+    set-ups that move between rows, by little and by a millimetre, with and without the time written down, each. `undeclared`:
+    of arms whose robot file declares no weight of any link. `also`: of other robots. `purpose`: of cases that must be none of
+    another size, whatever the seeds.
     """
 
     none: int
@@ -296,16 +262,7 @@ SIZES = {
 def cases_of(counts: Counts, seed: int) -> list[Case]:
     """All cases of a benchmark.
 
-    Parameters
-    ----------
-    counts : Counts
-    seed : int
-        Fresh seeds are fresh cases.
-
-    Returns
-    -------
-    list of Case
-        In the order of their names, that is in none.
+    `seed`: fresh seeds are fresh cases. Returns in the order of their names, that is in none.
     """
     found: list[Case] = []
 
@@ -388,17 +345,7 @@ def _setting(case: Case) -> dict[str, Any]:
 
 
 def specimen_of(case: Case, robots_folder: str | Path) -> PhysicalRobot:
-    """The robot of a case before anything is wrong with it; its weights, its tracker and its drives are the setting's.
-
-    Parameters
-    ----------
-    case : Case
-    robots_folder : str or Path
-
-    Returns
-    -------
-    PhysicalRobot
-    """
+    """The robot of a case before anything is wrong with it; its weights, its tracker and its drives are the setting's."""
     arm, setting = arm_from_file(robot_file(case, robots_folder)), _setting(case)
     arm = replace(arm, gravity_m_s2=setting.get("gravity_m_s2", arm.gravity_m_s2))
     robot = specimen(arm, case.seed, weighs=_weighs(case), off_line_m=setting.get("off_line_m", 0.0))
@@ -430,21 +377,9 @@ def _weighs(case: Case) -> bool:
 def defects_of(case: Case, robot: PhysicalRobot, design: Design) -> list[_Sized]:
     """The defects of a case at the sizes that give their non-centralities.
 
-    Parameters
-    ----------
-    case : Case
-    robot : PhysicalRobot
-        Faultless.
-    design : Design
+    `robot`: faultless. Returns (Defect, dict): each with its size as in the ground truth: target, quantity, signal, which draw.
+    Of one mechanism at several joints each has its own signal; the target is that of all together.
 
-    Returns
-    -------
-    list of (Defect, dict)
-        Each with its size as in the ground truth: target, quantity, signal, which draw. Of one mechanism at several joints each
-        has its own signal; the target is that of all together.
-
-    Notes
-    -----
     Where a location has no size of the wanted non-centrality, or one beyond three times the plausible, the next one is
     drawn; of eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the
     raw non-centrality is taken instead, and the ground truth states so: nothing can find that.
@@ -487,17 +422,7 @@ def _drawn(case: Case, robot: PhysicalRobot, effect: str, seed: int) -> list[Def
 def angle_to_alternative(case: Case, robot: PhysicalRobot, design: Design, bad: PhysicalRobot) -> float:
     """Smallest angle between the contributions of a case's defects and of its alternative at any location, degrees.
 
-    Parameters
-    ----------
-    case : Case
-        Of a sweep.
-    robot, bad : PhysicalRobot
-        Without and with the defects.
-    design : Design
-
-    Returns
-    -------
-    float
+    `case`: of a sweep. `robot`, `bad`: without and with the defects.
     """
     kind, yardstick = KINDS[case.alternative], _yardstick(case, robot, design)
 
@@ -558,17 +483,8 @@ def _first_plausible(
 def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, robots_folder: str | Path) -> str:
     """Make the campaign and the ground truth of a case.
 
-    Parameters
-    ----------
-    case : Case
-    blind_folder, sealed_folder : str or Path
-        The campaign goes to ``blind_folder/<name>/``, the ground truth to ``sealed_folder/<name>.json``.
-    robots_folder : str or Path
-
-    Returns
-    -------
-    str
-        SHA-256 of the ground truth.
+    `blind_folder`, `sealed_folder`: the campaign goes to ``blind_folder/<name>/``, the ground truth to
+    ``sealed_folder/<name>.json``. Returns SHA-256 of the ground truth.
     """
     robot, design = specimen_of(case, robots_folder), design_of(case)
     sized = defects_of(case, robot, design)
@@ -600,11 +516,7 @@ def _slipped(
 def write_manifest(path: str | Path, digests: Mapping[str, str]) -> None:
     """Write the commitment that is published before any diagnosis: a line ``sha256  name`` for each ground truth.
 
-    Parameters
-    ----------
-    path : str or Path
-    digests : dict of str to str
-        By the name of the case.
+    `digests`: by the name of the case.
     """
     write_text(path, "".join(f"{digest}  {name}.json\n" for name, digest in sorted(digests.items())))
 

@@ -78,14 +78,8 @@ CAMPAIGN = Design(declared=ERRORS_OF_GEOMETRY)
 class Wanted:
     """Poses that the robot shall reach.
 
-    Attributes
-    ----------
-    part : ndarray of str (N,)
-    position, rotation : ndarray (N, 3), (N, 3, 3)
-        m, base axes.
-    wrench : ndarray (N, 6)
-    start : ndarray (N, n)
-        Joint angles of the rigid robot, as the controller shows them, rad.
+    `part` (N,) of str. `position`, `rotation` (N, 3), (N, 3, 3): m, base axes. `wrench` (N, 6). `start` (N, n): joint angles of
+    the rigid robot, as the controller shows them, rad.
     """
 
     part: np.ndarray
@@ -114,20 +108,10 @@ def closed_loop(
 ) -> dict[str, np.ndarray]:
     """One robot with one hidden defect, from campaign to corrected targets that were measured.
 
-    Parameters
-    ----------
-    robot_file, robots_folder : str or Path
-    effect : str
-        Hidden, of plausible size at a joint that is drawn, beside errors of geometry, gears and weights.
-    seed : int
-    slips : bool
-        Whether the base is a little tilted against where it is declared, and the beam was lost in one row. What is wanted, and
-        whether the robot reached it, is then of the declared base.
-
-    Returns
-    -------
-    dict of str to ndarray
-        One row for each wanted pose and model, columns as `schema` has them.
+    `effect`: hidden, of plausible size at a joint that is drawn, beside errors of geometry, gears and weights. `slips`: whether
+    the base is a little tilted against where it is declared, and the beam was lost in one row. What is wanted, and whether the
+    robot reached it, is then of the declared base. Returns one row for each wanted pose and model, columns as `schema` has
+    them.
     """
     plant, _ = hidden_robot(robot_file, seed, [effect])
     if slips:
@@ -218,21 +202,8 @@ def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
 def bow(robot: Robot, length_m: float, count: int, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A path in a level plane at one orientation, in a posture that keeps within the limits, as for milling.
 
-    Parameters
-    ----------
-    robot : Robot
-    length_m : float
-    count : int
-        Of its poses.
-    draws : numpy.random.Generator
-        Of where it lies.
-
-    Returns
-    -------
-    position, rotation : ndarray (count, 3), (count, 3, 3)
-        m, base axes.
-    reported_angles : ndarray (count, n)
-        Of the rigid robot, rad.
+    `count`: of its poses. `draws`: of where it lies. Returns `position`, `rotation` (count, 3), (count, 3, 3): m, base axes;
+    `reported_angles` (count, n): of the rigid robot, rad.
     """
     low, high = robot.joint_limits.T
     share = np.linspace(-0.5, 0.5, count)[:, None]

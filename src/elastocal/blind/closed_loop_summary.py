@@ -23,18 +23,10 @@ _CASE = ["robot", "effect", "seed"]
 def case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """RMS errors of each case.
 
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        Rows of `closed_loop` by robot.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each case and part: ``robot, effect, seed, verdict, named, part``, the measured RMS of each model (m), the
-        same as the robot reached it, without the tracker's noise (``.._reached``), that of the model found over that of the
-        true one (``over_floor``), and ``calibration``: mean square error reached over mean
-        square predicted. Poses that some model could not correct are left out for all.
+    `tables`: rows of `closed_loop` by robot. Returns one row for each case and part: ``robot, effect, seed, verdict, named,
+    part``, the measured RMS of each model (m), the same as the robot reached it, without the tracker's noise (``.._reached``),
+    that of the model found over that of the true one (``over_floor``), and ``calibration``: mean square error reached over mean
+    square predicted. Poses that some model could not correct are left out for all.
     """
     frame = pd.concat([table.assign(robot=robot) for robot, table in tables.items()], ignore_index=True)
     pose = [*_CASE, "part", "pose"]
@@ -55,18 +47,8 @@ def case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def summary(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
     """Errors of all cases together.
 
-    Parameters
-    ----------
-    errors : pandas.DataFrame
-        Of `case_errors`.
-    seed : int
-        Of the bootstrap over cases.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each robot (and "all"), part and model: ``cases, rms_mm`` with 95 % limits, ``over_floor`` with limits, and
-        ``reached_mm``, without the tracker's noise.
+    `errors`: of `case_errors`. `seed`: of the bootstrap over cases. Returns one row for each robot (and "all"), part and model:
+    ``cases, rms_mm`` with 95 % limits, ``over_floor`` with limits, and ``reached_mm``, without the tracker's noise.
     """
     rows = []
     for robot in (*dict.fromkeys(errors["robot"]), "all"):
@@ -94,21 +76,11 @@ def summary(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
 def goals(errors: pd.DataFrame) -> pd.DataFrame:
     """How many cases reach the goal, where the effect was named and where not.
 
-    Parameters
-    ----------
-    errors : pandas.DataFrame
-        Of `case_errors`.
+    `errors`: of `case_errors`. Returns one row for each part, named and not: ``cases``, those within `GOAL` of the floor, their
+    share with 95 % limits [1], the median of ``over_floor`` and of ``calibration``.
 
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each part, named and not: ``cases``, those within `GOAL` of the floor, their share with 95 % limits [1]_,
-        the median of ``over_floor`` and of ``calibration``.
-
-    References
-    ----------
-    .. [1] Wilson, E. B., Probable inference, the law of succession, and statistical inference, Journal of the American
-       Statistical Association 22, 1927.
+    [1] Wilson, E. B., Probable inference, the law of succession, and statistical inference, Journal of the American Statistical
+        Association 22, 1927.
     """
     rows = []
     for part in PARTS:

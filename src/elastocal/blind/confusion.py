@@ -24,17 +24,9 @@ WORDS = (CLASS_WITH, CLASS_WITHOUT, SEVERAL, UNEXPLAINED, NOT_TESTABLE, ADEQUATE
 def confused(cases: pd.DataFrame) -> pd.DataFrame:
     """Ground truth against verdict.
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `case_rows.case_row`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each kind of robots, settings (usual, hard, or a group of its own such as a sweep), truth and level; one
-        column for each name of the catalogue stated alone and for each other verdict, all of them always there: every row adds
-        up to its cases.
+    `cases`: of `case_rows.case_row`. Returns one row for each kind of robots, settings (usual, hard, or a group of its own such
+    as a sweep), truth and level; one column for each name of the catalogue stated alone and for each other verdict, all of them
+    always there: every row adds up to its cases.
     """
     names = [*effects()]
     entries = zip(cases["verdict"], cases["found"], cases["holds_truth"], strict=True)

@@ -37,18 +37,9 @@ def intervals_of(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> list[d
 
     Wald intervals, with quantiles of Student's t where the noise has degrees of freedom.
 
-    Parameters
-    ----------
-    truth : dict
-        A sealed document.
-    verdict : dict
-        As verdict.json.
-
-    Returns
-    -------
-    list of dict
-        Joint compliances, whatever was found; parameters of an effect that was found at the right joints, whatever was found
-        beside it. A parameter that the data do not identify has no interval.
+    `truth`: a sealed document. `verdict`: as verdict.json. Returns joint compliances, whatever was found; parameters of an
+    effect that was found at the right joints, whatever was found beside it. A parameter that the data do not identify has no
+    interval.
     """
     case, found = truth["case"], verdict["effects"]
     right = sorted(effect["name"] for effect in found) == sorted(case["effects"])
@@ -81,17 +72,9 @@ def intervals_of(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> list[d
 def covered(intervals: pd.DataFrame) -> pd.DataFrame:
     """Shares of intervals that contain the true value.
 
-    Parameters
-    ----------
-    intervals : pandas.DataFrame
-        Rows of `intervals_of`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each kind of robots, effect, parameter and level, with ``all`` for parameters and levels together. Joint
-        compliances are apart: of cases without an effect in the usual setting, of those in which the right one was found, and
-        of those in which it was not.
+    `intervals`: rows of `intervals_of`. Returns one row for each kind of robots, effect, parameter and level, with ``all`` for
+    parameters and levels together. Joint compliances are apart: of cases without an effect in the usual setting, of those in
+    which the right one was found, and of those in which it was not.
     """
     columns = ["robots", *_KEYS, *rate([])]
     if not len(intervals):

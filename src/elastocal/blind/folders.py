@@ -36,18 +36,8 @@ def robot_document(
 ) -> dict[str, Any]:
     """Contents of the campaign's own robot file.
 
-    Parameters
-    ----------
-    document : dict
-        Of the robot file of which this is a specimen.
-    arm : Arm
-    declared : tuple of LinkMass
-        Weights as they are declared to the analyst; where there are none, the file has no masses.
-    gravity_m_s2 : tuple of float
-
-    Returns
-    -------
-    dict
+    `document`: of the robot file of which this is a specimen. `declared`: weights as they are declared to the analyst; where
+    there are none, the file has no masses.
     """
     described = {
         key: value for key, value in document.items() if key not in ("masses", "gravity_m_s2", "compensator", "payload_kg")
@@ -97,27 +87,10 @@ def write_blind_campaign(
 ) -> dict[str, Any]:
     """Measure, and write what the analyst gets.
 
-    Parameters
-    ----------
-    folder : str or Path
-        The campaign's own.
-    name : str
-        Of the campaign; must not give the ground truth away.
-    robot_file : str or Path
-        Of which the robot is a specimen.
-    robot : PhysicalRobot
-    design : Design
-    schedule : Schedule
-    declared : tuple of LinkMass
-        Weights as they are declared to the analyst.
-    kind : {"parquet", "csv"}
-    slipped : callable, optional
-        From a measured table to the same with what went wrong in the file, and a list of that.
-
-    Returns
-    -------
-    dict
-        How the data were made, for the ground truth of the case.
+    `folder`: the campaign's own. `name`: of the campaign; must not give the ground truth away. `robot_file`: of which the robot
+    is a specimen. `declared`: weights as they are declared to the analyst. `kind`: one of "parquet", "csv". `slipped`: from a
+    measured table to the same with what went wrong in the file, and a list of that. Returns how the data were made, for the
+    ground truth of the case.
     """
     table, outliers = measured_table(robot, design, schedule)
     table, slips = slipped(table) if slipped else (table, [])
@@ -149,13 +122,8 @@ def write_dynamic_campaign(
 ) -> None:
     """Measure a moving arm, and write what the analyst gets: for benchmarks of many measurements.
 
-    Parameters
-    ----------
-    folder, name, robot_file, robot, declared
-        As in `write_blind_campaign`.
-    measurements : int
-        At 1,000 a second, without a load.
-    seed : int
+    `folder`, `name`, `robot_file`, `robot`, `declared`: as in `write_blind_campaign`. `measurements`: at 1,000 a second,
+    without a load.
     """
     document = campaign_document(name, robot.arm, DYNAMIC) | {
         "compliance": "nominal",
@@ -177,21 +145,8 @@ def write_robot(folder: str | Path, robot_file: str | Path, robot: PhysicalRobot
 def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str | Path) -> str:
     """Seal the ground truth of a case: sorted JSON, outside of the campaign's folder.
 
-    Parameters
-    ----------
-    path : str or Path
-    truth : dict
-    campaign_folder : str or Path
-
-    Returns
-    -------
-    str
-        SHA-256 of the file, to be published before any diagnosis.
-
-    Raises
-    ------
-    ValueError
-        The file would lie in the campaign's folder.
+    Returns SHA-256 of the file, to be published before any diagnosis. Raises `ValueError`: the file would lie in the campaign's
+    folder.
     """
     path, folder = Path(path), Path(campaign_folder)
     if folder.resolve() in path.resolve().parents:

@@ -26,17 +26,8 @@ MOST = {"smoke": 1, "quick": 2, "development": 2, "full": 2}
 def followed_up(verdicts: Iterable[dict[str, Any]], most: int) -> list[dict[str, Any]]:
     """The cases that a block follows up.
 
-    Parameters
-    ----------
-    verdicts : sequence of dict
-        Of all cases of the block.
-    most : int
-
-    Returns
-    -------
-    list of dict
-        The first verdicts "class" with alternatives, for which an experiment is proposed, in the order of the names of their
-        cases, which are in none.
+    `verdicts`: of all cases of the block. Returns the first verdicts "class" with alternatives, for which an experiment is
+    proposed, in the order of the names of their cases, which are in none.
     """
     classes = [v for v in verdicts if v["verdict"] == CLASS and any(effect["alternatives"] for effect in v["effects"])]
     return sorted(classes, key=lambda verdict: verdict["campaign"])[:most]
@@ -50,17 +41,8 @@ def folder_name(arm: str, poses: int) -> str:
 def diagnosed_until_named(folder_at: Mapping[int, str], diagnose: Callable[[str], dict[str, Any]]) -> dict[int, dict[str, Any]]:
     """Verdicts with more and more poses, until a single name is stated.
 
-    Parameters
-    ----------
-    folder_at : dict of int to str
-        The campaign with so many further poses, the fewest first.
-    diagnose : callable
-        Verdict on a folder.
-
-    Returns
-    -------
-    dict of int to dict
-        Verdicts by the number of further poses; the last is the first that is "named", or that on all poses.
+    `folder_at`: the campaign with so many further poses, the fewest first. `diagnose`: verdict on a folder. Returns verdicts by
+    the number of further poses; the last is the first that is "named", or that on all poses.
     """
     verdicts: dict[int, dict[str, Any]] = {}
     for poses, folder in folder_at.items():
@@ -73,17 +55,8 @@ def diagnosed_until_named(folder_at: Mapping[int, str], diagnose: Callable[[str]
 def diagnosed_anew(campaigns: str | Path, diagnose: Callable[[str], dict[str, Any]]) -> list[dict[str, Any]]:
     """Verdicts on all that was followed up in a block.
 
-    Parameters
-    ----------
-    campaigns : str
-        Folder with ``<arm>_<poses>/<case>/``; empty where nothing was followed up.
-    diagnose : callable
-        Verdict on a folder.
-
-    Returns
-    -------
-    list of dict
-        ``campaign, arm, poses, verdict``; what is measured after a single name is not looked at.
+    `campaigns`: folder with ``<arm>_<poses>/<case>/``; empty where nothing was followed up. `diagnose`: verdict on a folder.
+    Returns ``campaign, arm, poses, verdict``; what is measured after a single name is not looked at.
     """
     anew = []
     for name in sorted({folder.name for folder in Path(campaigns).glob("*/*")}):

@@ -34,21 +34,10 @@ def followed(
 ) -> pd.DataFrame:
     """Score of the verdict on each case followed up, after each number of poses.
 
-    Parameters
-    ----------
-    truths : dict of str to dict
-        Sealed documents by the name of the case.
-    first : dict of str to dict
-        Verdicts on the campaigns as they were.
-    anew : sequence of dict
-        ``campaign, arm, poses, verdict``: verdicts on the campaigns with further poses.
-    promised : dict of str to float
-        Separation that the proposal promises from the nearest alternative with all its poses.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each case, arm and number of poses, 0 among them. After a single name no more is measured, and it stands.
+    `truths`: sealed documents by the name of the case. `first`: verdicts on the campaigns as they were. `anew`: ``campaign,
+    arm, poses, verdict``: verdicts on the campaigns with further poses. `promised`: separation that the proposal promises from
+    the nearest alternative with all its poses. Returns one row for each case, arm and number of poses, 0 among them. After a
+    single name no more is measured, and it stands.
     """
     verdicts = {(entry["campaign"], entry["arm"], entry["poses"]): entry["verdict"] for entry in anew}
     rows = []
@@ -90,16 +79,9 @@ def with_prospects(cases: pd.DataFrame) -> pd.Series:
 def promises_kept(cases: pd.DataFrame) -> pd.DataFrame:
     """How often an experiment that promises enough resolves the case, and how often as many random poses do.
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `followed`, with one effect each.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each kind of robots and quantity, with its target: the right name alone after all poses, of the cases whose
-        proposal promises a separation of at least `PROMISE`; and the ratio of proposed to random poses in that.
+    `cases`: of `followed`, with one effect each. Returns one row for each kind of robots and quantity, with its target: the
+    right name alone after all poses, of the cases whose proposal promises a separation of at least `PROMISE`; and the ratio of
+    proposed to random poses in that.
     """
     last = cases[(cases["poses_added"] == max(POSES)) & (cases["promised"] >= PROMISE)]
     rows: list[dict[str, Any]] = []
@@ -119,22 +101,12 @@ def promises_kept(cases: pd.DataFrame) -> pd.DataFrame:
 
 
 def rates(cases: pd.DataFrame) -> pd.DataFrame:
-    """How often the name is right, with Clopper-Pearson intervals [1]_.
+    """How often the name is right, with Clopper-Pearson intervals [1].
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `followed`.
+    `cases`: of `followed`. Returns columns right_name to high are shares of the cases, the others counts.
 
-    Returns
-    -------
-    pandas.DataFrame
-        Columns right_name to high are shares of the cases, the others counts.
-
-    References
-    ----------
-    .. [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
-       Biometrika 26, 1934.
+    [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
+        Biometrika 26, 1934.
     """
     rows = []
     for key, part in cases.groupby(["robots", "arm", "poses_added"]):
@@ -148,15 +120,7 @@ def rates(cases: pd.DataFrame) -> pd.DataFrame:
 def poses_needed(cases: pd.DataFrame) -> pd.DataFrame:
     """How many further poses it took until the right name.
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `followed`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        For the cases that reached it, their number and their median.
+    `cases`: of `followed`. Returns for the cases that reached it, their number and their median.
     """
     rows = []
     for key, part in cases.groupby(["robots", "arm"]):

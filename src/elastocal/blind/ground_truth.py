@@ -16,21 +16,8 @@ if TYPE_CHECKING:
 def load_ground_truth(files: Iterable[Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
     """Read sealed files whose hashes are those that were published.
 
-    Parameters
-    ----------
-    files : iterable of Path
-    manifest : str or Path
-        A line ``sha256  name`` for each.
-
-    Returns
-    -------
-    dict of str to dict
-        Sealed documents by the name of the case, in its order.
-
-    Raises
-    ------
-    InputError
-        A file is not the one whose hash was published.
+    `manifest`: a line ``sha256 name`` for each. Returns sealed documents by the name of the case, in its order. Raises
+    `InputError`: a file is not the one whose hash was published.
     """
     lines = Path(manifest).read_text(encoding="utf-8").splitlines()
     published = {name: digest for digest, name in map(str.split, lines)}

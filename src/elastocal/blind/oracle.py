@@ -41,30 +41,16 @@ def oracle(
 ) -> dict[str, Any] | None:
     """What knowing the effects is worth in one case.
 
-    Parameters
-    ----------
-    truth : dict
-        A sealed document.
-    verdict : dict
-        Of the same case; its noise is used again.
-    folder, robots_folder : str
-        As in `reading.read_campaign`.
-    seed : int
+    `truth`: a sealed document. `verdict`: of the same case; its noise is used again. `folder`, `robots_folder`: as in
+    `reading.read_campaign`. Returns ``candidates`` that the model was given; ``p_value`` of a Wald test [1] of all their
+    coefficients at once (chi-squared, with the covariance of the fit at its shapes; a fitted shape counts as one more degree of
+    freedom, and the p-value is multiplied by the number of variants, a Bonferroni correction [2]), 1 where these data identify
+    none of them; ``detected`` at 5 %; ``heldout``, errors on the held-out poses as in verdict.json. None where an effect is
+    outside of the catalogue: no model of it has that effect.
 
-    Returns
-    -------
-    dict or None
-        ``candidates`` that the model was given; ``p_value`` of a Wald test [1]_ of all their coefficients at once (chi-squared,
-        with the covariance of the fit at its shapes; a fitted shape counts as one more degree of freedom, and the p-value is
-        multiplied by the number of variants, a Bonferroni correction [2]_), 1 where these data identify none of them;
-        ``detected`` at 5 %; ``heldout``, errors on the held-out poses as in verdict.json. None where an effect is outside of
-        the catalogue: no model of it has that effect.
-
-    References
-    ----------
-    .. [1] Wald, A., Tests of statistical hypotheses concerning several parameters when the number of observations is large,
-       Transactions of the American Mathematical Society 54, 1943.
-    .. [2] Dunn, O. J., Multiple comparisons among means, Journal of the American Statistical Association 56, 1961.
+    [1] Wald, A., Tests of statistical hypotheses concerning several parameters when the number of observations is large,
+        Transactions of the American Mathematical Society 54, 1943.
+    [2] Dunn, O. J., Multiple comparisons among means, Journal of the American Statistical Association 56, 1961.
     """
     effects = [(defect["effect"], tuple(defect["joints"])) for defect in truth["defects"]]
     if any(effect.startswith(OUTSIDE) for effect, _ in effects):
@@ -83,17 +69,8 @@ def oracle(
 def members_of(effect: str, joints: Sequence[int], candidates: Iterable[Candidate]) -> list[list[Candidate]]:
     """Candidates that an effect at some joints consists of, for each of its variants.
 
-    Parameters
-    ----------
-    effect : str
-    joints : tuple of int
-        From 1; empty where the effect is no joint's.
-    candidates : iterable of Candidate
-
-    Returns
-    -------
-    list of list of Candidate
-        One variant each. Bands of orders of one joint are no variants but parts.
+    `joints`: from 1; empty where the effect is no joint's. Returns one variant each. Bands of orders of one joint are no
+    variants but parts.
     """
     mine = [c for c in candidates if c.effect == effect and bool(c.joints) == bool(joints) and set(c.joints) <= set(joints)]
     if joints:

@@ -18,16 +18,9 @@ _UNDETECTABLE += ["wrong_name", "retained_share", "times_plausible"]
 def powers(cases: pd.DataFrame) -> pd.DataFrame:
     """Detection against the size of the effect.
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `case_rows.case_row`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each kind of robots, group, effect and level, and ``all`` effects of a group together but those of which the
-        model absorbs everything. What an oracle would do is empty for effects that no model of the catalogue has.
+    `cases`: of `case_rows.case_row`. Returns one row for each kind of robots, group, effect and level, and ``all`` effects of a
+    group together but those of which the model absorbs everything. What an oracle would do is empty for effects that no model
+    of the catalogue has.
     """
     parts = cases[cases.group.isin(_GROUPS)]
     visible = parts[parts.level_of == "retained"].assign(truth=ALL)
@@ -53,16 +46,8 @@ def powers(cases: pd.DataFrame) -> pd.DataFrame:
 def undetectable(cases: pd.DataFrame) -> pd.DataFrame:
     """What cannot be found, with the reason.
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `case_rows.case_row`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each kind of robots, effect, setting and level of cases that are absorbed, whose covariate is not recorded,
-        or that are larger than plausible in at least half of them.
+    `cases`: of `case_rows.case_row`. Returns one row for each kind of robots, effect, setting and level of cases that are
+    absorbed, whose covariate is not recorded, or that are larger than plausible in at least half of them.
     """
     rows = []
     parts = cases[(cases.group == "single") | cases.hidden]

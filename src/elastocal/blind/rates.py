@@ -11,22 +11,13 @@ if TYPE_CHECKING:
 
 
 def rate(hits: Iterable[bool]) -> dict[str, float]:
-    """A share with its Clopper-Pearson interval [1]_ of 95 %.
+    """A share with its Clopper-Pearson interval [1] of 95 %.
 
-    Parameters
-    ----------
-    hits : iterable of bool
-        One a case.
+    `hits`: one a case. Returns ``hits``, ``cases``, ``rate``, ``low``, ``high``; without cases the rate is not a number and the
+    interval all there is.
 
-    Returns
-    -------
-    dict
-        ``hits``, ``cases``, ``rate``, ``low``, ``high``; without cases the rate is not a number and the interval all there is.
-
-    References
-    ----------
-    .. [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
-       Biometrika 26, 1934.
+    [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
+        Biometrika 26, 1934.
     """
     hits = [bool(hit) for hit in hits]
     count, cases = sum(hits), len(hits)

@@ -40,24 +40,9 @@ _WRENCH = [name for name, _, _ in WRENCH]
 def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ()) -> tuple[PhysicalRobot, list[Defect]]:
     """The robot that stands in.
 
-    Parameters
-    ----------
-    robot_file : str or Path
-        Of which it is a specimen.
-    seed : int
-    effects : sequence of str, optional
-        Keys of `defects.KINDS`, each at a joint that is drawn; one effect that is drawn by default.
-
-    Returns
-    -------
-    robot : PhysicalRobot
-    defects : list of Defect
-        For whoever wants to compare them with the verdict afterwards.
-
-    Raises
-    ------
-    InputError
-        An effect that this arm cannot have.
+    `robot_file`: of which it is a specimen. `effects`: keys of `defects.KINDS`, each at a joint that is drawn; one effect that
+    is drawn by default. Returns `defects`: for whoever wants to compare them with the verdict afterwards. Raises `InputError`:
+    an effect that this arm cannot have.
     """
     arm = arm_from_file(robot_file)
     possible = sorted(
@@ -83,27 +68,9 @@ def filled_sheet(
 ) -> pd.DataFrame:
     """A measurement sheet with what a tracker reads.
 
-    Parameters
-    ----------
-    sheet : pandas.DataFrame
-        Columns of measurements.csv but for those of the tracker, which may be there and empty.
-    document : mapping
-        Of campaign.yaml.
-    robot : PhysicalRobot
-    seed : int
-        Of the noise, and of where reflectors sit whose offset is unknown.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    pandas.DataFrame
-        The same rows.
-
-    Raises
-    ------
-    InputError
-        A moment that is not that of the row's force at a lever.
+    `sheet`: columns of measurements.csv but for those of the tracker, which may be there and empty. `document`: of
+    campaign.yaml. `seed`: of the noise, and of where reflectors sit whose offset is unknown. `source`: named in errors. Returns
+    the same rows. Raises `InputError`: a moment that is not that of the row's force at a lever.
     """
     states = sheet.drop_duplicates(_STATE)
     number = pd.MultiIndex.from_frame(states[_STATE]).get_indexer(pd.MultiIndex.from_frame(sheet[_STATE]))
@@ -128,28 +95,10 @@ def reached(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where the end effector comes to rest.
 
-    Parameters
-    ----------
-    robot : PhysicalRobot
-    shown : ndarray (N, n)
-        Commanded joint angles as the controller shows them, rad; each is approached afresh.
-    wrench : ndarray (N, 6)
-        At the last measuring point, base axes; N, N m.
-    seed : int
-        Of the repeatability of the drives.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    position : ndarray (N, 3)
-        m, in the frame that is declared as the base's; without the tracker's noise.
-    rotation : ndarray (N, 3, 3)
-
-    Raises
-    ------
-    InputError
-        As in `filled_sheet`.
+    `shown` (N, n): commanded joint angles as the controller shows them, rad; each is approached afresh. `wrench` (N, 6): at the
+    last measuring point, base axes; N, N m. `seed`: of the repeatability of the drives. `source`: named in errors. Returns
+    `position` (N, 3): m, in the frame that is declared as the base's; without the tracker's noise; `rotation` (N, 3, 3). Raises
+    `InputError`: as in `filled_sheet`.
     """
     columns = dict(zip([*(f"q{j + 1}" for j in range(shown.shape[1])), *_WRENCH], [*shown.T, *wrench.T], strict=True))
     rows = pd.DataFrame(columns | {"pose": np.arange(len(shown)), "load": 0, "repeat": 0})

@@ -24,26 +24,14 @@ MISPLACED = "base_placement"
 def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any]:
     """What a verdict is worth, given the ground truth.
 
-    Whether each true effect is held by another one of those found is an assignment problem [1]_.
+    Whether each true effect is held by another one of those found is an assignment problem [1].
 
-    Parameters
-    ----------
-    truth : dict
-        A sealed document.
-    verdict : dict
-        As verdict.json.
+    `truth`: a sealed document. `verdict`: as verdict.json. Returns of the case: where it belongs, what was true, what the
+    verdict was. ``exact``: the names found are the true ones; ``named_right``: so, and the verdict states no other name beside
+    it; ``holds_truth``: as many effects were found as were made, and each true one is the name of another of them or among its
+    alternatives; ``wrong_name``: one wrong name is stated alone.
 
-    Returns
-    -------
-    dict
-        Of the case: where it belongs, what was true, what the verdict was. ``exact``: the names found are the true ones;
-        ``named_right``: so, and the verdict states no other name beside it; ``holds_truth``: as many effects were found as
-        were made, and each true one is the name of another of them or among its alternatives; ``wrong_name``: one wrong name
-        is stated alone.
-
-    References
-    ----------
-    .. [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
+    [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
     """
     case = truth["case"]
     kind, effects = judged_apart_from_setup(truth, verdict)

@@ -22,16 +22,9 @@ OUTCOMES = ("right", "class", "wrong", "other")
 def swept(truths: Mapping[str, Mapping[str, Any]], verdicts: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """Outcome of each case of the sweep.
 
-    Parameters
-    ----------
-    truths, verdicts : dict of str to dict
-        By the name of the case; those of other groups are passed over.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a case: pair, truth, design, angle_deg of the alternative on the plant, verdict_angle_deg of the nearest that
-        the analysis saw, verdict, found, outcome.
+    `truths`, `verdicts`: by the name of the case; those of other groups are passed over. Returns one row a case: pair, truth,
+    design, angle_deg of the alternative on the plant, verdict_angle_deg of the nearest that the analysis saw, verdict, found,
+    outcome.
     """
     columns = ["case", "robot", "pair", "truth", "design", "angle_deg", "verdict_angle_deg", "verdict", "found", "outcome"]
     rows = []
@@ -57,20 +50,10 @@ def swept(truths: Mapping[str, Mapping[str, Any]], verdicts: Mapping[str, Mappin
 def against_angle(cases: pd.DataFrame) -> pd.DataFrame:
     """Shares of the outcomes in each bin of the angle, for each pair and for all.
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `swept`.
+    `cases`: of `swept`. Returns with Clopper-Pearson intervals [1].
 
-    Returns
-    -------
-    pandas.DataFrame
-        With Clopper-Pearson intervals [1]_.
-
-    References
-    ----------
-    .. [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
-       Biometrika 26, 1934.
+    [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
+        Biometrika 26, 1934.
     """
     bins = np.array(ANGLES)[np.minimum(np.searchsorted(ANGLES, cases["angle_deg"]), len(ANGLES) - 1)]
     columns = ["pair", "angle_up_to_deg", "cases", *(f"{name}{end}" for name in OUTCOMES for end in ("", "_low", "_high"))]

@@ -33,13 +33,8 @@ _SETTING_COLUMNS = ["robots", "setting", "kind", "level", *rate([]), "held", "na
 class Target:
     """What a figure shall be.
 
-    Attributes
-    ----------
-    words : str
-    low, high : float
-        Range in which it shall lie.
-    above, below : float
-        What the whole interval of 95 % shall lie above and below, exclusively.
+    `low`, `high`: range in which it shall lie. `above`, `below`: what the whole interval of 95 % shall lie above and below,
+    exclusively.
     """
 
     words: str
@@ -81,27 +76,12 @@ _TARGETS: dict[_Key | None, Target] = {
 def summarized(cases: pd.DataFrame, intervals: pd.DataFrame, statements: pd.DataFrame, seed: int) -> pd.DataFrame:
     """Every figure of the proof beside its target.
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `case_rows.case_row`.
-    intervals : pandas.DataFrame
-        Of `coverage.intervals_of`.
-    statements : pandas.DataFrame
-        Of `calibration.statements`.
-    seed : int
-        Of the bootstrap.
+    `cases`: of `case_rows.case_row`. `intervals`: of `coverage.intervals_of`. `statements`: of `calibration.statements`.
+    `seed`: of the bootstrap. Returns one row for each kind of robots and figure: rates with Clopper-Pearson intervals, ratios
+    with percentile bootstrap intervals [1] over cases. ``target_low`` and ``target_high`` are the range that the target
+    leaves; ``holds`` is empty where there is no target or no case.
 
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each kind of robots and figure: rates with Clopper-Pearson intervals, ratios with percentile bootstrap
-        intervals [1]_ over cases. ``target_low`` and ``target_high`` are the range that the target leaves; ``holds`` is empty
-        where there is no target or no case.
-
-    References
-    ----------
-    .. [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3, Chapman and Hall, 1993.
+    [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3, Chapman and Hall, 1993.
     """
     rows: list[dict[str, Any]] = []
     for robots in (PROOF, TUNED):
@@ -117,16 +97,8 @@ def summarized(cases: pd.DataFrame, intervals: pd.DataFrame, statements: pd.Data
 def by_setting(cases: pd.DataFrame) -> pd.DataFrame:
     """What the hard settings do to the verdicts.
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `case_rows.case_row`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each kind of robots, setting and kind of cases: without an effect (where a detection is a false alarm), with
-        one, and with one that needs what was not recorded.
+    `cases`: of `case_rows.case_row`. Returns one row for each kind of robots, setting and kind of cases: without an effect
+    (where a detection is a false alarm), with one, and with one that needs what was not recorded.
     """
     mine = cases[cases.group.isin(["setting", NONE])]
     kind = np.where(mine.truth == NONE, "no effect", np.where(mine.hidden, "hidden effect", "effect"))

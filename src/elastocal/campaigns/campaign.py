@@ -26,13 +26,8 @@ NO_REMAINDER = "none"
 class Target:
     """What is tracked.
 
-    Attributes
-    ----------
-    name : str
-    point : str
-        Measuring point of the chain on which it sits.
-    offset_m : tuple of float or None
-        In the frame of the point; None where unknown and fitted.
+    `point`: measuring point of the chain on which it sits. `offset_m`: in the frame of the point; None where unknown and
+    fitted.
     """
 
     name: str
@@ -44,27 +39,13 @@ class Target:
 class Measurements:
     """One entry for each measurement of one target; arrays of N.
 
-    Attributes
-    ----------
-    session, pose, load, repeat : ndarray of int32 (N,)
-        Session 0 where the file has no such column; load 0 is unloaded.
-    target : ndarray of int32 (N,)
-        Index into the campaign's targets.
-    joint_angles : ndarray (N, n)
-        The model's, rad, not the controller's: `Robot.model_angles` of what it reports.
-    wrench : ndarray (N, 6)
-        External wrench at the origin of the last measuring point, base axes; N, N m.
-    position : ndarray (N, 3)
-        m, in the campaign's frame.
-    rotation_vector : ndarray (N, 3) or None
-        rad; None where positions are measured.
-    approach : ndarray (N, n) or None
-        Sense in which each of the model's joints was approached, -1, 0 (not known) or +1.
-    time_s, temperature_c : ndarray (N,) or None
-    u95_m : ndarray (N,) or None
-        Expanded uncertainty of the position, 95 % of one coordinate; None where it is not stated for each measurement.
-    row : ndarray of int32 (N,)
-        Row in the file, 1 for the first of data; for messages.
+    `session`, `pose`, `load`, `repeat` (N,): session 0 where the file has no such column; load 0 is unloaded. `target` (N,):
+    index into the campaign's targets. `joint_angles` (N, n): the model's, rad, not the controller's: `Robot.model_angles` of
+    what it reports. `wrench` (N, 6): external wrench at the origin of the last measuring point, base axes; N, N m. `position`
+    (N, 3): m, in the campaign's frame. `rotation_vector` (N, 3): rad; None where positions are measured. `approach` (N, n):
+    sense in which each of the model's joints was approached, -1, 0 (not known) or +1. `time_s`, `temperature_c` (N,). `u95_m`
+    (N,): expanded uncertainty of the position, 95 % of one coordinate; None where it is not stated for each measurement. `row`
+    (N,): row in the file, 1 for the first of data; for messages.
     """
 
     session: np.ndarray
@@ -88,13 +69,7 @@ class Measurements:
     def select(self, mask_or_index: np.ndarray) -> Measurements:
         """The measurements of a mask or of an index array, in its order.
 
-        Parameters
-        ----------
-        mask_or_index : ndarray of bool (N,) or of int (M,)
-
-        Returns
-        -------
-        Measurements
+        `mask_or_index` (N,) of bool, (M,) of int.
         """
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         chosen: dict[str, Any] = {name: None if array is None else array[mask_or_index] for name, array in arrays.items()}
@@ -105,29 +80,13 @@ class Measurements:
 class Campaign:
     """A campaign that holds together.
 
-    Attributes
-    ----------
-    name : str
-    robot : Robot
-        With rigid joints where `compliance` is nominal and the robot file states none.
-    measured : {"position", "pose"}
-    frame : {"tracker", "base"}
-        tracker: the placement of the base in it is unknown, and another one in each session.
-    targets : tuple of Target
-    compliance : {"nominal", "identify"}
-    declared : tuple of str
-        Effects of the catalogue that the model already has.
-    noise : dict or None
-        ``position_m``, ``orientation_rad``, ``joint_rad``, as far as the campaign declares them.
-    holdout : dict
-        ``fraction`` and ``seed``, ``blocks`` and ``seed``, ``session``, ``poses`` or ``campaign``.
-    measurements : Measurements
-    remainder : str or None
-        Regression on what the final model leaves, a name in `remainder.catalogue`.
-    table : str
-        Name of the file of measurements; empty where they come from none.
-    header_line : int or None
-        Line of the file in which its header stands, where it is a text whose rows are lines.
+    `robot`: with rigid joints where `compliance` is nominal and the robot file states none. `measured`: one of "position",
+    "pose". `frame`: tracker: the placement of the base in it is unknown, and another one in each session. `compliance`: one of
+    "nominal", "identify". `declared`: effects of the catalogue that the model already has. `noise`: ``position_m``,
+    ``orientation_rad``, ``joint_rad``, as far as the campaign declares them. `holdout`: ``fraction`` and ``seed``, ``blocks``
+    and ``seed``, ``session``, ``poses`` or ``campaign``. `remainder`: regression on what the final model leaves, a name in
+    `remainder.catalogue`. `table`: name of the file of measurements; empty where they come from none. `header_line`: line of
+    the file in which its header stands, where it is a text whose rows are lines.
     """
 
     name: str
@@ -155,18 +114,7 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
 
     Nominal compliances that the robot file does not state leave rigid joints.
 
-    Parameters
-    ----------
-    document : dict
-        Contents of ``campaign.yaml``.
-    robot : Robot
-    measurements : Measurements
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    Campaign
+    `document`: contents of ``campaign.yaml``. `source`: named in errors.
     """
     compliance = document.get("compliance", "nominal")
     remainder = document.get("remainder", NO_REMAINDER)
@@ -191,22 +139,8 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
 def targets_from(described: Mapping[str, Any], chain: Chain, source: str) -> tuple[Target, ...]:
     """What a campaign says that it tracks.
 
-    Parameters
-    ----------
-    described : dict
-        ``targets`` of ``campaign.yaml``.
-    chain : Chain
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    tuple of Target
-
-    Raises
-    ------
-    InputError
-        A name that is no text, or a measuring point that the chain does not have.
+    `described`: ``targets`` of ``campaign.yaml``. `source`: named in errors. Raises `InputError`: a name that is no text, or a
+    measuring point that the chain does not have.
     """
     points = [point.name for point in chain.points]
     targets = []

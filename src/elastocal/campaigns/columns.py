@@ -54,20 +54,8 @@ def residual_columns(
 ) -> dict[str, np.ndarray]:
     """Columns of the residuals table.
 
-    Parameters
-    ----------
-    measurements : Measurements
-    held_out, gross_errors : bool
-    outside : ndarray of bool (N,)
-        Whether each lies outside of the range of the poses fitted.
-    position : ndarray (N, 3)
-        m, base axes.
-    stages : dict of str to ndarray (N, rows)
-        Residuals "before", of the declared model, and "after", of the found one, m and rad.
-
-    Returns
-    -------
-    dict of str to ndarray (N,)
+    `outside` (N,) of bool: whether each lies outside of the range of the poses fitted. `position` (N, 3): m, base axes.
+    `stages` (N, rows): residuals "before", of the declared model, and "after", of the found one, m and rad. Returns (N,).
     """
     count, joints = measurements.joint_angles.shape
     columns = {name: getattr(measurements, name) for name in IDENTITY}

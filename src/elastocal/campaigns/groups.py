@@ -6,16 +6,8 @@ import numpy as np
 def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Group equal rows: `numpy.unique` along the first axis, many times as fast.
 
-    Parameters
-    ----------
-    keys : ndarray (N, k)
-
-    Returns
-    -------
-    first : ndarray of int (G,)
-        First row of each group; groups in lexicographic order.
-    group : ndarray of int (N,)
-        Of each row.
+    `keys` (N, k). Returns `first` (G,) of int: first row of each group; groups in lexicographic order; `group` (N,) of int: of
+    each row.
     """
     order = np.lexsort(keys.T[::-1])
     rising = keys[order]

@@ -27,20 +27,9 @@ FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
 def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
     """Measurements to fit and measurements to test, parted by whole poses.
 
-    Parameters
-    ----------
-    campaign : Campaign
-
-    Returns
-    -------
-    training, held_out : Measurements
-        In the order of the file, on which the choice of poses does not depend. Where another campaign is the test, all
-        measurements are training and `held_out` is empty: see `reading.held_out_campaign`.
-
-    Raises
-    ------
-    InputError
-        Too few poses, or poses that are not there.
+    Returns `training`, `held_out`: in the order of the file, on which the choice of poses does not depend. Where another
+    campaign is the test, all measurements are training and `held_out` is empty: see `reading.held_out_campaign`. Raises
+    `InputError`: too few poses, or poses that are not there.
     """
     held_out = held_out_mask(campaign.holdout, campaign.measurements, campaign.name)
     return campaign.measurements.select(~held_out), campaign.measurements.select(held_out)
@@ -49,23 +38,8 @@ def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
 def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[str, Any]:
     """How a campaign parts its measurements, in one way and with a seed where the poses are drawn.
 
-    Parameters
-    ----------
-    described : dict
-        ``holdout`` of ``campaign.yaml``.
-    folder : Path
-        Folder of the campaign.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    InputError
-        No way or more than one, a seed where nothing is drawn, or as `other_folder`.
+    `described`: ``holdout`` of ``campaign.yaml``. `folder`: folder of the campaign. `source`: named in errors. Raises
+    `InputError`: no way or more than one, a seed where nothing is drawn, or as `other_folder`.
     """
     ways = [way for way in HOLDOUTS if way in described]
     drawn = ways in (["fraction"], ["blocks"])
@@ -80,23 +54,8 @@ def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[s
 def other_folder(named: str, folder: Path, source: str) -> Path:
     """Folder of the campaign that tests another one.
 
-    Parameters
-    ----------
-    named : str
-        As ``holdout.campaign`` names it.
-    folder : Path
-        Of the campaign that it tests.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    InputError
-        No campaign there, the same campaign, or a folder elsewhere than beside or below the tested one's.
+    `named`: as ``holdout.campaign`` names it. `folder`: of the campaign that it tests. `source`: named in errors. Raises
+    `InputError`: no campaign there, the same campaign, or a folder elsewhere than beside or below the tested one's.
     """
     other = folder / named
     allowed = f"a folder beside this one with a {DOCUMENT}, such as ../other"
@@ -131,16 +90,7 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, source
 def measured_poses(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
     """The poses that were measured, each once.
 
-    Parameters
-    ----------
-    measurements : Measurements
-
-    Returns
-    -------
-    pairs : ndarray of int32 (P, 2)
-        Session and pose, sorted.
-    index : ndarray of int (N,)
-        Of each measurement's pair.
+    Returns `pairs` (P, 2): session and pose, sorted; `index` (N,) of int: of each measurement's pair.
     """
     pairs = np.column_stack([measurements.session, measurements.pose])
     first, index = groups_of(pairs)

@@ -14,27 +14,15 @@ _LEVEL = 0.05
 def blocks(joint_angles: np.ndarray, count: int) -> np.ndarray:
     """Poses parted into blocks of neighbours whose sizes differ by one at most.
 
-    Bisecting k-means [1]_ with parts of given size: a block is cut across its principal direction [2]_, then across the line
+    Bisecting k-means [1] with parts of given size: a block is cut across its principal direction [2], then across the line
     between the means of its parts until these stay. No draw decides, and no block is too small to be held out. Joints count
     alike, by the cosine and sine of their angles over their spread.
 
-    Parameters
-    ----------
-    joint_angles : ndarray (P, n)
-        rad.
-    count : int
-        Of blocks, at most P.
+    `joint_angles` (P, n): rad. `count`: of blocks, at most P. Returns (P,) of int: 0 .. count-1.
 
-    Returns
-    -------
-    ndarray of int (P,)
-        0 .. count-1.
-
-    References
-    ----------
-    .. [1] Steinbach, M., Karypis, G. and Kumar, V., A comparison of document clustering techniques, KDD Workshop on Text
-       Mining, 2000.
-    .. [2] Boley, D., Principal direction divisive partitioning, Data Mining and Knowledge Discovery 2, 1998.
+    [1] Steinbach, M., Karypis, G. and Kumar, V., A comparison of document clustering techniques, KDD Workshop on Text Mining,
+        2000.
+    [2] Boley, D., Principal direction divisive partitioning, Data Mining and Knowledge Discovery 2, 1998.
     """
     circle = np.stack([np.cos(joint_angles), np.sin(joint_angles)], axis=-1)
     circle = circle - circle.mean(axis=0)
@@ -99,24 +87,13 @@ def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndar
     """Poses at which a joint stands farther beyond those of other poses than chance explains.
 
     Of P + 1 poses drawn from a box, one stands beyond the others' range at one of the 2 n ends by more than a share t of that
-    range with probability 2 n (1 + t)^(1-P) / (P + 1) at most, from the spacings of uniform order statistics [1]_. The margin
+    range with probability 2 n (1 + t)^(1-P) / (P + 1) at most, from the spacings of uniform order statistics [1]. The margin
     is the t that makes this 5 %, or what measurements of one pose may differ: without one, half of the random poses beside 20
     others would be called outside.
 
-    Parameters
-    ----------
-    fitted_angles : ndarray (P, n)
-        rad.
-    joint_angles : ndarray (S, n)
-        rad.
+    `fitted_angles` (P, n): rad. `joint_angles` (S, n): rad. Returns (S,) of bool.
 
-    Returns
-    -------
-    ndarray of bool (S,)
-
-    References
-    ----------
-    .. [1] David, H. A. and Nagaraja, H. N., Order Statistics, section 6.4, Wiley, 2003.
+    [1] David, H. A. and Nagaraja, H. N., Order Statistics, section 6.4, Wiley, 2003.
     """
     poses, joints = fitted_angles.shape
     low, high = fitted_angles.min(axis=0), fitted_angles.max(axis=0)

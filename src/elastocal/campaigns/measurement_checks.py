@@ -36,17 +36,7 @@ _LONGEST_TOOL_M = 1.0
 def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> None:
     """Refuse degrees: more turns than a joint has, or far beyond limits that a 57th of the angle keeps.
 
-    Parameters
-    ----------
-    reported : ndarray (N, n)
-        Joint angles as the controller reports them.
-    table : MeasurementFile
-    robot : Robot
-
-    Raises
-    ------
-    InputError
-        The first such angle.
+    `reported` (N, n): joint angles as the controller reports them. Raises `InputError`: the first such angle.
     """
     low, high = robot.joint_limits.T
     farthest = max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
@@ -72,21 +62,9 @@ def check_measurements(
 ) -> None:
     """Refuse measurements that cannot be of one campaign in the units of the format.
 
-    Parameters
-    ----------
-    measurements : Measurements
-    table : MeasurementFile
-        Where they were read from.
-    robot : Robot
-    targets : tuple of Target
-    source : str
-        Document of the campaign, named in errors of what is not in the table.
-
-    Raises
-    ------
-    InputError
-        The first fault: a measurement that is there twice, a load that contradicts its wrench, a pose at two places, times
-        that run backwards, millimetres or degrees, a target without a measurement.
+    `table`: where they were read from. `source`: document of the campaign, named in errors of what is not in the table. Raises
+    `InputError`: the first fault: a measurement that is there twice, a load that contradicts its wrench, a pose at two places,
+    times that run backwards, millimetres or degrees, a target without a measurement.
     """
     _check_duplicates(measurements, table, targets)
     _check_loads(measurements, table)

@@ -45,16 +45,7 @@ SHOWN_TO = 2e-3
 
 
 def file_columns(joints: int) -> dict[str, Column]:
-    """Every column that a file of measurements may have.
-
-    Parameters
-    ----------
-    joints : int
-
-    Returns
-    -------
-    dict of str to Column
-    """
+    """Every column that a file of measurements may have."""
     numbers = range(1, joints + 1)
     columns = [
         Column("session", "int32", "", "sessions have each their own tracker frame; 0 throughout where absent"),
@@ -82,22 +73,9 @@ def sheet_columns(joints: int) -> set[str]:
 def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFile:
     """Open the measurements of a campaign.
 
-    Parameters
-    ----------
-    folder : Path
-        Holds either `CSV` or `PARQUET`.
-    joints : int
-    measured : {"position", "pose"}
-
-    Returns
-    -------
-    MeasurementFile
-
-    Raises
-    ------
-    InputError
-        No file or two, a file that cannot be read, a column that is missing, unknown or there twice, a row of another length,
-        more than `MOST_MEASUREMENTS` rows.
+    `folder`: holds either `CSV` or `PARQUET`. `measured`: one of "position", "pose". Raises `InputError`: no file or two, a
+    file that cannot be read, a column that is missing, unknown or there twice, a row of another length, more than
+    `MOST_MEASUREMENTS` rows.
     """
     there = [path for path in (folder / CSV, folder / PARQUET) if path.is_file()]
     if len(there) != 1:
@@ -115,17 +93,7 @@ def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFi
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
     """Refuse a column that the format does not have.
 
-    Parameters
-    ----------
-    names : iterable of str
-    joints : int
-    path : str
-        Named in errors.
-
-    Raises
-    ------
-    InputError
-        The first such column.
+    `path`: named in errors. Raises `InputError`: the first such column.
     """
     known, beside = file_columns(joints), sheet_columns(joints)
     for name in names:
@@ -139,13 +107,7 @@ def check_column_names(names: Collection[str], joints: int, path: str) -> None:
 def write_measurements(path: str | Path, table: Mapping[str, Sequence[Any] | np.ndarray], joints: int) -> None:
     """Write the measurements of a campaign.
 
-    Parameters
-    ----------
-    path : str or Path
-        Holds CSV where its name is `CSV`, else Parquet.
-    table : dict of str to sequence
-        Columns of one length, named as in `file_columns`.
-    joints : int
+    `path`: holds CSV where its name is `CSV`, else Parquet. `table`: columns of one length, named as in `file_columns`.
     """
     columns = [column for name, column in file_columns(joints).items() if name in table]
     with atomic_write(path) as partial:
@@ -289,17 +251,9 @@ def _too_many(path: str, found: str) -> InputError:
 class MeasurementFile:
     """A file of measurements, whose columns are checked as they are asked for.
 
-    Attributes
-    ----------
-    path : str
-    columns : dict of str to sequence
-        Cells as they stand in the file.
-    rows : ndarray of int32 (N,)
-        Number in the file of each row that is not blank, 1 for the first of data.
-    lines : ndarray of int32 (N,) or None
-        Line of the file that each row ends in, where the file is a text.
-    angles, wrench, approach, orientation : list of str
-        Names of the columns that belong together; no orientation where positions are measured.
+    `columns`: cells as they stand in the file. `rows` (N,): number in the file of each row that is not blank, 1 for the first
+    of data. `lines` (N,): line of the file that each row ends in, where the file is a text. `angles`, `wrench`, `approach`,
+    `orientation`: names of the columns that belong together; no orientation where positions are measured.
     """
 
     def __init__(

@@ -6,16 +6,7 @@ from pathlib import Path
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether a path is that of a regular file; False too for what no path can be.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    bool
-    """
+    """Whether a path is that of a regular file; False too for what no path can be."""
     try:
         return Path(path).is_file()
     except (OSError, ValueError):
@@ -26,13 +17,6 @@ def is_file(path: str | Path) -> bool:
 def is_file_in(path: str | Path, *folders: str | Path) -> bool:
     """Whether a path is that of a regular file in or below one of some folders.
 
-    Parameters
-    ----------
-    path, *folders : str or Path
-        Links are followed, on both sides.
-
-    Returns
-    -------
-    bool
+    `path`, `*folders`: links are followed, on both sides.
     """
     return is_file(path) and any(Path(path).resolve().is_relative_to(Path(folder).resolve()) for folder in folders)

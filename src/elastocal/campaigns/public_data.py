@@ -19,17 +19,8 @@ FOLDER_VARIABLE = "ELASTOCAL_DATA"
 class PublicFile:
     """One file of a public repository.
 
-    Attributes
-    ----------
-    repository : str
-        owner/name on GitHub.
-    commit : str
-    path : str
-        In the repository.
-    sha256 : str
-    local : str
-        Where the file stands below a folder that has all of them.
-    licence : str
+    `repository`: owner/name on GitHub. `path`: in the repository. `local`: where the file stands below a folder that has all of
+    them.
     """
 
     repository: str
@@ -48,18 +39,8 @@ class PublicFile:
 def not_at_hand(names: Iterable[str], files: Mapping[str, PublicFile], kept: str | Path) -> str | None:
     """What of some files is missing where `FOLDER_VARIABLE` stands for a network.
 
-    Parameters
-    ----------
-    names : iterable of str
-    files : dict of str to PublicFile
-        As in `fetch`.
-    kept : str or Path
-        Folder of what was downloaded before.
-
-    Returns
-    -------
-    str or None
-        The first file that is missing, below the folder of `FOLDER_VARIABLE`; None where all are there, or may be downloaded.
+    `files`: as in `fetch`. `kept`: folder of what was downloaded before. Returns the first file that is missing, below the
+    folder of `FOLDER_VARIABLE`; None where all are there, or may be downloaded.
     """
     given = os.environ.get(FOLDER_VARIABLE)
     for name in names if given else ():
@@ -75,22 +56,8 @@ def _kept_as(name: str, file: PublicFile) -> str:
 def fetch(name: str, files: Mapping[str, PublicFile], folder: str | Path) -> Path:
     """A file of public data with the contents that this project knows: from `FOLDER_VARIABLE`, else downloaded once.
 
-    Parameters
-    ----------
-    name : str
-    files : dict of str to PublicFile
-        Those of the importer that reads it.
-    folder : str or Path
-        Keeps what is downloaded.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    InputError
-        An unknown name, a file of other contents, or no way to download it.
+    `files`: those of the importer that reads it. `folder`: keeps what is downloaded. Raises `InputError`: an unknown name, a
+    file of other contents, or no way to download it.
     """
     if name not in files:
         raise InputError("public data", "", repr(name), ", ".join(files))

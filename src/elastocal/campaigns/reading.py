@@ -76,21 +76,8 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
 def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:
     """What a campaign says of itself, and where its robot is described.
 
-    Parameters
-    ----------
-    folder, robots_folder : str or Path
-        As in `read_campaign`.
-
-    Returns
-    -------
-    document : dict
-        Contents of ``campaign.yaml``, which follow their schema.
-    robot_path : Path
-
-    Raises
-    ------
-    InputError
-        A document that its schema refuses, or a robot that is not there.
+    `folder`, `robots_folder`: as in `read_campaign`. Returns `document`: contents of ``campaign.yaml``, which follow their
+    schema. Raises `InputError`: a document that its schema refuses, or a robot that is not there.
     """
     source = (Path(folder) / DOCUMENT).as_posix()
     _check_place(Path(source), folder)
@@ -102,19 +89,7 @@ def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[di
 def campaign_files(folder: str | Path, robots_folder: str | Path) -> list[str]:
     """Files that a campaign is read from, those of the campaign that holds its test included.
 
-    Parameters
-    ----------
-    folder, robots_folder : str or Path
-        As in `read_campaign`.
-
-    Returns
-    -------
-    list of str
-
-    Raises
-    ------
-    InputError
-        As in `read_descriptions` and `holdout.other_folder`.
+    `folder`, `robots_folder`: as in `read_campaign`. Raises `InputError`: as in `read_descriptions` and `holdout.other_folder`.
     """
     document, robot_path = read_descriptions(folder, robots_folder)
     files = [Path(folder) / DOCUMENT, *_tables(Path(folder)), robot_path]
@@ -160,24 +135,9 @@ def held_out_campaign(
 ) -> Campaign | None:
     """The other campaign that tests this one.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    folder : str or Path
-        Folder of `campaign`.
-    robots_folder : str or Path
-    effects : iterable of str, optional
-        As in `read_campaign`.
-
-    Returns
-    -------
-    Campaign or None
-        With its own targets and frame; all of its measurements are for the test. None where this campaign holds out its own.
-
-    Raises
-    ------
-    InputError
-        A fault of the other campaign, or another chain than this one's.
+    `folder`: folder of `campaign`. `effects`: as in `read_campaign`. Returns with its own targets and frame; all of its
+    measurements are for the test. None where this campaign holds out its own. Raises `InputError`: a fault of the other
+    campaign, or another chain than this one's.
     """
     if "campaign" not in campaign.holdout:
         return None
@@ -196,25 +156,12 @@ def held_out_campaign(
 def folds_of(folder: str | Path, robots_folder: str | Path, number: int, of: int) -> dict[str, Any]:
     """Poses of one fold of a campaign, as in ``holdout`` of ``campaign.yaml``.
 
-    Of K-fold cross-validation [1]_ by whole poses.
+    Of K-fold cross-validation [1] by whole poses.
 
-    Parameters
-    ----------
-    folder, robots_folder : str or Path
-        As in `read_campaign`.
-    number : int
-        Fold, from 1.
-    of : int
-        How many folds; poses are dealt out in turn.
+    `folder`, `robots_folder`: as in `read_campaign`. `number`: fold, from 1. `of`: how many folds; poses are dealt out in turn.
 
-    Returns
-    -------
-    dict
-
-    References
-    ----------
-    .. [1] Geisser, S., The predictive sample reuse method with applications, Journal of the American Statistical Association
-       70, 1975.
+    [1] Geisser, S., The predictive sample reuse method with applications, Journal of the American Statistical Association 70,
+        1975.
     """
     pairs = measured_poses(read_campaign(folder, robots_folder).measurements)[0]
     return {"poses": pairs[number - 1 :: of].tolist()}

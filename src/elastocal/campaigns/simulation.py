@@ -22,21 +22,10 @@ if TYPE_CHECKING:
 class Plan:
     """What is measured.
 
-    Attributes
-    ----------
-    points : tuple of str
-        Measuring points with a target each.
-    poses : int
-    force_N : float
-        Largest force of the ladder; the direction is random in each pose.
-    ladder : tuple of float
-        Shares of it, 0 first: each is a load.
-    offset_m : tuple of float
-        From the end-effector to where the force acts, base axes.
-    repeats, repeated_poses : int
-        How often the loads 0 and 1 of the first poses are approached.
-    noise_m, noise_rad : float
-        Standard deviation of each component of a measurement.
+    `points`: measuring points with a target each. `force_N`: largest force of the ladder; the direction is random in each pose.
+    `ladder`: shares of it, 0 first: each is a load. `offset_m`: from the end-effector to where the force acts, base axes.
+    `repeats`, `repeated_poses`: how often the loads 0 and 1 of the first poses are approached. `noise_m`, `noise_rad`: standard
+    deviation of each component of a measurement.
     """
 
     points: tuple[str, ...]
@@ -55,18 +44,7 @@ def simulated_measurements(robot: Robot, plan: Plan, seed: int, name: str) -> di
 
     Springs yield by the virtual joint method, see `mechanics.elastostatics`; poses are exact.
 
-    Parameters
-    ----------
-    robot : Robot
-    plan : Plan
-    seed : int
-    name : str
-        Of the campaign; part of the name of the random stream.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Columns of a file of measurements.
+    `name`: of the campaign; part of the name of the random stream. Returns columns of a file of measurements.
     """
     draws = stream(seed, name, "campaign", 0)
     low, high = robot.joint_limits.T

@@ -24,24 +24,9 @@ _PERIODIC = re.compile(r"(.+)\1{19}$")
 def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> dict[str, dict[str, Any]]:
     """Where the campaigns that a configuration names come from.
 
-    Parameters
-    ----------
-    config : dict
-        Checked.
-    folder : str or Path
-        Holds ``campaigns/`` and ``robots/``.
-    source : str
-        File of the configuration, named in errors.
-
-    Returns
-    -------
-    dict of str to dict
-        Documents by the names of their files; a simulated one has the document of its robot under ``robot_document``.
-
-    Raises
-    ------
-    InputError
-        The first fault found.
+    `config`: checked. `folder`: holds ``campaigns/`` and ``robots/``. `source`: file of the configuration, named in errors.
+    Returns documents by the names of their files; a simulated one has the document of its robot under ``robot_document``.
+    Raises `InputError`: the first fault found.
     """
     found = {}
     for name in named_campaigns(config):
@@ -71,23 +56,9 @@ def named_league(config: Mapping[str, Any]) -> list[str]:
 def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results: str | Path) -> dict[str, str]:
     """A user's own campaign, its documents checked before any job starts.
 
-    Parameters
-    ----------
-    config : dict
-        ``campaign`` is its folder.
-    robots_folder : str or Path
-    results : str or Path
-        Folder with the results of each campaign by its name.
-
-    Returns
-    -------
-    dict of str to str
-        Its folder by its name, spelled in one way however it was given; empty where there is none.
-
-    Raises
-    ------
-    InputError
-        As `reading.campaign_files`; a name that a campaign of this project has, or another one whose results are there.
+    `config`: ``campaign`` is its folder. `results`: folder with the results of each campaign by its name. Returns its folder by
+    its name, spelled in one way however it was given; empty where there is none. Raises `InputError`: as
+    `reading.campaign_files`; a name that a campaign of this project has, or another one whose results are there.
     """
     if not config.get("campaign"):
         return {}

@@ -26,15 +26,7 @@ _ROBOT: dict[str, Any] = {
 def campaign_template(name: str, robot: Robot) -> str:
     """Text of a campaign.yaml to fill in.
 
-    Parameters
-    ----------
-    name : str
-    robot : Robot
-        Whose file is robot.yaml beside it.
-
-    Returns
-    -------
-    str
+    `robot`: whose file is robot.yaml beside it.
     """
     document = {
         "campaign": name,
@@ -55,16 +47,7 @@ def robot_template() -> str:
 
 
 def sheet_template(joints: int) -> str:
-    """Header of a measurements.csv to fill in, without optional covariates.
-
-    Parameters
-    ----------
-    joints : int
-
-    Returns
-    -------
-    str
-    """
+    """Header of a measurements.csv to fill in, without optional covariates."""
     optional = ("session", "approach", "time_s", "temperature_c", "u95_m", "rx", "ry", "rz")
     return ",".join(name for name in file_columns(joints) if not name.startswith(optional)) + "\n"
 
@@ -72,15 +55,7 @@ def sheet_template(joints: int) -> str:
 def explained(schema: str, document: Mapping[str, Any]) -> str:
     """A document as YAML in which each key of its schema is explained; those that it leaves out stand as comments.
 
-    Parameters
-    ----------
-    schema : str
-        Name of the schema, as in `read_schema`.
-    document : dict
-
-    Returns
-    -------
-    str
+    `schema`: name of the schema, as in `read_schema`.
     """
     lines = [f"# {read_schema(schema)['title']}. Keys behind # are optional."]
     for key, rule in read_schema(schema)["properties"].items():

@@ -28,21 +28,9 @@ def write_campaign(
 ) -> None:
     """Write a campaign's folder; each file appears whole or not at all, ``campaign.yaml`` last.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Made where it is not there.
-    document : dict
-        Contents of ``campaign.yaml``.
-    table : dict of str to sequence
-        Columns of one length, named as in `file_columns`.
-    joints : int
-    kind : {"parquet", "csv"}
-
-    Raises
-    ------
-    InputError
-        A document that the schema refuses, or a column that the format does not have.
+    `folder`: made where it is not there. `document`: contents of ``campaign.yaml``. `table`: columns of one length, named as in
+    `file_columns`. `kind`: one of "parquet", "csv". Raises `InputError`: a document that the schema refuses, or a column that
+    the format does not have.
     """
     folder = Path(folder)
     check_document(document, "campaign", (folder / DOCUMENT).as_posix())

@@ -38,13 +38,7 @@ def check(
 
 
 def show(facts: Mapping[str, Any], console: Console) -> None:
-    """Print what `overview` found.
-
-    Parameters
-    ----------
-    facts : dict
-    console : Console
-    """
+    """Print what `overview` found."""
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")

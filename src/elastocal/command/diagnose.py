@@ -46,13 +46,7 @@ def diagnose(
 
 
 def follow(lines: Iterable[str], console: Console) -> None:
-    """Show the lines of a run as they come: a job as the state of a bar, where there is a terminal, any other as it is.
-
-    Parameters
-    ----------
-    lines : iterable of str
-    console : Console
-    """
+    """Show the lines of a run as they come: a job as the state of a bar, where there is a terminal, any other as it is."""
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f} of {task.total:.0f}")
     with Progress(*columns, TimeElapsedColumn(), console=console, transient=True, disable=not console.is_terminal) as progress:
         bar = progress.add_task("reading", total=1)

@@ -15,14 +15,7 @@ _INSTALLED = f"share/elastocal/{_SNAKEFILE}"
 def pipeline() -> Path:
     """The folder with the Snakefile: of the checkout, where there is one, else what was installed with this package.
 
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    InputError
-        Where there is none.
+    Raises `InputError` where there is none.
     """
     found = _checkout() or _installed()
     if found is None:
@@ -32,12 +25,7 @@ def pipeline() -> Path:
 
 
 def workplace() -> Path:
-    """The folder in which results/ and reports/ are: the checkout, where there is one, else the working directory.
-
-    Returns
-    -------
-    Path
-    """
+    """The folder in which results/ and reports/ are: the checkout, where there is one, else the working directory."""
     return _checkout() or Path.cwd()
 
 

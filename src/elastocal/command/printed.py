@@ -19,21 +19,8 @@ _LONGEST = 60
 def printed(option: str, text: str) -> str:
     """A text that is printed as it is.
 
-    Parameters
-    ----------
-    option : str
-        Named in errors.
-    text : str
-
-    Returns
-    -------
-    str
-        Without blanks around it.
-
-    Raises
-    ------
-    InputError
-        Nothing but blanks, a line break or another control character, or more characters than a line of the document has.
+    `option`: named in errors. Returns without blanks around it. Raises `InputError`: nothing but blanks, a line break or
+    another control character, or more characters than a line of the document has.
     """
     line = text.strip(" ")
     if steering(line) or not 0 < len(line) <= _LONGEST:
@@ -44,21 +31,8 @@ def printed(option: str, text: str) -> str:
 def iso_date(option: str, text: str) -> str:
     """A day of the calendar.
 
-    Parameters
-    ----------
-    option : str
-        Named in errors.
-    text : str
-        As ISO 8601 writes it with hyphens, such as ``2026-11-20``.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        Another form, or no such day.
+    `option`: named in errors. `text`: as ISO 8601 writes it with hyphens, such as ``2026-11-20``. Raises `InputError`: another
+    form, or no such day.
     """
     try:
         day = date.fromisoformat(text).isoformat()

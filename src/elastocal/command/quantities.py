@@ -30,21 +30,8 @@ LARGEST_SEED, MOST_POSES, MOST_ROWS, MOST_JOBS = 2**32 - 1, 10_000, 10_000_000, 
 def length_m(option: str, text: str) -> float:
     """A length with its unit in metres.
 
-    Parameters
-    ----------
-    option : str
-        Named in errors.
-    text : str
-        Such as ``0.2mm``.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InputError
-        No unit, less than any instrument tells, or more than any robot misses by.
+    `option`: named in errors. `text`: such as ``0.2mm``. Raises `InputError`: no unit, less than any instrument tells, or more
+    than any robot misses by.
     """
     value = _quantity(text, _METRES)
     if not _LEAST_M <= value <= _LARGEST_M:
@@ -73,23 +60,8 @@ def _quantity(text: str, units: Mapping[str, float]) -> float:
 def numbers(option: str, text: str, count: int, largest: float = FARTHEST_PLACE_M) -> np.ndarray:
     """Numbers separated by commas, metres.
 
-    Parameters
-    ----------
-    option : str
-        Named in errors.
-    text : str
-    count : int
-    largest : float
-        Size that each may have.
-
-    Returns
-    -------
-    ndarray (count,)
-
-    Raises
-    ------
-    InputError
-        Another count, or something that is no number of such a size.
+    `option`: named in errors. `largest`: size that each may have. Returns (count,). Raises `InputError`: another count, or
+    something that is no number of such a size.
     """
     try:
         found = np.array([float(part) for part in text.split(",")])

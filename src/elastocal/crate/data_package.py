@@ -1,8 +1,6 @@
 """The tables of a run as a data package: each CSV file with its columns, size, SHA-256, and what it was made from.
 
-References
-----------
-.. [1] Data Package standard, version 2, Open Knowledge Foundation, 2024.
+[1] Data Package standard, version 2, Open Knowledge Foundation, 2024.
 """
 
 from __future__ import annotations
@@ -27,19 +25,8 @@ _TYPES = {"b": "boolean", "i": "integer", "u": "integer", "f": "number"}
 def data_package(jobs: Iterable[JobRecord], folder: str, licence: str) -> dict[str, Any]:
     """Describe the CSV files below a folder.
 
-    Parameters
-    ----------
-    jobs : iterable of JobRecord
-        That made them.
-    folder : str
-        Where the description is to stand; it names tables from there.
-    licence : str
-        Of the Open Definition, such as ``MIT``.
-
-    Returns
-    -------
-    dict
-        JSON-serialisable.
+    `jobs`: that made them. `folder`: where the description is to stand; it names tables from there. `licence`: of the Open
+    Definition, such as ``MIT``. Returns JSON-serialisable.
     """
     made = {file: job for job in jobs for file in job.outputs if file.endswith(".csv") and Path(file).is_relative_to(folder)}
     resources = [_resource(file, folder, made[file]) for file in sorted(made)]

@@ -4,10 +4,8 @@ The folder with the results is the crate: nothing is copied, and each file has i
 script, inputs, outputs, start and end; each rule a step of the workflow. Names of users and machines and absolute paths are not
 in it.
 
-References
-----------
-.. [1] Soiland-Reyes et al., Packaging research artefacts with RO-Crate, Data Science 5, 2022.
-.. [2] Leo et al., Recording provenance of workflow runs with RO-Crate, PLOS ONE 19, 2024.
+[1] Soiland-Reyes et al., Packaging research artefacts with RO-Crate, Data Science 5, 2022.
+[2] Leo et al., Recording provenance of workflow runs with RO-Crate, PLOS ONE 19, 2024.
 """
 
 from __future__ import annotations
@@ -51,25 +49,10 @@ _MEDIA_TYPES = {".parquet": "application/vnd.apache.parquet", ".typ": "text/plai
 class FinishedRun:
     """What is known of a run.
 
-    Attributes
-    ----------
-    jobs : sequence of JobRecord
-        In the order in which they began.
-    origin : Origin
-        Of the sources as they are now; each job has its own.
-    workflow : str
-        The Snakefile.
-    rules : sequence of str
-        Files that the workflow includes.
-    configuration : str
-        File with the resolved configuration, whose SHA-256 is the configuration's.
-    software_list : str
-        File with the packages.
-    packages : sequence of Package
-    python : str
-        Version.
-    others : sequence of str
-        Further files that describe the run.
+    `jobs`: in the order in which they began. `origin`: of the sources as they are now; each job has its own. `workflow`: the
+    Snakefile. `rules`: files that the workflow includes. `configuration`: file with the resolved configuration, whose SHA-256
+    is the configuration's. `software_list`: file with the packages. `python`: version. `others`: further files that describe
+    the run.
     """
 
     jobs: Sequence[JobRecord]
@@ -86,22 +69,8 @@ class FinishedRun:
 def run_crate(run: FinishedRun, words: Mapping[str, str]) -> dict[str, Any]:
     """The contents of ro-crate-metadata.json.
 
-    Parameters
-    ----------
-    run : FinishedRun
-        Files by their names in the working directory, which is the crate.
-    words : dict of str to str
-        ``name``, ``description``, ``author``, ``licence`` (SPDX) of the crate.
-
-    Returns
-    -------
-    dict
-        JSON-LD.
-
-    Raises
-    ------
-    InputError
-        No job at all, or a file outside of the crate.
+    `run`: files by their names in the working directory, which is the crate. `words`: ``name``, ``description``, ``author``,
+    ``licence`` (SPDX) of the crate. Returns JSON-LD. Raises `InputError`: no job at all, or a file outside of the crate.
     """
     if not run.jobs:
         raise InputError(run.workflow, "", "no record of any job", "a finished run")

@@ -18,11 +18,7 @@ _CLASSIFIER = "License :: OSI Approved :: "
 class Package:
     """An installed package.
 
-    Attributes
-    ----------
-    name, version : str
-    licence : str
-        As the package states it, empty where it does not.
+    `licence`: as the package states it, empty where it does not.
     """
 
     name: str
@@ -38,10 +34,7 @@ class Package:
 def installed_packages() -> list[Package]:
     """All packages of the environment that this runs in.
 
-    Returns
-    -------
-    list of Package
-        By name, each once.
+    Returns by name, each once.
     """
     found: dict[str, Package] = {}
     for distribution in distributions():

@@ -79,19 +79,8 @@ _EULER = {"XYZ": "Euler angles about the moved x, y, z", "xyz": "angles about th
 class Change:
     """One way in which the file may have to be read otherwise.
 
-    Attributes
-    ----------
-    name : str
-        Of the fault that it would be.
-    detail : str
-        One sentence in plain words.
-    correct : callable
-        ``(campaign, measurements)`` to those read otherwise.
-    joints : tuple of int
-        From 1.
-    parameters : tuple of Value
-    placement : {"", "frame", "targets"}
-        What it fits; its sentence and its numbers then come from the fit.
+    `name`: of the fault that it would be. `detail`: one sentence in plain words. `correct`: ``(campaign, measurements)`` to
+    those read otherwise. `joints`: from 1. `placement`: what it fits; its sentence and its numbers then come from the fit.
     """
 
     name: str
@@ -123,15 +112,7 @@ class Misfit:
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """The simplest ways to read the file otherwise that let absurd measurements fit.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
-
-    Returns
-    -------
-    list of Fault
-        Each beside the alternatives that fit as well.
+    Returns each beside the alternatives that fit as well.
     """
     some = spread(measurements, _POSES)
     found = _one_after_the_other(campaign, some)
@@ -158,14 +139,7 @@ def _one_after_the_other(campaign: Campaign, some: Measurements) -> list[Fault]:
 def single_changes(campaign: Campaign) -> list[Change]:
     """Every discrete change that is tried alone.
 
-    Parameters
-    ----------
-    campaign : Campaign
-
-    Returns
-    -------
-    list of Change
-        The commonest mistakes first: of two that fit alike the first is named.
+    Returns the commonest mistakes first: of two that fit alike the first is named.
     """
     oriented = campaign.measured == "pose"
     found = [*_senses(campaign.robot.joints), *_lengths_of_positions(), *_lengths_of_targets(campaign)]
@@ -175,16 +149,7 @@ def single_changes(campaign: Campaign) -> list[Change]:
 
 
 def placements(campaign: Campaign) -> list[Change]:
-    """Changes that fit where the base or the targets are, as far as the campaign says that it knows them.
-
-    Parameters
-    ----------
-    campaign : Campaign
-
-    Returns
-    -------
-    list of Change
-    """
+    """Changes that fit where the base or the targets are, as far as the campaign says that it knows them."""
     found = []
     if campaign.frame == "base":
         found.append(Change("wrong_frame", "", lambda c, r: (replace(c, frame="tracker"), r), placement="frame"))
@@ -200,16 +165,7 @@ def placements(campaign: Campaign) -> list[Change]:
 
 
 def pairs(campaign: Campaign) -> list[tuple[Change, ...]]:
-    """Two changes at once, where neither alone lets the measurements fit.
-
-    Parameters
-    ----------
-    campaign : Campaign
-
-    Returns
-    -------
-    list of tuple of Change
-    """
+    """Two changes at once, where neither alone lets the measurements fit."""
     placed_elsewhere = placements(campaign)
     found = [tuple(placed_elsewhere)] if len(placed_elsewhere) == 2 else []
     for change in placed_elsewhere:

@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 
 @cache
 def fault_modules() -> dict[str, ModuleType]:
-    """Modules that look for faults by their own names, each behind those that it comes after.
-
-    Returns
-    -------
-    dict of str to module
-    """
+    """Modules that look for faults by their own names, each behind those that it comes after."""
     names = sorted(module.name for module in pkgutil.iter_modules(elastocal.data_checks.__path__))
     modules = {name: import_module(f"elastocal.data_checks.{name}") for name in names}
     waiting = {name: module for name, module in modules.items() if hasattr(module, "NAMES")}
@@ -37,27 +32,14 @@ def fault_modules() -> dict[str, ModuleType]:
 
 
 def known_faults() -> set[str]:
-    """Names of all faults that may be found.
-
-    Returns
-    -------
-    set of str
-    """
+    """Names of all faults that may be found."""
     return {name for module in fault_modules().values() for name in module.NAMES}
 
 
 def faults(campaign: Campaign, measurements: Measurements) -> tuple[Fault, ...]:
     """Every fault that some measurements show.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
-
-    Returns
-    -------
-    tuple of Fault
-        A fault is not looked for where another one makes that meaningless: see `faults.protocol`.
+    Returns a fault is not looked for where another one makes that meaningless: see `faults.protocol`.
     """
     found: list[Fault] = []
     decisive: set[str] = set()

@@ -30,15 +30,8 @@ _SURE = 2.0
 def fitted_compliance_warnings(fitted: Fit) -> list[str]:
     """`compliance_warnings` of a fit.
 
-    Parameters
-    ----------
-    fitted : Fit
-
-    Returns
-    -------
-    list of str
-        None where compliances are not identified, nor where measurements are wrong by centimetres: they mean nothing there.
-        That the joints are taken as rigid, where the compliances are not known either.
+    Returns None where compliances are not identified, nor where measurements are wrong by centimetres: they mean nothing there.
+    That the joints are taken as rigid, where the compliances are not known either.
     """
     model = fitted.model
     if not model.identifies_compliance and not model.compliance_known:
@@ -61,19 +54,9 @@ def compliance_warnings(
 ) -> list[str]:
     """Name the identified joint compliances that are negative, or far off nominal either way.
 
-    Parameters
-    ----------
-    compliance, std_error : array_like (n,)
-        Identified, rad/(N m); standard error 0 where a compliance was not identified.
-    nominal : array_like (n,)
-        Of the robot file.
-    known : bool
-        Whether it states them; else they are usual ones.
-
-    Returns
-    -------
-    list of str
-        One sentence with value and standard error of each, or none.
+    `compliance`, `std_error` (n,): identified, rad/(N m); standard error 0 where a compliance was not identified. `nominal`
+    (n,): of the robot file. `known`: whether it states them; else they are usual ones. Returns one sentence with value and
+    standard error of each, or none.
     """
     compliance, std_error, nominal = (1e6 * np.asarray(values, float) for values in (compliance, std_error, nominal))
     most, word = (MOST_OFF_NOMINAL, "nominal") if known else (MOST_OFF_USUAL, "usual for such a robot")

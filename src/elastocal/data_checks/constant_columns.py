@@ -22,15 +22,7 @@ _FEWEST_POSES = 3
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """Columns that are the same in all poses and cannot be.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
-
-    Returns
-    -------
-    list of Fault
-        One for each kind, of the first target that shows it.
+    Returns one for each kind, of the first target that shows it.
     """
     some = spread(measurements)
     predicted = placed(campaign, some).predicted

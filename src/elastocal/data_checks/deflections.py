@@ -45,12 +45,7 @@ _DIFFERING = 1e-6
 class Unit:
     """Units in which loads may have been written.
 
-    Attributes
-    ----------
-    force, moment : float
-        N and N m for each unit written.
-    detail : str
-        Empty for N and N m themselves.
+    `force`, `moment`: N and N m for each unit written. `detail`: empty for N and N m themselves.
     """
 
     force: float
@@ -76,14 +71,7 @@ UNITS = (
 class Deflections:
     """Deflections, and what each joint should have made of them; rows are the coordinates of the measurements.
 
-    Attributes
-    ----------
-    seen : ndarray (R,)
-        m.
-    by_force, by_moment : ndarray (R, n)
-        Part of each joint at its nominal compliance, m.
-    poses : int
-        Behind the rows.
+    `seen` (R,): m. `by_force`, `by_moment` (R, n): part of each joint at its nominal compliance, m. `poses`: behind the rows.
     """
 
     seen: np.ndarray
@@ -96,18 +84,10 @@ class Deflections:
 class UnitFound:
     """Sign and unit in which the loads explain the deflections.
 
-    Attributes
-    ----------
-    sign : float
-        +1, or -1 where the loads are turned round.
-    unit : Unit
-        Which brings the compliances nearest to the nominal ones.
-    less_likely : Unit or None
-        Another that explains the deflections as well, by compliances that are further from the nominal ones.
-    slope : float
-        Deflection seen over the one expected as written, the mean over the joints.
-    rms_as_written, rms_corrected : float
-        Residual at nominal compliances times the best factor that robots have in common, m.
+    `sign`: +1, or -1 where the loads are turned round. `unit`: which brings the compliances nearest to the nominal ones.
+    `less_likely`: another that explains the deflections as well, by compliances that are further from the nominal ones.
+    `slope`: deflection seen over the one expected as written, the mean over the joints. `rms_as_written`, `rms_corrected`:
+    residual at nominal compliances times the best factor that robots have in common, m.
     """
 
     sign: float
@@ -122,22 +102,12 @@ def deflections(campaign: Campaign, measurements: Measurements) -> Deflections |
     """Differences between the loads of each pose; where there is one load a pose, all of the deflection.
 
     Frames, targets and geometry are taken off as means of each target in each pose (within transformation) or, where the loads
-    of a pose do not differ, by projection (Frisch-Waugh-Lovell theorem [1]_).
+    of a pose do not differ, by projection (Frisch-Waugh-Lovell theorem [1]).
 
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
+    Returns None without loads, or with too few poses.
 
-    Returns
-    -------
-    Deflections or None
-        None without loads, or with too few poses.
-
-    References
-    ----------
-    .. [1] Lovell, M. C., Seasonal adjustment of economic time series and multiple regression analysis, Journal of the American
-       Statistical Association 58, 1963.
+    [1] Lovell, M. C., Seasonal adjustment of economic time series and multiple regression analysis, Journal of the American
+        Statistical Association 58, 1963.
     """
     if not measurements.wrench.any():
         return None
@@ -167,14 +137,7 @@ def deflections(campaign: Campaign, measurements: Measurements) -> Deflections |
 def unit_of_loads(deflected: Deflections) -> UnitFound | None:
     """The sign and unit that explain the deflections far better than the loads as written.
 
-    Parameters
-    ----------
-    deflected : Deflections
-
-    Returns
-    -------
-    UnitFound or None
-        None where the loads as written do, or where nothing does.
+    Returns None where the loads as written do, or where nothing does.
     """
     as_written = (deflected.by_force + deflected.by_moment).sum(axis=1)
     found = []
@@ -218,20 +181,9 @@ def _left(seen: np.ndarray, expected: np.ndarray) -> tuple[float, float]:
 class StateDeflections:
     """Loaded less unloaded mean of each target, for S loaded states; zero where a target was not read.
 
-    Attributes
-    ----------
-    wrench : ndarray (S, 6)
-    seen : ndarray (S, T, 3)
-        m.
-    jacobian : ndarray (S, T, 3, n)
-        Of the targets.
-    end_jacobian : ndarray (S, 6, n)
-    targets : ndarray (S,)
-        How many were read.
-    rows : tuple of tuple of int
-        Loaded rows of the file behind each state.
-    compliance_known : bool
-        Whether the robot file states compliances.
+    `wrench` (S, 6). `seen` (S, T, 3): m. `jacobian` (S, T, 3, n): of the targets. `end_jacobian` (S, 6, n). `targets` (S,): how
+    many were read. `rows`: loaded rows of the file behind each state. `compliance_known`: whether the robot file states
+    compliances.
     """
 
     wrench: np.ndarray
@@ -245,17 +197,7 @@ class StateDeflections:
     def misfits(self, compliance: np.ndarray, seen: np.ndarray | None = None) -> np.ndarray:
         """RMS over the targets of what the load of each state (columns) leaves of the deflections of each state (rows).
 
-        Parameters
-        ----------
-        compliance : ndarray (n,)
-            rad/(N m).
-        seen : ndarray (S, T, 3), optional
-            Other deflections.
-
-        Returns
-        -------
-        ndarray (S, S)
-            m.
+        `compliance` (n,): rad/(N m). `seen` (S, T, 3): other deflections. Returns (S, S): m.
         """
         seen = self.seen if seen is None else seen
         per_wrench = (self.jacobian * compliance) @ self.end_jacobian[:, None].transpose(0, 1, 3, 2)
@@ -273,14 +215,7 @@ class StateDeflections:
     def compliance(self, states: np.ndarray, loads: np.ndarray, nominal: np.ndarray) -> np.ndarray:
         """Compliances that fit the deflections of some states best under some loads, near the nominal ones.
 
-        Parameters
-        ----------
-        states, loads : ndarray of int (K,)
-        nominal : ndarray (n,)
-
-        Returns
-        -------
-        ndarray (n,)
+        `states`, `loads` (K,) of int, `nominal` (n,). Returns (n,).
         """
         torques = generalized_forces(self.end_jacobian[states], self.wrench[loads]) * nominal
         left = (self.jacobian[states] * torques[:, None, None, :]).reshape(-1, len(nominal))
@@ -291,15 +226,7 @@ class StateDeflections:
 def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDeflections | None:
     """Deflections of every loaded state that has an unloaded one of its pose beside it.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
-
-    Returns
-    -------
-    StateDeflections or None
-        None where there is none.
+    Returns None where there is none.
     """
     pose = state_clusters(measurements)
     compared = np.isin(pose, pose[measurements.load == 0]) & np.isin(pose, pose[measurements.wrench.any(axis=1)])

@@ -19,15 +19,7 @@ _FARTHEST_M, _FARTHEST_RAD = 5 * IMPLAUSIBLE_M, 5 * IMPLAUSIBLE_RAD
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """Measurements absurdly far from the nominal robot, for a reason that no other fault names.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
-
-    Returns
-    -------
-    list of Fault
-        One, or none.
+    Returns one, or none.
     """
     some = spread(measurements)
     # Nearly all campaigns are done with the first, which takes a sixth of the time.

@@ -40,13 +40,7 @@ _TRIMMED = 0.1
 class Placement:
     """Measurements beside the nominal robot, in base axes.
 
-    Attributes
-    ----------
-    estimate : Estimate
-        Frames and targets.
-    predicted, measured : ndarray (N, 3)
-        m.
-    predicted_rotation, measured_rotation : ndarray (N, 3, 3) or None
+    `estimate`: frames and targets. `predicted`, `measured` (N, 3): m. `predicted_rotation`, `measured_rotation` (N, 3, 3).
     """
 
     estimate: Estimate
@@ -70,39 +64,18 @@ class Placement:
 
 
 def placed(campaign: Campaign, measurements: Measurements) -> Placement:
-    """Fit frames and targets to all measurements alike.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
-
-    Returns
-    -------
-    Placement
-    """
+    """Fit frames and targets to all measurements alike."""
     return _Nominal.of(campaign, measurements).placed()
 
 
 def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement:
     """Fit frames and targets to the measurements that agree with each other.
 
-    Least trimmed squares by concentration steps [1]_ from the fit to all, trimmed for each target in each session; then one
+    Least trimmed squares by concentration steps [1] from the fit to all, trimmed for each target in each session; then one
     reweighted fit.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
-
-    Returns
-    -------
-    Placement
-
-    References
-    ----------
-    .. [1] Rousseeuw, P. J. and Van Driessen, K., Computing LTS regression for large data sets, Data Mining and Knowledge
-       Discovery 12, 2006.
+    [1] Rousseeuw, P. J. and Van Driessen, K., Computing LTS regression for large data sets, Data Mining and Knowledge Discovery
+        12, 2006.
     """
     nominal = _Nominal.of(campaign, measurements)
     found = nominal.placed()
@@ -120,33 +93,14 @@ def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement
 
 
 def placed_by(campaign: Campaign, measurements: Measurements, estimate: Estimate) -> Placement:
-    """Measurements beside the nominal robot in given frames and targets, without loads: they move it by millimetres only.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
-    estimate : Estimate
-
-    Returns
-    -------
-    Placement
-    """
+    """Measurements beside the nominal robot in given frames and targets, without loads: they move it by millimetres only."""
     return _Nominal.of(campaign, measurements).placed_by(estimate)
 
 
 def spread(measurements: Measurements, poses: int = MANY_POSES) -> Measurements:
     """Measurements of some poses all over the campaign, at the lowest load of each.
 
-    Parameters
-    ----------
-    measurements : Measurements
-    poses : int
-        At most so many of each target in each session.
-
-    Returns
-    -------
-    Measurements
+    `poses`: at most so many of each target in each session.
     """
     chosen = []
     for members in _groups(measurements):
@@ -169,12 +123,10 @@ def trimmed_rms(distance: np.ndarray) -> float:
 def robust_sigma(distance: np.ndarray, components: int) -> float:
     """Standard deviation of each component of vectors, from the median of their lengths (N,).
 
-    The median absolute deviation [1]_ for vectors: divided by the median of the chi distribution.
+    The median absolute deviation [1] for vectors: divided by the median of the chi distribution.
 
-    References
-    ----------
-    .. [1] Hampel, F. R., The influence curve and its role in robust estimation, Journal of the American Statistical Association
-       69, 1974.
+    [1] Hampel, F. R., The influence curve and its role in robust estimation, Journal of the American Statistical Association
+        69, 1974.
     """
     return float(np.median(distance) / np.sqrt(chi2.median(components)))
 
@@ -191,14 +143,8 @@ def _groups(measurements: Measurements) -> list[np.ndarray]:
 class _Nominal:
     """Measurements beside the poses of their measuring points on the nominal robot, which every placement shares.
 
-    Attributes
-    ----------
-    model : Model
-        Frames and targets alone.
-    observations : Observations
-        N of them.
-    position, rotation : ndarray (N, 3), (N, 3, 3)
-        As by `registration.nominal_poses`.
+    `model`: frames and targets alone. `observations`: N of them. `position`, `rotation` (N, 3), (N, 3, 3): as by
+    `registration.nominal_poses`.
     """
 
     model: Model

@@ -17,12 +17,7 @@ from dataclasses import dataclass
 class Value:
     """One number that describes a fault.
 
-    Attributes
-    ----------
-    name : str
-    value : float
-    unit : str
-        "–" where it has none.
+    `unit`: "–" where it has none.
     """
 
     name: str
@@ -34,23 +29,11 @@ class Value:
 class Fault:
     """A fault that the measurements show.
 
-    Attributes
-    ----------
-    name : str
-        One of the ``NAMES`` of a module.
-    joints : tuple of int
-        Joints concerned, counted from 1; empty where there are none.
-    detail : str
-        One sentence in plain words.
-    parameters : tuple of Value
-    evidence : tuple of float
-        RMS residual as written and with the correction, m. Where only orientations show the fault: of a point 1 m away.
-    rows : tuple of int
-        Rows of the file concerned; empty where all are.
-    decisive : bool
-        Whether the measurements must be corrected before anything is traced.
-    alternatives : tuple of str
-        What would explain the measurements as well, in plain words.
+    `name`: one of the ``NAMES`` of a module. `joints`: joints concerned, counted from 1; empty where there are none. `detail`:
+    one sentence in plain words. `evidence`: RMS residual as written and with the correction, m. Where only orientations show
+    the fault: of a point 1 m away. `rows`: rows of the file concerned; empty where all are. `decisive`: whether the
+    measurements must be corrected before anything is traced. `alternatives`: what would explain the measurements as well, in
+    plain words.
     """
 
     name: str

@@ -3,14 +3,12 @@
 A row is out of place where it is absurdly far from the nominal robot as it stands, and where another place is not only better
 but clearly nearer than chance would have it: among many points some point is always near.
 
-Where most rows are out of place, they are matched by iterative closest points [1]_ from the principal axes of all points; loads
-are matched to deflections as an assignment problem [2]_.
+Where most rows are out of place, they are matched by iterative closest points [1] from the principal axes of all points; loads
+are matched to deflections as an assignment problem [2].
 
-References
-----------
-.. [1] Besl, P. J. and McKay, N. D., A method for registration of 3-D shapes, IEEE Transactions on Pattern Analysis and Machine
-   Intelligence 14, 1992.
-.. [2] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
+[1] Besl, P. J. and McKay, N. D., A method for registration of 3-D shapes, IEEE Transactions on Pattern Analysis and Machine
+    Intelligence 14, 1992.
+[2] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
 """
 
 from __future__ import annotations
@@ -77,17 +75,7 @@ class _Shift:
 
 
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
-    """Rows whose measured columns, or whose loads, belong to other rows.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    measurements : Measurements
-
-    Returns
-    -------
-    list of Fault
-    """
+    """Rows whose measured columns, or whose loads, belong to other rows."""
     return [*_of_positions(campaign, measurements), *_of_loads(campaign, measurements)]
 
 

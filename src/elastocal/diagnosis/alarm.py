@@ -1,18 +1,15 @@
 """Is anything missing at all? One Monte Carlo test.
 
 The statistic is the log of the average Bayes factor, over all units and all whole mechanisms, against "nothing": a Bayes factor
-as the statistic of a test, the Bayes/non-Bayes compromise [1]_. Its null distribution is that of simulated measurements of the
+as the statistic of a test, the Bayes/non-Bayes compromise [1]. Its null distribution is that of simulated measurements of the
 same design, at the pose error that fits best, with the pose error averaged over anew in each draw; the p-value counts how many
 draws reach the statistic of the measurements. With noise and pose error known that is exact; with a fitted pose error it is a
-parametric bootstrap [2]_. No Bonferroni correction and no choice of a test: competitors that the measurements cannot show have
+parametric bootstrap [2]. No Bonferroni correction and no choice of a test: competitors that the measurements cannot show have
 a Bayes factor of one in every draw. Sizes begin a step below those of the posterior: what lies between may be seen, and its
 probability does not matter to a test.
 
-References
-----------
-.. [1] Good, I. J., The Bayes/non-Bayes compromise: a brief review, Journal of the American Statistical Association 87, 1992.
-.. [2] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press,
-   1997.
+[1] Good, I. J., The Bayes/non-Bayes compromise: a brief review, Journal of the American Statistical Association 87, 1992.
+[2] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press, 1997.
 """
 
 from __future__ import annotations
@@ -37,12 +34,7 @@ if TYPE_CHECKING:
 class Alarm:
     """Outcome of the test.
 
-    Attributes
-    ----------
-    p_value : float
-    statistic : float
-        Log of the average Bayes factor against "nothing".
-    raised : bool
+    `statistic`: log of the average Bayes factor against "nothing".
     """
 
     p_value: float
@@ -53,17 +45,7 @@ class Alarm:
 def alarm_of(problem: Problem, products: Products | Sums, pose_error_rad: float, stream: np.random.Generator) -> Alarm:
     """Test whether the declared model lacks anything.
 
-    Parameters
-    ----------
-    problem : Problem
-    products : Products
-    pose_error_rad : float
-        Pose error of the declared model at which measurements are simulated.
-    stream : numpy.random.Generator
-
-    Returns
-    -------
-    Alarm
+    `pose_error_rad`: pose error of the declared model at which measurements are simulated.
     """
     settings, statistics = problem.settings, problem.statistics
     # Of measurements that are summed, the size of the pose error is known to a step of its grid.
@@ -88,10 +70,7 @@ def _average_bayes_factors(
 ) -> np.ndarray:
     """Log of the average Bayes factor for N sets of measurements, ndarray (N,).
 
-    Parameters
-    ----------
-    along : ndarray (T, K, N)
-    squares : ndarray (T, N)
+    `along` (T, K, N), `squares` (T, N).
     """
     grid = problem.grid
     start = (statistics.log_likelihood + log_pose)[:, None]

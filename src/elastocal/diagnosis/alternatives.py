@@ -8,16 +8,14 @@ then on average
     -2 ln p_j = u'G u - u'G_j (P_j + G_jj)^-1 G_j'u + tr((P_j + G_jj)^-1 P_j) + ln |P_j + G_jj| - ln |P_j| - d_j + const,
 
 with u = t - m_j and d_j coefficients, and the difference between two models, drawn over the posterior of t, is the
-*separation*: twice the Kullback-Leibler divergence of which Box and Hill add up all pairs [1]_. Such a sum never has enough of
-two models that are far apart already; the expected fall of the entropy [2]_ does. Of models with one covariance it is bounded
-from below through exp(-separation / 8), their Bhattacharyya coefficient [3]_; here, where covariances differ and each draw of t
+*separation*: twice the Kullback-Leibler divergence of which Box and Hill add up all pairs [1]. Such a sum never has enough of
+two models that are far apart already; the expected fall of the entropy [2] does. Of models with one covariance it is bounded
+from below through exp(-separation / 8), their Bhattacharyya coefficient [3]; here, where covariances differ and each draw of t
 has its separations, that is an approximation.
 
-References
-----------
-.. [1] Box, G. E. P. and Hill, W. J., Discrimination among mechanistic models, Technometrics 9, 1967.
-.. [2] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
-.. [3] Kolchinsky, A. and Tracey, B. D., Estimating mixture entropy with pairwise distances, Entropy 19, 2017.
+[1] Box, G. E. P. and Hill, W. J., Discrimination among mechanistic models, Technometrics 9, 1967.
+[2] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
+[3] Kolchinsky, A. and Tracey, B. D., Estimating mixture entropy with pairwise distances, Entropy 19, 2017.
 """
 
 from __future__ import annotations
@@ -45,20 +43,9 @@ _DRAWS = 4
 class Members:
     """Models as they are after the present measurements; M of them.
 
-    Attributes
-    ----------
-    names : tuple of tuple of str
-        Of the hypotheses, the best first.
-    hypothesis : ndarray of int (M,)
-    log_weights : ndarray (M,)
-        Of their probabilities, which sum to one.
-    columns : tuple of ndarray of int
-        Of the unknowns that each has.
-    means : ndarray (M, U)
-        Of the unknowns; zero for those that a model does not have.
-    precisions : tuple of ndarray (d, d)
-    roots : tuple of ndarray (d, d)
-        Times white noise, deviations of its coefficients.
+    `names`: of the hypotheses, the best first. `hypothesis` (M,) of int. `log_weights` (M,): of their probabilities, which sum
+    to one. `columns`: of the unknowns that each has. `means` (M, U): of the unknowns; zero for those that a model does not
+    have. `precisions` (d, d). `roots` (d, d): times white noise, deviations of its coefficients.
     """
 
     names: tuple[tuple[str, ...], ...]
@@ -98,19 +85,7 @@ def members_of(
 
     All models are taken at the pose error of the leading one; half-normal priors count as normal ones.
 
-    Parameters
-    ----------
-    evidence : Evidence
-    kept : dict of tuple of str to list of search.Model
-        Models of each hypothesis, the best first.
-    instrument : new_states.Instrument
-    lead : search.Model
-    factor : float
-        Times the noise taken that the leading model leaves.
-
-    Returns
-    -------
-    Members
+    `kept`: models of each hypothesis, the best first. `factor`: times the noise taken that the leading model leaves.
     """
     problem, products = evidence.linearized.problem, evidence.linearized.products
     total, _ = normal_equations(products, lead.pose_error_rad)
@@ -154,15 +129,7 @@ def members_of(
 def _misfits(members: Members, information: np.ndarray, truths: np.ndarray) -> np.ndarray:
     """-2 ln p_j on average, but for what is common to all models, for measurements that true coefficients make.
 
-    Parameters
-    ----------
-    members : Members
-    information : ndarray (N, U, U)
-    truths : ndarray (T, U)
-
-    Returns
-    -------
-    ndarray (N, T, M)
+    `information` (N, U, U), `truths` (T, U). Returns (N, T, M).
     """
     of_truths = information @ truths.T
     squares = (of_truths * truths.T).sum(axis=1)
@@ -185,13 +152,7 @@ def _misfits(members: Members, information: np.ndarray, truths: np.ndarray) -> n
 class Criterion:
     """Entropy of the hypotheses that an experiment leaves, by pairwise separations.
 
-    Attributes
-    ----------
-    members : Members
-    truths : ndarray (T, U)
-        Draws of each model's coefficients.
-    source : ndarray of int (T,)
-        Whose.
+    `truths` (T, U): draws of each model's coefficients. `source` (T,) of int: whose.
     """
 
     members: Members

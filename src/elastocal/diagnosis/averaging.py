@@ -1,14 +1,12 @@
 """Parameters averaged over models, so that values and intervals are honest after selection.
 
-Bayesian model averaging [1]_. The exact fit is that of the most probable model at its most probable sizes. What the others say
+Bayesian model averaging [1]. The exact fit is that of the most probable model at its most probable sizes. What the others say
 differently is taken from the linearised problem: the mean over models moves the estimate, and their spread widens its standard
 error (law of total variance). Parameters of the declared model are averaged over all models; those of an effect over its sizes
 and the models that have it, so that they answer how large it is if it is there.
 
-References
-----------
-.. [1] Hoeting, J. A., Madigan, D., Raftery, A. E. and Volinsky, C. T., Bayesian model averaging: a tutorial, Statistical
-   Science 14, 1999.
+[1] Hoeting, J. A., Madigan, D., Raftery, A. E. and Volinsky, C. T., Bayesian model averaging: a tutorial, Statistical Science
+    14, 1999.
 """
 
 from __future__ import annotations
@@ -38,11 +36,7 @@ _LEAST_PROBABILITY = 0.002
 class Averaged:
     """Corrections to the exact fit of the most probable model.
 
-    Attributes
-    ----------
-    shift : dict of (str, str) to float
-        By owner and name of a parameter: what the other models add to its estimate.
-    std_error : dict of (str, str) to float
+    `shift` (str, str): by owner and name of a parameter: what the other models add to its estimate. `std_error` (str, str).
     """
 
     shift: dict[tuple[str, str], float]
@@ -52,18 +46,7 @@ class Averaged:
 def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: Sequence[tuple[str, str]]) -> Averaged:
     """Average over the models of a posterior.
 
-    Parameters
-    ----------
-    linearized : Linearized
-    posterior : Posterior
-    best : search.Model
-        Of which there is an exact fit.
-    owners : sequence of (str, str)
-        Owner and name of each parameter of the declared block.
-
-    Returns
-    -------
-    Averaged
+    `best`: of which there is an exact fit. `owners` (str, str): owner and name of each parameter of the declared block.
     """
     likely = _likely(posterior, best)
     equations = {tau: normal_equations(linearized.products, tau)[0] for tau in {model.pose_error_rad for model, _ in likely}}
@@ -93,16 +76,7 @@ def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bo
     models, the expected square of the error falls from E d'd to E d'd - 2 d'E d + d'd where d is added: where 2 d'E d exceeds
     d'd. Measurements that were held out take no part.
 
-    Parameters
-    ----------
-    problem : Problem
-    posterior : Posterior
-    model : search.Model
-        Of the posterior.
-
-    Returns
-    -------
-    bool
+    `model`: of the posterior.
     """
     gram = problem.statistics.gram[0]
     mean, mine = np.zeros(len(gram)), _predicted(problem, model)

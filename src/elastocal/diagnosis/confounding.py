@@ -1,11 +1,9 @@
 """Angles between what candidates contribute beyond the declared model: which of them these data distinguish.
 
-Smallest principal angle between two subspaces [1]_, from Gram matrices alone.
+Smallest principal angle between two subspaces [1], from Gram matrices alone.
 
-References
-----------
-.. [1] Björck, Å. and Golub, G. H., Numerical methods for computing angles between linear subspaces, Mathematics of Computation
-   27, 1973.
+[1] Björck, Å. and Golub, G. H., Numerical methods for computing angles between linear subspaces, Mathematics of Computation 27,
+    1973.
 """
 
 from __future__ import annotations
@@ -26,15 +24,7 @@ _ROUNDING = 1e-6
 def angles_between(problem: Problem, numbers: Sequence[int]) -> np.ndarray:
     """Smallest angle between each two of some units.
 
-    Parameters
-    ----------
-    problem : Problem
-    numbers : sequence of int
-
-    Returns
-    -------
-    ndarray (N, N)
-        Degrees.
+    Returns (N, N): degrees.
     """
     gram = problem.statistics.gram[0]
     bases = [_orthonormal(gram, problem.units[number].columns) for number in numbers]
@@ -54,15 +44,7 @@ def angles_between(problem: Problem, numbers: Sequence[int]) -> np.ndarray:
 def nearest_angles(problem: Problem, found: Sequence[int]) -> np.ndarray:
     """Angle of each unit to the nearest of those found.
 
-    Parameters
-    ----------
-    problem : Problem
-    found : sequence of int
-
-    Returns
-    -------
-    ndarray (number of units,)
-        Degrees; not a number where nothing was found.
+    Returns (number of units,): degrees; not a number where nothing was found.
     """
     nearest = np.full(len(problem.units), np.nan)
     if not len(found):

@@ -47,13 +47,8 @@ _MOST_STEPS = 4
 class Step:
     """One model on the way from the nominal robot to all effects found.
 
-    Attributes
-    ----------
-    name : str
-    kind : {"frames", "declared", "effect", "kept"}
-        Of the last, "kept" where frames alone predict training poses better than what was fitted.
-    fitted : Fit
-        To the training poses.
+    `kind`: of the last, "kept" where frames alone predict training poses better than what was fitted. `fitted`: to the training
+    poses.
     """
 
     name: str
@@ -65,14 +60,7 @@ class Step:
 class Evidence:
     """What the last linearisation of a diagnosis says; None of it where the data are at fault.
 
-    Attributes
-    ----------
-    linearized : Linearized
-    posterior : Posterior
-    alarm : Alarm
-    conclusion : Conclusion
-    adopted : bool
-        Whether the effects found enter the model.
+    `adopted`: whether the effects found enter the model.
     """
 
     linearized: Linearized
@@ -86,16 +74,8 @@ class Evidence:
 class Diagnosis:
     """What training poses say of a campaign.
 
-    Attributes
-    ----------
-    case : Case
-    steps : tuple of Step
-        The last is the final model.
-    evidence : Evidence or None
-    document : dict
-        Contents of verdict.json, but for what held-out poses say.
-    left_out : Measurements
-        Gross errors, which are no part of the case.
+    `steps`: the last is the final model. `document`: contents of verdict.json, but for what held-out poses say. `left_out`:
+    gross errors, which are no part of the case.
     """
 
     case: Case

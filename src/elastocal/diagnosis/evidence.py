@@ -1,30 +1,28 @@
-"""Bayes factors of models [1]_ from sufficient statistics.
+"""Bayes factors of models [1] from sufficient statistics.
 
 Coefficients of a unit are normal about zero with standard deviation s times their plausible size, one size s for the unit: a
-local prior [2]_ beside the probability that the unit is not there, spike and slab [3]_. With D the diagonal of all s^2,
+local prior [2] beside the probability that the unit is not there, spike and slab [3]. With D the diagonal of all s^2,
 
     ln p(y | model, s, tau) = -1/2 ln |I + D^1/2 G D^1/2| + l(y'My - b'(G + D^-1)^-1 b),
 
 where l(rss) = -nu/2 ln sigma^2 - rss / (2 sigma^2) at sigma^2 = max(rss / nu, 1): the noise is at least what repeats or the
-campaign say, or else a smooth competitor could interpolate. Above one it is profiled [4]_, and the priors widen with it as
-conjugate ones do. Sizes and tau are averaged over, never maximised, as g is in mixtures of g priors [5]_.
+campaign say, or else a smooth competitor could interpolate. Above one it is profiled [4], and the priors widen with it as
+conjugate ones do. Sizes and tau are averaged over, never maximised, as g is in mixtures of g priors [5].
 
 Where physics gives a coefficient its sign, the prior is half-normal: the Bayes factor of the normal one times twice the
-posterior probability of that sign, as against an encompassing model [6]_; of several such coefficients as if they were
+posterior probability of that sign, as against an encompassing model [6]; of several such coefficients as if they were
 independent.
 
-References
-----------
-.. [1] Kass, R. E. and Raftery, A. E., Bayes factors, Journal of the American Statistical Association 90, 1995.
-.. [2] Johnson, V. E. and Rossell, D., On the use of non-local prior densities in Bayesian hypothesis tests, Journal of the
-   Royal Statistical Society B 72, 2010.
-.. [3] Mitchell, T. J. and Beauchamp, J. J., Bayesian variable selection in linear regression, Journal of the American
-   Statistical Association 83, 1988.
-.. [4] Murphy, S. A. and van der Vaart, A. W., On profile likelihood, Journal of the American Statistical Association 95, 2000.
-.. [5] Liang, F. et al., Mixtures of g priors for Bayesian variable selection, Journal of the American Statistical Association
-   103, 2008.
-.. [6] Klugkist, I., Laudy, O. and Hoijtink, H., Inequality constrained analysis of variance: a Bayesian approach, Psychological
-   Methods 10, 2005.
+[1] Kass, R. E. and Raftery, A. E., Bayes factors, Journal of the American Statistical Association 90, 1995.
+[2] Johnson, V. E. and Rossell, D., On the use of non-local prior densities in Bayesian hypothesis tests, Journal of the Royal
+    Statistical Society B 72, 2010.
+[3] Mitchell, T. J. and Beauchamp, J. J., Bayesian variable selection in linear regression, Journal of the American Statistical
+    Association 83, 1988.
+[4] Murphy, S. A. and van der Vaart, A. W., On profile likelihood, Journal of the American Statistical Association 95, 2000.
+[5] Liang, F. et al., Mixtures of g priors for Bayesian variable selection, Journal of the American Statistical Association 103,
+    2008.
+[6] Klugkist, I., Laudy, O. and Hoijtink, H., Inequality constrained analysis of variance: a Bayesian approach, Psychological
+    Methods 10, 2005.
 """
 
 from __future__ import annotations
@@ -48,15 +46,7 @@ if TYPE_CHECKING:
 def log_sum_exp(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -> np.ndarray:
     """ln of the sum of exponentials, as scipy's logsumexp without its cost on small arrays.
 
-    Parameters
-    ----------
-    values : ndarray
-    axis : int or tuple of int, optional
-
-    Returns
-    -------
-    ndarray
-        Without these axes; of no dimension where all are summed.
+    Returns without these axes; of no dimension where all are summed.
     """
     highest = np.max(values, axis=axis, keepdims=True)
     highest = np.where(np.isfinite(highest), highest, 0.0)
@@ -69,9 +59,7 @@ def log_sum_exp(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -
 class Grid:
     """Sizes that are averaged over, with the logarithms of their weights.
 
-    Attributes
-    ----------
-    scales, log_weights : ndarray (S,)
+    `scales`, `log_weights` (S,).
     """
 
     scales: np.ndarray
@@ -92,14 +80,7 @@ class Grid:
 def scale_weights(scales: Sequence[float] | np.ndarray, settings: Settings) -> np.ndarray:
     """Logarithms of the prior weights of sizes: log-normal pieces below and above the most likely size.
 
-    Parameters
-    ----------
-    scales : ndarray (S,)
-    settings : Settings
-
-    Returns
-    -------
-    ndarray (S,)
+    `scales` (S,). Returns (S,).
     """
     off = np.log(np.asarray(scales) / settings.scale_center)
     spread = np.where(off < 0, *settings.scale_spread)
@@ -110,14 +91,7 @@ def scale_weights(scales: Sequence[float] | np.ndarray, settings: Settings) -> n
 def pose_weights(pose_error_rad: np.ndarray, settings: Settings) -> np.ndarray:
     """Logarithms of the prior weights of sizes of the pose error, one of which is zero.
 
-    Parameters
-    ----------
-    pose_error_rad : ndarray (T,)
-    settings : Settings
-
-    Returns
-    -------
-    ndarray (T,)
+    `pose_error_rad` (T,). Returns (T,).
     """
     there = pose_error_rad > 0
     share = settings.pose_error_probability / max(there.sum(), 1)
@@ -127,16 +101,7 @@ def pose_weights(pose_error_rad: np.ndarray, settings: Settings) -> np.ndarray:
 def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
     """l(rss): the profiled likelihood of the noise, which is at least one.
 
-    Parameters
-    ----------
-    squares : ndarray
-        Of any shape.
-    freedom : int
-
-    Returns
-    -------
-    ndarray
-        Of the same shape.
+    `squares`: of any shape. Returns of the same shape.
     """
     variance = np.maximum(squares / freedom, 1.0)
     return -0.5 * freedom * np.log(variance) - 0.5 * squares / variance
@@ -146,16 +111,9 @@ def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
 class Conditioned:
     """Statistics given that some columns are in the model with given sizes.
 
-    Attributes
-    ----------
-    free : ndarray (T, K, K)
-        W'MW without them.
-    cross : ndarray (T, D, K)
-        Its rows of these columns, divided by the Cholesky factor of I + D^1/2 G D^1/2.
-    along : ndarray (T, K)
-    squares : ndarray (T,)
-    log_occam : ndarray (T,)
-        -1/2 ln |I + D^1/2 G D^1/2| of these columns, with what tau contributes alone and its prior.
+    `free` (T, K, K): W'MW without them. `cross` (T, D, K): its rows of these columns, divided by the Cholesky factor of I +
+    D^1/2 G D^1/2. `along` (T, K), `squares` (T,). `log_occam` (T,): -1/2 ln |I + D^1/2 G D^1/2| of these columns, with what tau
+    contributes alone and its prior.
     """
 
     free: np.ndarray
@@ -184,17 +142,7 @@ class Conditioned:
 def condition(statistics: Statistics, columns: np.ndarray, deviations: np.ndarray, log_pose: np.ndarray) -> Conditioned:
     """Take columns into the model.
 
-    Parameters
-    ----------
-    statistics : Statistics
-    columns : ndarray of int (D,)
-    deviations : ndarray (D,)
-        Prior standard deviation of each, in plausible sizes.
-    log_pose : ndarray (T,)
-
-    Returns
-    -------
-    Conditioned
+    `columns` (D,) of int. `deviations` (D,): prior standard deviation of each, in plausible sizes. `log_pose` (T,).
     """
     start = statistics.log_likelihood + log_pose
     gram = statistics.gram
@@ -218,13 +166,8 @@ def condition(statistics: Statistics, columns: np.ndarray, deviations: np.ndarra
 class Blocks:
     """Units gathered by their number of columns, decomposed for any size: G_uu = V diag(values) V'.
 
-    Attributes
-    ----------
-    members : tuple of ndarray of int (U,)
-        Numbers of the units of each block.
-    values : tuple of ndarray (T, U, d)
-    vectors : tuple of ndarray (T, U, d, d)
-    columns : tuple of ndarray of int (U, d)
+    `members` (U,) of int: numbers of the units of each block. `values` (T, U, d), `vectors` (T, U, d, d), `columns` (U, d) of
+    int.
     """
 
     members: tuple[np.ndarray, ...]
@@ -236,16 +179,7 @@ class Blocks:
 def blocks_of(gram: np.ndarray, units: Sequence[Unit], chosen: Sequence[int]) -> Blocks:
     """Decompose the Gram matrix of each of some units.
 
-    Parameters
-    ----------
-    gram : ndarray (T, K, K)
-    units : sequence of Unit
-    chosen : sequence of int
-        Which of them.
-
-    Returns
-    -------
-    Blocks
+    `gram` (T, K, K). `chosen`: which of them.
     """
     return _decomposed(units, chosen, lambda at: gram[:, at[:, :, None], at[:, None, :]])
 
@@ -269,21 +203,8 @@ def _decomposed(units: Sequence[Unit], chosen: Sequence[int], part_of: Callable[
 def added_evidence(conditioned: Conditioned, blocks: Blocks, grid: Grid, freedom: int, units: Sequence[Unit]) -> np.ndarray:
     """Log evidence of a model with each of some units added, at every size of that unit.
 
-    Parameters
-    ----------
-    conditioned : Conditioned
-        By what the model has already.
-    blocks : Blocks
-        Of the conditioned Gram matrix.
-    grid : Grid
-    freedom : int
-    units : sequence of Unit
-        All of them.
-
-    Returns
-    -------
-    ndarray (T, number of units, S)
-        -inf for units that are not in the blocks.
+    `conditioned`: by what the model has already. `blocks`: of the conditioned Gram matrix. `units`: all of them. Returns (T,
+    number of units, S): -inf for units that are not in the blocks.
     """
     found = np.full((len(conditioned.squares), len(units), len(grid.scales)), -np.inf)
     variances = grid.scales**2
@@ -302,16 +223,9 @@ def added_evidence(conditioned: Conditioned, blocks: Blocks, grid: Grid, freedom
 class Evaluated:
     """A model with its evidence.
 
-    Attributes
-    ----------
-    log_evidence : float
-        Averaged over sizes and tau.
-    scales : ndarray (m,)
-        Most probable size of each unit.
-    log_pose : ndarray (T,)
-        Log posterior weight of each tau at these sizes.
-    without : ndarray (m,)
-        Log evidence of the model without each of its units, the sizes of the others as they are.
+    `log_evidence`: averaged over sizes and tau. `scales` (m,): most probable size of each unit. `log_pose` (T,): log posterior
+    weight of each tau at these sizes. `without` (m,): log evidence of the model without each of its units, the sizes of the
+    others as they are.
     """
 
     log_evidence: float
@@ -327,26 +241,13 @@ def evaluate(
 
     The sum over all combinations of sizes is taken as the product of the sums over each size about the mode; exact for one
     unit, and where sizes are independent given the measurements. The mode is found by coordinate ascent (iterated conditional
-    modes [1]_), all units at once where that raises the density and else the one that gains most. One inverse gives what every
+    modes [1]), all units at once where that raises the density and else the one that gains most. One inverse gives what every
     unit sees given all others: with C the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
 
-    Parameters
-    ----------
-    statistics : Statistics
-    units : sequence of Unit
-    grid : Grid
-    log_pose : ndarray (T,)
-        Logarithm of the prior weight of each size of the pose error.
-    start : sequence of float
-        Sizes from which the search for the mode starts; each in its grid.
+    `log_pose` (T,): logarithm of the prior weight of each size of the pose error. `start`: sizes from which the search for the
+    mode starts; each in its grid.
 
-    Returns
-    -------
-    Evaluated
-
-    References
-    ----------
-    .. [1] Besag, J., On the statistical analysis of dirty pictures, Journal of the Royal Statistical Society B 48, 1986.
+    [1] Besag, J., On the statistical analysis of dirty pictures, Journal of the Royal Statistical Society B 48, 1986.
     """
     base = statistics.log_likelihood + log_pose
     if not units:
@@ -386,14 +287,7 @@ _MANY_COLUMNS = 30
 def inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Invert symmetric positive matrices.
 
-    Parameters
-    ----------
-    matrices : ndarray (T, D, D)
-
-    Returns
-    -------
-    inverses : ndarray (T, D, D)
-    log_determinants : ndarray (T,)
+    `matrices` (T, D, D). Returns `inverses` (T, D, D); `log_determinants` (T,).
     """
     if matrices.shape[1] < _MANY_COLUMNS:
         factors = np.linalg.cholesky(matrices)
@@ -413,15 +307,7 @@ def inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 class Joint:
     """Density of the measurements under one model with one size for each unit.
 
-    Parameters
-    ----------
-    statistics : Statistics
-    units : sequence of Unit
-    grid : Grid
-    base : ndarray (T,)
-        What each tau contributes alone, with its prior.
-    places : ndarray of int (m,)
-        Size of each unit in the grid.
+    `base` (T,): what each tau contributes alone, with its prior. `places` (m,) of int: size of each unit in the grid.
     """
 
     def __init__(self, statistics: Statistics, units: Sequence[Unit], grid: Grid, base: np.ndarray, places: np.ndarray) -> None:

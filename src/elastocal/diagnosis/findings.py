@@ -39,15 +39,7 @@ _SCALED = ("value", "std_error", "prior_std")
 def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     """A location in words: joint 2, links 2 and 3, joint 4 orders 1-2.
 
-    Parameters
-    ----------
-    mechanism : str
-    location : tuple
-        Of `Unit`.
-
-    Returns
-    -------
-    str
+    `location`: of `Unit`.
     """
     joints = [str(entry) for entry in location if not isinstance(entry, str)]
     names = [entry for entry in location if isinstance(entry, str)]
@@ -58,11 +50,8 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
 def probability_facts(problem: Problem, posterior: Posterior, conclusion: Conclusion, alarm: Alarm) -> dict[str, Any]:
     """Probabilities as they stand in verdict.json.
 
-    Returns
-    -------
-    dict
-        ``nothing``, ``alarm_p_value``, ``mechanisms`` by name, and ``sets`` of mechanisms with the locations of their most
-        probable model.
+    Returns ``nothing``, ``alarm_p_value``, ``mechanisms`` by name, and ``sets`` of mechanisms with the locations of their most
+    probable model.
     """
     sets = []
     for hypothesis in conclusion.hypotheses:
@@ -94,22 +83,7 @@ def effect_entries(
 ) -> list[dict[str, Any]]:
     """Entries of the effects found, those of the most probable mechanisms first.
 
-    Parameters
-    ----------
-    problem : Problem
-    posterior : Posterior
-    conclusion : Conclusion
-    alarm : Alarm
-    final : Fit
-        Of the most probable model.
-    averages : Averaged
-        What the other models add to it.
-    observations : Observations
-        To which it was fitted.
-
-    Returns
-    -------
-    list of dict
+    `final`: of the most probable model. `averages`: what the other models add to it. `observations`: to which it was fitted.
     """
     numbers = posterior.models[conclusion.best.model].units if conclusion.best.named else ()
     units = [problem.units[number] for number in numbers]
@@ -152,16 +126,6 @@ def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list
 
     How far springs of unknown compliance sag does not tell a mass. Where the compliances are those of the robot
     file, a mass is given as its product with that of the joint that it turns most, which measurements tell.
-
-    Parameters
-    ----------
-    member : Candidate
-    final : Fit
-    averages : Averaged
-
-    Returns
-    -------
-    list of dict
     """
     effect = next(effect for effect in final.model.effects if effect.key == member.key)
     mine = np.flatnonzero([owner == member.key for owner, _ in final.parameters])
@@ -199,20 +163,8 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
 
     Its standard error is by the delta method.
 
-    Parameters
-    ----------
-    name : str
-        Of the effect.
-    members : sequence of Candidate
-        At all of its locations.
-    final : Fit
-    observations : Observations
-        To which it was fitted.
-
-    Returns
-    -------
-    list of dict
-        One entry, in m; none where the effect is not of gravity, or where its masses are identifiable.
+    `name`: of the effect. `members`: at all of its locations. `observations`: to which it was fitted. Returns one entry, in m;
+    none where the effect is not of gravity, or where its masses are identifiable.
     """
     if members[0].family != "gravity" or final.model.identifies_compliance:
         return []
@@ -233,14 +185,7 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
 def fault_entry(fault: Mapping[str, Any]) -> dict[str, Any]:
     """Entry of a decisive fault of the data.
 
-    Parameters
-    ----------
-    fault : dict
-        Fields of `faults.protocol.Fault`.
-
-    Returns
-    -------
-    dict
+    `fault`: fields of `faults.protocol.Fault`.
     """
     return {
         "name": fault["name"],
@@ -263,17 +208,8 @@ def fault_entry(fault: Mapping[str, Any]) -> dict[str, Any]:
 def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: float | None = None) -> list[str]:
     """Warnings of found parameters that nature does not allow, however many effects were found.
 
-    Parameters
-    ----------
-    final : Fit
-    entries : sequence of dict
-        Of `effect_entries`.
-    rated_kg : float, optional
-        Payload for which the robot is rated; looked at where the compliances are identified, without which no mass is.
-
-    Returns
-    -------
-    list of str
+    `entries`: of `effect_entries`. `rated_kg`: payload for which the robot is rated; looked at where the compliances are
+    identified, without which no mass is.
     """
     effects = {effect.key: effect for effect in final.model.effects}
     found = []

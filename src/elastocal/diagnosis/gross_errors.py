@@ -1,18 +1,16 @@
 """Rows that no model of the robot explains: a lost beam, a held point, a mistyped angle. They are found, named and left out.
 
 A row is judged by its deletion residual: its distance from what the other rows predict, in standard deviations (the externally
-studentized residual [1]_). Rows are a gross error beyond the distance that the largest of so many good rows exceeds with a
-small probability (a test of mean-shift outliers with Bonferroni's bound [2]_). The unit is one standard deviation or, where
+studentized residual [1]). Rows are a gross error beyond the distance that the largest of so many good rows exceeds with a
+small probability (a test of mean-shift outliers with Bonferroni's bound [2]). The unit is one standard deviation or, where
 that is more, what the rows that do not stand out scatter: a model that does not fit makes no row stand out.
 
 Before it is known what the model lacks, the rows are predicted by everything that it might lack at once: the Gaussian process
 whose covariance is that of all candidates at their prior sizes. The worst row is taken out, the others are predicted again, and
 so on. Rows that the final model explains after all are taken back.
 
-References
-----------
-.. [1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, section 2.2, Chapman and Hall, 1982.
-.. [2] Barnett, V. and Lewis, T., Outliers in Statistical Data, section 8.2, Wiley, 1994.
+[1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, section 2.2, Chapman and Hall, 1982.
+[2] Barnett, V. and Lewis, T., Outliers in Statistical Data, section 8.2, Wiley, 1994.
 """
 
 from __future__ import annotations
@@ -63,13 +61,8 @@ _MOST_NAMED = 10
 class Deviations:
     """Rows beside a model.
 
-    Attributes
-    ----------
-    residual : ndarray (N, rows)
-        m and rad, base axes.
-    distance : ndarray (N,)
-        From what the other rows predict, in robust standard deviations.
-    gross : ndarray of bool (N,)
+    `residual` (N, rows): m and rad, base axes. `distance` (N,): from what the other rows predict, in robust standard
+    deviations. `gross` (N,) of bool.
     """
 
     residual: np.ndarray
@@ -94,12 +87,10 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     """What the rows that a model was fitted to say of themselves, beside the noise that was declared or repeats show.
 
     Of the error common to a pose that the fit states the share counts that makes the generalized variance of most rows smallest
-    (an S-estimate [1]_): the rest may be that of the very errors that are looked for, or of a law that is not linear.
+    (an S-estimate [1]): the rest may be that of the very errors that are looked for, or of a law that is not linear.
 
-    References
-    ----------
-    .. [1] Davies, P. L., Asymptotic behaviour of S-estimates of multivariate location parameters and dispersion matrices,
-       Annals of Statistics 15, 1987.
+    [1] Davies, P. L., Asymptotic behaviour of S-estimates of multivariate location parameters and dispersion matrices, Annals
+        of Statistics 15, 1987.
     """
     single = single_observations(measurements)
     some = select_states(single, spread_poses(single, _MOST))

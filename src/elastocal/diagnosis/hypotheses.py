@@ -29,27 +29,11 @@ OTHER = "other"
 class Unit:
     """One law at one location.
 
-    Attributes
-    ----------
-    mechanism : str
-        Name of the effect, or `OTHER`.
-    location : tuple of int or str
-        Where it acts; equal for variants of one mechanism at one location.
-    candidate : Candidate or None
-        None for `OTHER`.
-    shapes : tuple of float
-    columns : ndarray of int (d,)
-        Its columns in the sufficient statistics.
-    sizes : ndarray (d,)
-        Plausible size of each parameter: a column is the sensitivity times this.
-    signs : ndarray of int (d,)
-        Sign that physics gives each parameter, 0 where it may have either.
-    log_prior : float
-        Logarithm of its share among the variants at its location.
-    competitor : Competitor or None
-        Of `OTHER`.
-    smallest : int
-        Place in the grid of sizes of the smallest that the measurements could show.
+    `mechanism`: name of the effect, or `OTHER`. `location`: where it acts; equal for variants of one mechanism at one location.
+    `candidate`: None for `OTHER`. `columns` (d,) of int: its columns in the sufficient statistics. `sizes` (d,): plausible size
+    of each parameter: a column is the sensitivity times this. `signs` (d,) of int: sign that physics gives each parameter, 0
+    where it may have either. `log_prior`: logarithm of its share among the variants at its location. `competitor`: of `OTHER`.
+    `smallest`: place in the grid of sizes of the smallest that the measurements could show.
     """
 
     mechanism: str
@@ -79,35 +63,20 @@ class Prior:
     """Prior probability of every model: a set of units.
 
     A mechanism is there with a small probability; given that, the number of its locations is geometric and all sets of so many
-    locations are equally likely, which allows for their multiplicity [1]_.
+    locations are equally likely, which allows for their multiplicity [1].
 
-    Attributes
-    ----------
-    log_odds : dict of str to float
-        Of each mechanism.
-    log_counts : dict of str to ndarray (L + 1,)
-        Logarithm of the probability of one given set of k locations of a mechanism that has L, given that it is there.
+    `log_odds`: of each mechanism. `log_counts` (L + 1,): logarithm of the probability of one given set of k locations of a
+    mechanism that has L, given that it is there.
 
-    References
-    ----------
-    .. [1] Scott, J. G. and Berger, J. O., Bayes and empirical-Bayes multiplicity adjustment in the variable-selection problem,
-       Annals of Statistics 38, 2010.
+    [1] Scott, J. G. and Berger, J. O., Bayes and empirical-Bayes multiplicity adjustment in the variable-selection problem,
+        Annals of Statistics 38, 2010.
     """
 
     log_odds: dict[str, float]
     log_counts: dict[str, np.ndarray]
 
     def log_odds_of(self, units: Iterable[Unit]) -> float:
-        """Logarithm of the prior odds of a model against "nothing".
-
-        Parameters
-        ----------
-        units : iterable of Unit
-
-        Returns
-        -------
-        float
-        """
+        """Logarithm of the prior odds of a model against "nothing"."""
         units = list(units)
         total = sum(unit.log_prior for unit in units)
         for mechanism, count in Counter(unit.mechanism for unit in units).items():
@@ -122,17 +91,7 @@ class Prior:
 
 
 def prior_of(units: Sequence[Unit], settings: Settings) -> Prior:
-    """Prior of all models that units can form.
-
-    Parameters
-    ----------
-    units : sequence of Unit
-    settings : Settings
-
-    Returns
-    -------
-    Prior
-    """
+    """Prior of all models that units can form."""
     odds: dict[str, float] = {}
     counts: dict[str, np.ndarray] = {}
     special = {"link_weight": settings.gravity_probability, OTHER: settings.other_probability}
@@ -153,17 +112,8 @@ def units_of(
 ) -> tuple[Unit, ...]:
     """Units of candidates and of the competitor, numbered in the order of their columns.
 
-    Parameters
-    ----------
-    tested : sequence of (Candidate, sequence of float)
-        With shape values.
-    features : sequence of (Competitor, int)
-        Laws of `OTHER`, with their numbers of columns.
-    settings : Settings
-
-    Returns
-    -------
-    tuple of Unit
+    `tested` (Candidate, sequence of float): with shape values. `features` (Competitor, int): laws of `OTHER`, with their
+    numbers of columns.
     """
     start = 0
     units: list[Unit] = []

@@ -51,16 +51,8 @@ _ERRORS = {"mean_m": "mean error", "rms_m": "RMS error", "p95_m": "95th percenti
 class Verdict:
     """A diagnosis with what held-out poses say of it.
 
-    Attributes
-    ----------
-    document : dict
-        Contents of verdict.json.
-    rows : list of dict
-        Of before_after.csv.
-    held_out : Case
-        What was held out, without its gross errors.
-    left_out : Measurements
-        These.
+    `document`: contents of verdict.json. `rows`: of before_after.csv. `held_out`: what was held out, without its gross errors.
+    `left_out`: these.
     """
 
     document: dict[str, Any]
@@ -72,17 +64,8 @@ class Verdict:
 def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """Open the held-out poses and state the verdict.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    held_out : Case
-        The held-out measurements; of another campaign, whose frames and targets are then fitted to them.
-    seed : int
-        Of the bootstrap over poses.
-
-    Returns
-    -------
-    Verdict
+    `held_out`: the held-out measurements; of another campaign, whose frames and targets are then fitted to them. `seed`: of the
+    bootstrap over poses.
     """
     case, steps = diagnosis.case, diagnosis.steps
     errors, part = without_gross_errors(diagnosis, held_out)
@@ -156,21 +139,7 @@ def heldout_errors(
 ) -> tuple[list[dict[str, Any]], dict[str, Any], list[str]]:
     """Errors of every step on training and held-out poses.
 
-    Parameters
-    ----------
-    steps : sequence of Step
-    case : Case
-    held_out : Case
-        As in `judge`.
-    seed : int
-
-    Returns
-    -------
-    rows : list of dict
-        Of before_after.csv.
-    heldout : dict
-        As in verdict.json.
-    warnings : list of str
+    `held_out`: as in `judge`. Returns `rows`: of before_after.csv; `heldout`: as in verdict.json.
     """
     there, errors = _errors(steps, case, held_out)
     before, after = _declared(steps), len(steps) - 1
@@ -226,18 +195,7 @@ def _summary(errors: Errors) -> dict[str, float]:
 def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:
     """Errors on the held-out poses beside those that cross-validation of the training poses predicts.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    held_out : Case
-        Of the verdict.
-    seed : int
-        As in `judge`.
-
-    Returns
-    -------
-    list of dict
-        Rows of splits.csv.
+    `held_out`: of the verdict. `seed`: as in `judge`. Returns rows of splits.csv.
     """
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     draws = stream(seed, case.campaign.name, "splits", 0)

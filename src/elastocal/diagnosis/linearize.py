@@ -65,20 +65,9 @@ _WIDE = 10.0
 class Linearized:
     """A model about a fit, and everything that it might lack.
 
-    Attributes
-    ----------
-    problem : Problem
-    products : Products or Sums
-        Of one pass over the measurements.
-    untestable : dict of str to str
-        Why a candidate is not tested.
-    about : Fit
-    around : Conditions
-        Of the states looked at.
-    candidates : frozenset of str
-        Keys of all candidates: parameters of the fit that they own are coefficients of units here.
-    pose_std_error_rad : float
-        With which the measurements of one pose tell a joint angle.
+    `products`: of one pass over the measurements. `untestable`: why a candidate is not tested. `around`: of the states looked
+    at. `candidates`: keys of all candidates: parameters of the fit that they own are coefficients of units here.
+    `pose_std_error_rad`: with which the measurements of one pose tell a joint angle.
     """
 
     problem: Problem
@@ -102,19 +91,8 @@ def linearized(
     Coefficients count from zero, not from the fit: what candidates and declared geometry contribute to the prediction is
     given back to the residual, so that their priors mean what they say.
 
-    Parameters
-    ----------
-    fitted : Fit
-        Of the declared model, or with effects found already, about which the problem is then linear.
-    observations : Observations
-    candidates : sequence of Candidate
-    settings : Settings
-    shapes : dict of str to list of tuple, optional
-        Values of the shape of some candidates, by their keys, instead of `shapes_tried`.
-
-    Returns
-    -------
-    Linearized
+    `fitted`: of the declared model, or with effects found already, about which the problem is then linear. `shapes`: values of
+    the shape of some candidates, by their keys, instead of `shapes_tried`.
     """
     around, sites = _conditions_of(fitted, observations), fitted.model.sites
     untestable = {c.key: reason for c in candidates if (reason := lacking(c, fitted.model, observations.states))}
@@ -178,16 +156,8 @@ def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Sett
     A test for one direction, with a Bonferroni correction for all units, reaches that where the non-centrality is the critical
     value. A smaller effect is there or not, and the measurements are the same: it counts as not there.
 
-    Parameters
-    ----------
-    statistics : Statistics
-    units : sequence of Unit
-    settings : Settings
-
-    Returns
-    -------
-    ndarray of int (number of units,)
-        Place among the sizes; their number where even the largest, the plausible one, is too small to be seen.
+    Returns (number of units,) of int: place among the sizes; their number where even the largest, the plausible one, is too
+    small to be seen.
     """
     critical = chi2.isf(settings.alarm_level / max(len(units), 1), 1)
     grams = (statistics.gram[0][np.ix_(unit.columns, unit.columns)] for unit in units)
@@ -199,20 +169,8 @@ def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Sett
 class _Source:
     """Whitened rows of a fit, made for some whole poses at a time.
 
-    Attributes
-    ----------
-    fitted : Fit
-    observations : Observations
-    around : Conditions
-        Of their states.
-    tested : list of (Candidate, tuple)
-    against : list of other.Law
-    units : tuple of Unit
-        Of both.
-    found : ndarray of bool (P,)
-        Which parameters of the fit are those of candidates.
-    values : ndarray (P,)
-        Of the parameters, in which the prediction is linear; zero for shapes.
+    `around`: of their states. `tested` (Candidate, tuple). `units`: of both. `found` (P,) of bool: which parameters of the fit
+    are those of candidates. `values` (P,): of the parameters, in which the prediction is linear; zero for shapes.
     """
 
     fitted: Fit
@@ -287,15 +245,7 @@ class _Source:
 class _Line:
     """A part of the measurements about a fit.
 
-    Attributes
-    ----------
-    line : Linearization
-    observations : Observations
-    jacobian : ndarray (M, rows, n)
-        With respect to the joints.
-    whitening : Whitening or Scaling
-    root : ndarray (M,)
-        Square roots of the weights.
+    `jacobian` (M, rows, n): with respect to the joints. `root` (M,): square roots of the weights.
     """
 
     line: Linearization
@@ -315,33 +265,14 @@ def _flat(values: np.ndarray) -> np.ndarray:
 
 
 def searched_part(fitted: Fit, observations: Observations, settings: Settings) -> tuple[Fit, Observations]:
-    """What the search looks at of a fit and its observations: no more than so many, at poses spread over the campaign.
-
-    Parameters
-    ----------
-    fitted : Fit
-    observations : Observations
-    settings : Settings
-
-    Returns
-    -------
-    Fit, Observations
-    """
+    """What the search looks at of a fit and its observations: no more than so many, at poses spread over the campaign."""
     return selected(fitted, observations, spread_poses(observations, settings.searched_observations))
 
 
 def selected(fitted: Fit, observations: Observations, chosen: np.ndarray) -> tuple[Fit, Observations]:
     """A fit and its observations in some of the states.
 
-    Parameters
-    ----------
-    fitted : Fit
-    observations : Observations
-    chosen : ndarray of bool (S,)
-
-    Returns
-    -------
-    Fit, Observations
+    `chosen` (S,) of bool.
     """
     some = select_states(observations, chosen)
     around = fitted.conditions
@@ -380,16 +311,8 @@ def shapes_tried(candidate: Candidate, fitted: Fit) -> list[tuple[float, ...]]:
 def shapes_looked_at_closely(problem: Problem, alone: np.ndarray) -> dict[str, list[tuple[float, ...]]]:
     """Values of the shapes of the best candidates, closer to each other about the best value of each.
 
-    Parameters
-    ----------
-    problem : Problem
-    alone : ndarray (number of units,)
-        Log Bayes factor of each unit alone.
-
-    Returns
-    -------
-    dict of str to list of tuple
-        By the keys of candidates; empty where no shape matters.
+    `alone` (number of units,): log Bayes factor of each unit alone. Returns by the keys of candidates; empty where no shape
+    matters.
     """
     units = problem.units
     odds = alone + [problem.prior.log_odds_of([unit]) for unit in units]

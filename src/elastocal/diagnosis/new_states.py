@@ -52,16 +52,9 @@ _OTHER_SIDE = 0.15
 class Entries:
     """E poses with their loads.
 
-    Attributes
-    ----------
-    joint_angles : ndarray (E, n)
-        rad.
-    wrench : ndarray (E, 6)
-        N, N m, at the last measuring point, base axes.
-    approach : ndarray (E, L, n) or None
-        Sense in which each joint is approached at each of L shares of the load.
-    weighed : ndarray of bool (E,)
-        Whether the load is a known weight instead of what a load cell shows.
+    `joint_angles` (E, n): rad. `wrench` (E, 6): N, N m, at the last measuring point, base axes. `approach` (E, L, n): sense in
+    which each joint is approached at each of L shares of the load. `weighed` (E,) of bool: whether the load is a known weight
+    instead of what a load cell shows.
     """
 
     joint_angles: np.ndarray
@@ -92,25 +85,11 @@ class Entries:
 class Reach:
     """What robot and campaign can do.
 
-    Attributes
-    ----------
-    limits : ndarray (n, 2)
-        rad.
-    wrenches : ndarray (W, 6)
-        Loads of the campaign, none or more.
-    largest_N : float
-    any_direction, either_sense : bool
-        Whether loads can have any direction, or at least the opposite one.
-    down : ndarray (3,)
-        Direction of weights.
-    weights : bool
-        Whether a reference weight is worth considering.
-    shares : tuple of float
-        Shares of its load at which each pose is read.
-    free : bool
-        Whether size and lever of the load and the side of the approach are chosen for each pose; with a given ladder loads are
-        as large as they can be, and the side is drawn anew for each share.
-    approach_noted : bool
+    `limits` (n, 2): rad. `wrenches` (W, 6): loads of the campaign, none or more. `any_direction`, `either_sense`: whether loads
+    can have any direction, or at least the opposite one. `down` (3,): direction of weights. `weights`: whether a reference
+    weight is worth considering. `shares`: shares of its load at which each pose is read. `free`: whether size and lever of the
+    load and the side of the approach are chosen for each pose; with a given ladder loads are as large as they can be, and the
+    side is drawn anew for each share.
     """
 
     limits: np.ndarray
@@ -128,21 +107,8 @@ class Reach:
 def reach_of(states: States, robot: Robot, joint_limits: np.ndarray, ladder: tuple[float, ...] | None, weights: bool) -> Reach:
     """What a robot can be asked to do after a campaign.
 
-    Parameters
-    ----------
-    states : States
-        Of the campaign.
-    robot : Robot
-    joint_limits : ndarray (n, 2)
-        rad.
-    ladder : tuple of float or None
-        As in `next_experiment.propose`.
-    weights : bool
-        Whether a reference weight would tell anything, were it within reach.
-
-    Returns
-    -------
-    Reach
+    `states`: of the campaign. `joint_limits` (n, 2): rad. `ladder`: as in `next_experiment.propose`. `weights`: whether a
+    reference weight would tell anything, were it within reach.
     """
     force = states.wrench[:, :3]
     size = np.linalg.norm(force, axis=1)
@@ -170,18 +136,7 @@ def reach_of(states: States, robot: Robot, joint_limits: np.ndarray, ladder: tup
 
 
 def drawn(reach: Reach, count: int, stream: np.random.Generator) -> Entries:
-    """Random entries within reach.
-
-    Parameters
-    ----------
-    reach : Reach
-    count : int
-    stream : numpy.random.Generator
-
-    Returns
-    -------
-    Entries
-    """
+    """Random entries within reach."""
     low, high = reach.limits.T
     angles = low + (high - low) * stream.random((count, len(low)))
     wrench, weighed = np.zeros((count, 6)), np.zeros(count, bool)
@@ -207,20 +162,7 @@ def drawn(reach: Reach, count: int, stream: np.random.Generator) -> Entries:
 def near(reach: Reach, entries: Entries, count: int, radius: float, stream: np.random.Generator) -> Entries:
     """Neighbours of entries: other angles, for half of them another direction of the load, now and then the other side.
 
-    Parameters
-    ----------
-    reach : Reach
-    entries : Entries
-    count : int
-        For each.
-    radius : float
-        rad.
-    stream : numpy.random.Generator
-
-    Returns
-    -------
-    Entries
-        `count` of the first, then of the second, ...
+    `radius`: rad. Returns `count` of the first, then of the second.
     """
     found = entries.at(np.repeat(np.arange(len(entries)), count))
     angles = found.joint_angles + radius * stream.standard_normal(found.joint_angles.shape)
@@ -241,10 +183,7 @@ def _turned(wrench: np.ndarray, rotation: Rotation) -> np.ndarray:
 def approaches(reach: Reach, count: int, stream: np.random.Generator) -> np.ndarray | None:
     """Random senses of approach: one for each entry where it is chosen, else one for each share of its load.
 
-    Returns
-    -------
-    ndarray (count, L, n) or None
-        None where the campaign does not note them.
+    Returns (count, L, n): None where the campaign does not note them.
     """
     if not reach.approach_noted:
         return None
@@ -257,28 +196,13 @@ def approaches(reach: Reach, count: int, stream: np.random.Generator) -> np.ndar
 class Instrument:
     """Turns entries into information on declared parameters and units.
 
-    Attributes
-    ----------
-    model, estimate : Model, Estimate
-        About which sensitivities are taken, with a target at each measuring point that has none yet.
-    own : int
-        Number of the campaign's own targets, which come first.
-    linearized : Linearized
-        In the parameters of whose products information is stated.
-    laws : list of (Displacing, tuple)
-        In the order of the columns.
-    columns : ndarray of int (U,)
-        Of the statistics.
-    sizes : ndarray (U,)
-    of_load_cell : ndarray of bool (U,)
-        Columns of effects that a reference weight does not have.
-    declared, added : ndarray of bool (P,)
-        Which of the model's parameters are those of the products, and which belong to targets that are not there yet.
-    noise : Noise
-        With the error common to the measurements of a pose.
-    states : States
-        Of the campaign, whose last session, time and usual temperature go on.
-    reach : Reach
+    `model`, `estimate`: about which sensitivities are taken, with a target at each measuring point that has none yet. `own`:
+    number of the campaign's own targets, which come first. `linearized`: in the parameters of whose products information is
+    stated. `laws` (Displacing, tuple): in the order of the columns. `columns` (U,) of int: of the statistics. `sizes` (U,).
+    `of_load_cell` (U,) of bool: columns of effects that a reference weight does not have. `declared`, `added` (P,) of bool:
+    which of the model's parameters are those of the products, and which belong to targets that are not there yet. `noise`: with
+    the error common to the measurements of a pose. `states`: of the campaign, whose last session, time and usual temperature go
+    on.
     """
 
     model: Model
@@ -308,11 +232,7 @@ class Instrument:
     def information(self, entries: Entries, targets: Sequence[int]) -> np.ndarray:
         """Fisher information on all unknowns in each entry, ndarray (E, U, U).
 
-        Parameters
-        ----------
-        entries : Entries
-        targets : sequence of int
-            Which targets are read.
+        `targets`: which targets are read.
         """
         parts = [np.zeros((0, self.unknowns, self.unknowns))]
         for start in range(0, len(entries), _BLOCK):
@@ -373,24 +293,9 @@ def instrument_of(
 ) -> Instrument:
     """What tells the information in entries.
 
-    Parameters
-    ----------
-    linearized : Linearized
-    fitted : Fit
-        About which new states are linear: the model found.
-    numbers : sequence of int
-        Units of the problem whose columns matter.
-    noise : Noise
-        Of one measurement, with the error common to the measurements of a pose.
-    states : States
-        Of the campaign.
-    reach : Reach
-    further_targets : bool
-        Whether a target can be put on measuring points that have none: at a known place where the campaign's targets are.
-
-    Returns
-    -------
-    Instrument
+    `fitted`: about which new states are linear: the model found. `numbers`: units of the problem whose columns matter. `noise`:
+    of one measurement, with the error common to the measurements of a pose. `states`: of the campaign. `further_targets`:
+    whether a target can be put on measuring points that have none: at a known place where the campaign's targets are.
     """
     model, estimate, own = fitted.model, fitted.estimate, len(fitted.model.targets)
     if further_targets:

@@ -1,15 +1,13 @@
 """The next experiment: poses and loads after which the measurements, most probably, say which hypothesis holds.
 
-The experiment that leaves the least entropy between the models of the posterior ([1]_, `alternatives`) is looked for greedily,
-then by Fedorov's exchange [2]_ in its modified form, each pose in turn against all of a short list [3]_, then by random local
+The experiment that leaves the least entropy between the models of the posterior ([1], `alternatives`) is looked for greedily,
+then by Fedorov's exchange [2] in its modified form, each pose in turn against all of a short list [3], then by random local
 search in angles, directions of loads and approaches. What is promised of it is simulated (`promise`).
 
-References
-----------
-.. [1] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
-.. [2] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
-.. [3] Cook, R. D. and Nachtsheim, C. J., A comparison of algorithms for constructing exact D-optimal designs, Technometrics 22,
-   1980.
+[1] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
+[2] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
+[3] Cook, R. D. and Nachtsheim, C. J., A comparison of algorithms for constructing exact D-optimal designs, Technometrics 22,
+    1980.
 """
 
 from __future__ import annotations
@@ -70,22 +68,9 @@ def propose(
 ) -> Proposal:
     """Choose the poses and loads that most probably resolve what a diagnosis leaves ambiguous.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    joint_limits : ndarray (n, 2)
-        rad.
-    settings : Settings
-    stream : numpy.random.Generator
-    poses : int
-    ladder : tuple of float, optional
-        Shares of its load at which each pose is read, at the targets of the campaign and with any approach. Without, each is
-        read without its load, under it and, where the campaign has such, under the opposite one; sizes and levers of the load,
-        a reference weight, targets on further points and the side of the approach are chosen.
-
-    Returns
-    -------
-    Proposal
+    `joint_limits` (n, 2): rad. `ladder`: shares of its load at which each pose is read, at the targets of the campaign and with
+    any approach. Without, each is read without its load, under it and, where the campaign has such, under the opposite one;
+    sizes and levers of the load, a reference weight, targets on further points and the side of the approach are chosen.
     """
     joints, case, evidence = len(joint_limits), diagnosis.case, diagnosis.evidence
     if evidence is None:

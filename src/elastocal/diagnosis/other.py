@@ -1,23 +1,21 @@
 """A competitor for effects that the catalogue does not have: smooth random displacements of each joint and of the base.
 
-A displacement is a random function of a few inputs, a sum of random Fourier features [1]_ with normal coefficients: an
-approximate Gaussian process. Such a discrepancy [2]_ should leave to the model what the model explains [3]_: what is constant
+A displacement is a random function of a few inputs, a sum of random Fourier features [1] with normal coefficients: an
+approximate Gaussian process. Such a discrepancy [2] should leave to the model what the model explains [3]: what is constant
 of it, or at a joint straight in its angle, is taken off, for a zero offset, a frame that is fitted and a transmission ratio
 have names. A function of everything at once would fit nothing better than chance does, so that each law has the inputs of one
-cause, as terms of an additive Gaussian process have [4]_: a joint's own angle, torque and approach; the angles of the joints
+cause, as terms of an additive Gaussian process have [4]: a joint's own angle, torque and approach; the angles of the joints
 beside it; time and temperature; the load on the base along each of its axes; the place of the end. Half of the features are
 multiplied by the load, so that they vanish without it. Alone it means that the residual is *unexplained*; beside a mechanism,
 that a *related* one acts. It names nothing and is not used to predict.
 
-References
-----------
-.. [1] Rahimi, A. and Recht, B., Random features for large-scale kernel machines, Advances in Neural Information Processing
-   Systems 20, 2007.
-.. [2] Kennedy, M. C. and O'Hagan, A., Bayesian calibration of computer models, Journal of the Royal Statistical Society B 63,
-   2001.
-.. [3] Plumlee, M., Bayesian calibration of inexact computer models, Journal of the American Statistical Association 112, 2017.
-.. [4] Duvenaud, D., Nickisch, H. and Rasmussen, C. E., Additive Gaussian processes, Advances in Neural Information Processing
-   Systems 24, 2011.
+[1] Rahimi, A. and Recht, B., Random features for large-scale kernel machines, Advances in Neural Information Processing Systems
+    20, 2007.
+[2] Kennedy, M. C. and O'Hagan, A., Bayesian calibration of computer models, Journal of the Royal Statistical Society B 63,
+    2001.
+[3] Plumlee, M., Bayesian calibration of inexact computer models, Journal of the American Statistical Association 112, 2017.
+[4] Duvenaud, D., Nickisch, H. and Rasmussen, C. E., Additive Gaussian processes, Advances in Neural Information Processing
+    Systems 24, 2011.
 """
 
 from __future__ import annotations
@@ -54,14 +52,8 @@ _SEED = 2007
 class Competitor:
     """One law at one location.
 
-    Attributes
-    ----------
-    location : tuple of int
-        Joint counted from 1; empty for the base.
-    law : str
-        By what it goes: "own", "neighbours" or "time" at a joint; "force", "time" or "place" at the base.
-    motion : {"turn", "shift"}
-        Joints turn; the base does either.
+    `location`: joint counted from 1; empty for the base. `law`: by what it goes: "own", "neighbours" or "time" at a joint;
+    "force", "time" or "place" at the base. `motion`: joints turn; the base does either.
     """
 
     location: tuple[int, ...]
@@ -75,16 +67,7 @@ class Competitor:
 
 
 def competitors(campaign: Conditions) -> list[Competitor]:
-    """Laws of which a campaign has inputs, at each joint and at the base.
-
-    Parameters
-    ----------
-    campaign : Conditions
-
-    Returns
-    -------
-    list of Competitor
-    """
+    """Laws of which a campaign has inputs, at each joint and at the base."""
     joints = range(campaign.sites.joints)
     every = [Competitor((joint + 1,), law) for joint in joints for law in _AT_A_JOINT]
     every += [Competitor((), law, motion) for law in _AT_THE_BASE for motion in (SHIFT, TURN)]
@@ -97,17 +80,9 @@ def competitors(campaign: Conditions) -> list[Competitor]:
 class Law:
     """Random displacements by one law, in the shape of a candidate: per unit of their coefficients in plausible sizes.
 
-    Attributes
-    ----------
-    competitor : Competitor
-    campaign : Conditions
-        By whose inputs and loads those of all states are normalised.
-    size : float
-        rad or m.
-    parts : tuple of (int, callable, callable)
-        Coordinate that is displaced, waves by their inputs, and the part of them that has a name by the states.
-    waves : int
-        Of each coordinate.
+    `campaign`: by whose inputs and loads those of all states are normalised. `size`: rad or m. `parts` (int, callable,
+    callable): coordinate that is displaced, waves by their inputs, and the part of them that has a name by the states. `waves`:
+    of each coordinate.
     """
 
     competitor: Competitor
@@ -137,17 +112,7 @@ class Law:
 def law_of(competitor: Competitor, campaign: Conditions, features: int) -> Law:
     """Draw the displacements by one law.
 
-    Parameters
-    ----------
-    competitor : Competitor
-    campaign : Conditions
-        Of whose states what has a name is taken off.
-    features : int
-        At a joint.
-
-    Returns
-    -------
-    Law
+    `campaign`: of whose states what has a name is taken off. `features`: at a joint.
     """
     location = competitor.location
     draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)

@@ -1,11 +1,9 @@
 """What an experiment promises: simulated, with coefficients from the posterior and measurements of the whole experiment.
 
-Preposterior analysis [1]_. Where coefficients are known, odds of 19:1 are reached with 50, 90 and 95 % if the separation is 6,
+Preposterior analysis [1]. Where coefficients are known, odds of 19:1 are reached with 50, 90 and 95 % if the separation is 6,
 16 and 21; where they may turn out small, the separation that is stated is the one for which this holds.
 
-References
-----------
-.. [1] Raiffa, H. and Schlaifer, R., Applied Statistical Decision Theory, Harvard University, 1961.
+[1] Raiffa, H. and Schlaifer, R., Applied Statistical Decision Theory, Harvard University, 1961.
 """
 
 from __future__ import annotations
@@ -30,11 +28,9 @@ PROMISE_DRAWS = 600
 class Promise:
     """What an experiment brings, by simulation with the same random numbers for every experiment.
 
-    Common random numbers [1]_: experiments differ by what they tell, not by luck.
+    Common random numbers [1]: experiments differ by what they tell, not by luck.
 
-    References
-    ----------
-    .. [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random numbers, Management Science 38, 1992.
+    [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random numbers, Management Science 38, 1992.
     """
 
     def __init__(self, members: Members, stream: np.random.Generator) -> None:
@@ -53,10 +49,7 @@ class Promise:
     def log_factors(self, information: np.ndarray) -> np.ndarray:
         """ln p of the simulated measurements under each hypothesis, but for what is common to all; ndarray (N, H).
 
-        Parameters
-        ----------
-        information : ndarray (U, U)
-            Of a whole experiment.
+        `information` (U, U): of a whole experiment.
         """
         members = self.members
         values, vectors = np.linalg.eigh(information)
@@ -103,14 +96,6 @@ def separation_resolved(probability: float) -> float:
     """Separation of two fixed hypotheses with which one gets odds of 19:1 so often: ln 19 = lambda / 2 - z sqrt(lambda).
 
     The log Bayes factor of two normal distributions with one covariance is normal, with mean lambda / 2 and variance lambda.
-
-    Parameters
-    ----------
-    probability : float
-
-    Returns
-    -------
-    float
     """
     z = norm.ppf(probability)
     return float((z + np.sqrt(z**2 + 2 * np.log(19.0))) ** 2) if probability > 0 else 0.0
@@ -121,18 +106,8 @@ def poses_needed(promise: Promise, total: np.ndarray, resolved: np.ndarray) -> i
 
     By bisection in the number of poses.
 
-    Parameters
-    ----------
-    promise : Promise
-    total : ndarray (U, U)
-        Information of all poses proposed.
-    resolved : ndarray (E,)
-        Probability that it is resolved after each.
-
-    Returns
-    -------
-    int or None
-        None beyond the most.
+    `total` (U, U): information of all poses proposed. `resolved` (E,): probability that it is resolved after each. Returns None
+    beyond the most.
     """
     enough = np.flatnonzero(resolved >= WANTED_PROBABILITY)
     if len(enough):

@@ -30,37 +30,18 @@ WANTED_PROBABILITY = 0.9
 class Proposal:
     """Poses to measure next, in the order of their worth, and what they promise; arrays of E, empty where nothing helps.
 
-    Attributes
-    ----------
-    joint_angles : ndarray (E, n)
-        rad.
-    wrench : ndarray (E, 6)
-        N, N m, at the last measuring point, base axes, at the share 1 of `shares`.
-    approach : ndarray (E, n) or None
-        Sense in which to approach each joint; None where the campaign does not note it, or where a ladder is given: then any.
-    reference_weight : ndarray of bool (E,)
-        Whether the load is a weight hung at the last measuring point, known by weighing and not by the load cell.
-    shares : tuple of float
-        Shares of its load at which each pose is read; a weight hangs at their absolute values.
-    points : tuple of str
-        Measuring points at which targets are read in every pose.
-    separation : ndarray (E,)
-        From the nearest alternative, by measurements of this pose and all before it: at most twice the log Bayes factor that
-        they bring for the true hypothesis on average; 16 gives it odds of 19:1 from even ones with 90 %.
-    resolved : ndarray (E,)
-        Probability that after this pose the right hypothesis has 95 %, those in `indistinguishable` aside.
-    present : float
-        Separation from the nearest alternative that the present measurements give to an effect as large as the one found.
-    poses_needed : int or None
-        For `resolved` of 90 %, if further poses tell as much as these; None where a hundred are not enough.
-    best : tuple of str
-        Mechanisms of the best hypothesis.
-    nearest : tuple of str
-        Of the alternative with the smallest separation.
-    indistinguishable : tuple of tuple of str
-        Alternatives that no experiment within reach distinguishes from the best; they do not count in the promise.
-    reason : str
-        Why there is nothing to measure; empty where there is.
+    `joint_angles` (E, n): rad. `wrench` (E, 6): N, N m, at the last measuring point, base axes, at the share 1 of `shares`.
+    `approach` (E, n): sense in which to approach each joint; None where the campaign does not note it, or where a ladder is
+    given: then any. `reference_weight` (E,) of bool: whether the load is a weight hung at the last measuring point, known by
+    weighing and not by the load cell. `shares`: shares of its load at which each pose is read; a weight hangs at their absolute
+    values. `points`: measuring points at which targets are read in every pose. `separation` (E,): from the nearest alternative,
+    by measurements of this pose and all before it: at most twice the log Bayes factor that they bring for the true hypothesis
+    on average; 16 gives it odds of 19:1 from even ones with 90 %. `resolved` (E,): probability that after this pose the right
+    hypothesis has 95 %, those in `indistinguishable` aside. `present`: separation from the nearest alternative that the present
+    measurements give to an effect as large as the one found. `poses_needed`: for `resolved` of 90 %, if further poses tell as
+    much as these; None where a hundred are not enough. `best`: mechanisms of the best hypothesis. `nearest`: of the alternative
+    with the smallest separation. `indistinguishable`: alternatives that no experiment within reach distinguishes from the best;
+    they do not count in the promise. `reason`: why there is nothing to measure; empty where there is.
     """
 
     joint_angles: np.ndarray
@@ -83,19 +64,7 @@ class Proposal:
 
 
 def without_poses(joints: int, best: tuple[str, ...], indistinguishable: tuple[tuple[str, ...], ...], reason: str) -> Proposal:
-    """A proposal without poses.
-
-    Parameters
-    ----------
-    joints : int
-    best : tuple of str
-    indistinguishable : tuple of tuple of str
-    reason : str
-
-    Returns
-    -------
-    Proposal
-    """
+    """A proposal without poses."""
     none = np.zeros(0)
     return Proposal(
         np.zeros((0, joints)),
@@ -118,18 +87,10 @@ def without_poses(joints: int, best: tuple[str, ...], indistinguishable: tuple[t
 def table_of(proposal: Proposal, robot: Robot) -> pd.DataFrame:
     """The proposal as whoever drives the robot wants it.
 
-    Parameters
-    ----------
-    proposal : Proposal
-    robot : Robot
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each pose; joint angles as the controller reports them (rad), ``load`` 1 where it is loaded,
-        ``separation`` and ``resolved`` after it and all before, ``separation_without`` from the present measurements, and what
-        the promise leaves aside as ``indistinguishable``; ``approach1..n`` where the campaign has them and
-        ``reference_weight_kg`` where a weight is asked for.
+    Returns one row for each pose; joint angles as the controller reports them (rad), ``load`` 1 where it is loaded,
+    ``separation`` and ``resolved`` after it and all before, ``separation_without`` from the present measurements, and what the
+    promise leaves aside as ``indistinguishable``; ``approach1..n`` where the campaign has them and ``reference_weight_kg``
+    where a weight is asked for.
     """
     joints, count = robot.joints, len(proposal)
     columns: dict[str, Any] = {
@@ -155,16 +116,7 @@ def table_of(proposal: Proposal, robot: Robot) -> pd.DataFrame:
 
 
 def facts_of(proposal: Proposal) -> dict[str, Any]:
-    """What verdict.json says of the next experiment.
-
-    Parameters
-    ----------
-    proposal : Proposal
-
-    Returns
-    -------
-    dict
-    """
+    """What verdict.json says of the next experiment."""
     return {
         "poses": len(proposal),
         "reason": proposal.reason,
@@ -179,16 +131,7 @@ def facts_of(proposal: Proposal) -> dict[str, Any]:
 
 
 def sentence_of(proposal: Proposal) -> str:
-    """What the report says of the next experiment.
-
-    Parameters
-    ----------
-    proposal : Proposal
-
-    Returns
-    -------
-    str
-    """
+    """What the report says of the next experiment."""
     aside = "".join(f" {sentence}" for sentence in _left_aside(proposal))
     if proposal.reason == NOT_DISTINGUISHABLE:
         return f"No further measurement is proposed.{aside}"

@@ -1,12 +1,10 @@
 """The exact fit of a selected model: same priors, exact kinematics.
 
-Maximum a posteriori, a generalized ridge regression [1]_: coefficients keep the normal priors under which they were selected,
+Maximum a posteriori, a generalized ridge regression [1]: coefficients keep the normal priors under which they were selected,
 half-normal ones as normal, so that what the measurements do not determine stays at zero; the noise is that which the selected
 model leaves.
 
-References
-----------
-.. [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
+[1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
 """
 
 from __future__ import annotations
@@ -33,27 +31,15 @@ if TYPE_CHECKING:
 class Selected:
     """A model as the exact fit wants it.
 
-    Attributes
-    ----------
-    effects : tuple of (Candidate, ndarray)
-        Found, with normal priors on their parameters, and shape values. Without the competitor, which predicts nothing.
+    `effects` (Candidate, ndarray): found, with normal priors on their parameters, and shape values. Without the competitor,
+    which predicts nothing.
     """
 
     effects: tuple[tuple[Candidate, np.ndarray], ...]
 
 
 def selected(linearized: Linearized, model: Model) -> Selected:
-    """What a model of the posterior is for the exact fit.
-
-    Parameters
-    ----------
-    linearized : Linearized
-    model : search.Model
-
-    Returns
-    -------
-    Selected
-    """
+    """What a model of the posterior is for the exact fit."""
     effects = []
     for number, scale in zip(model.units, model.scales, strict=True):
         unit = linearized.problem.units[number]
@@ -65,15 +51,7 @@ def selected(linearized: Linearized, model: Model) -> Selected:
 def with_shapes_of(chosen: Selected, fitted: Fit) -> Selected:
     """A selected model with the values of shapes that a fit of it found.
 
-    Parameters
-    ----------
-    chosen : Selected
-    fitted : Fit
-        That has all its effects.
-
-    Returns
-    -------
-    Selected
+    `fitted`: that has all its effects.
     """
     effects = tuple((candidate, fitted.values_of(candidate.key)[1]) for candidate, _ in chosen.effects)
     return replace(chosen, effects=effects)
@@ -84,22 +62,8 @@ def fit_with_sizes(
 ) -> Fit:
     """Fit the declared model with the effects of a selected one.
 
-    Parameters
-    ----------
-    declared : Fit
-        Where the search starts.
-    observations : Observations
-    noise : Noise
-        Of measurements and poses, as the selected model leaves it.
-    chosen : Selected
-    near : Fit, optional
-        With other effects: the search then starts from its values of those that are the same.
-    **options
-        Of `fitting.fit`.
-
-    Returns
-    -------
-    Fit
+    `declared`: where the search starts. `noise`: of measurements and poses, as the selected model leaves it. `near`: with other
+    effects: the search then starts from its values of those that are the same. `**options`: of `fitting.fit`.
     """
     model = declared.model
     effects = [candidate for candidate, _ in chosen.effects]
@@ -116,15 +80,7 @@ def fit_with_sizes(
 def mean_square_left(problem: Problem, model: Model) -> float:
     """Mean square of the whitened residual that a model leaves, by the linearised problem.
 
-    Parameters
-    ----------
-    problem : Problem
-    model : search.Model
-
-    Returns
-    -------
-    float
-        1 where the noise accounts for it.
+    Returns 1 where the noise accounts for it.
     """
     statistics = problem.statistics
     place = int(np.argmin(np.abs(statistics.pose_error_rad - model.pose_error_rad)))
@@ -138,15 +94,7 @@ def mean_square_left(problem: Problem, model: Model) -> float:
 def mean_square(fitted: Fit) -> float:
     """Mean square of the whitened residual of an exact fit, over all that is left free, its priors included.
 
-    Parameters
-    ----------
-    fitted : Fit
-        With the noise that a linear problem promised to leave.
-
-    Returns
-    -------
-    float
-        1 where it left that.
+    `fitted`: with the noise that a linear problem promised to leave. Returns 1 where it left that.
     """
     white = fitted.whitened(fitted.residual)
     squares, priors = (white**2).sum(), [parameter.prior_std for _, parameter in fitted.parameters]
@@ -159,18 +107,7 @@ def mean_square(fitted: Fit) -> float:
 def remaining_noise(problem: Problem, model: Model, taken: Noise, least: Noise) -> Noise:
     """Noise as a model leaves it.
 
-    Parameters
-    ----------
-    problem : Problem
-    model : search.Model
-    taken : Noise
-        By which the problem was whitened.
-    least : Noise
-        That repeats or the campaign say, below which it does not fall.
-
-    Returns
-    -------
-    Noise
+    `taken`: by which the problem was whitened. `least`: that repeats or the campaign say, below which it does not fall.
     """
     left = mean_square_left(problem, model)
     factor = float(np.sqrt(max(left * (taken.position_m / least.position_m) ** 2, 1.0)))

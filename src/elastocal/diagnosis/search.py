@@ -1,15 +1,13 @@
 """Posterior over models: extend the best, drop what is not needed, weigh all that were met.
 
 A model is a set of units. From the declared model on, and from each mechanism at all its locations, the best few models met are
-extended by every unit and shrunk by each of theirs: a beam search over the neighbours of shotgun stochastic search [1]_,
-without its draws and its exchanges. What lies in Occam's window [2]_ is evaluated in full.
+extended by every unit and shrunk by each of theirs: a beam search over the neighbours of shotgun stochastic search [1],
+without its draws and its exchanges. What lies in Occam's window [2] is evaluated in full.
 
-References
-----------
-.. [1] Hans, C., Dobra, A. and West, M., Shotgun stochastic search for "large p" regression, Journal of the American Statistical
-   Association 102, 2007.
-.. [2] Madigan, D. and Raftery, A. E., Model selection and accounting for model uncertainty in graphical models using Occam's
-   window, Journal of the American Statistical Association 89, 1994.
+[1] Hans, C., Dobra, A. and West, M., Shotgun stochastic search for "large p" regression, Journal of the American Statistical
+    Association 102, 2007.
+[2] Madigan, D. and Raftery, A. E., Model selection and accounting for model uncertainty in graphical models using Occam's
+    window, Journal of the American Statistical Association 89, 1994.
 """
 
 from __future__ import annotations
@@ -58,15 +56,7 @@ REACH = 2
 
 @dataclass(frozen=True)
 class Problem:
-    """Everything that a search needs.
-
-    Attributes
-    ----------
-    statistics : Statistics
-    units : tuple of Unit
-    prior : Prior
-    settings : Settings
-    """
+    """Everything that a search needs."""
 
     statistics: Statistics
     units: tuple[Unit, ...]
@@ -88,16 +78,8 @@ class Problem:
 class Model:
     """One set of units with its posterior weight.
 
-    Attributes
-    ----------
-    units : tuple of int
-        Rising.
-    log_odds : float
-        Posterior log odds against the declared model alone.
-    scales : ndarray (m,)
-        Most probable size of each unit.
-    pose_error_rad : float
-        Most probable size of the error common to the measurements of a pose.
+    `units`: rising. `log_odds`: posterior log odds against the declared model alone. `scales` (m,): most probable size of each
+    unit. `pose_error_rad`: most probable size of the error common to the measurements of a pose.
     """
 
     units: tuple[int, ...]
@@ -110,11 +92,7 @@ class Model:
 class Posterior:
     """Models in the order of their probability.
 
-    Attributes
-    ----------
-    models : tuple of Model
-    probabilities : ndarray (M,)
-        "Nothing" among them.
+    `probabilities` (M,): "Nothing" among them.
     """
 
     models: tuple[Model, ...]
@@ -129,14 +107,7 @@ class Posterior:
 def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:
     """The declared model alone, and each unit alone against it.
 
-    Parameters
-    ----------
-    problem : Problem
-
-    Returns
-    -------
-    nothing : Model
-    log_bayes_factors : ndarray (number of units,)
+    Returns `log_bayes_factors` (number of units,).
     """
     searcher, prior = _Searcher(problem), problem.prior
     met = searcher.met
@@ -147,15 +118,7 @@ def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:
 def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
     """Search the models.
 
-    Parameters
-    ----------
-    problem : Problem
-    known : collection of str, optional
-        Keys of the candidates of a good model, from which the search starts, too.
-
-    Returns
-    -------
-    Posterior
+    `known`: keys of the candidates of a good model, from which the search starts, too.
     """
     searcher = _Searcher(problem)
     searcher.measure(())
@@ -170,15 +133,7 @@ def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.n
 
     And up to `REACH` steps beyond the most likely, for measurements that are simulated with that may look like more.
 
-    Parameters
-    ----------
-    statistics : Statistics
-        Of the declared model alone.
-    settings : Settings
-
-    Returns
-    -------
-    ndarray of bool (T,)
+    `statistics`: of the declared model alone. Returns (T,) of bool.
     """
     problem = Problem(statistics, (), Prior({}, {}), settings)
     weights = evaluate(statistics, [], problem.grid, problem.log_pose, ()).log_pose
@@ -189,16 +144,7 @@ def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.n
 def likely_pose_errors(statistics: Statistics, units: Sequence[Unit], settings: Settings) -> np.ndarray:
     """Sizes of the pose error that "nothing" or some good single unit makes likely; zero, to which Gram matrices refer, always.
 
-    Parameters
-    ----------
-    statistics : Statistics
-        Of zero first.
-    units : sequence of Unit
-    settings : Settings
-
-    Returns
-    -------
-    ndarray of bool (T,)
+    `statistics`: of zero first. Returns (T,) of bool.
     """
     problem = Problem(statistics, tuple(units), Prior({}, {}), settings)
     conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), problem.log_pose)

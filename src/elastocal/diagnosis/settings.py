@@ -12,12 +12,7 @@ def _setting(default: _Value, reason: str) -> _Value:
 
 @dataclass(frozen=True)
 class Settings:
-    """Choices of the diagnosing engine.
-
-    Attributes
-    ----------
-    See the metadata of each field: every one carries the reason for its value.
-    """
+    """Choices of the diagnosing engine."""
 
     alarm_level: float = _setting(
         0.02,
@@ -132,11 +127,6 @@ class Settings:
     )
 
     def document(self) -> dict[str, dict[str, Any]]:
-        """Name, value and reason of every setting, JSON-serialisable.
-
-        Returns
-        -------
-        dict of str to dict
-        """
+        """Name, value and reason of every setting, JSON-serialisable."""
         values = asdict(self)
         return {entry.name: {"value": values[entry.name], "reason": entry.metadata["reason"]} for entry in fields(self)}

@@ -3,19 +3,17 @@
 Measurements y = X beta + W gamma + e, with X the declared model's sensitivities and W those of all candidates, both whitened by
 the noise of the measurements. The measurements of a pose may have an error in common as well: that of the joints when the pose
 was taken, of variance Lambda(tau) = tau^2 I (+ Sigma_q where one approach serves a whole pose), seen through the Jacobian. By
-the matrix inversion lemma (Woodbury's identity [1]_)
+the matrix inversion lemma (Woodbury's identity [1])
 
     Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (Lambda^-1 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
 
 so that one pass over the measurements serves every tau. Columns are first made orthogonal to X by a QR decomposition of the
 scaled rows: the condition number of X is not squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X
-(X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML [2]_).
+(X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML [2]).
 
-References
-----------
-.. [1] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
-.. [2] Harville, D. A., Maximum likelihood approaches to variance component estimation and to related problems, Journal of the
-   American Statistical Association 72, 1977.
+[1] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
+[2] Harville, D. A., Maximum likelihood approaches to variance component estimation and to related problems, Journal of the
+    American Statistical Association 72, 1977.
 """
 
 from __future__ import annotations
@@ -37,20 +35,8 @@ if TYPE_CHECKING:
 class Statistics:
     """Sufficient statistics at T sizes of the pose error, for K columns.
 
-    Attributes
-    ----------
-    pose_error_rad : ndarray (T,)
-        tau.
-    gram : ndarray (T, K, K)
-        W'MW.
-    along : ndarray (T, K)
-        W'My.
-    squares : ndarray (T,)
-        y'My.
-    log_likelihood : ndarray (T,)
-        What tau contributes alone: -1/2 ln |Sigma| - 1/2 ln |X'Sigma^-1 X|.
-    freedom : int
-        Rows less what the declared model fits.
+    `pose_error_rad` (T,): tau. `gram` (T, K, K): W'MW. `along` (T, K): W'My. `squares` (T,): y'My. `log_likelihood` (T,): what
+    tau contributes alone: -1/2 ln |Sigma| - 1/2 ln |X'Sigma^-1 X|. `freedom`: rows less what the declared model fits.
     """
 
     pose_error_rad: np.ndarray
@@ -76,26 +62,11 @@ class Statistics:
 class Products:
     """What one pass over the measurements gathers; `statistics_of` makes `Statistics` of it, `null_draws` simulated ones.
 
-    Attributes
-    ----------
-    declared : int
-        P, columns of the declared model; orthonormal.
-    gram : ndarray (P + K + 1, P + K + 1)
-        Z'Z of Z = [X W y].
-    pose_rows : ndarray (G, n, P + K + 1)
-        B_p of each of G poses.
-    pose_gram : ndarray (G, n, n)
-        C_p.
-    joint_rad : ndarray (n,)
-        Repeatability of the joints, where the measurements of a pose share one approach; else zero.
-    rows : WhiteRows
-        Of which they are.
-    freedom : int
-        Measurements' components less what the declared model fits.
-    into_basis : ndarray (P, P)
-        Turns declared columns into orthonormal ones.
-    projected : ndarray (P, K + 1)
-        What the orthonormal columns have in those of the candidates and the residual.
+    `declared`: P, columns of the declared model; orthonormal. `gram` (P + K + 1, P + K + 1): Z'Z of Z = [X W y]. `pose_rows`
+    (G, n, P + K + 1): B_p of each of G poses. `pose_gram` (G, n, n): C_p. `joint_rad` (n,): repeatability of the joints, where
+    the measurements of a pose share one approach; else zero. `rows`: of which they are. `freedom`: measurements' components
+    less what the declared model fits. `into_basis` (P, P): turns declared columns into orthonormal ones. `projected` (P, K +
+    1): what the orthonormal columns have in those of the candidates and the residual.
     """
 
     declared: int
@@ -122,17 +93,8 @@ class Products:
     def alike(self, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Whitened rows at other states in the parameters of these products.
 
-        Parameters
-        ----------
-        declared : ndarray (..., P)
-        candidates : ndarray (..., U)
-            Sensitivities to some of the candidates, in units of their plausible sizes.
-        columns : ndarray of int (U,)
-            Which of them.
-
-        Returns
-        -------
-        ndarray (..., P + U)
+        `declared` (..., P). `candidates` (..., U): sensitivities to some of the candidates, in units of their plausible sizes.
+        `columns` (U,) of int: which of them. Returns (..., P + U).
         """
         return rows_alike(self, declared, candidates, columns)
 
@@ -140,29 +102,14 @@ class Products:
 def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray, joint_rad: np.ndarray) -> Products:
     """Gather the products of whitened rows.
 
-    Parameters
-    ----------
-    rows : WhiteRows
-    prior_std : ndarray (P,)
-        Standard deviation of the prior of each declared parameter; wide ones keep the problem well posed.
-    present : ndarray (P,)
-        Present value of each less the mean of its prior.
-    joint_rad : ndarray (n,)
-        As in `Products`.
+    `prior_std` (P,): standard deviation of the prior of each declared parameter; wide ones keep the problem well posed.
+    `present` (P,): present value of each less the mean of its prior. `joint_rad` (n,): as in `Products`.
 
-    Returns
-    -------
-    Products
-
-    Notes
-    -----
     The declared columns are made orthonormal by QR of the scaled rows, so that no condition number is squared; what candidates
     have in them is taken off their products by Pythagoras' theorem, which costs 1e-16 of the square of a candidate: nothing
-    beside noise of one. What the declared model fits are its effective degrees of freedom, the trace of its hat matrix [1]_.
+    beside noise of one. What the declared model fits are its effective degrees of freedom, the trace of its hat matrix [1].
 
-    References
-    ----------
-    .. [1] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
+    [1] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
     """
     observed, components, count = rows.declared.shape
     declared = rows.declared.reshape(observed * components, count)
@@ -195,14 +142,7 @@ def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray, joi
 def statistics_of(products: Products | Sums, pose_error_rad: np.ndarray) -> Statistics:
     """Sufficient statistics at some sizes of the pose error.
 
-    Parameters
-    ----------
-    products : Products or Sums
-    pose_error_rad : ndarray (T,)
-
-    Returns
-    -------
-    Statistics
+    `pose_error_rad` (T,).
     """
     declared = products.declared
     count = products.gram.shape[0] - declared
@@ -227,15 +167,7 @@ def statistics_of(products: Products | Sums, pose_error_rad: np.ndarray) -> Stat
 def normal_equations(products: Products | Sums, tau: float) -> tuple[np.ndarray, float]:
     """Z'Sigma(tau)^-1 Z, and ln |Sigma| beyond that of white noise.
 
-    Parameters
-    ----------
-    products : Products or Sums
-    tau : float
-        rad; of sums, the nearest of their sizes counts.
-
-    Returns
-    -------
-    ndarray (P + K + 1, P + K + 1), float
+    `tau`: rad; of sums, the nearest of their sizes counts. Returns (P + K + 1, P + K + 1).
     """
     if isinstance(products, Sums):
         place = int(np.argmin(np.abs(products.pose_error_rad - tau)))
@@ -249,28 +181,14 @@ def null_draws(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Statistics of simulated measurements of the declared model, in which nothing is missing.
 
-    A parametric bootstrap [1]_; of sums, which have no measurements any more, of the statistics themselves.
+    A parametric bootstrap [1]; of sums, which have no measurements any more, of the statistics themselves.
 
-    Parameters
-    ----------
-    products : Products or Sums
-    tau : float
-        Pose error with which to simulate, rad.
-    pose_error_rad : ndarray (T,)
-        At which the statistics are wanted; of sums, that with which they are simulated alone.
-    count : int
-    stream : numpy.random.Generator
+    `tau`: pose error with which to simulate, rad. `pose_error_rad` (T,): at which the statistics are wanted; of sums, that with
+    which they are simulated alone. Returns `along` (T, K, N); `squares` (T, N): as in `Statistics`, for N draws of unit
+    variance.
 
-    Returns
-    -------
-    along : ndarray (T, K, N)
-    squares : ndarray (T, N)
-        As in `Statistics`, for N draws of unit variance.
-
-    References
-    ----------
-    .. [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press,
-       1997.
+    [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press,
+        1997.
     """
     if isinstance(products, Sums):
         gram = statistics_of(products, np.array([tau])).gram[0]

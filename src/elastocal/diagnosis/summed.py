@@ -44,16 +44,9 @@ class InBasis(Protocol):
 class WhiteRows:
     """Whitened rows of M observations in some whole poses; states and poses number from 0 in each block.
 
-    Attributes
-    ----------
-    declared : ndarray (M, rows, P)
-        Sensitivities to the declared parameters.
-    candidates : Factored
-        Sensitivities to the K columns of all candidates, in units of their plausible sizes.
-    residual : ndarray (M, rows)
-    jacobian : ndarray (M, rows, n)
-        With respect to the joints.
-    pose : ndarray of int (M,)
+    `declared` (M, rows, P): sensitivities to the declared parameters. `candidates`: sensitivities to the K columns of all
+    candidates, in units of their plausible sizes. `residual` (M, rows). `jacobian` (M, rows, n): with respect to the joints.
+    `pose` (M,) of int.
     """
 
     declared: np.ndarray
@@ -70,17 +63,8 @@ class WhiteRows:
     def products_by_pose(self, beside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What an error of the joints in each pose would look like in other rows, the candidates and itself.
 
-        Parameters
-        ----------
-        beside : ndarray (M, rows, P + 1)
-            Orthonormal declared columns Q, and the residual y.
-
-        Returns
-        -------
-        ndarray (G, n, P + K + 1)
-            J'[Q W y] of each pose.
-        ndarray (G, n, n)
-            J'J.
+        `beside` (M, rows, P + 1): orthonormal declared columns Q, and the residual y. Returns (G, n, P + K + 1): J'[Q W y] of
+        each pose; (G, n, n): J'J.
         """
         count, joints, poses = beside.shape[2] - 1, self.jacobian.shape[2], int(self.pose.max()) + 1
         rows, gram = np.empty((poses, joints, count + self.candidates.columns + 1)), np.empty((poses, joints, joints))
@@ -112,19 +96,9 @@ class WhiteRows:
 class Sums:
     """What `Products` are for measurements that are held; in the same parameters.
 
-    Attributes
-    ----------
-    declared : int
-        P.
-    pose_error_rad : ndarray (T,)
-        Zero first.
-    totals : ndarray (T, P + K + 1, P + K + 1)
-        Z'Sigma(tau)^-1 Z, the rows of the declared parameters' priors included.
-    log_dets : ndarray (T,)
-        ln |Sigma| beyond that of white noise.
-    rows, freedom : int
-    into_basis, projected : ndarray
-        As in `Products`.
+    `declared`: P. `pose_error_rad` (T,): zero first. `totals` (T, P + K + 1, P + K + 1): Z'Sigma(tau)^-1 Z, the rows of the
+    declared parameters' priors included. `log_dets` (T,): ln |Sigma| beyond that of white noise. `into_basis`, `projected`: as
+    in `Products`.
     """
 
     declared: int
@@ -158,21 +132,12 @@ def rows_at_once(columns: int) -> int:
 
 
 def triangle_of(blocks: Iterable[np.ndarray]) -> np.ndarray:
-    """Triangular factor of rows that come in blocks: sequential TSQR [1]_.
+    """Triangular factor of rows that come in blocks: sequential TSQR [1].
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray (R, k)
-        One at least.
+    `blocks` (R, k): one at least. Returns (k, k).
 
-    Returns
-    -------
-    ndarray (k, k) or fewer rows
-
-    References
-    ----------
-    .. [1] Demmel, J., Grigori, L., Hoemmen, M. and Langou, J., Communication-optimal parallel and sequential QR and LU
-       factorizations, SIAM Journal on Scientific Computing 34, 2012.
+    [1] Demmel, J., Grigori, L., Hoemmen, M. and Langou, J., Communication-optimal parallel and sequential QR and LU
+        factorizations, SIAM Journal on Scientific Computing 34, 2012.
     """
     rest = iter(blocks)
     triangle = _triangular_factor(next(rest))
@@ -190,20 +155,8 @@ def summed(
 ) -> Sums:
     """Sum the products of whitened rows.
 
-    Parameters
-    ----------
-    blocks : iterable of WhiteRows
-        One at least, all of the same candidates.
-    triangle : ndarray (P, P)
-        R of the declared columns of all rows.
-    prior_std, present : ndarray (P,)
-        As in `statistics.products_of`.
-    pose_error_rad : ndarray (T,)
-        Zero first.
-
-    Returns
-    -------
-    Sums
+    `blocks`: one at least, all of the same candidates. `triangle` (P, P): R of the declared columns of all rows. `prior_std`,
+    `present` (P,): as in `statistics.products_of`. `pose_error_rad` (T,): zero first.
     """
     prior = np.diag(1.0 / prior_std)
     factor = _triangular_factor(np.concatenate([triangle, prior]))
@@ -297,14 +250,7 @@ def _log_det(block: WhiteRows, tau: float) -> float:
 def nothing_left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Columns of which nothing but rounding is left after something is taken off.
 
-    Parameters
-    ----------
-    before, after : ndarray (K, K)
-        Products of the columns.
-
-    Returns
-    -------
-    ndarray of bool (K,)
+    `before`, `after` (K, K): products of the columns. Returns (K,) of bool.
     """
     return np.diag(after) <= _INSIDE * np.diag(before)
 
@@ -313,25 +259,12 @@ def null_draws_of(sums: Sums, gram: np.ndarray, count: int, stream: np.random.Ge
     """Statistics of simulated measurements of the declared model, at the size of the pose error with which they are simulated.
 
     b = W'My is normal with covariance G = W'MW, and y'My is its square in G^-1 and an independent chi-squared of what is left
-    (Cochran's theorem [1]_).
+    (Cochran's theorem [1]).
 
-    Parameters
-    ----------
-    sums : Sums
-    gram : ndarray (K, K)
-        W'MW.
-    count : int
-    stream : numpy.random.Generator
+    `gram` (K, K): W'MW. Returns `along` (K, N); `squares` (N,).
 
-    Returns
-    -------
-    along : ndarray (K, N)
-    squares : ndarray (N,)
-
-    References
-    ----------
-    .. [1] Cochran, W. G., The distribution of quadratic forms in a normal system, with applications to the analysis of
-       covariance, Proceedings of the Cambridge Philosophical Society 30, 1934.
+    [1] Cochran, W. G., The distribution of quadratic forms in a normal system, with applications to the analysis of covariance,
+        Proceedings of the Cambridge Philosophical Society 30, 1934.
     """
     scale = np.sqrt(np.clip(np.diag(gram), 1e-300, None))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))

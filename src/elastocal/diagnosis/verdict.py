@@ -3,13 +3,11 @@
 A hypothesis is a set of mechanisms, whatever their locations. `OTHER` beside a mechanism means that a related mechanism acts;
 `OTHER` alone, that the catalogue does not have what acts.
 
-A class lists the credible set of highest posterior probability [1]_ and what the measurements alone favour; the probability of
-a mechanism is its posterior inclusion probability [2]_, summed over hypotheses.
+A class lists the credible set of highest posterior probability [1] and what the measurements alone favour; the probability of
+a mechanism is its posterior inclusion probability [2], summed over hypotheses.
 
-References
-----------
-.. [1] Box, G. E. P. and Tiao, G. C., Bayesian Inference in Statistical Analysis, Addison-Wesley, 1973.
-.. [2] Barbieri, M. M. and Berger, J. O., Optimal predictive model selection, Annals of Statistics 32, 2004.
+[1] Box, G. E. P. and Tiao, G. C., Bayesian Inference in Statistical Analysis, Addison-Wesley, 1973.
+[2] Barbieri, M. M. and Berger, J. O., Optimal predictive model selection, Annals of Statistics 32, 2004.
 """
 
 from __future__ import annotations
@@ -37,13 +35,7 @@ _OF_THE_SETUP = "drift"
 class Hypothesis:
     """A set of mechanisms.
 
-    Attributes
-    ----------
-    mechanisms : tuple of str
-        In the order of their names; empty for "nothing".
-    probability : float
-    model : int
-        Number of its most probable model in the posterior.
+    `mechanisms`: in the order of their names; empty for "nothing". `model`: number of its most probable model in the posterior.
     """
 
     mechanisms: tuple[str, ...]
@@ -65,17 +57,9 @@ class Hypothesis:
 class Conclusion:
     """What the posterior says.
 
-    Attributes
-    ----------
-    verdict : str
-    hypotheses : tuple of Hypothesis
-        The most probable first; "nothing" among them.
-    best : Hypothesis
-        The most probable in accordance with the alarm: "nothing" without one.
-    alternatives : dict of str to tuple of str
-        For each mechanism of the best hypothesis what may be meant instead.
-    mechanisms : dict of str to float
-        Probability that each mechanism is there, in falling order.
+    `hypotheses`: the most probable first; "nothing" among them. `best`: the most probable in accordance with the alarm:
+    "nothing" without one. `alternatives`: for each mechanism of the best hypothesis what may be meant instead. `mechanisms`:
+    probability that each mechanism is there, in falling order.
     """
 
     verdict: str
@@ -88,20 +72,11 @@ class Conclusion:
 def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusion:
     """State the verdict.
 
-    Parameters
-    ----------
-    problem : Problem
-    posterior : Posterior
-    alarm : Alarm
-
-    Returns
-    -------
-    Conclusion
-        adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for, and favoured over
-        each other one by the measurements alone. class: one mechanism, but which of some, or whether a related one, remains
-        ambiguous. several: more than one mechanism.
-        unexplained: something acts that the catalogue does not have, or that no model explains better than "nothing" does.
-        not_testable: the measurements can test no mechanism of the robot, and nothing of the set-up shows.
+    Returns adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for, and favoured over
+    each other one by the measurements alone. class: one mechanism, but which of some, or whether a related one, remains
+    ambiguous. several: more than one mechanism. unexplained: something acts that the catalogue does not have, or that no model
+    explains better than "nothing" does. not_testable: the measurements can test no mechanism of the robot, and nothing of the
+    set-up shows.
     """
     settings = problem.settings
     hypotheses = hypotheses_of(problem, posterior)
@@ -161,15 +136,7 @@ def _marginal(hypotheses: Iterable[Hypothesis]) -> dict[str, float]:
 def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, ...]:
     """Probability of each set of mechanisms.
 
-    Parameters
-    ----------
-    problem : Problem
-    posterior : Posterior
-
-    Returns
-    -------
-    tuple of Hypothesis
-        The most probable first; "nothing" is always among them.
+    Returns the most probable first; "nothing" is always among them.
     """
     found: dict[tuple[str, ...], tuple[float, int]] = {(): (0.0, -1)}
     for number, (model, probability) in enumerate(zip(posterior.models, posterior.probabilities, strict=True)):
@@ -181,12 +148,7 @@ def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, .
 
 
 def location_probabilities(problem: Problem, posterior: Posterior, mechanism: str) -> dict[tuple[int | str, ...], float]:
-    """Probability of each location of a mechanism, given that it is there.
-
-    Returns
-    -------
-    dict of tuple to float
-    """
+    """Probability of each location of a mechanism, given that it is there."""
     total = 0.0
     found: dict[tuple[int | str, ...], float] = {}
     for model, probability in zip(posterior.models, posterior.probabilities, strict=True):

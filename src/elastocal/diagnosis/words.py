@@ -40,16 +40,7 @@ _MOST_DETAILED = 2
 
 
 def physical_name(effect: str) -> str:
-    """Physical name of an effect of the catalogue; its own name as words where its module has none.
-
-    Parameters
-    ----------
-    effect : str
-
-    Returns
-    -------
-    str
-    """
+    """Physical name of an effect of the catalogue; its own name as words where its module has none."""
     return getattr(effects().get(effect), "WORDS", effect.replace("_", " "))
 
 
@@ -61,15 +52,7 @@ def detail_words(effect: str, detail: str) -> str:
 def parameter_words(effect: str, name: str) -> str:
     """A parameter of an effect as an engineer would call it: shift along x for dx, cos(2q) for cos_2q.
 
-    Parameters
-    ----------
-    effect : str
-        By its name in the catalogue; what is not there, such as a frame, has no words of its own.
-    name : str
-
-    Returns
-    -------
-    str
+    `effect`: by its name in the catalogue; what is not there, such as a frame, has no words of its own.
     """
     text = getattr(effects().get(effect), "PARAMETER_WORDS", {}).get(name, name.replace("_", " "))
     for pattern, instead in _PARAMETER_WORDS:
@@ -100,16 +83,8 @@ def at_joints(effect: str, joints: Collection[int]) -> str:
 def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
     """An effect and where it acts.
 
-    Parameters
-    ----------
-    effect : str
-    locations : sequence of str
-        As `findings.location_words` writes them: joint 2, links 1 and 2 one section, joint 4 orders 1-2, column.
-
-    Returns
-    -------
-    str
-        Such as: gravity sag of joints 2 and 3.
+    `locations`: as `findings.location_words` writes them: joint 2, links 1 and 2 one section, joint 4 orders 1-2, column.
+    Returns such as: gravity sag of joints 2 and 3.
     """
     parsed = []
     for location in filter(None, locations):
@@ -123,16 +98,7 @@ def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
 def found_words(effect: str, keys: Iterable[str]) -> str:
     """An effect and where it was found.
 
-    Parameters
-    ----------
-    effect : str
-    keys : sequence of str
-        Of its candidates.
-
-    Returns
-    -------
-    str
-        As `effect_words`.
+    `keys`: of its candidates. Returns as `effect_words`.
     """
     locations = []
     for key in keys:
@@ -145,16 +111,7 @@ def found_words(effect: str, keys: Iterable[str]) -> str:
 
 
 def candidate_words(key: str) -> str:
-    """The key of a candidate in words: zero offset of joint 3, gear transmission error of joint 1 (orders 1-2).
-
-    Parameters
-    ----------
-    key : str
-
-    Returns
-    -------
-    str
-    """
+    """The key of a candidate in words: zero offset of joint 3, gear transmission error of joint 1 (orders 1-2)."""
     found = re.match(_ANY_KEY, key)
     return found_words(found["effect"], [key]) if found else key.replace("_", " ")
 
@@ -162,16 +119,8 @@ def candidate_words(key: str) -> str:
 def hypothesis_words(mechanisms: Collection[str], locations: Mapping[str, Iterable[str]] | None = None) -> str:
     """A hypothesis, which is a set of mechanisms, in words.
 
-    Parameters
-    ----------
-    mechanisms : sequence of str
-        `OTHER` alone is something that the catalogue does not have; beside a mechanism, that a related one may act.
-    locations : dict of str to list of str, optional
-        Of each mechanism, see `effect_words`.
-
-    Returns
-    -------
-    str
+    `mechanisms`: `OTHER` alone is something that the catalogue does not have; beside a mechanism, that a related one may act.
+    `locations`: of each mechanism, see `effect_words`.
     """
     named = [effect_words(name, (locations or {}).get(name, ())) for name in mechanisms if name != OTHER]
     if not named:
@@ -182,14 +131,7 @@ def hypothesis_words(mechanisms: Collection[str], locations: Mapping[str, Iterab
 def hypotheses_words(sets: Sequence[Mapping[str, Any]]) -> list[str]:
     """Hypotheses in words; those that hold all of the first and more by what they add to it.
 
-    Parameters
-    ----------
-    sets : sequence of dict
-        As in verdict.json, the most probable first.
-
-    Returns
-    -------
-    list of str
+    `sets`: as in verdict.json, the most probable first.
     """
     first = set(sets[0]["mechanisms"]) if sets else set()
     found: list[str] = []
@@ -210,16 +152,7 @@ def alternative_words(name: str) -> str:
 
 
 def in_words(text: str) -> str:
-    """A text with every name of the catalogue, every key of a candidate and the parameter stated after it in words.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    str
-    """
+    """A text with every name of the catalogue, every key of a candidate and the parameter stated after it in words."""
     names = "|".join(sorted(effects(), key=len, reverse=True))
 
     def worded(found: re.Match[str]) -> str:

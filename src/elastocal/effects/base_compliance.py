@@ -2,11 +2,9 @@
 
 u = C (F, M + p x F), C = diag(c_h, c_h, c_v, c_t, c_t, 0), is the displacement of the foot (m, rad) in base axes under a force
 F (N) and a moment M (N m) at p (m), declared masses included; c_h and c_v in m/N, c_t in rad/(N m), like a rigid footing on
-springs [1]_. The compliance about the vertical is that of a joint 1 that turns about it, and is not counted again.
+springs [1]. The compliance about the vertical is that of a joint 1 that turns about it, and is not counted again.
 
-References
-----------
-.. [1] F. E. Richart, J. R. Hall and R. D. Woods, Vibrations of Soils and Foundations, Prentice-Hall, 1970.
+[1] F. E. Richart, J. R. Hall and R. D. Woods, Vibrations of Soils and Foundations, Prentice-Hall, 1970.
 """
 
 from __future__ import annotations

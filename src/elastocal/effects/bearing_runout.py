@@ -1,12 +1,10 @@
 """A bearing that runs out: races or seats that are out of round or askew move the axis of a joint once and twice per turn.
 
 e = sum_k a_k cos(k q) + b_k sin(k q), k = 1, 2, with q the joint angle (rad), is each of the error motions of an axis of
-rotation [1]_: radial along two fixed axes across it (m), axial along it (m), and tilt about the two (rad). Fixed axes are
+rotation [1]: radial along two fixed axes across it (m), axial along it (m), and tilt about the two (rad). Fixed axes are
 those of the link before the joint.
 
-References
-----------
-.. [1] ISO 230-7, Test code for machine tools, part 7: Geometric accuracy of axes of rotation, 2015.
+[1] ISO 230-7, Test code for machine tools, part 7: Geometric accuracy of axes of rotation, 2015.
 """
 
 from __future__ import annotations

@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 
 @cache
 def effects() -> dict[str, Effect]:
-    """Modules of the catalogue by the name of their effect.
-
-    Returns
-    -------
-    dict of str to module
-    """
+    """Modules of the catalogue by the name of their effect."""
     names = sorted(module.name for module in pkgutil.iter_modules(elastocal.effects.__path__))
     modules = [import_module(f"elastocal.effects.{name}") for name in names]
     return {module.NAME: cast("Effect", module) for module in modules if hasattr(module, "NAME")}
@@ -34,14 +29,7 @@ def effects() -> dict[str, Effect]:
 def candidates_on(sites: Sites) -> dict[str, Candidate]:
     """Every way in which an effect of the catalogue can act on a robot.
 
-    Parameters
-    ----------
-    sites : Sites
-
-    Returns
-    -------
-    dict of str to Candidate
-        By their keys.
+    Returns by their keys.
     """
     found = [candidate for module in effects().values() for candidate in module.candidates(sites)]
     require_unique([candidate.key for candidate in found])
@@ -51,21 +39,7 @@ def candidates_on(sites: Sites) -> dict[str, Candidate]:
 def declared_candidates(names: Iterable[str], sites: Sites, source: str = "declared") -> list[Candidate]:
     """All candidates of the effects that a campaign declares.
 
-    Parameters
-    ----------
-    names : sequence of str
-    sites : Sites
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    list of Candidate
-
-    Raises
-    ------
-    InputError
-        An effect that the catalogue does not have.
+    `source`: named in errors. Raises `InputError`: an effect that the catalogue does not have.
     """
     for name in names:
         if name not in effects():

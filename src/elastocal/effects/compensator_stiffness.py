@@ -2,15 +2,13 @@
 
 k = -dT/dq = K a L [(s0/s) (cos p + a L sin^2 p / s^2) - cos p], p = alpha + q,
 
-is what the spring [1]_ adds (N m/rad), with T and its symbols as in `compensator_torque`, and -c^2 k is what that adds to the
+is what the spring [1] adds (N m/rad), with T and its symbols as in `compensator_torque`, and -c^2 k is what that adds to the
 compliance c of the joint. For a short crank it is theta = tau (u_1 cos q + v_1 sin q + u_2 cos 2q + v_2 sin 2q), with theta in
 rad, tau the torque of load and declared masses (N m), u and v in rad/(N m). With order 1 alone it is the same as a shoulder
 whose own stiffness depends on its angle.
 
-References
-----------
-.. [1] A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet and A. Pashkevich, Identification of geometrical and elastostatic
-   parameters of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
+[1] A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet and A. Pashkevich, Identification of geometrical and elastostatic parameters
+    of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
 """
 
 from __future__ import annotations

@@ -3,13 +3,11 @@
 T = -dU/dq = K a L (1 - s0/s) sin(alpha + q), U = K (s - s0)^2 / 2, s^2 = a^2 + L^2 + 2 a L cos(alpha + q),
 
 in N m, for a spring of stiffness K (N/m) and free length s0 (m) between a crank a on the joint and an anchor at the distance L
-(m) [1]_. For a short crank, a << L, it is a sine of q and of 2q with unknown phases, under the law of a gas cylinder too; the
+(m) [1]. For a short crank, a << L, it is a sine of q and of 2q with unknown phases, under the law of a gas cylinder too; the
 compliance of the joint turns it into theta = sum_k u_k cos(k q) + v_k sin(k q), k = 1, 2, in rad.
 
-References
-----------
-.. [1] A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet and A. Pashkevich, Identification of geometrical and elastostatic
-   parameters of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
+[1] A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet and A. Pashkevich, Identification of geometrical and elastostatic parameters
+    of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """What effects may depend on in each state of the robot: its loads, its motion, the approach, time and temperature.
 
-The load on each coordinate is the generalized force J^T w of a wrench w (N, N m) by the principle of virtual work [1]_.
+The load on each coordinate is the generalized force J^T w of a wrench w (N, N m) by the principle of virtual work [1].
 
-References
-----------
-.. [1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
+[1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
 """
 
 from __future__ import annotations
@@ -52,33 +50,16 @@ class Conditions:
     """Everything that an effect may depend on, for S states of the robot.
 
     Loads are taken where the robot has yielded to them: at the displaced coordinates behind `motion`, not at the commanded ones
-    (the term K_C of the conservative congruence transformation [1]_).
+    (the term K_C of the conservative congruence transformation [1]).
 
-    Attributes
-    ----------
-    sites : Sites
-    compliance : ndarray (n,)
-        Joint compliances, rad/(N m).
-    joint_angles : ndarray (S, n)
-        As commanded, rad.
-    wrench : ndarray (S, 6)
-        N, N m, at the last measuring point, base axes.
-    motion : Motion
-        Of `Sites.followed`.
-    mass_corrections : ndarray (4 m,)
-        By how much each of the declared masses is off its robot file, kg, and then its first moments along the axes of its
-        frame beyond what goes with the mass, kg m.
-    approach : ndarray (S, n) or None
-    time_s : ndarray (S,) or None
-        Since the first measurement to which the model was fitted.
-    temperature_c : ndarray (S,) or None
-    progress : ndarray (S,)
-        How far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`.
+    `compliance` (n,): joint compliances, rad/(N m). `joint_angles` (S, n): as commanded, rad. `wrench` (S, 6): N, N m, at the
+    last measuring point, base axes. `motion`: of `Sites.followed`. `mass_corrections` (4 m,): by how much each of the declared
+    masses is off its robot file, kg, and then its first moments along the axes of its frame beyond what goes with the mass, kg
+    m. `approach` (S, n). `time_s` (S,): since the first measurement to which the model was fitted. `temperature_c` (S,).
+    `progress` (S,): how far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`.
 
-    References
-    ----------
-    .. [1] S.-F. Chen and I. Kao, Conservative congruence transformation for joint and Cartesian stiffness matrices of robotic
-       hands and fingers, International Journal of Robotics Research 19, 2000.
+    [1] S.-F. Chen and I. Kao, Conservative congruence transformation for joint and Cartesian stiffness matrices of robotic
+        hands and fingers, International Journal of Robotics Research 19, 2000.
     """
 
     sites: Sites
@@ -118,9 +99,7 @@ class Conditions:
     def gravity_of_corrections(self, coordinates: Sequence[int]) -> Iterator[np.ndarray]:
         """By how much `gravity` on some coordinates, in rising order, grows with each of the `mass_corrections`, per unit.
 
-        Yields
-        ------
-        ndarray (number of the coordinates, S)
+        Yields (number of the coordinates, S).
         """
         moved = self.motion
         chosen = np.flatnonzero(np.isin(moved.coordinate, coordinates))
@@ -220,16 +199,8 @@ class Conditions:
 def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.ndarray:
     """How far a campaign had come in each state.
 
-    Parameters
-    ----------
-    states : States
-    row_span : (int, int), optional
-        First and last row of the campaign; those of the states without. States that have no row come after it.
-
-    Returns
-    -------
-    ndarray (S,)
-        0 at the first row, 1 at the last. Where no rows are known, poses count in the order of their numbers.
+    `row_span` (int, int): first and last row of the campaign; those of the states without. States that have no row come after
+    it. Returns (S,): 0 at the first row, 1 at the last. Where no rows are known, poses count in the order of their numbers.
     """
     if not len(states) or (states.row is None and row_span is not None):
         return np.ones(len(states))
@@ -249,24 +220,9 @@ def conditions_of(
 ) -> Conditions:
     """What effects may depend on, in some states.
 
-    Parameters
-    ----------
-    sites : Sites
-    compliance : ndarray (n,)
-        rad/(N m).
-    states : States
-    time_zero_s : float
-        From which effects count the time.
-    mass_corrections : ndarray (4 m,), optional
-        As in `Conditions`; zero without.
-    row_span : (int, int), optional
-        As in `progress_of`.
-    coordinates : ndarray (S, C), optional
-        Where the robot has yielded to; the commanded poses without.
-
-    Returns
-    -------
-    Conditions
+    `compliance` (n,): rad/(N m). `time_zero_s`: from which effects count the time. `mass_corrections` (4 m,): as in
+    `Conditions`; zero without. `row_span` (int, int): as in `progress_of`. `coordinates` (S, C): where the robot has yielded
+    to; the commanded poses without.
     """
     if coordinates is None:
         coordinates = np.zeros((len(states), sites.chain.coordinates))
@@ -294,14 +250,7 @@ def at_coordinates(conditions: Conditions, coordinates: np.ndarray) -> Condition
 def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
     """Some of the states.
 
-    Parameters
-    ----------
-    conditions : Conditions
-    chosen : slice or ndarray of bool (S,)
-
-    Returns
-    -------
-    Conditions
+    `chosen` (S,) of bool.
     """
     moved = conditions.motion
     some = replace(
@@ -346,17 +295,8 @@ def with_total(conditions: Conditions, total: np.ndarray) -> Conditions:
 def offered(sites: Sites, states: States) -> frozenset[str]:
     """What is there that effects may need.
 
-    Parameters
-    ----------
-    sites : Sites
-    states : States
-
-    Returns
-    -------
-    frozenset of str
-        "load": an external load, or declared masses, whose weight loads the joints too; "external load", without which
-        the compliances are not identifiable; "approach", where it is known somewhere; "time" and "temperature", where they
-        change.
+    Returns "load": an external load, or declared masses, whose weight loads the joints too; "external load", without which the
+    compliances are not identifiable; "approach", where it is known somewhere; "time" and "temperature", where they change.
     """
     there = {
         "load": bool(sites.masses) or bool(states.wrench.any()),

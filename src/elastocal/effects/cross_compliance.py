@@ -1,12 +1,10 @@
 """Elastic coupling of two joints: each turns under the torque of the other, as where one flexible casting holds both gears.
 
 theta_i = c_ij tau_j and theta_j = c_ij tau_i, with theta in rad, tau the torques of load and declared masses (N m) and c_ij in
-rad/(N m), the same both ways by the reciprocal theorem of elastic bodies [1]_. Beside the compliances of two parallel joints,
+rad/(N m), the same both ways by the reciprocal theorem of elastic bodies [1]. Beside the compliances of two parallel joints,
 seen at the end-effector alone, it is not distinguishable from bending of the link between them in its plane.
 
-References
-----------
-.. [1] S. P. Timoshenko and J. N. Goodier, Theory of Elasticity, 3rd edition, McGraw-Hill, 1970.
+[1] S. P. Timoshenko and J. N. Goodier, Theory of Elasticity, 3rd edition, McGraw-Hill, 1970.
 """
 
 from __future__ import annotations

@@ -1,13 +1,11 @@
 """A flange, its bearing or a tool changer that yields elastically: what holds the tool is a spring behind the last joint.
 
 u = C w, with u the shift (m) and turn (rad) of the flange along its axes, w the external force (N) and moment (N m) there
-and C diagonal, m/N and rad/(N m): a spring in six directions, as in complete stiffness models of serial robots [1]_. The turn
+and C diagonal, m/N and rad/(N m): a spring in six directions, as in complete stiffness models of serial robots [1]. The turn
 about the axis of the last joint is that of its compliance, and is held by the fit where that is identified.
 
-References
-----------
-.. [1] A. Klimchik, S. Caro, B. Furet and A. Pashkevich, Complete stiffness model for a serial robot, International Conference
-   on Informatics in Control, Automation and Robotics, 2014.
+[1] A. Klimchik, S. Caro, B. Furet and A. Pashkevich, Complete stiffness model for a serial robot, International Conference on
+    Informatics in Control, Automation and Robotics, 2014.
 """
 
 from __future__ import annotations

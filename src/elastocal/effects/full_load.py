@@ -20,15 +20,7 @@ _PULL_N, _LEAST_LEVER_M = 1e3, 0.5
 def lever_m(sites: Sites, joint: int) -> float:
     """Length of the arm beyond a joint, outstretched; at least that of a tool.
 
-    Parameters
-    ----------
-    sites : Sites
-    joint : int
-        From 0.
-
-    Returns
-    -------
-    float
+    `joint`: from 0.
     """
     return max(float(np.linalg.norm(sites.link_vectors_m[joint + 1 :], axis=1).sum()), _LEAST_LEVER_M)
 
@@ -38,15 +30,7 @@ def full_torque_Nm(sites: Sites, joint: int) -> float:  # noqa: N802 - units in 
 
     By it laws of gears are scaled.
 
-    Parameters
-    ----------
-    sites : Sites
-    joint : int
-        From 0.
-
-    Returns
-    -------
-    float
+    `joint`: from 0.
     """
     pull = _PULL_N if sites.payload_kg is None else sites.payload_kg * float(np.linalg.norm(sites.gravity_m_s2))
     return pull * lever_m(sites, joint) + sites.longest_weight_torque_Nm(joint)

@@ -1,12 +1,10 @@
 """Friction and backlash that hold a joint back on the side from which it came: the gear stays wound up when the motor stops.
 
 theta_i = h_i s_i, with s_i = -1 or +1 the sense in which the joint was approached, 0 where it is not known, and h_i half the
-width of the loop (rad; m for a prismatic joint), negative where the joint stays short: friction F sgn(dq/dt) [1]_ that is left
+width of the loop (rad; m for a prismatic joint), negative where the joint stays short: friction F sgn(dq/dt) [1] that is left
 at rest winds up a gear of compliance c by c F. Where the approach is not recorded this is part of the repeatability.
 
-References
-----------
-.. [1] B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer, 1991.
+[1] B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer, 1991.
 """
 
 from __future__ import annotations

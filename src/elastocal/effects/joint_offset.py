@@ -1,11 +1,9 @@
 """Zero offset of a joint: its encoder was mastered a little off the mark.
 
-theta_i = delta_i at every pose, with and without load, in rad (m for a prismatic joint) [1]_. An offset of the first joint is a
+theta_i = delta_i at every pose, with and without load, in rad (m for a prismatic joint) [1]. An offset of the first joint is a
 turn of the base, one of the last a turn of the tool: they are identifiable only where frame and target are known.
 
-References
-----------
-.. [1] W. Khalil and E. Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002.
+[1] W. Khalil and E. Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002.
 """
 
 from __future__ import annotations

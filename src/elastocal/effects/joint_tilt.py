@@ -1,13 +1,11 @@
 """A bearing that tilts across its axis under the moment that it carries.
 
 theta_e = c_e (e . M_i) at joint i, with theta_e the tilt (rad) about each of the two axes e across the joint's own, which turn
-with it, M_i the moment of load and declared masses there (N m) and c_e in rad/(N m) [1]_. The carriage of a prismatic joint
+with it, M_i the moment of load and declared masses there (N m) and c_e in rad/(N m) [1]. The carriage of a prismatic joint
 rolls about its own axis as well.
 
-References
-----------
-.. [1] C. Reinl, M. Friedmann, J. Bauer, M. Pischan, E. Abele and O. von Stryk, Model-based off-line compensation of path
-   deviation for industrial robots in milling applications, IEEE/ASME Conference on Advanced Intelligent Mechatronics, 2011.
+[1] C. Reinl, M. Friedmann, J. Bauer, M. Pischan, E. Abele and O. von Stryk, Model-based off-line compensation of path deviation
+    for industrial robots in milling applications, IEEE/ASME Conference on Advanced Intelligent Mechatronics, 2011.
 """
 
 from __future__ import annotations

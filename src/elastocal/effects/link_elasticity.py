@@ -3,13 +3,11 @@
 y = F_y l^3 a/EI + M_z l^2 b/EI, r_z = F_y l^2 b/EI + M_z l c/EI, likewise in the other plane, r_x = M_x l c/GJ,
 
 are shift (m) and turns (rad) of the far end under force F (N) and moment M (N m) there, with x along the link of length l (m):
-Euler-Bernoulli and St Venant [1]_, linear in 1/EI and 1/GJ, 1/(N m^2), at the near end. A uniform link has a, b, c = 1/3, 1/2,
+Euler-Bernoulli and St Venant [1], linear in 1/EI and 1/GJ, 1/(N m^2), at the near end. A uniform link has a, b, c = 1/3, 1/2,
 1; one whose diameter falls linearly by a share t to its far end, thin-walled, the integrals over s from 0 to 1 of (1 - s)^2,
 1 - s and 1 over (1 - t s)^3. Stretching and shear are left out, for they are small in links much longer than wide.
 
-References
-----------
-.. [1] S. P. Timoshenko and J. M. Gere, Mechanics of Materials, Van Nostrand Reinhold, 1972.
+[1] S. P. Timoshenko and J. M. Gere, Mechanics of Materials, Van Nostrand Reinhold, 1972.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
 """Wrong dimensions of a link: machining and assembly leave its far end shifted and turned from where the drawing has it.
 
 u = (d, r), the same at every pose, in the frame of the chain at the far end, d in m and r in rad: to first order all that
-Denavit-Hartenberg or Hayati parameters [1]_ can be wrong by, without their singularities. Components that other links, the
+Denavit-Hartenberg or Hayati parameters [1] can be wrong by, without their singularities. Components that other links, the
 base or the tool make as well are not identifiable and are held by the fit.
 
-References
-----------
-.. [1] W. Khalil and E. Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002.
+[1] W. Khalil and E. Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002.
 """
 
 from __future__ import annotations

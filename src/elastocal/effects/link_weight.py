@@ -1,15 +1,13 @@
 """Sag of the arm, or of one joint, under the weight of the links that it carries.
 
 theta_i = c_i sum_k m_k tau_ik(q), with theta_i in rad, c_i the compliance (rad/(N m)), m_k a mass at the far end of link k (kg)
-and tau_ik its torque on joint i (N m/kg). Given the compliances it is linear in masses and first moments [1]_, which turn all
+and tau_ik its torque on joint i (N m/kg). Given the compliances it is linear in masses and first moments [1], which turn all
 joints at once; of one joint alone, in the products with its compliance. A link's own mass m at its middle counts as m/2 at
 either end. Where the robot file declares masses, theirs are parameters already (`declared_weight`). Variants have the first
 moments of these links across their lines (kg m) too: centres of mass are seldom on them.
 
-References
-----------
-.. [1] C. G. Atkeson, C. H. An and J. M. Hollerbach, Estimation of inertial parameters of manipulator loads and links,
-   International Journal of Robotics Research 5, 1986.
+[1] C. G. Atkeson, C. H. An and J. M. Hollerbach, Estimation of inertial parameters of manipulator loads and links,
+    International Journal of Robotics Research 5, 1986.
 """
 
 from __future__ import annotations

@@ -2,11 +2,9 @@
 
 theta_i = D_i tanh(tau_i / tau_0), with theta_i in rad, tau_i the torque of load and declared masses (N m), D_i half the play
 (rad) and tau_0 the torque at which it is taken up (N m). Linear in D_i, not in tau_0: makers of gears measure lost motion at
-3 % of the rated torque [1]_. Derived here: tanh is a smooth step from one flank, -D_i, to the other, +D_i.
+3 % of the rated torque [1]. Derived here: tanh is a smooth step from one flank, -D_i, to the other, +D_i.
 
-References
-----------
-.. [1] Nabtesco, Precision Reduction Gear RV, catalogue, glossary: lost motion, the torsion angle at 3 % of the rated torque.
+[1] Nabtesco, Precision Reduction Gear RV, catalogue, glossary: lost motion, the torsion angle at 3 % of the rated torque.
 """
 
 from __future__ import annotations

@@ -2,12 +2,10 @@
 
 theta_i = sum_k a_k cos(k N q_i) + b_k sin(k N q_i), k = 1, 2, with theta_i, a_k, b_k and the joint angle q_i in rad and N the
 gear ratio, which must be known well enough for the phase of its waves. Strain wave gears, too, err in the rhythm of their
-input [1]_. Where the robot file has no gear ratio of a joint nothing is offered there.
+input [1]. Where the robot file has no gear ratio of a joint nothing is offered there.
 
-References
-----------
-.. [1] T. D. Tuttle, Understanding and Modeling the Behavior of a Harmonic Drive Gear Transmission, technical report, MIT
-   Artificial Intelligence Laboratory, 1992.
+[1] T. D. Tuttle, Understanding and Modeling the Behavior of a Harmonic Drive Gear Transmission, technical report, MIT
+    Artificial Intelligence Laboratory, 1992.
 """
 
 from __future__ import annotations

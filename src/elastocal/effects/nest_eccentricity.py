@@ -4,12 +4,10 @@ d = sum_e e (a_e cos 2q + b_e sin 2q) over the two axes e across the last joint,
 b_e in m, q the angle of that joint in rad. Derived here: of the Fourier series of d, order 0 is a target elsewhere and order
 1, if it circles against the joint, a link of other dimensions; order 2 is the lowest of which neither makes a part, as of an
 oval ball or nest in which the reflector turns to face the tracker. How well reflectors are centred is one of the errors of
-trackers [1]_.
+trackers [1].
 
-References
-----------
-.. [1] B. Muralikrishnan, S. Phillips and D. Sawyer, Laser trackers for large-scale dimensional metrology: a review, Precision
-   Engineering 44, 2016.
+[1] B. Muralikrishnan, S. Phillips and D. Sawyer, Laser trackers for large-scale dimensional metrology: a review, Precision
+    Engineering 44, 2016.
 """
 
 from __future__ import annotations

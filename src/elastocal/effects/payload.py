@@ -2,12 +2,10 @@
 
 theta = diag(c) J^T (m g, m r x g), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian
 of the end-effector, g gravity (m/s^2), m the mass (kg) and r its centre from there (m). Given the compliances it is linear in
-m and in the first moments m r along the axes of the end-effector (kg m) [1]_.
+m and in the first moments m r along the axes of the end-effector (kg m) [1].
 
-References
-----------
-.. [1] C. G. Atkeson, C. H. An and J. M. Hollerbach, Estimation of inertial parameters of manipulator loads and links,
-   International Journal of Robotics Research 5, 1986.
+[1] C. G. Atkeson, C. H. An and J. M. Hollerbach, Estimation of inertial parameters of manipulator loads and links,
+    International Journal of Robotics Research 5, 1986.
 """
 
 from __future__ import annotations

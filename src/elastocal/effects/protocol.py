@@ -47,26 +47,14 @@ class Displacing(Protocol):
 class Parameter:
     """One unknown of an effect.
 
-    Attributes
-    ----------
-    name, unit : str
-    plausible : float
-        Magnitude that such an effect can reach on a real robot; one that the data cannot distinguish from zero even at this
-        size is not estimated.
-    prior_std : float or None
-        Standard deviation of a normal prior about zero, for series whose terms the data distinguish only in part, as
-        in ridge regression [1]_. None, as nearly everywhere, for no prior. Reported with the estimate.
-    sign : {-1, 0, 1}
-        That such an effect has by its physics; 0 where it may have either.
-    order : int
-        Of a harmonic, whose plausible size falls with it; 1 elsewhere.
-    sized : bool
-        Whether the prior's standard deviation was estimated from the measurements, not known beforehand.
+    `plausible`: magnitude that such an effect can reach on a real robot; one that the data cannot distinguish from zero even at
+    this size is not estimated. `prior_std`: standard deviation of a normal prior about zero, for series whose terms the data
+    distinguish only in part, as in ridge regression [1]. None, as nearly everywhere, for no prior. Reported with the estimate.
+    `sign`: that such an effect has by its physics; 0 where it may have either. `order`: of a harmonic, whose plausible size
+    falls with it; 1 elsewhere. `sized`: whether the prior's standard deviation was estimated from the measurements, not known
+    beforehand.
 
-    References
-    ----------
-    .. [1] A. E. Hoerl and R. W. Kennard, Ridge regression: biased estimation for nonorthogonal problems,
-       Technometrics 12, 1970.
+    [1] A. E. Hoerl and R. W. Kennard, Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
 
     name: str
@@ -82,16 +70,9 @@ class Parameter:
 class Shape:
     """An unknown in which the effect is not linear.
 
-    Attributes
-    ----------
-    name, unit : str
-    start : float
-        Where the search starts.
-    lowest, highest : float
-        Range in which the law keeps its meaning.
-    tried : int
-        How many evenly spaced values a search must try lest it step over the law, one for the start alone; 0 where a few values
-        of growing size will do.
+    `start`: where the search starts. `lowest`, `highest`: range in which the law keeps its meaning. `tried`: how many evenly
+    spaced values a search must try lest it step over the law, one for the start alone; 0 where a few values of growing size
+    will do.
     """
 
     name: str
@@ -131,31 +112,16 @@ class Shape:
 class Candidate:
     """One way in which one effect can act on this robot.
 
-    Attributes
-    ----------
-    effect, family : str
-    joints : tuple of int
-        Joints concerned, counted from 1; empty where the effect belongs to no joint.
-    detail : str
-        Which variant, where an effect has more than one for these joints.
-    parameters : tuple of Parameter
-        In which the displacement is linear.
-    displacement : callable
-        ``displacement(conditions, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its
-        displacement per unit of the parameter, ndarray (S,). It may go with the total loads of the coordinates that it
-        displaces, of no others.
-    needs : frozenset of str
-        What must be there, see `Model.offered`: "load", "external load", "approach", "time", "temperature", "declared base".
-    shapes : tuple of Shape
-    distinct_angles : int
-        How many different angles of its joints the law needs to be distinguishable from a smooth one.
-    of_setup : bool
-        Whether it belongs to where tracker and robot stood in one campaign, and is not carried over to another.
-    location_name : str
-        Names the location beside the joints where these do not: a column, a band of orders. Candidates of one effect at one
-        location are variants of its law, of which only one can hold.
-    turning : tuple of int
-        Joints with whose angles the law goes, counted from 1, where it belongs to no joint.
+    `joints`: joints concerned, counted from 1; empty where the effect belongs to no joint. `detail`: which variant, where an
+    effect has more than one for these joints. `parameters`: in which the displacement is linear. `displacement`:
+    ``displacement(conditions, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its displacement per
+    unit of the parameter, ndarray (S,). It may go with the total loads of the coordinates that it displaces, of no others.
+    `needs`: what must be there, see `Model.offered`: "load", "external load", "approach", "time", "temperature", "declared
+    base". `distinct_angles`: how many different angles of its joints the law needs to be distinguishable from a smooth one.
+    `of_setup`: whether it belongs to where tracker and robot stood in one campaign, and is not carried over to another.
+    `location_name`: names the location beside the joints where these do not: a column, a band of orders. Candidates of one
+    effect at one location are variants of its law, of which only one can hold. `turning`: joints with whose angles the law
+    goes, counted from 1, where it belongs to no joint.
     """
 
     effect: str
@@ -211,14 +177,7 @@ class Effect(Protocol):
 def needed(values: np.ndarray | None) -> np.ndarray:
     """What states need not have, for a law whose candidate names it among its needs.
 
-    Parameters
-    ----------
-    values : ndarray (S,) or (S, n)
-
-    Returns
-    -------
-    ndarray (S,) or (S, n)
-        The same.
+    `values` (S,), (S, n). Returns (S,), (S, n): the same.
     """
     if values is None:
         raise TypeError("states without what the law of a candidate needs")
@@ -233,15 +192,6 @@ def effect_of(key: str) -> str:
 def per_joint(sites: Sites, make: Callable[[int], Candidate], prismatic: bool = False) -> list[Candidate]:
     """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each.
 
-    Parameters
-    ----------
-    sites : Sites
-    make : callable
-    prismatic : bool
-        Whether the effect has a meaning for prismatic joints; most of them are about what turns.
-
-    Returns
-    -------
-    list of Candidate
+    `prismatic`: whether the effect has a meaning for prismatic joints; most of them are about what turns.
     """
     return [make(joint) for joint in range(sites.joints) if prismatic or not sites.prismatic[joint]]

@@ -5,12 +5,10 @@ theta_i = d_i (tau_i - s(tau_i)), with s(tau) = clip(tau, -tau_1, tau_1) or tau_
 theta_i in rad, tau_i the torque of load and declared masses (N m), d_i < 0 in rad/(N m), and s the part that bends the gear as
 at rest: either two slopes that meet at the torque tau_1 (N m); or a slope that falls smoothly, as several kinks do together,
 and which below tau_1 is the cubic law tau^3 / (3 tau_1^2). Neither is linear in tau_1. A stiffness that depends on the torque
-was measured on strain wave gears [1]_.
+was measured on strain wave gears [1].
 
-References
-----------
-.. [1] T. D. Tuttle, Understanding and Modeling the Behavior of a Harmonic Drive Gear Transmission, technical report, MIT
-   Artificial Intelligence Laboratory, 1992.
+[1] T. D. Tuttle, Understanding and Modeling the Behavior of a Harmonic Drive Gear Transmission, technical report, MIT
+    Artificial Intelligence Laboratory, 1992.
 """
 
 from __future__ import annotations

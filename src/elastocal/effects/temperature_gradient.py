@@ -1,14 +1,12 @@
 """An arm that is warmer on one side or at one end than at the other: motors, sun or a draught warm it unevenly.
 
-A gradient g (K/m) across a link bends it to the curvature alpha g (1/m) [1]_, with alpha the expansion (1/K), so that a link
+A gradient g (K/m) across a link bends it to the curvature alpha g (1/m) [1], with alpha the expansion (1/K), so that a link
 of length l (m) ends by l^2 / 2 times that to the side (m) and turned by l times that (rad). Along the arm motors and gears at
 its foot are warmer than the wrist: a link whose middle is x (m) from the foot grows by the share b (x - x_0), x_0 the mean
 over the arm, which keeps its length. Both in proportion to the temperature above 20 °C where it is measured, parameters in
 1/(K m), or to a first-order lag since the campaign began, in 1/m.
 
-References
-----------
-.. [1] B. A. Boley and J. H. Weiner, Theory of Thermal Stresses, Wiley, 1960.
+[1] B. A. Boley and J. H. Weiner, Theory of Thermal Stresses, Wiley, 1960.
 """
 
 from __future__ import annotations

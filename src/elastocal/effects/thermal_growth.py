@@ -1,13 +1,11 @@
 """Column and links that grow as they warm up: motors, gears and the air warm the castings, which expand.
 
 dl = alpha dT l for each length l (m). With a measured temperature alpha is the expansion (1/K) and dT the temperature above 20
-°C, at which dimensions are stated [1]_; with the time t (s) alone dl = g (1 - exp(-t / t_0)) l, with g the final growth (m/m)
-and t_0 (s) the lag of a body that has one temperature throughout [2]_.
+°C, at which dimensions are stated [1]; with the time t (s) alone dl = g (1 - exp(-t / t_0)) l, with g the final growth (m/m)
+and t_0 (s) the lag of a body that has one temperature throughout [2].
 
-References
-----------
-.. [1] ISO 1, Geometrical product specifications: standard reference temperature, 2016.
-.. [2] F. P. Incropera and D. P. DeWitt, Fundamentals of Heat and Mass Transfer, Wiley, 2002.
+[1] ISO 1, Geometrical product specifications: standard reference temperature, 2016.
+[2] F. P. Incropera and D. P. DeWitt, Fundamentals of Heat and Mass Transfer, Wiley, 2002.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
 """Transmission error of a gear, periodic in the angle of its joint: eccentric and uneven parts let it run ahead and behind.
 
 theta_i = sum_k a_k cos(k q_i) + b_k sin(k q_i), with theta_i, a_k, b_k and the joint angle q_i in rad. Orders 1 and 2 are an
-eccentric gear [1]_ or encoder. Orders 3 to 36 are left by parts that pass so many times in a turn of the joint, and come in
+eccentric gear [1] or encoder. Orders 3 to 36 are left by parts that pass so many times in a turn of the joint, and come in
 bands that are judged one by one; those of the motor's turns are `motor_eccentricity`.
 
-References
-----------
-.. [1] J. D. Smith, Gear Noise and Vibration, 2nd edition, Marcel Dekker, 2003.
+[1] J. D. Smith, Gear Noise and Vibration, 2nd edition, Marcel Dekker, 2003.
 """
 
 from __future__ import annotations

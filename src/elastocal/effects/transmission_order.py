@@ -1,13 +1,11 @@
 """Transmission error of an order that is no integer: parts of a gear that do not come round with the joint.
 
 theta_i = a cos(k q_i) + b sin(k q_i), with theta_i, a, b and the joint angle q_i in rad and k between two integers: planets,
-cranks and cages turn by ratios of numbers of teeth [1]_. Integers themselves are those of `transmission_harmonic`. Over the
+cranks and cages turn by ratios of numbers of teeth [1]. Integers themselves are those of `transmission_harmonic`. Over the
 part of a turn that a joint uses, orders nearer than half a wave over that part are nearly one function, so that the middle
 between two integers is where a search has to try; and less than a whole wave in a turn would be nearly any smooth function.
 
-References
-----------
-.. [1] H. W. Müller, Epicyclic Drive Trains, Wayne State University Press, 1982.
+[1] H. W. Müller, Epicyclic Drive Trains, Wayne State University Press, 1982.
 """
 
 from __future__ import annotations

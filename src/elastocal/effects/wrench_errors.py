@@ -1,11 +1,9 @@
 """What errors of the load have in common: a changed wrench, which the joint compliances turn into angles.
 
 theta = diag(c) J^T dw, with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the loaded
-point and dw the error of the wrench (N, N m): J^T dw are its torques by the principle of virtual work [1]_.
+point and dw the error of the wrench (N, N m): J^T dw are its torques by the principle of virtual work [1].
 
-References
-----------
-.. [1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
+[1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
 """
 
 from __future__ import annotations
@@ -54,14 +52,7 @@ def at_flange_and_in_pull(
 
     Between flange and tool a sensor measures forces and moments; in the line of a pull, the force alone.
 
-    Parameters
-    ----------
-    name, family, parameters, change
-        As of `base_and_flange`.
-
-    Returns
-    -------
-    list of Candidate
+    `name`, `family`, `parameters`, `change`: as of `base_and_flange`.
     """
 
     def in_pull(conditions: Conditions, axes: Sequence[Axis]) -> list[np.ndarray]:
@@ -79,17 +70,8 @@ def at_flange_and_in_pull(
 def lever_of_pull(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Where a pull acts: the one place, in the flange or in base axes, about which forces make the moments (least squares).
 
-    Parameters
-    ----------
-    wrench : ndarray (S, 6)
-        At a point of the flange, base axes.
-    rotation : ndarray (S, 3, 3)
-        Of the flange.
-
-    Returns
-    -------
-    ndarray (S, 3)
-        From the point of the wrench, m, base axes; zero where no place explains the moments.
+    `wrench` (S, 6): at a point of the flange, base axes. `rotation` (S, 3, 3): of the flange. Returns (S, 3): from the point of
+    the wrench, m, base axes; zero where no place explains the moments.
     """
     for axes in (rotation, np.broadcast_to(np.eye(3), rotation.shape)):
         force, moment = (np.einsum("sji,sj->si", axes, part) for part in (wrench[:, :3], wrench[:, 3:]))
@@ -106,17 +88,8 @@ def base_and_flange(
 ) -> list[Candidate]:
     """Candidates for an error of the load that is fixed in base axes or turns with the flange.
 
-    Parameters
-    ----------
-    name, family : str
-    parameters : tuple of Parameter
-        For x, y and z.
-    change : callable
-        ``change(axis, wrench)`` is the change (S, 6) of a wrench (S, 6) per unit of the parameter of an `Axis`.
-
-    Returns
-    -------
-    list of Candidate
+    `parameters`: for x, y and z. `change`: ``change(axis, wrench)`` is the change (S, 6) of a wrench (S, 6) per unit of the
+    parameter of an `Axis`.
     """
 
     def changes(conditions: Conditions, axes: Sequence[Axis]) -> list[np.ndarray]:

@@ -84,15 +84,7 @@ _KNOWN |= {name: name for name in (*EULER, *MATRIX, *HOMOGENEOUS)}
 def kind_of(name: str) -> tuple[str, ...]:
     """Kinds of quantities that a column may hold.
 
-    Parameters
-    ----------
-    name : str
-        As this module calls columns.
-
-    Returns
-    -------
-    tuple of str
-        Keys of `UNITS`.
+    `name`: as this module calls columns. Returns keys of `UNITS`.
     """
     if re.fullmatch(r"q[0-9]+", name):
         # A prismatic joint reports a length.
@@ -128,12 +120,8 @@ def recognized(header: str) -> tuple[str | None, str | None]:
     A number in brackets is an index, whatever else stands there a unit. Of a topic such as ``/tcp/pose/position/x`` or
     ``field.pose.position.x`` the last two names count, or the last but one before ``position``.
 
-    Returns
-    -------
-    name : str or None
-        As this module calls columns, None where the header is not known.
-    unit : str or None
-        As it stands in the header, None where none does.
+    Returns `name`: as this module calls columns, None where the header is not known; `unit`: as it stands in the header, None
+    where none does.
     """
     text, unit = _without_unit(header)
     name = _named(text)

@@ -47,16 +47,8 @@ LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
 class Dialect:
     """How a table is written; what is None is found out, or refused where it is ambiguous.
 
-    Attributes
-    ----------
-    separator, decimal : str
-        Names in `SEPARATORS` and `DECIMALS`.
-    header : int
-        Line of the names of columns, from 1.
-    encoding : str
-        As Python calls it.
-    thousands : str or None
-        Name in `THOUSANDS` of the mark between thousands; None for none.
+    `separator`, `decimal`: names in `SEPARATORS` and `DECIMALS`. `header`: line of the names of columns, from 1. `encoding`: as
+    Python calls it. `thousands`: name in `THOUSANDS` of the mark between thousands; None for none.
     """
 
     separator: str | None = None
@@ -95,22 +87,10 @@ def read_text_table(
 
     Columns without a name are called ``column 3`` by their place; those of empty cells are left out, and so are such rows.
 
-    Parameters
-    ----------
-    path : str or Path
-    is_header : callable
-        Of the cells of a line, whether they name the columns; the first such line does where no line is stated, else one
-        behind a comment mark.
-    stated : Dialect, optional
-    wanted : str
-        What a header has, for messages.
-    ignored : collection of str
-        Names of columns that are left out whatever they hold.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be read or has no header, a row of another length, or numbers that may be read in two ways.
+    `is_header`: of the cells of a line, whether they name the columns; the first such line does where no line is stated, else
+    one behind a comment mark. `wanted`: what a header has, for messages. `ignored`: names of columns that are left out whatever
+    they hold. Raises `InputError`: a file that cannot be read or has no header, a row of another length, or numbers that may be
+    read in two ways.
     """
     source = Path(path).as_posix()
     lines, encoding = _lines(path, stated.encoding)
@@ -277,24 +257,8 @@ def _separator_of(line: str) -> str:
 def cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
     """Cells of one line.
 
-    Parameters
-    ----------
-    line : str
-    separator : str
-        A name in `SEPARATORS`, or the mark itself.
-    source : str
-        Named in errors.
-    number : int
-        Of the line.
-
-    Returns
-    -------
-    list of str
-
-    Raises
-    ------
-    InputError
-        Quotes that are not in pairs, a cell of more than 100,000 characters.
+    `separator`: a name in `SEPARATORS`, or the mark itself. `source`: named in errors. `number`: of the line. Raises
+    `InputError`: quotes that are not in pairs, a cell of more than 100,000 characters.
     """
     mark = SEPARATORS.get(separator, separator)
     if mark == " ":

@@ -1,14 +1,12 @@
 """A Denavit-Hartenberg table to the contents of a robot file.
 
-A row of the standard notation [1]_ is ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, one of Craig's modified notation [2]_
+A row of the standard notation [1] is ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, one of Craig's modified notation [2]
 ``Rx(alpha) Tx(a) Rz(theta) Tz(d)`` with the alpha and a of its own row, which he calls alpha and a of i - 1. A joint's angle is
 added to theta, a prismatic joint's shift to d.
 
-References
-----------
-.. [1] Denavit, J. and Hartenberg, R. S., A kinematic notation for lower-pair mechanisms based on matrices, Journal of Applied
-   Mechanics 22, 1955.
-.. [2] Craig, J. J., Introduction to Robotics: Mechanics and Control, Addison-Wesley, 1986.
+[1] Denavit, J. and Hartenberg, R. S., A kinematic notation for lower-pair mechanisms based on matrices, Journal of Applied
+    Mechanics 22, 1955.
+[2] Craig, J. J., Introduction to Robotics: Mechanics and Control, Addison-Wesley, 1986.
 """
 
 from __future__ import annotations
@@ -55,26 +53,9 @@ def robot_from_dh(
 ) -> Imported:
     """The robot of a Denavit-Hartenberg table, or of a YAML file of `ros_kinematics`.
 
-    Parameters
-    ----------
-    path : str or Path
-    modified : bool
-        Craig's notation; else the standard one.
-    angles, lengths, decimal : str
-        As in `read_dh_table`.
-    name : str, optional
-        Of the robot; that of the file without.
-    relative_std : float
-        How well masses are known.
-
-    Returns
-    -------
-    Imported
-
-    Raises
-    ------
-    InputError
-        As in `read_dh_table`; compliances of some joints only, a prismatic joint without limits, two points of one name.
+    `modified`: craig's notation; else the standard one. `angles`, `lengths`, `decimal`: as in `read_dh_table`. `name`: of the
+    robot; that of the file without. `relative_std`: how well masses are known. Raises `InputError`: as in `read_dh_table`;
+    compliances of some joints only, a prismatic joint without limits, two points of one name.
     """
     source = Path(path).as_posix()
     if Path(path).suffix.lower() in (".yaml", ".yml"):

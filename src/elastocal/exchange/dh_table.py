@@ -52,24 +52,11 @@ MOST_TURNS = 1000
 class DhRow:
     """One row, in SI units.
 
-    Attributes
-    ----------
-    where : str
-        Line or row of the file, for messages.
-    joint : str
-        As the table calls it; empty where it does not.
-    kind : {"R", "P", "F"}
-    theta, d, a, alpha : float
-        rad and m; theta of a revolute joint is the offset that is added to its angle, d of a prismatic one to its shift.
-    limits : (float, float) or None
-        rad, of a prismatic joint m.
-    compliance : float or None
-        µrad/(N m), of a prismatic joint µm/N.
-    mass_kg : float or None
-    centre_m : (float, float, float)
-        In the frame of the row.
-    point : str
-        Measuring point at the frame of the row; empty for none.
+    `where`: line or row of the file, for messages. `joint`: as the table calls it; empty where it does not. `kind`: one of "R",
+    "P", "F". `theta`, `d`, `a`, `alpha`: rad and m; theta of a revolute joint is the offset that is added to its angle, d of a
+    prismatic one to its shift. `limits` (float, float): rad, of a prismatic joint m. `compliance`: µrad/(N m), of a prismatic
+    joint µm/N. `centre_m` (float, float, float): in the frame of the row. `point`: measuring point at the frame of the row;
+    empty for none.
     """
 
     where: str
@@ -89,25 +76,9 @@ class DhRow:
 def read_dh_table(path: str | Path, angles: str = "deg", lengths: str = "m", decimal: str | None = None) -> list[DhRow]:
     """Rows of a Denavit-Hartenberg table.
 
-    Parameters
-    ----------
-    path : str or Path
-        Ends in ``.csv``, ``.yaml`` or ``.yml``.
-    angles : {"deg", "rad"}
-        Of columns that do not say.
-    lengths : {"m", "mm"}
-        Of columns that do not say.
-    decimal : {"point", "comma"}, optional
-        Of CSV; commas are asked for where it is not stated.
-
-    Returns
-    -------
-    list of DhRow
-
-    Raises
-    ------
-    InputError
-        File, line and column of what cannot be read.
+    `path`: ends in ``.csv``, ``.yaml`` or ``.yml``. `angles`: of columns that do not say. `lengths`: of columns that do not
+    say. `decimal`: of CSV; commas are asked for where it is not stated. Raises `InputError`: file, line and column of what
+    cannot be read.
     """
     source = Path(path).as_posix()
     suffix = Path(path).suffix.lower()

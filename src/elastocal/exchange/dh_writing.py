@@ -2,12 +2,10 @@
 
 Rows are of the standard notation, ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, from the base's z axis over each joint axis to that of
 the end effector. Where two axes are nominally parallel, their common normal jumps with the smallest error, so that d is fixed
-and the row ends in ``Ty(b) Ry(beta)`` instead, after Hayati [1]_; b is 0 but where the axes nominally coincide, where theta is
+and the row ends in ``Ty(b) Ry(beta)`` instead, after Hayati [1]; b is 0 but where the axes nominally coincide, where theta is
 fixed and a and b are the offset. All parameters then change as little as the robot does.
 
-References
-----------
-.. [1] Hayati, S. A., Robot arm geometric link parameter estimation, IEEE Conference on Decision and Control, 1983.
+[1] Hayati, S. A., Robot arm geometric link parameter estimation, IEEE Conference on Decision and Control, 1983.
 """
 
 from __future__ import annotations
@@ -58,19 +56,8 @@ class _Kind:
 def dh_rows(robot: Robot) -> list[Row]:
     """Rows of a robot: of its base, of each joint, and of the end effector's frame.
 
-    Parameters
-    ----------
-    robot : Robot
-
-    Returns
-    -------
-    list of Row
-        n + 2 of them. Angles of joints are the controller's where it counts each joint by itself, else those of the chain.
-
-    Raises
-    ------
-    InputError
-        Prismatic or passive joints.
+    Returns n + 2 of them. Angles of joints are the controller's where it counts each joint by itself, else those of the chain.
+    Raises `InputError`: prismatic or passive joints.
     """
     return _described(robot, None, robot.counts_each_joint)[0]
 
@@ -87,16 +74,8 @@ def dh_frames(robot: Robot) -> np.ndarray:
 def dh_table(robot: Robot, nominal: Robot | None = None) -> pd.DataFrame:
     """Rows as `elastocal import dh` reads them: ``Ty(b) Ry(beta)`` becomes a fixed row of its own.
 
-    Parameters
-    ----------
-    robot : Robot
-    nominal : Robot, optional
-        By which each pair of axes is described, see `dh_deltas`; the robot itself without.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Of the angles that the controller reports, where for both it counts each joint by itself.
+    `nominal`: by which each pair of axes is described, see `dh_deltas`; the robot itself without. Returns of the angles that
+    the controller reports, where for both it counts each joint by itself.
     """
     rows: list[dict[str, Any]] = []
     turned, like = 0.0, nominal or robot
@@ -118,14 +97,7 @@ def dh_table(robot: Robot, nominal: Robot | None = None) -> pd.DataFrame:
 def dh_deltas(nominal: Robot, calibrated: Robot) -> pd.DataFrame:
     """Parameters of both robots row by row, and their differences.
 
-    Parameters
-    ----------
-    nominal, calibrated : Robot
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``row`` (base, q1 .. qn, end effector), the calibrated `PARAMETERS`, then ``delta_..``: calibrated minus nominal.
+    Returns ``row`` (base, q1 .. qn, end effector), the calibrated `PARAMETERS`, then ``delta_..``: calibrated minus nominal.
     """
     names = ["base", *(f"q{joint}" for joint in range(1, nominal.joints + 1)), nominal.chain.end_effector.name]
     own = nominal.counts_each_joint and calibrated.counts_each_joint

@@ -20,13 +20,7 @@ _DECIMALS = 12
 def displacement_words(transform: np.ndarray) -> list[str]:
     """A homogeneous transform in words.
 
-    Parameters
-    ----------
-    transform : ndarray (4, 4)
-
-    Returns
-    -------
-    list of str
+    `transform` (4, 4).
     """
     yaw, pitch, roll = yaw_pitch_roll(transform[:3, :3])
     shifts = [shift_word(axis, amount) for axis, amount in zip("xyz", transform[:3, 3], strict=True)]
@@ -36,19 +30,8 @@ def displacement_words(transform: np.ndarray) -> list[str]:
 def turned_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str]]:
     """A joint's axis as one of the chain's, between a fixed rotation and its inverse where it is oblique.
 
-    Parameters
-    ----------
-    axis : ndarray (3,)
-        Not zero.
-
-    Returns
-    -------
-    before : list of str
-        Words of the rotation that turns z into the axis, empty for x, y and z.
-    letter, sign : str
-        Of the axis then, and "-" or "".
-    after : list of str
-        Words of the rotation back.
+    `axis` (3,): not zero. Returns `before`: words of the rotation that turns z into the axis, empty for x, y and z; `letter`,
+    `sign`: of the axis then, and "-" or ""; `after`: words of the rotation back.
     """
     before, letter, sign = _aligned(axis)
     return _words_of(before), letter, sign, _words_of([(name, -angle) for name, angle in reversed(before)])
@@ -89,13 +72,7 @@ def yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:
 
     Near a pitch of 90 deg yaw and roll are not separate; the roll is read of what the yaw leaves, so that the product is right.
 
-    Parameters
-    ----------
-    rotation : ndarray (3, 3)
-
-    Returns
-    -------
-    yaw, pitch, roll : float
+    `rotation` (3, 3).
     """
     level = math.hypot(rotation[0, 0], rotation[1, 0])
     yaw = math.atan2(rotation[1, 0], rotation[0, 0]) if level > 10.0**-_DECIMALS else 0.0

@@ -21,18 +21,7 @@ IMPORT = "import.yaml"
 def read_import_options(path: str | Path) -> ImportOptions:
     """Options of an earlier import.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    ImportOptions
-
-    Raises
-    ------
-    InputError
-        No YAML, an unknown key or a value that none may have.
+    Raises `InputError`: no YAML, an unknown key or a value that none may have.
     """
     document = read_document(path) or {}
     check_document(document, "measurement_import", Path(path).as_posix())
@@ -43,15 +32,7 @@ def read_import_options(path: str | Path) -> ImportOptions:
 def import_options_text(options: ImportOptions, source: str | Path) -> str:
     """Text of the options of an import.
 
-    Parameters
-    ----------
-    options : ImportOptions
-    source : str or Path
-        The table that was imported.
-
-    Returns
-    -------
-    str
+    `source`: the table that was imported.
     """
     digest = hashlib.sha256(Path(source).read_bytes()).hexdigest()
     document: dict[str, Any] = {"source": Path(source).name, "sha256": digest}

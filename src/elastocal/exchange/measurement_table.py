@@ -83,24 +83,11 @@ _LARGEST_ORDINAL = 2**31 - 1
 class ImportOptions:
     """How a table is read; what is None or absent is found out, or refused where it is ambiguous.
 
-    Attributes
-    ----------
-    separator, decimal, header, encoding, thousands
-        As in `csv_dialect.Dialect`.
-    ignore : sequence of str
-        Headers of columns that are left out.
-    columns : dict of str to str
-        Headers by the names of `column_names`.
-    units : dict of str to str
-        Units by the same names; ``angles`` and ``lengths`` for all that have no other.
-    rotation : str or None
-        Notation of `rotations`.
-    target : str or None
-        Name for all rows where no column has it.
-    wrench : {"on-robot", "by-robot"}
-        What the forces act on; those that the robot exerts are turned round.
-    skip_empty : bool
-        Whether rows without a position are left out.
+    `separator`, `decimal`, `header`, `encoding`, `thousands`: as in `csv_dialect.Dialect`. `ignore`: headers of columns that
+    are left out. `columns`: headers by the names of `column_names`. `units`: units by the same names; ``angles`` and
+    ``lengths`` for all that have no other. `rotation`: notation of `rotations`. `target`: name for all rows where no column has
+    it. `wrench`: what the forces act on; those that the robot exerts are turned round. `skip_empty`: whether rows without a
+    position are left out.
     """
 
     separator: str | None = None
@@ -121,19 +108,9 @@ class ImportOptions:
 class ImportedMeasurements:
     """Measurements as a campaign has them.
 
-    Attributes
-    ----------
-    table : dict of str to ndarray (N,)
-        Columns of measurements.csv.
-    joints : int
-    options : ImportOptions
-        With which the same comes out again: nothing is left to be found out.
-    ignored : tuple of str
-        Headers of columns that are not used.
-    skipped : int
-        Rows without a position that were left out.
-    notes : tuple of str
-        How columns were understood that may surprise, and what else was left out.
+    `table` (N,): columns of measurements.csv. `options`: with which the same comes out again: nothing is left to be found out.
+    `ignored`: headers of columns that are not used. `skipped`: rows without a position that were left out. `notes`: how columns
+    were understood that may surprise, and what else was left out.
     """
 
     table: dict[str, np.ndarray]
@@ -147,21 +124,9 @@ class ImportedMeasurements:
 def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robot | None = None) -> ImportedMeasurements:
     """Read measurements from a table of another program.
 
-    Parameters
-    ----------
-    path : str or Path
-    options : ImportOptions
-    robot : Robot, optional
-        Whose joints they are: columns may be called as its file names them, and there have to be as many.
-
-    Returns
-    -------
-    ImportedMeasurements
-
-    Raises
-    ------
-    InputError
-        What is missing or ambiguous, with the option that says it; or line and column of what is no number or no rotation.
+    `robot`: whose joints they are: columns may be called as its file names them, and there have to be as many. Raises
+    `InputError`: what is missing or ambiguous, with the option that says it; or line and column of what is no number or no
+    rotation.
     """
     mapped = dict(options.columns or {})
     for name in (*mapped, *(set(options.units or {}) - {"angles", "lengths"})):

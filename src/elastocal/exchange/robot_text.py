@@ -41,16 +41,8 @@ _ORDER = (
 class Imported:
     """A robot that was read of a file of another kind.
 
-    Attributes
-    ----------
-    document : dict
-        Contents of its robot file.
-    robot : Robot
-        The same, as it is used.
-    origin : str
-        Where it came from: file, digest and options, in a sentence.
-    notes : tuple of str
-        What is to be known of it, and what it lacks.
+    `document`: contents of its robot file. `robot`: the same, as it is used. `origin`: where it came from: file, digest and
+    options, in a sentence. `notes`: what is to be known of it, and what it lacks.
     """
 
     document: dict[str, Any]
@@ -62,23 +54,8 @@ class Imported:
 def imported(document: dict[str, Any], path: str | Path, options: str, notes: Sequence[str]) -> Imported:
     """Check the contents of a robot file that were made from another file.
 
-    Parameters
-    ----------
-    document : dict
-    path : str or Path
-        The other file.
-    options : str
-        How it was read.
-    notes : sequence of str
-
-    Returns
-    -------
-    Imported
-
-    Raises
-    ------
-    InputError
-        Where the robot is none that a robot file may describe.
+    `path`: the other file. `options`: how it was read. Raises `InputError` where the robot is none that a robot file may
+    describe.
     """
     source = Path(path).as_posix()
     check_document(document, "robot", source)
@@ -93,16 +70,7 @@ def imported(document: dict[str, Any], path: str | Path, options: str, notes: Se
 
 
 def robot_text(result: Imported) -> str:
-    """The text of a robot file.
-
-    Parameters
-    ----------
-    result : Imported
-
-    Returns
-    -------
-    str
-    """
+    """The text of a robot file."""
     head = [line for text in (result.origin, *map(_sentence, result.notes)) for line in _comment(text)]
     body = [line for key in _ORDER if key in result.document for line in _lines(key, result.document[key])]
     return "\n".join([*head, *body]) + "\n"
@@ -111,15 +79,7 @@ def robot_text(result: Imported) -> str:
 def write_robot(result: Imported, path: str | Path) -> None:
     """Write a robot file; it appears whole or not at all.
 
-    Parameters
-    ----------
-    result : Imported
-    path : str or Path
-
-    Raises
-    ------
-    InputError
-        A place that cannot be written to.
+    Raises `InputError`: a place that cannot be written to.
     """
     try:
         write_text(path, robot_text(result))
@@ -128,16 +88,7 @@ def write_robot(result: Imported, path: str | Path) -> None:
 
 
 def summary(result: Imported) -> list[str]:
-    """What was read, and what is to be known of it, in a few lines.
-
-    Parameters
-    ----------
-    result : Imported
-
-    Returns
-    -------
-    list of str
-    """
+    """What was read, and what is to be known of it, in a few lines."""
     robot = result.robot
     shifts = sum(robot.chain.prismatic)
     kinds = f"{robot.joints} joint{'s' if robot.joints > 1 else ''}" + (f", {shifts} of them prismatic" if shifts else "")
@@ -177,15 +128,7 @@ _WHOLE_WORDS: dict[str, Any] = {"break_on_hyphens": False, "break_long_words": F
 def refuse_existing(path: str | Path, force: bool) -> None:
     """Refuse a path where something is already.
 
-    Parameters
-    ----------
-    path : str or Path
-    force : bool
-        Whether a file there may be replaced.
-
-    Raises
-    ------
-    InputError
+    `force`: whether a file there may be replaced. Raises `InputError`.
     """
     if Path(path).is_dir() or not Path(path).resolve().parent.is_dir():
         raise InputError(path, "", "no place for a file", "a file in a folder that is there")

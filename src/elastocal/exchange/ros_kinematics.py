@@ -1,11 +1,9 @@
 """The kinematics file of a calibrated robot, as the ROS drivers of Universal Robots write it, to the contents of a robot file.
 
-``kinematics`` has a fixed transform before each joint, ``{x, y, z, roll, pitch, yaw}`` (m, rad), as ``origin`` of a URDF [1]_;
+``kinematics`` has a fixed transform before each joint, ``{x, y, z, roll, pitch, yaw}`` (m, rad), as ``origin`` of a URDF [1];
 the joint turns about z. The base frame is that of the controller (``base`` of ur_description, not ``base_link``).
 
-References
-----------
-.. [1] Universal Robots, ur_calibration: extracts the factory calibration of a robot, github.com/UniversalRobots.
+[1] Universal Robots, ur_calibration: extracts the factory calibration of a robot, github.com/UniversalRobots.
 """
 
 from __future__ import annotations

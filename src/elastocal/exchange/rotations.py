@@ -37,16 +37,8 @@ def is_rotation(text: str) -> bool:
 def columns_of_rotation(notation: str, there: Collection[str]) -> tuple[str, ...]:
     """Names of the columns of an orientation.
 
-    Parameters
-    ----------
-    notation : str
-        Of `ALLOWED`.
-    there : collection of str
-        Columns that a table has: Euler angles about three different axes may be named after the axes, ``rx``, or ``e1..e3``.
-
-    Returns
-    -------
-    tuple of str
+    `notation`: of `ALLOWED`. `there`: columns that a table has: Euler angles about three different axes may be named after the
+    axes, ``rx``, or ``e1..e3``.
     """
     if notation.startswith(EULER_ANGLES):
         axes = notation.removeprefix(EULER_ANGLES).lower()
@@ -64,19 +56,9 @@ def columns_of_rotation(notation: str, there: Collection[str]) -> tuple[str, ...
 def rotation_vectors(notation: str, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rotation vectors of orientations.
 
-    Parameters
-    ----------
-    notation : str
-        Of `ALLOWED`, but not "none".
-    values : ndarray (N, columns)
-        In the order of `columns_of_rotation`; angles in rad. Of homogeneous matrices the translations are left aside.
-
-    Returns
-    -------
-    vectors : ndarray (N, 3)
-        rad.
-    off : ndarray of bool (N,)
-        Whether a quaternion is not of length one or a matrix not a rotation, more than rounding to four digits explains.
+    `notation`: of `ALLOWED`, but not "none". `values` (N, columns): in the order of `columns_of_rotation`; angles in rad. Of
+    homogeneous matrices the translations are left aside. Returns `vectors` (N, 3): rad; `off` (N,) of bool: whether a
+    quaternion is not of length one or a matrix not a rotation, more than rounding to four digits explains.
     """
     good = np.zeros(len(values), bool)
     if notation == VECTORS:

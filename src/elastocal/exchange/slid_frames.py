@@ -2,11 +2,9 @@
 
 A turn about z and a shift along z commute: ``Tz(s) Rz(q) Tz(-s) = Rz(q)``, and so for ``Tz(q)``. Where two axes are nearly
 parallel, their common normal is anywhere along them, and a calibrated Denavit-Hartenberg table has lengths d of hundreds of
-metres that cancel [1]_; the frames of a chain need not be there.
+metres that cancel [1]; the frames of a chain need not be there.
 
-References
-----------
-.. [1] Hayati, S., Robot arm geometric link parameter estimation, 22nd IEEE Conference on Decision and Control, 1983.
+[1] Hayati, S., Robot arm geometric link parameter estimation, 22nd IEEE Conference on Decision and Control, 1983.
 """
 
 from __future__ import annotations
@@ -34,18 +32,8 @@ def lengths_of(words: Sequence[str]) -> float:
 def slid_words(gaps: Sequence[Sequence[Piece]], kinds: Sequence[str]) -> tuple[list[str], np.ndarray]:
     """A chain in words whose joints lie as near as their axes allow to the joint before, and how far each was moved.
 
-    Parameters
-    ----------
-    gaps : sequence of sequences
-        Displacements before, between and behind n joints, which move about or along z.
-    kinds : sequence of str (n,)
-        ``P`` of prismatic joints.
-
-    Returns
-    -------
-    words : list of str
-    slides : ndarray (n + 1,)
-        m along z of each joint, and 0 before for the base.
+    `gaps`: displacements before, between and behind n joints, which move about or along z. `kinds` (n,) of str: ``P`` of
+    prismatic joints. Returns `slides` (n + 1,): m along z of each joint, and 0 before for the base.
     """
     words: list[str] = []
     slides = np.zeros(len(gaps))

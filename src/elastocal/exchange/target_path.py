@@ -38,19 +38,8 @@ _FARTHEST_M = 10.0
 class TargetPath:
     """N wanted poses; None where the file has no such columns.
 
-    Attributes
-    ----------
-    position : ndarray (N, 3)
-        m, base axes.
-    rotation : ndarray (N, 3, 3)
-    start : ndarray (N, n) or None
-        rad.
-    wrench : ndarray (N, 6) or None
-        N, N m.
-    approach : ndarray (N, n) or None
-    time_s, temperature_c : ndarray (N,) or None
-    lines : tuple of int (N,)
-        Line of the file of each pose.
+    `position` (N, 3): m, base axes. `rotation` (N, 3, 3). `start` (N, n): rad. `wrench` (N, 6): N, N m. `approach` (N, n),
+    `time_s`, `temperature_c` (N,). `lines` (N,) of int: line of the file of each pose.
     """
 
     position: np.ndarray
@@ -69,20 +58,8 @@ class TargetPath:
 def read_target_path(path: str | Path, joints: int) -> TargetPath:
     """Read and check a file of wanted poses.
 
-    Parameters
-    ----------
-    path : str or Path
-    joints : int
-        Of the robot.
-
-    Returns
-    -------
-    TargetPath
-
-    Raises
-    ------
-    InputError
-        A column that is missing, unknown or there in part, or a cell that is no finite number; a position that no arm reaches.
+    `joints`: of the robot. Raises `InputError`: a column that is missing, unknown or there in part, or a cell that is no finite
+    number; a position that no arm reaches.
     """
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
     approach = tuple(f"approach{j}" for j in range(1, joints + 1))
@@ -124,10 +101,7 @@ class CorrectedTargets:
 def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
     """Read a file that `elastocal correct` wrote; other columns than those of `CorrectedTargets` do not matter.
 
-    Raises
-    ------
-    InputError
-        A column that is missing, or a cell that is no finite number.
+    Raises `InputError`: a column that is missing, or a cell that is no finite number.
     """
     read = read_text_table(path, lambda _: True, _DIALECT)
     angles = tuple(f"q{j}" for j in range(1, joints + 1))

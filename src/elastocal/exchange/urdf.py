@@ -40,27 +40,11 @@ def robot_from_urdf(
 ) -> Imported:
     """The robot between two links of a URDF.
 
-    Parameters
-    ----------
-    path : str or Path
-    base, tip : str
-        Links: the robot's base frame, and its last measuring point.
-    points : sequence of str
-        Links between them that become measuring points too.
-    relative_std : float
-        How well the masses are known.
-    limits_in : {"rad", "deg"}, optional
-        Unit of the limits of joints that turn; asked for where one goes farther than joints do in rad, else rad as URDF has it.
-
-    Returns
-    -------
-    Imported
-        Joint limits of continuous joints are a turn either way; compliances are none, for a URDF has none.
-
-    Raises
-    ------
-    InputError
-        As in `read_urdf` and `chain_between`; a prismatic joint without limits.
+    `base`, `tip`: links: the robot's base frame, and its last measuring point. `points`: links between them that become
+    measuring points too. `relative_std`: how well the masses are known. `limits_in`: unit of the limits of joints that turn;
+    asked for where one goes farther than joints do in rad, else rad as URDF has it. Returns joint limits of continuous joints
+    are a turn either way; compliances are none, for a URDF has none. Raises `InputError`: as in `read_urdf` and
+    `chain_between`; a prismatic joint without limits.
     """
     urdf, source = read_urdf(path), str(path)
     chain = chain_between(urdf, base, tip, points, source)

@@ -39,14 +39,8 @@ _MOVING = {"revolute": "R", "continuous": "R", "prismatic": "T"}
 class Carried:
     """Where a link of the chain is.
 
-    Attributes
-    ----------
-    body : int
-        Number of the joint that carries it, 0 for the column.
-    transform : ndarray (4, 4)
-        Of its frame, in the frame directly behind that joint, all joints at zero.
-    behind_passive : bool
-        Whether a passive joint turns it against that joint's frame.
+    `body`: number of the joint that carries it, 0 for the column. `transform` (4, 4): of its frame, in the frame directly
+    behind that joint, all joints at zero. `behind_passive`: whether a passive joint turns it against that joint's frame.
     """
 
     body: int
@@ -58,14 +52,7 @@ class Carried:
 class UrdfChain:
     """The chain between two links.
 
-    Attributes
-    ----------
-    words : tuple of str
-        In the notation, with measuring points.
-    joints : tuple of Joint
-        Those of q1, q2, ...
-    links : dict of str to Carried
-        Links on the chain.
+    `words`: in the notation, with measuring points. `joints`: those of q1, q2, ... `links`: links on the chain.
     """
 
     words: tuple[str, ...]
@@ -94,24 +81,9 @@ def joints_above(urdf: Urdf, link: str) -> Iterator[Joint]:
 def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
     """The chain from one link to another that it carries.
 
-    Parameters
-    ----------
-    urdf : Urdf
-    base, tip : str
-        Names of links.
-    points : sequence of str
-        Further links of the chain that become measuring points; the tip is the last one always.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    UrdfChain
-
-    Raises
-    ------
-    InputError
-        A link that is not there or not on the chain, a tip that the base does not carry, a joint that the notation cannot say.
+    `base`, `tip`: names of links. `points`: further links of the chain that become measuring points; the tip is the last one
+    always. `source`: named in errors. Raises `InputError`: a link that is not there or not on the chain, a tip that the base
+    does not carry, a joint that the notation cannot say.
     """
     path = _path(urdf, base, tip, source)
     masters = _masters(urdf, path, source)

@@ -1,11 +1,9 @@
 """A URDF file, read safely: its links, joints and masses, nothing that it refers to.
 
-The Unified Robot Description Format [1]_ is XML. No document type is accepted, and so no entity that grows or fetches another
+The Unified Robot Description Format [1] is XML. No document type is accepted, and so no entity that grows or fetches another
 file; meshes, materials and plug-ins are left out, and no other file is opened.
 
-References
-----------
-.. [1] Open Robotics, XML Robot Description Format (URDF), wiki.ros.org/urdf/XML.
+[1] Open Robotics, XML Robot Description Format (URDF), wiki.ros.org/urdf/XML.
 """
 
 from __future__ import annotations

@@ -30,11 +30,7 @@ _FEWEST_ALIKE = 3
 class Weights:
     """Masses of a robot file, and what is to be said of them.
 
-    Attributes
-    ----------
-    masses : list of dict
-        Entries of ``masses``.
-    notes : tuple of str
+    `masses`: entries of ``masses``.
     """
 
     masses: list[dict[str, Any]]
@@ -44,16 +40,7 @@ class Weights:
 def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD) -> Weights:
     """Masses and centres of what each joint carries.
 
-    Parameters
-    ----------
-    urdf : Urdf
-    chain : UrdfChain
-    relative_std : float
-        How well they are known.
-
-    Returns
-    -------
-    Weights
+    `relative_std`: how well they are known.
     """
     moments: dict[int, np.ndarray] = {}
     held, passive = set(), set()
@@ -84,15 +71,7 @@ def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD)
 def gravity_in_base(urdf: Urdf, base: str) -> list[float] | None:
     """Gravity in the axes of a link, m/s², where the root of the tree stands upright and the joints before it are at zero.
 
-    Parameters
-    ----------
-    urdf : Urdf
-    base : str
-
-    Returns
-    -------
-    list of float or None
-        None where it points down the link's z axis.
+    Returns None where it points down the link's z axis.
     """
     transform = np.eye(4)
     for joint in joints_above(urdf, base):

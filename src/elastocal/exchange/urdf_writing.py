@@ -1,13 +1,11 @@
 """A robot file's chain as URDF: joints with their origins, axes and limits, masses, and measuring points as links.
 
-URDF [1]_ is rigid: compliances are not in it. Joint values are the controller's where it counts each joint by itself, in
+URDF [1] is rigid: compliances are not in it. Joint values are the controller's where it counts each joint by itself, in
 either sense; where it couples joints they are the angles of the chain, and a comment says so. A joint that stands in two places
 becomes a mimic joint. Masses are point masses; MuJoCo, which moves nothing without mass and inertia, is given the least. A URDF
 from which the robot was imported comes back by `urdf_origins`.
 
-References
-----------
-.. [1] ROS, XML Robot Description Format (URDF), https://wiki.ros.org/urdf/XML
+[1] ROS, XML Robot Description Format (URDF), https://wiki.ros.org/urdf/XML
 """
 
 from __future__ import annotations
@@ -33,16 +31,7 @@ _LEAST = {"boundmass": "1e-6", "boundinertia": "1e-9"}
 def urdf_of(robot: Robot, comment: str = "") -> str:
     """A robot as URDF.
 
-    Parameters
-    ----------
-    robot : Robot
-    comment : str
-        Stands at the top.
-
-    Returns
-    -------
-    str
-        Links ``base``, ``link_1 .. link_n``, and one for each measuring point by its name.
+    `comment`: stands at the top. Returns links ``base``, ``link_1 .. link_n``, and one for each measuring point by its name.
     """
     own = robot.counts_each_joint
     sense = np.diag(robot.reported_matrix) if own else np.ones(robot.joints)

@@ -28,16 +28,7 @@ _HEADS = {
 def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
     """Table 4 among studies of the same size: the paper's figures, how studies scatter, and what is expected of them.
 
-    Parameters
-    ----------
-    comparison, expectations : DataFrame
-        The tables of these names.
-    titles : dict of str to str
-        Name of each robot to draw, by its key.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `comparison`, `expectations`: the tables of these names. `titles`: name of each robot to draw, by its key.
     """
     shown = comparison[(comparison.table == "4") & comparison.studies_mean.notna()]
     quantities, strategies = list(dict.fromkeys(shown.quantity)), list(dict.fromkeys(shown.strategy))
@@ -90,18 +81,8 @@ def _expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Serie
 def table2_samples(initial: Mapping[str, pd.DataFrame], reference: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
     """Statistics of single data sets, in which the paper's Table 2 lies, although it is far from all data sets together.
 
-    Parameters
-    ----------
-    initial : dict of str to DataFrame
-        The initial table of each robot.
-    reference : DataFrame
-        The printed figures.
-    titles : dict of str to str
-        Name of each robot to draw, by its key.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `initial`: the initial table of each robot. `reference`: the printed figures. `titles`: name of each robot to draw, by its
+    key.
     """
     figure, axes = panels(1, 3, 66)
     printed = reference[reference.table == "2"].set_index(["robot", "quantity"]).value

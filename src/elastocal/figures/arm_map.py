@@ -25,18 +25,8 @@ _COLOURS = "viridis_r"
 def arm_map(table: pd.DataFrame, outlines: Mapping[str, np.ndarray], titles: Mapping[str, str]) -> Figure:
     """Side views of the arms, each place coloured by the error with a target there, over that with none.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `question_tables.places_table`.
-    outlines : dict of str to ndarray (K, 3)
-        Corners of each robot's arm in one posture, m.
-    titles : dict of str to str
-        Name of each robot to draw, by its key.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `table`: from `question_tables.places_table`. `outlines` (K, 3): corners of each robot's arm in one posture, m. `titles`:
+    name of each robot to draw, by its key.
     """
     figure, axes = panels(1, len(titles), 104, sharex=True, sharey=True)
     scale = Normalize(1.0, table.ratio.max())

@@ -37,16 +37,7 @@ _LINE = 26
 def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None = None) -> Figure:
     """Bars of the errors on held-out poses, one for each model.
 
-    Parameters
-    ----------
-    steps : sequence of dict
-        Rows of before_after.csv.
-    noise_floor_m : float, optional
-        RMS error that the noise alone leaves.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `steps`: rows of before_after.csv. `noise_floor_m`: RMS error that the noise alone leaves.
     """
     labels = [step_name(step["step"]) for step in steps]
     lines = [label.count("\n") + 1 for label in labels]

@@ -33,14 +33,7 @@ _Ratio = TypeVar("_Ratio", "float", "pd.Series")
 def errors_against_oracle(cases: pd.DataFrame) -> Figure:
     """Held-out RMS after the diagnosis against the oracle's, case by case, and the ratio of the two by size.
 
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of reports/blind/cases.csv. A case without a held-out error, whose data are at fault, is not drawn.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `cases`: of reports/blind/cases.csv. A case without a held-out error, whose data are at fault, is not drawn.
     """
     mine = cases[(cases.robots == leading(cases.robots)) & cases.group.isin(_GROUPS)].dropna(
         subset=["oracle_rms_m", "after_rms_m"]

@@ -34,14 +34,7 @@ _ALL, _NONE, _OUTSIDE = "all", "none", "outside:"
 def power_map(power: pd.DataFrame) -> Figure:
     """Shares detected and named for each effect and size, beside the oracle that knows the effect.
 
-    Parameters
-    ----------
-    power : pandas.DataFrame
-        Of reports/blind/power.csv.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `power`: of reports/blind/power.csv.
     """
     single = power[(power.robots == leading(power.robots)) & (power.group == "single")]
     if single.empty:
@@ -72,14 +65,7 @@ def power_map(power: pd.DataFrame) -> Figure:
 def confusion_map(confusion: pd.DataFrame) -> Figure:
     """Verdicts by ground truth, at the largest sizes.
 
-    Parameters
-    ----------
-    confusion : pandas.DataFrame
-        Of reports/blind/confusion.csv.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `confusion`: of reports/blind/confusion.csv.
     """
     usual = confusion[(confusion.robots == leading(confusion.robots)) & (confusion.settings == "usual")]
     if usual.empty:

@@ -68,14 +68,7 @@ _Row = TypeVar("_Row", bound="NamedTuple")
 def rates_and_targets(summary: pd.DataFrame) -> Figure:
     """Every figure that has a target, with its interval and the range that the target leaves.
 
-    Parameters
-    ----------
-    summary : pandas.DataFrame
-        Of reports/blind/summary.csv.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `summary`: of reports/blind/summary.csv.
     """
     aimed = summary[summary.target.notna() & (summary.target != "")]
     ratio = aimed.quantity.str.contains("over the oracle")
@@ -101,14 +94,7 @@ def rates_and_targets(summary: pd.DataFrame) -> Figure:
 def coverage_by_effect(coverage: pd.DataFrame) -> Figure:
     """How often 95 % intervals contain the true value, for each kind of parameter.
 
-    Parameters
-    ----------
-    coverage : pandas.DataFrame
-        Of reports/blind/coverage.csv.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `coverage`: of reports/blind/coverage.csv.
     """
     whole = coverage[(coverage.parameter == "all") & (coverage.level.astype(str) == "all")]
     rows = whole[whole.robots == leading(whole.robots)]

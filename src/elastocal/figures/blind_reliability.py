@@ -18,14 +18,7 @@ _LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D
 def reliability_diagram(reliability: pd.DataFrame) -> Figure:
     """Shares of cases whose most probable set of mechanisms is true, against what was stated, and numbers of cases.
 
-    Parameters
-    ----------
-    reliability : pandas.DataFrame
-        Of reports/blind/reliability.csv.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `reliability`: of reports/blind/reliability.csv.
     """
     rows = reliability[reliability.group == "all"]
     if rows.empty:

@@ -33,16 +33,7 @@ _AT_FAULT = "the measurements are at fault"
 def probabilities(stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarray]) -> Figure:
     """Posterior probabilities of the leading hypotheses, and Bayes factors of the leading candidates alone.
 
-    Parameters
-    ----------
-    stated : dict or None
-        ``probabilities`` of a diagnosis; None where the data are at fault.
-    table : dict of str to ndarray
-        Columns of the candidates table.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `stated`: ``probabilities`` of a diagnosis; None where the data are at fault. `table`: columns of the candidates table.
     """
     order = leading(table)
     if stated is None or not len(order):
@@ -101,16 +92,7 @@ def _factors(axis: Axes, table: Mapping[str, np.ndarray], named: np.ndarray) -> 
 def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]) -> Figure:
     """Angles between the contributions of the leading candidates beyond the declared model.
 
-    Parameters
-    ----------
-    table : dict of str to ndarray
-        Columns of the candidates table.
-    pairs : dict of str to ndarray
-        Columns of the confounding table.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `table`: columns of the candidates table. `pairs`: columns of the confounding table.
     """
     known = set(pairs["one"]) | set(pairs["other"])
     order = [index for index in leading(table) if name_in_pairs(table, index) in known]

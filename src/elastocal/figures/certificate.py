@@ -30,16 +30,7 @@ _REST = ("uncertainty of the parameters", "repeatability", "form of the model", 
 def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float]) -> Figure:
     """Errors over distance from the base axis and height: uncorrected, and the bound of the corrected robot.
 
-    Parameters
-    ----------
-    maps : sequence of WorkspaceErrors
-        One row of panels each.
-    forces_N : sequence of float
-        Hanging load of each.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `maps`: one row of panels each. `forces_N`: hanging load of each.
     """
     figure, axes = panels(len(maps), 2, 70 * len(maps), sharex=True, sharey=True)
     for row, (errors, force) in zip(axes, zip(maps, forces_N, strict=True), strict=True):
@@ -81,17 +72,7 @@ def _panel(axis: Axes, errors: WorkspaceErrors, values: np.ndarray, share: float
 def budget_bars(budget: Sequence[Mapping[str, Any]], names: Sequence[str], tolerance_m: float) -> Figure:
     """Lines of an error budget as bars with their intervals, against the tolerance.
 
-    Parameters
-    ----------
-    budget : sequence of dict
-        ``name, rms_m, low_m, high_m``.
-    names : sequence of str
-        Of the lines, in words.
-    tolerance_m : float
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `budget`: ``name, rms_m, low_m, high_m``. `names`: of the lines, in words.
     """
     shown = [line for line in budget if line["rms_m"] > 0.0]
     labels = [name for name, line in zip(names, budget, strict=True) if line["rms_m"] > 0.0]

@@ -27,14 +27,7 @@ _PARTS = {"unloaded": "unloaded", "loaded": "under loads", "milling": "milling p
 def closed_loop(table: pd.DataFrame) -> Figure:
     """Measured position errors, a panel for each part, a marker for each robot and model.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Of `closed_loop_summary.summary`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `table`: of `closed_loop_summary.summary`.
     """
     robots = [robot for robot in dict.fromkeys(table["robot"]) if robot != "all"]
     figure, axes = panels(1, len(_PARTS), 62, sharey=True, sharex=True)

@@ -22,18 +22,8 @@ _LENGTH_SHARE = 0.12
 def dh_frames_picture(frames: np.ndarray, robot: str, names: Sequence[str]) -> Figure:
     """Frames where the controller reports zero, joined by a line from the base to the end effector.
 
-    Parameters
-    ----------
-    frames : ndarray (F, 4, 4)
-        From `exchange.dh_writing.dh_frames`, base axes.
-    robot : str
-        Name.
-    names : sequence of str (F,)
-        What stands at each frame.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `frames` (F, 4, 4): from `exchange.dh_writing.dh_frames`, base axes. `robot`: name. `names` (F,) of str: what stands at each
+    frame.
     """
     figure = Figure(figsize=(WIDTH_MM / 25.4, 120 / 25.4), layout="constrained")
     axis = figure.add_subplot(projection="3d")

@@ -48,18 +48,10 @@ _HOUR_S = 3600.0
 class Signature:
     """An effect at one location of the arm, displaced through the three experiments.
 
-    Attributes
-    ----------
-    candidate : Candidate
-        With all its parameters at their plausible sizes and its shapes where a search starts.
-    joint : int
-        Whose angle is varied, counted from 1.
-    angle_deg, force_N, time_h : ndarray (S,)
-    by_angle, by_angle_loaded : ndarray (S, 3)
-        Displacement of the reflector in mm, base axes, without and with the largest pull.
-    by_force, by_force_falling : ndarray (S, 3)
-        While the force rises and while it falls.
-    by_time : ndarray (S, 3)
+    `candidate`: with all its parameters at their plausible sizes and its shapes where a search starts. `joint`: whose angle is
+    varied, counted from 1. `angle_deg`, `force_N`, `time_h` (S,). `by_angle`, `by_angle_loaded` (S, 3): displacement of the
+    reflector in mm, base axes, without and with the largest pull. `by_force`, `by_force_falling` (S, 3): while the force rises
+    and while it falls. `by_time` (S, 3).
     """
 
     candidate: Candidate
@@ -77,17 +69,8 @@ class Signature:
 def signature(name: str, robot: Robot) -> Signature:
     """The signature of an effect on an arm.
 
-    Parameters
-    ----------
-    name : str
-        Of an effect of the catalogue.
-    robot : Robot
-        With compliances, and with a compensator for the effects of one. What its links weigh is left aside, since the
-        weight of links is an effect only where it is not declared.
-
-    Returns
-    -------
-    Signature
+    `name`: of an effect of the catalogue. `robot`: with compliances, and with a compensator for the effects of one. What its
+    links weigh is left aside, since the weight of links is an effect only where it is not declared.
     """
     sites = _weightless(robot)
     offered = offered_candidates(name, robot)
@@ -167,14 +150,7 @@ def _displacement_mm(candidate: Candidate, sites: Sites, compliance: np.ndarray,
 def signature_figure(shown: Signature) -> Figure:
     """Draw a signature.
 
-    Parameters
-    ----------
-    shown : Signature
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Three panels on one scale of millimetres: angle of the joint, force, time.
+    Returns three panels on one scale of millimetres: angle of the joint, force, time.
     """
     figure, axes = panels(1, 3, 58, sharey=True)
     # All figures alike; to search for a layout takes longer than to draw.

@@ -43,18 +43,9 @@ SEPARATOR = {"lw": 1.2, "ls": (0, (3, 2)), "color": GREY}
 def kinematic_scheme(robot: Robot) -> Figure:
     """Equivalent kinematic scheme of a serial robot (the paper's Figure 2), drawn from its chain.
 
-    Parameters
-    ----------
-    robot : Robot
-        Any chain of revolute joints about x, y and z.
+    `robot`: any chain of revolute joints about x, y and z. Returns about 160 mm wide. Artists have a gid: ``joint-1``,
+    ``length-1``, ``point-NAME``, ``point-NAME-box``.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-        About 160 mm wide. Artists have a gid: ``joint-1``, ``length-1``, ``point-NAME``, ``point-NAME-box``.
-
-    Notes
-    -----
     A joint that turns about its own link is drawn on that link instead of at its end: moved along its axis, it is the same
     joint. So the three joints of a spherical wrist can be seen apart.
     """

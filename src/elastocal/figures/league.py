@@ -33,15 +33,7 @@ _UNKNOWN = "not in the catalogue"
 def league_picture(table: pd.DataFrame, methods: Mapping[str, Method]) -> Figure:
     """RMS of every method over that of geometry alone, a panel for each split, a row for each data set.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Of `table.league_table`.
-    methods : dict of str to Method
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `table`: of `table.league_table`.
     """
     names = list(dict.fromkeys(table["data"]))
     splits = [split for split in _SPLITS if split in set(table["split"])]
@@ -76,14 +68,7 @@ def league_picture(table: pd.DataFrame, methods: Mapping[str, Method]) -> Figure
 def mechanism_picture(table: pd.DataFrame) -> Figure:
     """Mechanisms by data set: the area of a circle is the share of the error, its colour the probability.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Of `table.mechanism_table`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `table`: of `table.mechanism_table`.
     """
     strongest = table.groupby("mechanism")["probability"].max()
     kept = [name for name in strongest.index if strongest[name] >= _LEAST_PROBABLE]

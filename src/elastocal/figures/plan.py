@@ -26,18 +26,7 @@ _VIEWS = (("from above", 0, 1), ("from the side", 0, 2))
 
 @styled
 def plan_picture(robot: Robot, cell: Cell, plan: Plan) -> Figure:
-    """Configurations in the cell, and the accuracy against the number of poses.
-
-    Parameters
-    ----------
-    robot : Robot
-    cell : Cell
-    plan : Plan
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Configurations in the cell, and the accuracy against the number of poses."""
     figure, axes = panels(1, 3, 72)
     for axis, (words, across, up) in zip(axes[0], _VIEWS, strict=False):
         _view(axis, robot, cell, plan, across, up)

@@ -23,14 +23,7 @@ _DESIGNS = {"random": "random", "A": "A-optimal", "D": "D-optimal", "I": "I-opti
 def ladder(table: pd.DataFrame) -> Figure:
     """Error of one data set by number of link springs, for each noise and length, of the first robot with links.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `question_tables.ladder_table`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `table`: from `question_tables.ladder_table`.
     """
     if table.empty:
         return note("no robot of this study has elastic links")
@@ -57,18 +50,8 @@ def ladder(table: pd.DataFrame) -> Figure:
 def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figure:
     """Error of one data set by set of measuring points, with as many configurations and with as many measurements.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `budget_tables.budget_table`.
-    titles : dict of str to str
-        Name of each robot to draw, by its key.
-    length : int
-        Configurations; the budget is twice as many measurements.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `table`: from `budget_tables.budget_table`. `titles`: name of each robot to draw, by its key. `length`: configurations; the
+    budget is twice as many measurements.
     """
     labels = list(dict.fromkeys(table.points))
     figure, axes = panels(1, len(titles), 16 + 7 * len(labels), sharex=True, sharey=True)
@@ -96,20 +79,8 @@ def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figur
 def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, joint_range: str) -> Figure:
     """Error that random and optimal configurations leave, by their number.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `question_tables.designs_table`.
-    titles : dict of str to str
-        Name of each robot to draw, by its key.
-    accuracy_um : float
-        Marked by a line.
-    joint_range : str
-        Whose rows are drawn.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `table`: from `question_tables.designs_table`. `titles`: name of each robot to draw, by its key. `accuracy_um`: marked by a
+    line. `joint_range`: whose rows are drawn.
     """
     table = table[table.joint_range == joint_range]
     figure, axes = panels(1, len(titles), 80, sharey=True)
@@ -134,19 +105,8 @@ def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, 
 def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, str]) -> Figure:
     """Scores of the strategies over those of the classical one, metric by metric.
 
-    Parameters
-    ----------
-    table : DataFrame
-        From `ranks.ranks_table`.
-    titles : dict of str to str
-        Name of each robot to draw, by its key.
-    names : dict of str to str
-        What each metric is called.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One estimator under several names is drawn once, under the first of them.
+    `table`: from `ranks.ranks_table`. `titles`: name of each robot to draw, by its key. `names`: what each metric is called.
+    Returns one estimator under several names is drawn once, under the first of them.
     """
     figure, axes = panels(1, len(titles), 26 + 8 * len(names), sharey=True, sharex=True)
     for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):

@@ -40,15 +40,8 @@ _ARROW = 0.13
 def residuals(table: Mapping[str, np.ndarray]) -> Figure:
     """Residual against each joint angle, the load and the time, before and after.
 
-    Parameters
-    ----------
-    table : dict of str to ndarray
-        Columns of the residuals table.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One panel for each quantity that the campaign varies; each shows the component that this quantity explains best.
+    `table`: columns of the residuals table. Returns one panel for each quantity that the campaign varies; each shows the
+    component that this quantity explains best.
     """
     drawn_against, stages = quantities(table), _stages(table)
     if not drawn_against:
@@ -88,15 +81,8 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
 def arrows(table: Mapping[str, np.ndarray]) -> Figure:
     """Residuals as arrows where the measurements were taken, from the side and from above.
 
-    Parameters
-    ----------
-    table : dict of str to ndarray
-        Columns of the residuals table.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Repeats are averaged; where states are still many, one of each cell of a grid is drawn.
+    `table`: columns of the residuals table. Returns repeats are averaged; where states are still many, one of each cell of a
+    grid is drawn.
     """
     place, off, stages = *_states(table), _stages(table)
     size = np.linalg.norm(off["before"], axis=1)
@@ -136,14 +122,7 @@ def arrows(table: Mapping[str, np.ndarray]) -> Figure:
 def quantities(table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """What a residual can be drawn against: angles, load and time, where the campaign varies them.
 
-    Parameters
-    ----------
-    table : dict of str to ndarray
-
-    Returns
-    -------
-    dict of str to ndarray (M,)
-        By the label of the axis.
+    Returns (M,): by the label of the axis.
     """
     joints = sum(name[0] == "q" and name[1:].isdigit() for name in table)
     found = {f"angle of joint {joint} (°)": np.degrees(table[f"q{joint}"]) for joint in range(1, joints + 1)}
@@ -157,15 +136,7 @@ def quantities(table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 def components(table: Mapping[str, np.ndarray], stage: str) -> np.ndarray:
     """Position residuals in m, radial, tangential and vertical at the place of each measurement, and along its force.
 
-    Parameters
-    ----------
-    table : dict of str to ndarray
-    stage : {"before", "after"}
-
-    Returns
-    -------
-    ndarray (M, 4)
-        Not a number along the force where there is none.
+    `stage`: one of "before", "after". Returns (M, 4): not a number along the force where there is none.
     """
     off = np.column_stack([table[f"{stage}_d{axis}"] for axis in "xyz"])
     force = np.column_stack([table[f"f{axis}"] for axis in "xyz"])
@@ -196,15 +167,7 @@ def bins_of(values: np.ndarray) -> np.ndarray:
 def share_explained(bins: np.ndarray, values: np.ndarray) -> float:
     """Share of the mean square of values that the means of their bins make, beyond what chance gives to as many bins.
 
-    Parameters
-    ----------
-    bins : ndarray of int (M,)
-    values : ndarray (M,)
-
-    Returns
-    -------
-    float
-        At least 0.
+    `bins` (M,) of int, `values` (M,). Returns at least 0.
     """
     known = (bins >= 0) & np.isfinite(values)
     if not known.any():
@@ -235,17 +198,8 @@ def _cloud(axis: Axes, values: np.ndarray, residual: np.ndarray, held_out: np.nd
 def running_quartiles(values: np.ndarray, residual: np.ndarray, bins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Quartiles of the residual bin by bin, with a row that is not a number where a line would cross a gap.
 
-    Parameters
-    ----------
-    values, residual : ndarray (M,)
-    bins : ndarray of int (M,)
-        From `bins_of`.
-
-    Returns
-    -------
-    middle : ndarray (B,)
-        Median of the values in each bin.
-    quartiles : ndarray (B, 3)
+    `values`, `residual` (M,). `bins` (M,) of int: from `bins_of`. Returns `middle` (B,): median of the values in each bin;
+    `quartiles` (B, 3).
     """
     ordered = np.sort(values[np.isfinite(values)])
     few = len(np.unique(np.round(ordered, 3))) <= _FEWEST_BINS
@@ -267,18 +221,7 @@ def running_quartiles(values: np.ndarray, residual: np.ndarray, bins: np.ndarray
 def middle_of_cells(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray:
     """The state of middle size in each cell of a grid.
 
-    Parameters
-    ----------
-    at : ndarray (N, 2)
-        m.
-    size : ndarray (N,)
-    side : float
-        m.
-
-    Returns
-    -------
-    ndarray of int (cells,)
-        One for each cell that is not empty.
+    `at` (N, 2): m. `size` (N,). `side`: m. Returns (cells,) of int: one for each cell that is not empty.
     """
     _, cell = np.unique(np.floor(at / side).astype(int), axis=0, return_inverse=True)
     order = np.lexsort((size, cell.ravel()))

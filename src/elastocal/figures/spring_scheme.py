@@ -46,15 +46,7 @@ class _Block:
 def spring_scheme(robot: Robot) -> Figure:
     """Virtual joint model of a robot as a chain of blocks (the paper's Figure 3), drawn from its chain.
 
-    Parameters
-    ----------
-    robot : Robot
-        With `links`, the extended model is drawn below the reduced one.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        About 160 mm wide.
+    `robot`: with `links`, the extended model is drawn below the reduced one. Returns about 160 mm wide.
     """
     sheet = Sheet()
     models = [("Reduced model: a 1-DoF spring in each joint", False)]

@@ -28,17 +28,7 @@ _BANDS = "bands: ± one Monte Carlo standard error"
 def noise_impact(metrics: pd.DataFrame, strategy: str, titles: Mapping[str, str]) -> Figure:
     """Figure 4: deviation of one strategy against the data set length, for each noise level.
 
-    Parameters
-    ----------
-    metrics : DataFrame
-        Long.
-    strategy : str
-    titles : dict of str to str
-        Name of each robot to draw, by its key.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `metrics`: long. `titles`: name of each robot to draw, by its key.
     """
     figure, axes = panels(2, len(titles), 118, sharex=True, sharey="row")
     for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
@@ -68,22 +58,8 @@ def stiffness_errors(
 ) -> Figure:
     """Figures 5a and 5b: summed stiffness error of all strategies against the data set length, under both counts of joints.
 
-    Parameters
-    ----------
-    metrics : DataFrame
-        Long, of one noise level.
-    printed : DataFrame
-        The printed figures; those of k_sigma are taken to count the joints of the first stage.
-    title : str
-    robot : str
-    order : sequence of str
-        Strategies.
-    limit_percent : float
-        Marked by a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `metrics`: long, of one noise level. `printed`: the printed figures; those of k_sigma are taken to count the joints of the
+    first stage. `order`: strategies. `limit_percent`: marked by a line.
     """
     figure, axes = panels(1, 2, 92, sharey=True)
     counts = {"k_sigma": "all joints (equation 14)", "k_sigma_first_stage": "joints of the first stage"}
@@ -104,22 +80,7 @@ def deviations(
 ) -> Figure:
     """Figures 5c and 5d: deviation of all strategies against the data set length.
 
-    Parameters
-    ----------
-    metrics : DataFrame
-        Long, of one noise level.
-    printed : DataFrame
-        The printed figures.
-    title : str
-    robot : str
-    order : sequence of str
-        Strategies.
-    limit_um : float
-        Marked by a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `metrics`: long, of one noise level. `printed`: the printed figures. `order`: strategies. `limit_um`: marked by a line.
     """
     figure, axes = panels(1, 1, 88)
     axis = axes[0, 0]
@@ -137,22 +98,8 @@ def bias_and_accuracy(
 ) -> Figure:
     """What the paper's metric hides: the bias of the averaged model against the error that one data set leaves.
 
-    Parameters
-    ----------
-    metrics : DataFrame
-        Long, of one noise level.
-    per_dataset : DataFrame
-        The table of the same name, of the same noise level.
-    titles : dict of str to str
-        Name of each robot to draw, by its key.
-    order : sequence of str
-        Strategies to draw.
-    accuracy_um : float
-        Wanted; marked by a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `metrics`: long, of one noise level. `per_dataset`: the table of the same name, of the same noise level. `titles`: name of
+    each robot to draw, by its key. `order`: strategies to draw. `accuracy_um`: wanted; marked by a line.
     """
     figure, axes = panels(1, len(titles), 92, sharey=True)
     for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
@@ -182,19 +129,8 @@ def bias_and_accuracy(
 def accuracy_of_one_data_set(per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str], length: int) -> Figure:
     """Error that one data set of a given length leaves, strategy by strategy, beside the bound of its own measurements.
 
-    Parameters
-    ----------
-    per_dataset : DataFrame
-        The table of the same name, of one noise level.
-    titles : dict of str to str
-        Name of each robot to draw, by its key.
-    order : sequence of str
-        Strategies.
-    length : int
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `per_dataset`: the table of the same name, of one noise level. `titles`: name of each robot to draw, by its key. `order`:
+    strategies.
     """
     figure, axes = panels(1, len(titles), 72, sharey=True)
     rows = np.arange(len(order))[::-1]

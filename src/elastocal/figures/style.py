@@ -41,17 +41,7 @@ styled = rc_context(SETTINGS)
 def panels(rows: int, columns: int, height_mm: float, width_mm: float = WIDTH_MM, **options: Any) -> tuple[Figure, np.ndarray]:
     """A figure with a grid of axes in the common look.
 
-    Parameters
-    ----------
-    rows, columns : int
-    height_mm, width_mm : float
-    **options
-        Passed on to ``Figure.subplots``.
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-    axes : ndarray of Axes (rows, columns)
+    `**options`: passed on to ``Figure.subplots``. Returns `axes` (rows, columns).
     """
     figure = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
@@ -71,20 +61,11 @@ def line_style(index: int) -> dict[str, Any]:
 
 
 def ink_on(colour: tuple[float, ...]) -> str:
-    """Black or white, whichever has the higher contrast on a colour by its relative luminance [1]_.
+    """Black or white, whichever has the higher contrast on a colour by its relative luminance [1].
 
-    Parameters
-    ----------
-    colour : tuple of float
-        Red, green and blue of sRGB, 0 to 1; what follows is ignored.
+    `colour`: red, green and blue of sRGB, 0 to 1; what follows is ignored.
 
-    Returns
-    -------
-    {"black", "white"}
-
-    References
-    ----------
-    .. [1] World Wide Web Consortium, Web Content Accessibility Guidelines 2.2, "relative luminance" and "contrast ratio", 2023.
+    [1] World Wide Web Consortium, Web Content Accessibility Guidelines 2.2, "relative luminance" and "contrast ratio", 2023.
     """
     linear = [value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in colour[:3]]
     luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
@@ -97,13 +78,8 @@ def save(figure: Figure, pdf: str, png: str, origin: Origin | None = None) -> No
 
     Each has a layout of its own: the widths of its letters differ by a few per cent, and labels would be cut off.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    pdf, png : str
-        Paths; each file appears whole or not at all.
-    origin : Origin, optional
-        Named in the metadata of both: Subject and Keywords of the PDF, Description and Source of the PNG.
+    `pdf`, `png`: paths; each file appears whole or not at all. `origin`: named in the metadata of both: Subject and Keywords of
+    the PDF, Description and Source of the PNG.
     """
     subject = {} if origin is None else {"Subject": origin.words, "Keywords": " ".join(map(str, vars(origin).values()))}
     described = {} if origin is None else {"Description": origin.words, "Source": origin.commit}
@@ -120,11 +96,7 @@ def save_svg(figure: Figure, path: str) -> None:
 
     Letters stay letters, which the reader's own sans serif draws.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    path : str
-        The file appears whole or not at all.
+    `path`: the file appears whole or not at all.
     """
     with rc_context({"svg.hashsalt": "elastocal", "svg.fonttype": "none"}), atomic_write(path) as partial:
         figure.savefig(partial, format="svg", metadata={"Date": None})

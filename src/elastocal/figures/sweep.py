@@ -25,14 +25,7 @@ _COLUMNS = 4
 def sweep(table: pd.DataFrame) -> Figure:
     """Stacked bars of the outcomes, a panel for each pair and one for all.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        sweep.csv.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `table`: sweep.csv.
     """
     pairs = list(dict.fromkeys(table["pair"])) or ["all"]
     bins = sorted(set(table["angle_up_to_deg"]))

@@ -27,16 +27,8 @@ if TYPE_CHECKING:
 class Case:
     """A campaign ready to be fitted.
 
-    Attributes
-    ----------
-    campaign : Campaign
-        Its measurements are those to fit.
-    observations : Observations
-        Their repeats averaged, without the outlying ones.
-    model : Model
-        As declared.
-    candidates : dict of str to Candidate
-        Everything that the model might lack.
+    `campaign`: its measurements are those to fit. `observations`: their repeats averaged, without the outlying ones. `model`:
+    as declared. `candidates`: everything that the model might lack.
     """
 
     campaign: Campaign
@@ -53,16 +45,7 @@ class Case:
 def case_from(descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Case:
     """Put a campaign together.
 
-    Parameters
-    ----------
-    descriptions : dict
-        With ``campaign`` and ``robot``, as step 1 writes them.
-    columns : dict of str to ndarray
-        Of the measurements table.
-
-    Returns
-    -------
-    Case
+    `descriptions`: with ``campaign`` and ``robot``, as step 1 writes them. `columns`: of the measurements table.
     """
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)

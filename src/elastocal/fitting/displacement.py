@@ -27,18 +27,8 @@ def conditions(model: Model, estimate: Estimate, states: States, coordinates: np
 
     By fixed-point iteration: loads at the displaced pose, then the displacement under these loads.
 
-    Parameters
-    ----------
-    model : Model
-    estimate : Estimate
-        Its joint compliances and masses, where they are parameters, and where it takes the robot to, at which loads are taken.
-    states : States
-    coordinates : ndarray (S, C), optional
-        Where the robot has yielded to; found without.
-
-    Returns
-    -------
-    Conditions
+    `estimate`: its joint compliances and masses, where they are parameters, and where it takes the robot to, at which loads are
+    taken. `coordinates` (S, C): where the robot has yielded to; found without.
     """
     compliance, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
     around = conditions_of(model.sites, compliance, states, model.time_zero_s, corrections, model.row_span, coordinates)
@@ -65,18 +55,7 @@ def _values_of(name: str, model: Model, estimate: Estimate, otherwise: np.ndarra
 
 
 def with_springs_of(model: Model, estimate: Estimate, conditions: Conditions) -> Conditions:
-    """Conditions with the joint compliances and masses of an estimate, where they are parameters.
-
-    Parameters
-    ----------
-    model : Model
-    estimate : Estimate
-    conditions : Conditions
-
-    Returns
-    -------
-    Conditions
-    """
+    """Conditions with the joint compliances and masses of an estimate, where they are parameters."""
     return with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
 
 
@@ -85,9 +64,7 @@ def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditio
 
     Springs yield to the total load, the external one and the weight that the robot file declares.
 
-    Returns
-    -------
-    ndarray (S, C)
+    Returns (S, C).
     """
     around = with_springs_of(model, estimate, conditions)
     displaced = np.zeros((len(around.joint_angles), model.sites.chain.coordinates))
@@ -104,16 +81,7 @@ def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditio
 def displace(displaced: np.ndarray, effect: Candidate, values: np.ndarray, shapes: Iterable[float], around: Conditions) -> None:
     """Add what an effect does to the coordinates of the sites, in place.
 
-    Parameters
-    ----------
-    displaced : ndarray (S, C)
-    effect : Candidate
-    values : ndarray (D,)
-        Its linear parameters.
-    shapes : ndarray (F,)
-        Its shape parameters.
-    around : Conditions
-        Of the S states.
+    `displaced` (S, C). `values` (D,): its linear parameters. `shapes` (F,): its shape parameters. `around`: of the S states.
     """
     for value, law in zip(values, effect.displacement(around, *shapes), strict=True):
         for coordinate, per_unit in law.items():

@@ -35,13 +35,8 @@ _MANY_ENTRIES = 16
 class Displacements:
     """What columns do to coordinates, entry by entry; entries of one coordinate lie side by side, those of many first.
 
-    Attributes
-    ----------
-    columns : int
-        K.
-    values : ndarray (E, S)
-        Displacement of one coordinate by one column, in each state.
-    coordinate, column : ndarray of int (E,)
+    `columns`: K. `values` (E, S): displacement of one coordinate by one column, in each state. `coordinate`, `column` (E,) of
+    int.
     """
 
     columns: int
@@ -53,18 +48,7 @@ class Displacements:
     def of(cls, laws: Sequence[Mapping[int, np.ndarray]], sizes: np.ndarray, states: int) -> Displacements:
         """Gather laws, each a displacement of some coordinates.
 
-        Parameters
-        ----------
-        laws : sequence of dict of int to ndarray (S,)
-            One for each column.
-        sizes : ndarray (K,)
-            By which columns are multiplied.
-        states : int
-            S.
-
-        Returns
-        -------
-        Displacements
+        `laws` (S,): one for each column. `sizes` (K,): by which columns are multiplied. `states`: S.
         """
         count = Counter(coordinate for law in laws for coordinate in law)
         entries = sorted((-count[coordinate], coordinate, column) for column, law in enumerate(laws) for coordinate in law)
@@ -94,14 +78,8 @@ class Displacements:
 class Factored:
     """Rows of columns that displace coordinates.
 
-    Attributes
-    ----------
-    displacements : Displacements
-        K columns in S states.
-    jacobian : ndarray (M, rows, C)
-        Of each observation with respect to the coordinates, whitened or not.
-    state : ndarray of int (M,)
-        Its state.
+    `displacements`: K columns in S states. `jacobian` (M, rows, C): of each observation with respect to the coordinates,
+    whitened or not. `state` (M,) of int: its state.
     """
 
     displacements: Displacements
@@ -161,13 +139,7 @@ class Factored:
     def times(self, right: np.ndarray) -> np.ndarray:
         """Products of the columns with other rows.
 
-        Parameters
-        ----------
-        right : ndarray (M, rows, q)
-
-        Returns
-        -------
-        ndarray (K, q)
+        `right` (M, rows, q). Returns (K, q).
         """
         values, seen = self.displacements.values, self._products_by_state(right)
         found = np.empty((len(values), right.shape[2]))
@@ -178,15 +150,7 @@ class Factored:
     def times_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
         """Products of the columns with other rows, of the measurements of each pose.
 
-        Parameters
-        ----------
-        right : ndarray (M, rows, n)
-        pose : ndarray of int (M,)
-            0 .. G-1; all measurements of a state are of one pose.
-
-        Returns
-        -------
-        ndarray (G, n, K)
+        `right` (M, rows, n). `pose` (M,) of int: 0 .. G-1; all measurements of a state are of one pose. Returns (G, n, K).
         """
         values, states = self.displacements.values, self.displacements.values.shape[1]
         seen, poses = self._products_by_state(right), int(pose.max()) + 1

@@ -31,32 +31,15 @@ if TYPE_CHECKING:
 class Fit:
     """A model fitted to observations.
 
-    Attributes
-    ----------
-    model : Model
-    estimate : Estimate
-    noise : Noise
-    held : ndarray of bool (P,)
-        Parameters that are not identifiable from the data.
-    covariance : ndarray (P, P)
-        Of the parameters: inverse of the normal matrix of the last step, which approximates the Hessian (Gauss-Newton); with
-        priors as in Laplace's approximation [1]_. Zero where held.
-    weights : ndarray (M,)
-        Robust weight of each observation.
-    whitener : Whitening or Scaling
-    residual : ndarray (M, rows)
-        m and rad, base axes.
-    joint_jacobian : ndarray (M, rows, n) or None
-        Of each target with respect to the joints; None where there are too many to keep it.
-    conditions : Conditions or None
-        Of the states fitted; None where these are too many to keep it.
-    converged : bool
-        Whether the last step was below a thousandth of a standard error in every parameter, so that the estimate is a minimum.
+    `held` (P,) of bool: parameters that are not identifiable from the data. `covariance` (P, P): of the parameters: inverse of
+    the normal matrix of the last step, which approximates the Hessian (Gauss-Newton); with priors as in Laplace's approximation
+    [1]. Zero where held. `weights` (M,): robust weight of each observation. `residual` (M, rows): m and rad, base axes.
+    `joint_jacobian` (M, rows, n): of each target with respect to the joints; None where there are too many to keep it.
+    `conditions`: of the states fitted; None where these are too many to keep it. `converged`: whether the last step was below a
+    thousandth of a standard error in every parameter, so that the estimate is a minimum.
 
-    References
-    ----------
-    .. [1] Tierney, L. and Kadane, J. B., Accurate approximations for posterior moments and marginal densities, Journal of the
-       American Statistical Association 81, 1986.
+    [1] Tierney, L. and Kadane, J. B., Accurate approximations for posterior moments and marginal densities, Journal of the
+        American Statistical Association 81, 1986.
     """
 
     model: Model
@@ -89,15 +72,7 @@ class Fit:
     def sensitivities(self, observations: Observations) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
         """Sensitivities of the observations that were fitted, as they are and whitened, in parts of whole poses.
 
-        Parameters
-        ----------
-        observations : Observations
-
-        Yields
-        ------
-        seen : slice
-            Observations of the part.
-        plain, whitened : ndarray (M', rows, P)
+        Yields `seen`: observations of the part; `plain`, `whitened` (M', rows, P).
         """
         for states, seen in parts_of(observations, observations_at_once(observations.rows, len(self.held))):
             some = part_at(observations, states, seen)

@@ -19,36 +19,14 @@ def solve_identifiable(
     """Least squares over the parameters that the data identify.
 
     A parameter whose standard error would exceed its plausible size, first beside those before it and then beside all, keeps
-    its value. Nothing is regularised but what carries a prior, as in generalized ridge regression [1]_.
+    its value. Nothing is regularised but what carries a prior, as in generalized ridge regression [1].
 
-    Parameters
-    ----------
-    left : ndarray (R, P)
-        Whitened sensitivities.
-    right : ndarray (R,)
-        Whitened residual.
-    plausible : ndarray (P,)
-        Plausible size of each parameter.
-    frozen : bool or ndarray of bool (P,)
-        Parameters not to move.
-    penalty : float or ndarray (P,)
-        One over the variance of the prior about zero; 0 for none.
-    present : float or ndarray (P,)
-        Values from which the step is taken.
-    nonlinear : bool or ndarray of bool (P,)
-        As in `identifiable`.
+    `left` (R, P): whitened sensitivities. `right` (R,): whitened residual. `plausible` (P,): plausible size of each parameter.
+    `frozen` (P,) of bool: parameters not to move. `penalty` (P,): one over the variance of the prior about zero; 0 for none.
+    `present` (P,): values from which the step is taken. `nonlinear` (P,) of bool: as in `identifiable`. Returns `step` (P,):
+    zero where held; `covariance` (P, P); `held` (P,) of bool.
 
-    Returns
-    -------
-    step : ndarray (P,)
-        Zero where held.
-    covariance : ndarray (P, P)
-    held : ndarray of bool (P,)
-
-    References
-    ----------
-    .. [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12,
-       1970.
+    [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
     scaled = left * plausible
     return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, frozen, penalty, present, nonlinear)
@@ -65,17 +43,8 @@ def solve_normal(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """As `solve_identifiable`, from products of sensitivities in plausible sizes.
 
-    Parameters
-    ----------
-    gram : ndarray (P, P)
-    along : ndarray (P,)
-    plausible, frozen, penalty, present, nonlinear
-        As in `solve_identifiable`.
-
-    Returns
-    -------
-    step, covariance, held
-        As in `solve_identifiable`.
+    `gram` (P, P), `along` (P,). `plausible`, `frozen`, `penalty`, `present`, `nonlinear`: as in `solve_identifiable`. Returns
+    as in `solve_identifiable`.
     """
     gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
     along = along - plausible * np.broadcast_to(penalty * present, len(plausible))
@@ -94,18 +63,9 @@ def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) ->
 
     Forward selection in the order given, by the pivots of a Cholesky decomposition, then backward elimination.
 
-    Parameters
-    ----------
-    gram : ndarray (P, P)
-        Information on the parameters, each in units of its plausible size.
-    frozen : ndarray of bool (P,)
-        Left out from the start.
-    nonlinear : ndarray of bool (P,)
-        Shapes: given up before a parameter that they are bound to, as that of their law is where it is nearly a straight line.
-
-    Returns
-    -------
-    ndarray of bool (P,)
+    `gram` (P, P): information on the parameters, each in units of its plausible size. `frozen` (P,) of bool: left out from the
+    start. `nonlinear` (P,) of bool: shapes: given up before a parameter that they are bound to, as that of their law is where
+    it is nearly a straight line. Returns (P,) of bool.
     """
     kept = np.flatnonzero(~frozen).tolist()
     while (first := _first_without_information(gram[np.ix_(kept, kept)])) is not None:

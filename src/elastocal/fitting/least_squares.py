@@ -33,29 +33,14 @@ def fit(
     reweighted: bool = False,
     settled: float = SETTLED,
 ) -> Fit:
-    """Fit a model by robust generalized least squares [1]_ and Gauss-Newton steps [2]_, see `robust.robustly`.
+    """Fit a model by robust generalized least squares [1] and Gauss-Newton steps [2], see `robust.robustly`.
 
-    Parameters
-    ----------
-    model : Model
-    observations : Observations
-    noise : Noise
-    start : Estimate, optional
-        Of this model; by `registered` without.
-    reweighted : bool
-        Whether the start comes of a fit: outliers lose weight from the first step on.
-    settled : float
-        Largest step that remains, in standard errors.
+    `start`: of this model; by `registered` without. `reweighted`: whether the start comes of a fit: outliers lose weight from
+    the first step on. `settled`: largest step that remains, in standard errors.
 
-    Returns
-    -------
-    Fit
-
-    References
-    ----------
-    .. [1] Aitken, A. C., On least squares and linear combination of observations, Proceedings of the Royal Society of Edinburgh
-       55, 1935.
-    .. [2] Björck, Å., Numerical Methods for Least Squares Problems, SIAM, 1996.
+    [1] Aitken, A. C., On least squares and linear combination of observations, Proceedings of the Royal Society of Edinburgh
+        55, 1935.
+    [2] Björck, Å., Numerical Methods for Least Squares Problems, SIAM, 1996.
     """
     few = sample_of(observations, _MOST_STARTED_FROM)
     if len(few) < len(observations):
@@ -77,19 +62,8 @@ def evaluated(model: Model, observations: Observations, noise: Noise, estimate: 
 def fit_frames(fitted: Fit, model: Model, observations: Observations, noise: Noise, own_targets: bool = True) -> Estimate:
     """Fit frames and targets of other observations; everything else stays as it was found.
 
-    Parameters
-    ----------
-    fitted : Fit
-    model : Model
-        The same effects with the targets of these observations.
-    observations : Observations
-    noise : Noise
-    own_targets : bool
-        Whether these observations have targets of their own; where not, those of the fit stay as they were found.
-
-    Returns
-    -------
-    Estimate
+    `model`: the same effects with the targets of these observations. `own_targets`: whether these observations have targets of
+    their own; where not, those of the fit stay as they were found.
     """
     found = fitted.estimate
     if not own_targets:

@@ -34,22 +34,11 @@ _SPRINGS = ("joint_compliance", declared_weight.EFFECT)
 class Linearization:
     """A model about an estimate, for M observations.
 
-    Attributes
-    ----------
-    residual : ndarray (M, rows)
-        Measured less predicted, base axes, m and rad.
-    coordinate_jacobian : ndarray (M, rows, C)
-        Of each target with respect to the coordinates of the sites.
-    displacements : Displacements
-        What each of the P `parameters` does to the coordinates; nothing by those of targets.
-    target_columns : ndarray (M, rows, Q)
-        Sensitivities to the parameters of targets.
-    of_targets : ndarray of int (Q,)
-        Which parameters these are.
-    state : ndarray of int (M,)
-        State of each observation.
-    conditions : Conditions
-        Where the robot has yielded to, by this estimate.
+    `residual` (M, rows): measured less predicted, base axes, m and rad. `coordinate_jacobian` (M, rows, C): of each target with
+    respect to the coordinates of the sites. `displacements`: what each of the P `parameters` does to the coordinates; nothing
+    by those of targets. `target_columns` (M, rows, Q): sensitivities to the parameters of targets. `of_targets` (Q,) of int:
+    which parameters these are. `state` (M,) of int: state of each observation. `conditions`: where the robot has yielded to, by
+    this estimate.
     """
 
     residual: np.ndarray
@@ -74,14 +63,7 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
     Sensitivities are analytic, but for shapes (central differences) and for what springs do by way of other effects (forward
     differences).
 
-    Parameters
-    ----------
-    model, estimate, observations, conditions
-        As in `predict`.
-
-    Returns
-    -------
-    Linearization
+    `model`, `estimate`, `observations`, `conditions`: as in `predict`.
     """
     around = with_springs_of(model, estimate, conditions)
     coordinates = displaced_coordinates(model, estimate, around)
@@ -131,18 +113,8 @@ def effect_columns(
 ) -> np.ndarray:
     """Sensitivities of the measurements to the linear parameters of effects.
 
-    Parameters
-    ----------
-    effects : sequence of (Displacing, sequence of float)
-        With their shape parameters.
-    conditions : Conditions
-    coordinate_jacobian : ndarray (M, rows, C)
-    state : ndarray (M,)
-        State of each observation.
-
-    Returns
-    -------
-    ndarray (M, rows, D)
+    `effects` (Displacing, sequence of float): with their shape parameters. `coordinate_jacobian` (M, rows, C). `state` (M,):
+    state of each observation. Returns (M, rows, D).
     """
     laws = [law for effect, shapes in effects for law in effect.displacement(conditions, *shapes)]
     displacements = Displacements.of(laws, np.ones(len(laws)), len(conditions.joint_angles))

@@ -31,16 +31,5 @@ def held_at_once(observations: Observations, columns: int) -> bool:
 
 
 def kept_conditions(model: Model, estimate: Estimate, observations: Observations) -> Conditions | None:
-    """Conditions of all states, or None where these are too many to keep them.
-
-    Parameters
-    ----------
-    model : Model
-    estimate : Estimate
-    observations : Observations
-
-    Returns
-    -------
-    Conditions or None
-    """
+    """Conditions of all states, or None where these are too many to keep them."""
     return conditions(model, estimate, observations.states) if len(observations.states) <= _MOST_STATES else None

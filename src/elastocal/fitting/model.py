@@ -24,25 +24,12 @@ if TYPE_CHECKING:
 class Model:
     """What is taken to make the measurements.
 
-    Attributes
-    ----------
-    sites : Sites
-    targets : tuple of Target
-        As in the campaign; those without an offset are fitted.
-    fitted_frames : bool
-        Whether the placement of the base is unknown, one for each session.
-    rows : int
-        3 where positions are measured, 6 where poses are.
-    nominal_compliance : ndarray (n,)
-        rad/(N m).
-    effects : tuple of Candidate
-        Joint compliances, where they are identified, and errors of declared masses, where there are any, among them.
-    time_zero_s : float
-        From which effects count the time: the first measurement to be fitted.
-    row_span : (int, int) or None
-        First and last row of the measurements to be fitted, between which the campaign made its progress.
-    compliance_known : bool
-        Whether the nominal compliances are those of the robot file; else they are usual ones, or 0 of joints taken as rigid.
+    `targets`: as in the campaign; those without an offset are fitted. `fitted_frames`: whether the placement of the base is
+    unknown, one for each session. `rows`: 3 where positions are measured, 6 where poses are. `nominal_compliance` (n,): rad/(N
+    m). `effects`: joint compliances, where they are identified, and errors of declared masses, where there are any, among them.
+    `time_zero_s`: from which effects count the time: the first measurement to be fitted. `row_span` (int, int): first and last
+    row of the measurements to be fitted, between which the campaign made its progress. `compliance_known`: whether the nominal
+    compliances are those of the robot file; else they are usual ones, or 0 of joints taken as rigid.
     """
 
     sites: Sites
@@ -73,17 +60,9 @@ class Model:
 class Estimate:
     """Values of everything that a model leaves open.
 
-    Attributes
-    ----------
-    sessions : tuple of int
-    frame_rotation, frame_position : ndarray (K, 3, 3), (K, 3)
-        Placement of the base in the frame of each session.
-    target_offset, target_rotation : ndarray (T, 3), (T, 3, 3)
-        Each target in the frame of its measuring point, m.
-    coefficients : tuple of ndarray
-        Linear parameters of each effect.
-    shapes : tuple of ndarray
-        Shape parameters of each effect.
+    `frame_rotation`, `frame_position` (K, 3, 3), (K, 3): placement of the base in the frame of each session. `target_offset`,
+    `target_rotation` (T, 3), (T, 3, 3): each target in the frame of its measuring point, m. `coefficients`: linear parameters
+    of each effect. `shapes`: shape parameters of each effect.
     """
 
     sessions: tuple[int, ...]
@@ -106,15 +85,7 @@ class Estimate:
 def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Model:
     """The model that a campaign declares.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    effects : sequence of Candidate
-        Declared effects.
-
-    Returns
-    -------
-    Model
+    `effects`: declared effects.
     """
     sites = sites_of(campaign.robot)
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()

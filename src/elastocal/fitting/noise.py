@@ -46,20 +46,10 @@ _DEVIATIONS = 40
 class Noise:
     """Standard deviations of one measurement.
 
-    Attributes
-    ----------
-    source : {"repeats", "declared"}
-    position_m, orientation_rad : float
-        Sensor part, each component.
-    joint_rad : ndarray (n,)
-        Repeatability of each joint.
-    degrees_of_freedom : int
-        Contrasts of repeats behind the figures; 0 where they are declared.
-    pose_rad : float
-        Error of each joint that all measurements of a pose have in common.
-    usual_m : float
-        Where measurements state uncertainties of their own, that with which a measurement has `position_m`; others are in
-        proportion. 0 where all are alike.
+    `source`: one of "repeats", "declared". `position_m`, `orientation_rad`: sensor part, each component. `joint_rad` (n,):
+    repeatability of each joint. `degrees_of_freedom`: contrasts of repeats behind the figures; 0 where they are declared.
+    `pose_rad`: error of each joint that all measurements of a pose have in common. `usual_m`: where measurements state
+    uncertainties of their own, that with which a measurement has `position_m`; others are in proportion. 0 where all are alike.
     """
 
     source: str
@@ -111,29 +101,18 @@ def _usual(measurements: Measurements) -> float:
 def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measurements) -> Noise | None:
     """Noise by restricted maximum likelihood from the differences between repeats.
 
-    The likelihood is that of error contrasts [1]_, here of orthonormal Helmert contrasts of repeats; L-BFGS-B [2]_ finds its
-    maximum. The joints' part is taken where it is worth its parameters by Akaike's criterion [3]_, at the upper limit of a
+    The likelihood is that of error contrasts [1], here of orthonormal Helmert contrasts of repeats; L-BFGS-B [2] finds its
+    maximum. The joints' part is taken where it is worth its parameters by Akaike's criterion [3], at the upper limit of a
     one-sided chi-squared interval of 80 %; with fewer contrasts than show it, their mean square is the sensor's part.
 
-    Parameters
-    ----------
-    model : Model
-    estimate : Estimate
-        Its frames turn measurements into base axes; nothing else of it matters.
-    measurements : Measurements
+    `estimate`: its frames turn measurements into base axes; nothing else of it matters. Returns None where there are too few
+    repeats, or where they do not differ at all.
 
-    Returns
-    -------
-    Noise or None
-        None where there are too few repeats, or where they do not differ at all.
-
-    References
-    ----------
-    .. [1] Patterson, H. D. and Thompson, R., Recovery of inter-block information when block sizes are unequal, Biometrika 58,
-       1971.
-    .. [2] Byrd, R. H., Lu, P., Nocedal, J. and Zhu, C., A limited memory algorithm for bound constrained optimization, SIAM
-       Journal on Scientific Computing 16, 1995.
-    .. [3] Akaike, H., A new look at the statistical model identification, IEEE Transactions on Automatic Control 19, 1974.
+    [1] Patterson, H. D. and Thompson, R., Recovery of inter-block information when block sizes are unequal, Biometrika 58,
+        1971.
+    [2] Byrd, R. H., Lu, P., Nocedal, J. and Zhu, C., A limited memory algorithm for bound constrained optimization, SIAM
+        Journal on Scientific Computing 16, 1995.
+    [3] Akaike, H., A new look at the statistical model identification, IEEE Transactions on Automatic Control 19, 1974.
     """
     contrasts, jacobians = _contrasts(model, estimate, measurements)
     total = sum(part.size for part in contrasts)
@@ -203,17 +182,7 @@ def chosen_noise(
 
     A ratio of the two outside the chi-squared interval of 99 % of a variance is a warning.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    model, estimate, measurements
-        As in `noise_from_repeats`.
-
-    Returns
-    -------
-    noise : Noise or None
-        None where there are neither.
-    warnings : list of str
+    `model`, `estimate`, `measurements`: as in `noise_from_repeats`. Returns `noise`: None where there are neither.
     """
     repeats, declared = noise_from_repeats(model, estimate, measurements), declared_noise(campaign)
     if repeats is None:
@@ -231,19 +200,8 @@ def chosen_noise(
 def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int, spread: np.ndarray | None = None) -> np.ndarray:
     """Covariance of all measurements of one approach.
 
-    Parameters
-    ----------
-    noise : Noise
-    jacobians : ndarray (G, k, rows, n)
-        Of the k targets, with respect to the joints.
-    rows : int
-        3 for positions, 6 for poses.
-    spread : ndarray (G, k), optional
-        Of `Noise.spread`.
-
-    Returns
-    -------
-    ndarray (G, k * rows, k * rows)
+    `jacobians` (G, k, rows, n): of the k targets, with respect to the joints. `rows`: 3 for positions, 6 for poses. `spread`
+    (G, k): of `Noise.spread`. Returns (G, k * rows, k * rows).
     """
     groups, targets = jacobians.shape[:2]
     stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
@@ -258,16 +216,7 @@ def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int, spre
 def of_components(spread: np.ndarray, rows: int) -> np.ndarray:
     """Spread of each component of observations.
 
-    Parameters
-    ----------
-    spread : ndarray (...)
-        Of positions; orientations are alike.
-    rows : int
-        3 for positions, 6 for poses.
-
-    Returns
-    -------
-    ndarray (..., rows)
+    `spread` (...): of positions; orientations are alike. `rows`: 3 for positions, 6 for poses. Returns (..., rows).
     """
     whole = np.ones((*spread.shape, rows))
     whole[..., :3] = spread[..., None]
@@ -327,16 +276,8 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
 class _Seen:
     """What contrasts v (G, k * rows) of one number k of targets say of the noise, Jacobians S (G, k * rows, n) beside them.
 
-    Attributes
-    ----------
-    count : int
-        Numbers of one sensor's part, of positions or of orientations, in v.
-    squares : ndarray (s,)
-        v'v of each sensor's part, of all groups.
-    along : ndarray (G, s, n)
-        S'v of each.
-    gram : ndarray (G, s, n, n)
-        S'S of each.
+    `count`: numbers of one sensor's part, of positions or of orientations, in v. `squares` (s,): v'v of each sensor's part, of
+    all groups. `along` (G, s, n): S'v of each. `gram` (G, s, n, n): S'S of each.
     """
 
     count: int
@@ -359,11 +300,9 @@ def _negative_log_likelihood(logs: np.ndarray, parts: Sequence[_Seen]) -> tuple[
     """Minus the logarithm of the restricted likelihood, and its derivatives by the logarithms of the deviations.
 
     With D the variances of the sensors and L those of the joints, Sigma = D + S L S' has the determinant |D| |I + L C| and the
-    inverse D^-1 - D^-1 S A S' D^-1, C = S' D^-1 S and A = (I + L C)^-1 L, by Woodbury's identity [1]_.
+    inverse D^-1 - D^-1 S A S' D^-1, C = S' D^-1 S and A = (I + L C)^-1 L, by Woodbury's identity [1].
 
-    References
-    ----------
-    .. [1] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
+    [1] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
     """
     sensors = len(logs) - parts[0].along.shape[2]
     precision, deviation = np.exp(-2.0 * logs[:sensors]), np.exp(logs[sensors:])

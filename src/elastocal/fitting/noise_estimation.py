@@ -30,14 +30,7 @@ def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
 def noise_of(case: Case) -> dict[str, Any]:
     """Noise from repeats or as declared; from the residual of the declared model where there is neither.
 
-    Parameters
-    ----------
-    case : Case
-
-    Returns
-    -------
-    dict
-        ``noise`` and ``warnings``, JSON-serialisable.
+    Returns ``noise`` and ``warnings``, JSON-serialisable.
     """
     start = registered(case.model, case.observations)
     noise, warnings = chosen_noise(case.campaign, case.model, start, case.campaign.measurements)

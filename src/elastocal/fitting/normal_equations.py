@@ -36,16 +36,8 @@ class Parts:
     Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. Of states that
     are too many to keep their conditions, the coordinates are kept at which loads are taken.
 
-    Parameters
-    ----------
-    model : Model
-    observations : Observations
-        M of them.
-    noise : Noise
-    around : Conditions or None
-        Of all their states; None where these are too many to keep it.
-    plausible : ndarray (P,)
-        Plausible size of each parameter.
+    `observations`: M of them. `around`: of all their states; None where these are too many to keep it. `plausible` (P,):
+    plausible size of each parameter.
     """
 
     def __init__(
@@ -209,12 +201,10 @@ def _products(line: Linearization, turned: Whitening | Scaling, right: np.ndarra
 def _of_rotation_vectors(residual: np.ndarray) -> np.ndarray:
     """Matrices (M, rows, rows) that turn sensitivities of poses into those of the residual itself.
 
-    Where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2): Bortz's equation [1]_.
+    Where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2): Bortz's equation [1].
 
-    References
-    ----------
-    .. [1] Bortz, J. E., A new mathematical formulation for strapdown inertial navigation, IEEE Transactions on Aerospace and
-       Electronic Systems AES-7, 1971.
+    [1] Bortz, J. E., A new mathematical formulation for strapdown inertial navigation, IEEE Transactions on Aerospace and
+        Electronic Systems AES-7, 1971.
     """
     count, rows = residual.shape
     maps = np.tile(np.eye(rows), (count, 1, 1))

@@ -25,20 +25,9 @@ _COVERAGE = 1.959964
 class States:
     """Each pose, load and sense of approach once; arrays of S.
 
-    Attributes
-    ----------
-    session, pose, load : ndarray (S,)
-    joint_angles : ndarray (S, n)
-        rad.
-    wrench : ndarray (S, 6)
-        N, N m, at the origin of the last measuring point, base axes.
-    repeats : ndarray (S,)
-        How many approaches were averaged.
-    approach : ndarray (S, n) or None
-        Sense in which each joint was approached, -1, 0, +1.
-    time_s, temperature_c : ndarray (S,) or None
-    row : ndarray (S,) or None
-        First row of the file that belongs to the state.
+    `session`, `pose`, `load` (S,). `joint_angles` (S, n): rad. `wrench` (S, 6): N, N m, at the origin of the last measuring
+    point, base axes. `repeats` (S,): how many approaches were averaged. `approach` (S, n): sense in which each joint was
+    approached, -1, 0, +1. `time_s`, `temperature_c` (S,). `row` (S,): first row of the file that belongs to the state.
     """
 
     session: np.ndarray
@@ -60,17 +49,9 @@ class States:
 class Observations:
     """One averaged reading of one target in one state; M of them, in the order of the states.
 
-    Attributes
-    ----------
-    states : States
-    state, target : ndarray (M,)
-        Index of the state and of the target.
-    position : ndarray (M, 3)
-        m, in the frame of the session.
-    rotation : ndarray (M, 3, 3) or None
-        Measured orientation, where poses are measured.
-    position_std : ndarray (M,) or None
-        Stated standard deviation of one measurement of one coordinate of the position, m; None where it is not stated.
+    `state`, `target` (M,): index of the state and of the target. `position` (M, 3): m, in the frame of the session. `rotation`
+    (M, 3, 3): measured orientation, where poses are measured. `position_std` (M,): stated standard deviation of one measurement
+    of one coordinate of the position, m; None where it is not stated.
     """
 
     states: States
@@ -97,14 +78,7 @@ class Observations:
 def state_clusters(states: States | Measurements) -> np.ndarray:
     """Number of the (session, pose) of each state, 0 .. P-1.
 
-    Parameters
-    ----------
-    states : States or Measurements
-        Of measurements, that of each measurement.
-
-    Returns
-    -------
-    ndarray (S,)
+    Returns (S,).
     """
     return groups_of(np.column_stack([states.session, states.pose]))[1]
 
@@ -112,15 +86,8 @@ def state_clusters(states: States | Measurements) -> np.ndarray:
 def groups_by_size(group: np.ndarray) -> list[np.ndarray]:
     """Places of each group, for each number of places in one.
 
-    Parameters
-    ----------
-    group : ndarray of int (M,)
-        Such as the states or the poses of observations.
-
-    Returns
-    -------
-    list of ndarray of int (G, k)
-        Groups by their numbers, the places of each rising.
+    `group` (M,) of int: such as the states or the poses of observations. Returns (G, k) of int: groups by their numbers, the
+    places of each rising.
     """
     order, seen = np.argsort(group, kind="stable"), np.bincount(group)
     start = np.concatenate([[0], np.cumsum(seen)[:-1]])
@@ -130,14 +97,7 @@ def groups_by_size(group: np.ndarray) -> list[np.ndarray]:
 def averaged(measurements: Measurements) -> Observations:
     """Observations with the repeats averaged that were approached alike.
 
-    Parameters
-    ----------
-    measurements : Measurements
-        Of `campaign`.
-
-    Returns
-    -------
-    Observations
+    `measurements`: of `campaign`.
     """
     return _observations(measurements, _approached_alike(measurements))
 
@@ -145,15 +105,7 @@ def averaged(measurements: Measurements) -> Observations:
 def each_approach(measurements: Measurements) -> tuple[Observations, np.ndarray]:
     """Observations of every single approach: repeats are states of their own.
 
-    Parameters
-    ----------
-    measurements : Measurements
-
-    Returns
-    -------
-    observations : Observations
-    repeated : ndarray (S,)
-        Number of the state that would hold this approach if repeats were averaged.
+    Returns `repeated` (S,): number of the state that would hold this approach if repeats were averaged.
     """
     key = _approached_alike(measurements)
     single = np.column_stack([key, measurements.repeat])
@@ -182,21 +134,11 @@ def single_observations(measurements: Measurements) -> Observations:
 def without_outlying_repeats(measurements: Measurements) -> Measurements:
     """Measurements without those that are far from the other repeats of their state and target.
 
-    Hampel's identifier [1]_: distances from the median, here in units of the median absolute deviation of all repeats. An
+    Hampel's identifier [1]: distances from the median, here in units of the median absolute deviation of all repeats. An
     outlier would be taken for noise, and would move the mean of its repeats. Of two repeats nothing tells which is outlying.
 
-    Parameters
-    ----------
-    measurements : Measurements
-
-    Returns
-    -------
-    Measurements
-
-    References
-    ----------
-    .. [1] Davies, L. and Gather, U., The identification of multiple outliers, Journal of the American Statistical Association
-       88, 1993.
+    [1] Davies, L. and Gather, U., The identification of multiple outliers, Journal of the American Statistical Association 88,
+        1993.
     """
     group = groups_of(np.column_stack([_approached_alike(measurements), measurements.target]))[1]
     off = np.abs(measurements.position - _medians(measurements.position, group)[group])
@@ -270,20 +212,11 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
 
 
 def standard_uncertainty(u95: np.ndarray) -> np.ndarray:
-    """Standard deviations of one coordinate, by the quantile of the normal distribution [1]_.
+    """Standard deviations of one coordinate, by the quantile of the normal distribution [1].
 
-    Parameters
-    ----------
-    u95 : ndarray
-        Expanded uncertainties of 95 %.
+    `u95`: expanded uncertainties of 95 %.
 
-    Returns
-    -------
-    ndarray
-
-    References
-    ----------
-    .. [1] JCGM 100:2008, Guide to the expression of uncertainty in measurement, section 6.
+    [1] JCGM 100:2008, Guide to the expression of uncertainty in measurement, section 6.
     """
     return u95 / _COVERAGE
 
@@ -291,14 +224,7 @@ def standard_uncertainty(u95: np.ndarray) -> np.ndarray:
 def select_states(observations: Observations, kept: np.ndarray) -> Observations:
     """The part of some observations that was taken in some of their states.
 
-    Parameters
-    ----------
-    observations : Observations
-    kept : ndarray of bool (S,)
-
-    Returns
-    -------
-    Observations
+    `kept` (S,) of bool.
     """
     states = _states_at(observations.states, kept)
     mask = kept[observations.state]
@@ -313,17 +239,8 @@ def select_states(observations: Observations, kept: np.ndarray) -> Observations:
 def parts_of(observations: Observations, most: int) -> list[tuple[slice, slice]]:
     """Some observations in parts of whole poses, in their order.
 
-    Parameters
-    ----------
-    observations : Observations
-        Those of a pose one after the other, as `averaged` gives them.
-    most : int
-        About so many observations in a part.
-
-    Returns
-    -------
-    list of (slice, slice)
-        States and observations of each part; one part where they are few.
+    `observations`: those of a pose one after the other, as `averaged` gives them. `most`: about so many observations in a part.
+    Returns (slice, slice): states and observations of each part; one part where they are few.
     """
     first = np.flatnonzero(np.diff(state_clusters(observations.states), prepend=-1))
     place = np.searchsorted(observations.state, first)
@@ -336,15 +253,7 @@ def parts_of(observations: Observations, most: int) -> list[tuple[slice, slice]]
 def part_at(observations: Observations, states: slice, seen: slice) -> Observations:
     """One of the `parts_of` observations.
 
-    Parameters
-    ----------
-    observations : Observations
-    states, seen : slice
-        Of the states and of the observations.
-
-    Returns
-    -------
-    Observations
+    `states`, `seen`: of the states and of the observations.
     """
     some = _states_at(observations.states, states)
     rotation = None if observations.rotation is None else observations.rotation[seen]
@@ -362,15 +271,7 @@ def _states_at(states: States, chosen: np.ndarray | slice) -> States:
 def spread_poses(observations: Observations, most: int) -> np.ndarray:
     """Which states belong to poses evenly spread over a campaign, so many that about `most` observations are left.
 
-    Parameters
-    ----------
-    observations : Observations
-    most : int
-
-    Returns
-    -------
-    ndarray of bool (S,)
-        True throughout where there are no more.
+    Returns (S,) of bool: True throughout where there are no more.
     """
     if len(observations) <= most:
         return np.ones(len(observations.states), bool)
@@ -382,17 +283,7 @@ def spread_poses(observations: Observations, most: int) -> np.ndarray:
 
 
 def sample_of(observations: Observations, most: int) -> Observations:
-    """About so many observations at poses spread over a campaign, or all where the sample would miss a session or a target.
-
-    Parameters
-    ----------
-    observations : Observations
-    most : int
-
-    Returns
-    -------
-    Observations
-    """
+    """About so many observations at poses spread over a campaign, or all where the sample would miss a session or a target."""
     if len(observations) <= most:
         return observations
     some = select_states(observations, spread_poses(observations, most))
@@ -415,12 +306,9 @@ def _means(values: np.ndarray, group: np.ndarray) -> np.ndarray:
 def _mean_rotations(rotations: Rotation, group: np.ndarray) -> np.ndarray:
     """Mean of rotations close to each other: the mean turn from the first of each group.
 
-    The first step towards the Riemannian mean [1]_.
+    The first step towards the Riemannian mean [1].
 
-    References
-    ----------
-    .. [1] Moakher, M., Means and averaging in the group of rotations, SIAM Journal on Matrix Analysis and Applications 24,
-       2002.
+    [1] Moakher, M., Means and averaging in the group of rotations, SIAM Journal on Matrix Analysis and Applications 24, 2002.
     """
     first = np.unique(group, return_index=True)[1]
     reference = rotations[first]

@@ -22,15 +22,7 @@ _ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
 def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
     """Everything that is fitted, in the order of the sensitivities.
 
-    Parameters
-    ----------
-    model : Model
-    estimate : Estimate
-
-    Returns
-    -------
-    list of (str, Parameter)
-        What it belongs to ("frame 0", "target A", the key of an effect) and the parameter.
+    Returns (str, Parameter): what it belongs to ("frame 0", "target A", the key of an effect) and the parameter.
     """
     found = []
     shift = [Parameter(name, "m", _ANYWHERE_M) for name in _LENGTH]
@@ -64,14 +56,7 @@ def parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
 
     Frames and targets are fitted by steps from where they are and count as zero.
 
-    Parameters
-    ----------
-    model : Model
-    estimate : Estimate
-
-    Returns
-    -------
-    ndarray (P,)
+    Returns (P,).
     """
     owned = [owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, estimate)]
     effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
@@ -81,15 +66,7 @@ def parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
 def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
     """An estimate after a step of all parameters, in the order of `parameters`.
 
-    Parameters
-    ----------
-    model : Model
-    estimate : Estimate
-    step : ndarray (P,)
-
-    Returns
-    -------
-    Estimate
+    `step` (P,).
     """
     left = list(step)
 

@@ -23,18 +23,7 @@ def predict(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact poses of the targets, in base axes.
 
-    Parameters
-    ----------
-    model : Model
-    estimate : Estimate
-    observations : Observations
-    conditions : Conditions
-        Of the states of the observations.
-
-    Returns
-    -------
-    position : ndarray (M, 3)
-    rotation : ndarray (M, 3, 3)
+    `conditions`: of the states of the observations. Returns `position` (M, 3); `rotation` (M, 3, 3).
     """
     coordinates = displaced_coordinates(model, estimate, conditions)
     position, rotation = poses_of_points(model.sites.chain, coordinates, target_points(model, estimate))
@@ -45,15 +34,7 @@ def predict(
 def residuals(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> np.ndarray:
     """Measured less predicted, in base axes.
 
-    Parameters
-    ----------
-    model, estimate, observations, conditions
-        As in `predict`.
-
-    Returns
-    -------
-    ndarray (M, rows)
-        m and, where poses are measured, rad.
+    `model`, `estimate`, `observations`, `conditions`: as in `predict`. Returns (M, rows): m and, where poses are measured, rad.
     """
     position, rotation = predict(model, estimate, observations, conditions)
     return differences(measured_in_base(estimate, observations), position, rotation)
@@ -62,10 +43,7 @@ def residuals(model: Model, estimate: Estimate, observations: Observations, cond
 def measured_in_base(estimate: Estimate, observations: Observations) -> tuple[np.ndarray, np.ndarray | None]:
     """Measured poses, taken from the frames of the sessions into base axes.
 
-    Returns
-    -------
-    position : ndarray (M, 3)
-    rotation : ndarray (M, 3, 3) or None
+    Returns `position` (M, 3); `rotation` (M, 3, 3).
     """
     session = np.searchsorted(estimate.sessions, observations.states.session[observations.state])
     into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
@@ -76,17 +54,8 @@ def measured_in_base(estimate: Estimate, observations: Observations) -> tuple[np
 def differences(measured: tuple[np.ndarray, np.ndarray | None], position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Measured less predicted poses, both in base axes.
 
-    Parameters
-    ----------
-    measured : (ndarray (M, 3), ndarray (M, 3, 3) or None)
-        As by `measured_in_base`.
-    position, rotation : ndarray (M, 3), (M, 3, 3)
-        As by `predict`.
-
-    Returns
-    -------
-    ndarray (M, rows)
-        m and, where poses are measured, rad.
+    `measured` (ndarray (M, 3), ndarray (M, 3, 3) or None): as by `measured_in_base`. `position`, `rotation` (M, 3), (M, 3, 3):
+    as by `predict`. Returns (M, rows): m and, where poses are measured, rad.
     """
     measured_position, measured_rotation = measured
     if measured_rotation is None:

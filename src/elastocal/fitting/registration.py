@@ -24,25 +24,15 @@ _SETTLED_M = 1e-9
 def registered(model: Model, observations: Observations) -> Estimate:
     """Frames and targets of a model that its nominal kinematics explain best, by alternating closed-form steps.
 
-    Block coordinate descent: frames by the Kabsch algorithm [1]_ for Wahba's problem [2]_, given the targets; positions of
-    targets as means, given the frames. The turn of a target is the chordal mean of rotations [3]_.
+    Block coordinate descent: frames by the Kabsch algorithm [1] for Wahba's problem [2], given the targets; positions of
+    targets as means, given the frames. The turn of a target is the chordal mean of rotations [3].
 
-    Parameters
-    ----------
-    model : Model
-    observations : Observations
+    Returns with all effects at zero, except that joint compliances start at their nominal values.
 
-    Returns
-    -------
-    Estimate
-        With all effects at zero, except that joint compliances start at their nominal values.
-
-    References
-    ----------
-    .. [1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta Crystallographica A32, 1976.
-    .. [2] Wahba, G., A least squares estimate of satellite attitude, SIAM Review 7, 1965.
-    .. [3] Markley, F. L., Cheng, Y., Crassidis, J. L. and Oshman, Y., Averaging quaternions, Journal of Guidance, Control, and
-       Dynamics 30, 2007.
+    [1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta Crystallographica A32, 1976.
+    [2] Wahba, G., A least squares estimate of satellite attitude, SIAM Review 7, 1965.
+    [3] Markley, F. L., Cheng, Y., Crassidis, J. L. and Oshman, Y., Averaging quaternions, Journal of Guidance, Control, and
+        Dynamics 30, 2007.
     """
     observations = sample_of(observations, _MOST)
     return registered_to(model, observations, *nominal_poses(model, observations))
@@ -51,17 +41,7 @@ def registered(model: Model, observations: Observations) -> Estimate:
 def nominal_poses(model: Model, observations: Observations) -> tuple[np.ndarray, np.ndarray]:
     """Poses of the measuring points of some observations on the nominal robot without loads.
 
-    Parameters
-    ----------
-    model : Model
-    observations : Observations
-        M of them.
-
-    Returns
-    -------
-    position : ndarray (M, 3)
-        m, base axes.
-    rotation : ndarray (M, 3, 3)
+    `observations`: M of them. Returns `position` (M, 3): m, base axes; `rotation` (M, 3, 3).
     """
     chain, states = model.sites.chain, observations.states
     coordinates = np.zeros((len(states), chain.coordinates))
@@ -76,16 +56,7 @@ def registered_to(
 ) -> Estimate:
     """As `registered`, to nominal poses that are known.
 
-    Parameters
-    ----------
-    model : Model
-    observations : Observations
-    nominal_position, nominal_rotation : ndarray (M, 3), (M, 3, 3)
-        Of them, as by `nominal_poses`.
-
-    Returns
-    -------
-    Estimate
+    `nominal_position`, `nominal_rotation` (M, 3), (M, 3, 3): of them, as by `nominal_poses`.
     """
     states = observations.states
     sessions = np.unique(states.session)
@@ -127,14 +98,7 @@ def registered_to(
 class _Sums:
     """What rounds need of the measurements of one target in one session, whose number does not matter then.
 
-    Parameters
-    ----------
-    position : ndarray (N, 3)
-        p, of the nominal measuring point.
-    rotation : ndarray (N, 3, 3)
-        R, of the same.
-    measured : ndarray (N, 3)
-        y.
+    `position` (N, 3): p, of the nominal measuring point. `rotation` (N, 3, 3): R, of the same. `measured` (N, 3): y.
     """
 
     def __init__(self, position: np.ndarray, rotation: np.ndarray, measured: np.ndarray) -> None:

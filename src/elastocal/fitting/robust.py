@@ -46,49 +46,31 @@ def robustly(
     reweighted: bool = False,
     settled: float = SETTLED,
 ) -> Fit:
-    """Iteratively reweighted least squares with Huber's weights [1]_ by Gauss-Newton steps, each halved until it helps enough.
+    """Iteratively reweighted least squares with Huber's weights [1] by Gauss-Newton steps, each halved until it helps enough.
 
     Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
-    [2]_, so that it falls with them. Where measurements have errors in common there is none: weights come before whitening,
-    which would carry an outlier into the measurements beside it, and the estimate solves the weighted equations [3]_. A
+    [2], so that it falls with them. Where measurements have errors in common there is none: weights come before whitening,
+    which would carry an outlier into the measurements beside it, and the estimate solves the weighted equations [3]. A
     whitening belongs to the axes in which a step begins: residuals after the step are turned into these, or a fit would turn
     frame and robot together on and on. Against curvature a step is backtracked until weighted squares and priors fall by
-    Armijo's condition [4]_. Where that hinders the first trial, what is linear given the laws that other parameters load, and
-    given their shapes, is solved for again there, as in variable projection [5]_: that is the acceleration by which a path
-    follows a bent valley [6]_, in which steps are then halved. The first step gives all observations one weight, unless the
+    Armijo's condition [4]. Where that hinders the first trial, what is linear given the laws that other parameters load, and
+    given their shapes, is solved for again there, as in variable projection [5]: that is the acceleration by which a path
+    follows a bent valley [6], in which steps are then halved. The first step gives all observations one weight, unless the
     start comes of reweighted steps already.
 
-    Parameters
-    ----------
-    model : Model
-    observations : Observations
-        M of them.
-    around : Conditions or None
-        Of all their states; None where these are too many to keep it.
-    noise : Noise
-    estimate : Estimate
-        From which the first step is taken.
-    frozen : bool or ndarray of bool (P,)
-        Parameters not to move.
-    reweighted, settled
-        As in `least_squares.fit`.
+    `observations`: M of them. `around`: of all their states; None where these are too many to keep it. `estimate`: from which
+    the first step is taken. `frozen` (P,) of bool: parameters not to move. `reweighted`, `settled`: as in `least_squares.fit`.
 
-    Returns
-    -------
-    Fit
-
-    References
-    ----------
-    .. [1] Holland, P. W. and Welsch, R. E., Robust regression using iteratively reweighted least-squares, Communications in
-       Statistics A6, 1977.
-    .. [2] Huber, P. J. and Ronchetti, E. M., Robust Statistics, section 7.8, Wiley, 2009.
-    .. [3] Preisser, J. S. and Qaqish, B. F., Robust regression for clustered data with application to binary responses,
-       Biometrics 55, 1999.
-    .. [4] Nocedal, J. and Wright, S. J., Numerical Optimization, section 3.1, Springer, 2006.
-    .. [5] Golub, G. H. and Pereyra, V., The differentiation of pseudo-inverses and nonlinear least squares problems whose
-       variables separate, SIAM Journal on Numerical Analysis 10, 1973.
-    .. [6] Transtrum, M. K. and Sethna, J. P., Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares
-       minimization, arXiv 1201.5885, 2012.
+    [1] Holland, P. W. and Welsch, R. E., Robust regression using iteratively reweighted least-squares, Communications in
+        Statistics A6, 1977.
+    [2] Huber, P. J. and Ronchetti, E. M., Robust Statistics, section 7.8, Wiley, 2009.
+    [3] Preisser, J. S. and Qaqish, B. F., Robust regression for clustered data with application to binary responses, Biometrics
+        55, 1999.
+    [4] Nocedal, J. and Wright, S. J., Numerical Optimization, section 3.1, Springer, 2006.
+    [5] Golub, G. H. and Pereyra, V., The differentiation of pseudo-inverses and nonlinear least squares problems whose
+        variables separate, SIAM Journal on Numerical Analysis 10, 1973.
+    [6] Transtrum, M. K. and Sethna, J. P., Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares
+        minimization, arXiv 1201.5885, 2012.
     """
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))

@@ -1,12 +1,10 @@
 """Tolerances of what a campaign declares: every fit of its geometry has one prior, whose size the measurements say.
 
 A robot is off its drawing by so many times what is plausible; one number for all declared geometry, by type II maximum
-likelihood [1]_, together with how many times the noise taken the measurements scatter. Both come of the declared model alone,
+likelihood [1], together with how many times the noise taken the measurements scatter. Both come of the declared model alone,
 so that all models of a campaign, with effects and without, have the same geometry beforehand.
 
-References
-----------
-.. [1] Good, I. J., The Estimation of Probabilities: An Essay on Modern Bayesian Methods, MIT Press, 1965.
+[1] Good, I. J., The Estimation of Probabilities: An Essay on Modern Bayesian Methods, MIT Press, 1965.
 """
 
 from __future__ import annotations

@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 class Whitening:
     """What turns correlated rows into independent ones of unit variance.
 
-    Attributes
-    ----------
-    blocks : tuple of (ndarray (G, k), ndarray (G, k * rows, k * rows))
-        For the states, or the poses, with k observations: their indices, and the inverse Cholesky factor of their covariance.
+    `blocks` (ndarray (G, k), ndarray (G, k * rows, k * rows)): for the states, or the poses, with k observations: their
+    indices, and the inverse Cholesky factor of their covariance.
     """
 
     blocks: tuple[tuple[np.ndarray, np.ndarray], ...]
@@ -32,13 +30,7 @@ class Whitening:
     def apply(self, values: np.ndarray) -> np.ndarray:
         """Whitened values.
 
-        Parameters
-        ----------
-        values : ndarray (M, rows, ...)
-
-        Returns
-        -------
-        ndarray (M, rows, ...)
+        `values` (M, rows, ...). Returns (M, rows, ...).
         """
         (members, factor), *others = self.blocks
         if not others and (members.ravel() == np.arange(len(values))).all():
@@ -53,13 +45,7 @@ class Whitening:
     def after(self, maps: np.ndarray) -> Whitening:
         """What whitens values to each of whose observations a matrix is applied first.
 
-        Parameters
-        ----------
-        maps : ndarray (M, rows, rows)
-
-        Returns
-        -------
-        Whitening
+        `maps` (M, rows, rows).
         """
         blocks = []
         for members, factor in self.blocks:
@@ -73,12 +59,8 @@ class Whitening:
 class Scaling:
     """What turns rows into ones of unit variance where nothing is correlated.
 
-    Attributes
-    ----------
-    precision : ndarray (rows,)
-        Of one measurement: one over its standard deviation.
-    root : ndarray (M,) or (M, rows)
-        Square root of the number of measurements of which each observation is the average, over their spread.
+    `precision` (rows,): of one measurement: one over its standard deviation. `root` (M,), (M, rows): square root of the number
+    of measurements of which each observation is the average, over their spread.
     """
 
     precision: np.ndarray
@@ -100,15 +82,7 @@ class Scaling:
 def joined(parts: Sequence[Whitening | Scaling], starts: Sequence[int]) -> Whitening | Scaling:
     """Whitening of observations of which there is one for each part.
 
-    Parameters
-    ----------
-    parts : sequence of Whitening or of Scaling
-    starts : sequence of int
-        The first observation of each.
-
-    Returns
-    -------
-    Whitening or Scaling
+    `starts`: the first observation of each.
     """
     scalings = [part for part in parts if isinstance(part, Scaling)]
     if scalings:
@@ -121,24 +95,12 @@ def joined(parts: Sequence[Whitening | Scaling], starts: Sequence[int]) -> White
 def whitening(observations: Observations, jacobian: np.ndarray | None, noise: Noise) -> Whitening | Scaling:
     """Whitening of averaged observations.
 
-    For generalized least squares [1]_: inverse Cholesky factors of the covariance of what errs together.
+    For generalized least squares [1]: inverse Cholesky factors of the covariance of what errs together.
 
-    Parameters
-    ----------
-    observations : Observations
-    jacobian : ndarray (M, rows, n)
-        With respect to the joints.
-    noise : Noise
-        Of one measurement.
+    `jacobian` (M, rows, n): with respect to the joints. `noise`: of one measurement.
 
-    Returns
-    -------
-    Whitening or Scaling
-
-    References
-    ----------
-    .. [1] Aitken, A. C., On least squares and linear combination of observations, Proceedings of the Royal Society of Edinburgh
-       55, 1935.
+    [1] Aitken, A. C., On least squares and linear combination of observations, Proceedings of the Royal Society of Edinburgh
+        55, 1935.
     """
     spread = noise.spread(observations)
     if not noise.pose_rad and not noise.joint_rad.any():

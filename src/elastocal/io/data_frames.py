@@ -18,34 +18,15 @@ if TYPE_CHECKING:
 
 
 def read_frame(path: str | Path, schema: TableSchema, columns: Sequence[str] | None = None) -> pd.DataFrame:
-    """A table as a data frame, checked as in `storage.read_blocks`.
-
-    Parameters
-    ----------
-    path : str
-    schema : TableSchema
-    columns : sequence of str, optional
-
-    Returns
-    -------
-    pandas.DataFrame
-    """
+    """A table as a data frame, checked as in `storage.read_blocks`."""
     return pd.DataFrame(read_table(path, schema, columns))
 
 
 def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
     """Tables of many strategies in one frame, headed by what their provenance says: robot, noise_um, strategy (its name).
 
-    Parameters
-    ----------
-    paths : iterable of str
-    schema : callable
-        Number of joints to TableSchema.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns of robots with fewer joints are empty for the joints that they lack.
+    `schema`: number of joints to TableSchema. Returns columns of robots with fewer joints are empty for the joints that they
+    lack.
     """
     frames = [pd.DataFrame({"robot": [], "noise_um": [], "strategy": []})]
     for path in paths:
@@ -63,16 +44,7 @@ def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema])
 def read_studies(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
     """Tables of further studies of several robots in one frame, headed by the robot that their provenance says.
 
-    Parameters
-    ----------
-    paths : iterable of str
-        One at least.
-    schema : callable
-        Number of joints to TableSchema.
-
-    Returns
-    -------
-    pandas.DataFrame
+    `paths`: one at least. `schema`: number of joints to TableSchema.
     """
     frames = []
     for path in paths:
@@ -85,12 +57,7 @@ def read_studies(paths: Iterable[str | Path], schema: Callable[[int], TableSchem
 def write_csv(path: str | Path, frame: pd.DataFrame, digits: int = 9) -> None:
     """Write a data frame; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str
-    frame : pandas.DataFrame
-    digits : int
-        Significant ones of numbers.
+    `digits`: significant ones of numbers.
     """
     write_text(path, frame.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 

@@ -119,18 +119,7 @@ _NOT_XML = "YAML; a URDF becomes a robot file by `elastocal import urdf FILE --b
 def read_document(path: str | Path) -> Any:
     """Contents of a YAML file.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    object
-
-    Raises
-    ------
-    InputError
-        A file that is missing or is no YAML, such as a URDF.
+    Raises `InputError`: a file that is missing or is no YAML, such as a URDF.
     """
     return parsed(read_text(path, LARGEST_BYTES), path)
 
@@ -138,20 +127,8 @@ def read_document(path: str | Path) -> Any:
 def parsed(text: str, source: str | Path) -> Any:
     """Contents of a YAML text.
 
-    Parameters
-    ----------
-    text : str
-    source : str or Path
-        Named in errors.
-
-    Returns
-    -------
-    object
-
-    Raises
-    ------
-    InputError
-        No YAML, such as a URDF, or YAML that is unclear or out of bounds; the line is named.
+    `source`: named in errors. Raises `InputError`: no YAML, such as a URDF, or YAML that is unclear or out of bounds; the line
+    is named.
     """
     if text.lstrip("\ufeff \r\n\t").startswith("<"):
         raise InputError(source, "", "XML", _NOT_XML)
@@ -207,16 +184,7 @@ def _enlarged(frame: tuple[str | None, int, int], count: int, height: int) -> tu
 
 
 def one_line(value: Any) -> str:
-    """A value as YAML on one line.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    str
-    """
+    """A value as YAML on one line."""
     text: str = yaml.safe_dump(value, default_flow_style=True, width=math.inf, sort_keys=False, allow_unicode=True)
     return text.removesuffix("\n").removesuffix("\n...")
 
@@ -231,18 +199,8 @@ def read_schema(name: str) -> dict[str, Any]:
 def check_document(document: Any, schema: str, source: str) -> None:
     """Check a document against a schema.
 
-    Parameters
-    ----------
-    document : object
-    schema : str
-        Name of the schema, as in `read_schema`.
-    source : str
-        The document's file, named in errors.
-
-    Raises
-    ------
-    InputError
-        Names the first key at fault, what was found and what is allowed.
+    `schema`: name of the schema, as in `read_schema`. `source`: the document's file, named in errors. Raises `InputError`:
+    names the first key at fault, what was found and what is allowed.
     """
     validator = _Validator(read_schema(schema), format_checker=_FORMATS)
     errors = sorted(
@@ -382,26 +340,8 @@ def document_path(folder: str | Path, kind: str, name: str) -> str:
 def named_document(folder: str | Path, kind: str, schema: str, name: str, source: str) -> dict[str, Any]:
     """Read and check a document that a configuration names.
 
-    Parameters
-    ----------
-    folder : str or Path
-    kind : str
-        Subfolder: robots, strategies, campaigns.
-    schema : str
-        As in `check_document`.
-    name : str
-        Of the file, without its ending.
-    source : str
-        File that names it, for errors.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    InputError
-        No such file, or a document that its schema refuses.
+    `kind`: subfolder: robots, strategies, campaigns. `schema`: as in `check_document`. `name`: of the file, without its ending.
+    `source`: file that names it, for errors. Raises `InputError`: no such file, or a document that its schema refuses.
     """
     path = Path(document_path(folder, kind, name))
     known = sorted(file.stem for file in Path(folder, kind).glob("*.yaml") if file.is_file())

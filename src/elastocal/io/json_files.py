@@ -14,16 +14,7 @@ if TYPE_CHECKING:
 
 
 def read_json(path: str | Path) -> Any:
-    """Contents of a JSON file.
-
-    Parameters
-    ----------
-    path : str
-
-    Returns
-    -------
-    object
-    """
+    """Contents of a JSON file."""
     check_file(path)
     with open(path, encoding="utf-8") as file:
         return json.load(file)
@@ -32,12 +23,6 @@ def read_json(path: str | Path) -> Any:
 def write_json(path: str | Path, contents: Any, **options: Any) -> None:
     """Write a JSON file that people can read too; it appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str
-    contents : object
-        JSON-serialisable.
-    **options
-        Passed on to ``json.dumps``.
+    `contents`: JSON-serialisable. `**options`: passed on to ``json.dumps``.
     """
     write_text(path, json.dumps(contents, indent=1, **options) + "\n")

@@ -23,13 +23,8 @@ _LIBRARIES = ("numpy", "pandas", "pyarrow", "scipy")
 class Origin:
     """What a file was made from.
 
-    Attributes
-    ----------
-    commit : str
-        Of the repository, with ``-dirty`` behind it where sources were edited since; ``unknown`` outside of a checkout.
-    configuration_sha256 : str
-        From `configuration_sha256`.
-    seed : int
+    `commit`: of the repository, with ``-dirty`` behind it where sources were edited since; ``unknown`` outside of a checkout.
+    `configuration_sha256`: from `configuration_sha256`.
     """
 
     commit: str
@@ -45,14 +40,7 @@ class Origin:
 def canonical_json(value: Any) -> str:
     """The one JSON text of a value: keys sorted, no spaces, so that equal values have equal digests.
 
-    Parameters
-    ----------
-    value : object
-        JSON-serialisable.
-
-    Returns
-    -------
-    str
+    `value`: JSON-serialisable.
     """
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
@@ -60,14 +48,7 @@ def canonical_json(value: Any) -> str:
 def configuration_sha256(configuration: Any) -> str:
     """SHA-256 of the canonical JSON of a configuration, in UTF-8.
 
-    Parameters
-    ----------
-    configuration : object
-        With everything that it refers to, such as the documents of robots.
-
-    Returns
-    -------
-    str
+    `configuration`: with everything that it refers to, such as the documents of robots.
     """
     return hashlib.sha256(canonical_json(configuration).encode()).hexdigest()
 

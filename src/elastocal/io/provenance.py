@@ -25,17 +25,8 @@ SOURCES_DIGEST = "sources_sha256"
 def provenance(settings: Settings, **more: Any) -> dict[str, Any]:
     """Provenance of an output.
 
-    Parameters
-    ----------
-    settings : object with ``items()``
-        The configuration leaves that made the table, the seed among them.
-    **more
-        Further facts, such as the noise level.
-
-    Returns
-    -------
-    dict
-        JSON-serialisable and the same for the same settings.
+    `settings` (): the configuration leaves that made the table, the seed among them. `**more`: further facts, such as the noise
+    level. Returns JSON-serialisable and the same for the same settings.
     """
     kept = {name: value for name, value in settings.items() if name != SOURCES_DIGEST}
     leaves = json.loads(json.dumps(kept, sort_keys=True, default=list))

@@ -35,20 +35,9 @@ _CATALOGUE = "catalogue.py"
 class JobRecord:
     """One job that has ended well.
 
-    Attributes
-    ----------
-    rule : str
-    wildcards : dict of str to str
-    started, ended : str
-        UTC, ISO 8601.
-    inputs : dict of str to str
-        SHA-256 of files by their names in the working directory; scripts and modules are among them.
-    own : tuple of str
-        Inputs of the user, which no job made and which may lie elsewhere by now.
-    outputs : tuple of str
-    origin : Origin
-    environment : dict of str to str
-        From `origin.environment`.
+    `started`, `ended`: UTC, ISO 8601. `inputs`: SHA-256 of files by their names in the working directory; scripts and modules
+    are among them. `own`: inputs of the user, which no job made and which may lie elsewhere by now. `environment`: from
+    `origin.environment`.
     """
 
     rule: str

@@ -36,17 +36,8 @@ _AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again
 class Column:
     """One column of a table.
 
-    Attributes
-    ----------
-    name : str
-    type : {"float64", "float32", "int32", "bool", "string", "text"}
-        A string column has one value for each row group, a text column one for each row.
-    unit : str
-        Empty for counts, names and shares.
-    meaning : str
-    missing : bool
-        Whether a floating-point column may hold not-a-number or infinity.
-    minimum : float or None
+    `type`: a string column has one value for each row group, a text column one for each row. `unit`: empty for counts, names
+    and shares. `missing`: whether a floating-point column may hold not-a-number or infinity.
     """
 
     name: str
@@ -72,19 +63,8 @@ class TableSchema:
 def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], provenance: Mapping[str, Any]) -> None:
     """Write a table block by block, each a row group; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str
-    schema : TableSchema
-    blocks : iterable of dict of str to array
-        One value or array for each column; all arrays of a block have the same length.
-    provenance : dict
-        JSON-serialisable; says from what the table was made.
-
-    Raises
-    ------
-    InputError
-        A column that is missing, too many, not finite or out of range.
+    `blocks`: one value or array for each column; all arrays of a block have the same length. `provenance`: JSON-serialisable;
+    says from what the table was made. Raises `InputError`: a column that is missing, too many, not finite or out of range.
     """
     fields = [pa.field(c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}) for c in schema.columns]
     floats = [c.name for c in schema.columns if c.type.startswith("float")]
@@ -116,23 +96,8 @@ def read_blocks(
 ) -> Iterator[dict[str, np.ndarray]]:
     """Read a table block by block, checked against its schema and its digests.
 
-    Parameters
-    ----------
-    path : str
-    schema : TableSchema
-    columns : sequence of str, optional
-        Only these; all without.
-    **where
-        Column = value: only row groups with this value throughout.
-
-    Yields
-    ------
-    dict of str to ndarray
-
-    Raises
-    ------
-    InputError
-        A file that cannot be read, is another table, or whose contents are not those written.
+    `columns`: only these; all without. `**where`: column = value: only row groups with this value throughout. Raises
+    `InputError`: a file that cannot be read, is another table, or whose contents are not those written.
     """
     wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
     with _parquet_file(path) as file:
@@ -167,12 +132,7 @@ def read_blocks(
 def read_table(
     path: str | Path, schema: TableSchema, columns: Sequence[str] | None = None, **where: str | float
 ) -> dict[str, np.ndarray]:
-    """Read a whole table; as `read_blocks`, with the blocks joined.
-
-    Returns
-    -------
-    dict of str to ndarray
-    """
+    """Read a whole table; as `read_blocks`, with the blocks joined."""
     blocks = list(read_blocks(path, schema, columns, **where))
     if not blocks and not where:
         wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
@@ -183,16 +143,7 @@ def read_table(
 
 
 def read_provenance(path: str | Path) -> dict[str, Any]:
-    """Provenance of a table, as it was given to `write_table`.
-
-    Parameters
-    ----------
-    path : str
-
-    Returns
-    -------
-    dict
-    """
+    """Provenance of a table, as it was given to `write_table`."""
     with _parquet_file(path) as file:
         return _metadata(path, file, _PROVENANCE)
 

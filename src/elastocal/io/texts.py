@@ -35,22 +35,8 @@ def check_file(path: str | Path, kind: str = "a readable file") -> int:
 def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") -> bytes:
     """Contents of a file.
 
-    Parameters
-    ----------
-    path : str or Path
-    largest : int
-        Bytes that it may have.
-    kind : str
-        What the file should be, for messages.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    InputError
-        No file, none that may be read, a larger one, or a pipe or device, which might never end.
+    `largest`: bytes that it may have. `kind`: what the file should be, for messages. Raises `InputError`: no file, none that
+    may be read, a larger one, or a pipe or device, which might never end.
     """
     try:
         if check_file(path, kind) <= largest:
@@ -71,19 +57,8 @@ def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") ->
 def read_text(path: str | Path, largest: int, kind: str = "a readable file") -> str:
     """Contents of a file in UTF-8, without the byte order mark that spreadsheets write.
 
-    Parameters
-    ----------
-    path, largest, kind
-        As in `read_bytes`.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        As `read_bytes`, and a text in another encoding, with the line of the first byte at fault.
+    `path`, `largest`, `kind`: as in `read_bytes`. Raises `InputError`: as `read_bytes`, and a text in another encoding, with
+    the line of the first byte at fault.
     """
     return decoded(read_bytes(path, largest, kind), path)
 
@@ -91,21 +66,7 @@ def read_text(path: str | Path, largest: int, kind: str = "a readable file") -> 
 def decoded(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> str:
     """Text of the contents of a file.
 
-    Parameters
-    ----------
-    content : bytes
-    path : str or Path
-        Named in errors.
-    encoding : str
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        Another encoding.
+    `path`: named in errors. Raises `InputError`: another encoding.
     """
     try:
         return content.decode(encoding)
@@ -119,16 +80,8 @@ def decoded(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> st
 def plain_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
     """A decimal number as people write it.
 
-    Parameters
-    ----------
-    text : str
-    largest : float
-        Size that it may have.
-
-    Returns
-    -------
-    float or None
-        None for anything else: nothing, words, not-a-number, infinity, digits with underscores, a larger number.
+    `largest`: size that it may have. Returns None for anything else: nothing, words, not-a-number, infinity, digits with
+    underscores, a larger number.
     """
     value = float(text) if len(text) <= _LONGEST_NUMBER and _NUMBER.fullmatch(text) else math.inf
     return value if abs(value) <= largest else None

@@ -18,14 +18,7 @@ if TYPE_CHECKING:
 def load_data_set(descriptions_path: str | Path, measurements_path: str | Path, folds_path: str | Path) -> DataSet:
     """Read a data set.
 
-    Parameters
-    ----------
-    descriptions_path, measurements_path, folds_path : str or Path
-        As `deal_league_folds` wrote them.
-
-    Returns
-    -------
-    DataSet
+    `descriptions_path`, `measurements_path`, `folds_path`: as `deal_league_folds` wrote them.
     """
     descriptions = read_json(descriptions_path)
     joints = joint_count(descriptions["robot"], descriptions["source"])

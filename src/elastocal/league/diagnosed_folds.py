@@ -41,19 +41,7 @@ def physics_of_fold(
 ) -> Fit:
     """The physical model of a method, fitted to the training poses of a fold, or as its diagnosis left it.
 
-    Parameters
-    ----------
-    method : Method
-    training : Case
-    facts : dict or None
-        Contents of diagnoses.json, for a method that needs a diagnosis.
-    fits : dict of str to ndarray or None
-        Columns of the fits table, likewise.
-    fold : int
-
-    Returns
-    -------
-    Fit
+    `facts`: contents of diagnoses.json, for a method that needs a diagnosis. `fits`: columns of the fits table, likewise.
     """
     if method.physics != DIAGNOSIS or facts is None or fits is None:
         return fitted_physics(method.physics, training)

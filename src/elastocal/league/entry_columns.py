@@ -13,17 +13,8 @@ if TYPE_CHECKING:
 def entry_columns(entry: Entry, fold: int, other: int) -> dict[str, np.ndarray]:
     """Columns of one fold.
 
-    Parameters
-    ----------
-    entry : Entry
-    fold : int
-        From 1.
-    other : int
-        Number of the other data set that is the test, from 1; 0 where it is a part of the same.
-
-    Returns
-    -------
-    dict of str to ndarray (M,)
+    `fold`: from 1. `other`: number of the other data set that is the test, from 1; 0 where it is a part of the same. Returns
+    (M,).
     """
     seen, states = entry.observations, entry.observations.states
     columns = {"fold": np.full(len(seen), fold), "set": np.full(len(seen), other)}

@@ -24,24 +24,12 @@ def dealt(measurements: Measurements, count: int, draws: np.random.Generator) ->
     """Deal poses into folds, those of a configuration into one, at random and by blocks of joint space.
 
     Random folds have neighbours among the poses fitted, so they ask how well a method interpolates; blocks of joint space ask
-    how well it extrapolates [1]_.
+    how well it extrapolates [1].
 
-    Parameters
-    ----------
-    measurements : Measurements
-    count : int
-        Of folds.
-    draws : numpy.random.Generator
+    `count`: of folds. Returns columns: ``session`` and ``pose`` (P,), and of each split the fold (P,), from 1.
 
-    Returns
-    -------
-    dict of str to ndarray
-        Columns: ``session`` and ``pose`` (P,), and of each split the fold (P,), from 1.
-
-    References
-    ----------
-    .. [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic
-       structure, Ecography 40, 2017.
+    [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic
+        structure, Ecography 40, 2017.
     """
     pairs, index = measured_poses(measurements)
     configuration = configurations(measurements.joint_angles, index)

@@ -19,15 +19,7 @@ def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray |
     up, over that of the residual which these leave; all in units of the noise. Mechanisms that resemble each other share, so
     shares need not add up to that of all together.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    fold : int
-
-    Returns
-    -------
-    dict of str to ndarray (K,)
-        Columns of the mechanisms table; none where the data are at fault.
+    Returns (K,): columns of the mechanisms table; none where the data are at fault.
     """
     names: list[str] = []
     probabilities, shares = [], []

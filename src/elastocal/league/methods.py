@@ -33,17 +33,10 @@ FRAMES, GEOMETRY, DIAGNOSIS = "frames", "geometry", "diagnosis"
 class Method:
     """A method of the league.
 
-    Attributes
-    ----------
-    physics : {"frames", "geometry", "diagnosis"}
-        What is fitted first: frames and targets alone; what the campaign declares too, such as geometry; or what a diagnosis
-        of the training poses finds.
-    regression : str or None
-        Name in `remainder.catalogue`: fitted to what the physical model leaves.
-    within_range : bool
-        Whether the regression is left out where a pose lies outside the range of those fitted.
-    words : str
-        What tables and pictures call it.
+    `physics`: what is fitted first: frames and targets alone; what the campaign declares too, such as geometry; or what a
+    diagnosis of the training poses finds. `regression`: name in `remainder.catalogue`: fitted to what the physical model
+    leaves. `within_range`: whether the regression is left out where a pose lies outside the range of those fitted. `words`:
+    what tables and pictures call it.
     """
 
     physics: str
@@ -56,17 +49,9 @@ class Method:
 class Entry:
     """What a method predicts of poses that it has not seen; arrays of M.
 
-    Attributes
-    ----------
-    observations : Observations
-    residual : ndarray (M, 3)
-        Measured less predicted positions, m, base axes.
-    std : ndarray (M, 3)
-        Standard deviation that the method states for them, m; not a number where it states none.
-    outside : ndarray of bool (M,)
-        Whether the pose lies outside the range of the training poses.
-    setting : dict or None
-        Of the regression, as chosen; None without one, or where none helped.
+    `residual` (M, 3): measured less predicted positions, m, base axes. `std` (M, 3): standard deviation that the method states
+    for them, m; not a number where it states none. `outside` (M,) of bool: whether the pose lies outside the range of the
+    training poses. `setting`: of the regression, as chosen; None without one, or where none helped.
     """
 
     observations: Observations
@@ -79,21 +64,8 @@ class Entry:
 def method_from(described: Mapping[str, Any], name: str, source: str) -> Method:
     """A method as a configuration describes it.
 
-    Parameters
-    ----------
-    described : dict
-        ``physics`` and perhaps ``regression`` and ``within_range``.
-    name, source : str
-        Named in errors.
-
-    Returns
-    -------
-    Method
-
-    Raises
-    ------
-    InputError
-        A regression that the catalogue does not have.
+    `described`: ``physics`` and perhaps ``regression`` and ``within_range``. `name`, `source`: named in errors. Raises
+    `InputError`: a regression that the catalogue does not have.
     """
     method = Method(**described)
     if method.regression is not None and method.regression not in regressions():
@@ -105,14 +77,7 @@ def method_from(described: Mapping[str, Any], name: str, source: str) -> Method:
 def fitted_physics(physics: str, case: Case) -> Fit:
     """Fit frames, or what the campaign declares, to training poses.
 
-    Parameters
-    ----------
-    physics : {"frames", "geometry"}
-    case : Case
-
-    Returns
-    -------
-    Fit
+    `physics`: one of "frames", "geometry".
     """
     model = replace(case.model, effects=()) if physics == FRAMES else case.model
     return fit_declared(model, case.observations, estimated_noise(case)[0])
@@ -124,21 +89,7 @@ def entered(method: Method, fitted: Fit, case: Case, held_out: Case, split: str,
     A regression is tuned by the same kind of split that judges, within the training poses, see `remainder.corrected`. Poses of
     another campaign have their frames and targets fitted to them, whatever the method.
 
-    Parameters
-    ----------
-    method : Method
-    fitted : Fit
-        Its physical model, fitted to the training poses.
-    case : Case
-        Of the training poses.
-    held_out : Case
-    split : str
-        One of `folds.SPLITS`.
-    seed : int
-
-    Returns
-    -------
-    Entry
+    `fitted`: its physical model, fitted to the training poses. `case`: of the training poses. `split`: one of `folds.SPLITS`.
     """
     if method.regression is not None:
         plan = Plan(method.regression, blocks=split != RANDOM, within_range=method.within_range, seed=seed)

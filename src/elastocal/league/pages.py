@@ -38,19 +38,8 @@ def league_page(
 ) -> str:
     """Tables of the league as Markdown.
 
-    Parameters
-    ----------
-    table, costs, mechanisms : pandas.DataFrame
-        Of `table`.
-    published : pandas.DataFrame
-        Figures of other people: ``data, rms_mm, what, source, why``.
-    methods : dict of str to Method
-    missing : dict of str to str
-        Data sets that were left out, with the file that each lacks.
-
-    Returns
-    -------
-    str
+    `published`: Figures of other people: ``data, rms_mm, what, source, why``. `missing`: data sets that were left out, with the
+    file that each lacks.
     """
     words = {name: method.words or name for name, method in methods.items()}
     parts = [f"Left out: {_words(name)}, as {file} is missing." for name, file in missing.items()]
@@ -68,16 +57,7 @@ def league_page(
 def error_table(table: pd.DataFrame, words: Mapping[str, str]) -> str:
     """Errors of all methods on one split, a row for each data set, as Markdown.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Rows of `table.league_table` of one split.
-    words : dict of str to str
-        Methods by what they are called.
-
-    Returns
-    -------
-    str
+    `table`: rows of `table.league_table` of one split. `words`: methods by what they are called.
     """
     rows = []
     for name in dict.fromkeys(table["data"]):

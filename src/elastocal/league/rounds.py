@@ -22,14 +22,8 @@ if TYPE_CHECKING:
 class DataSet:
     """A data set of the league as its tables hold it.
 
-    Attributes
-    ----------
-    descriptions : dict
-        As `loading.load_campaign` gives them.
-    columns : dict of str to ndarray (N,)
-        Of all measurements.
-    dealt : dict of str to ndarray (P,)
-        As by `folds.dealt`.
+    `descriptions`: as `loading.load_campaign` gives them. `columns` (N,): of all measurements. `dealt` (P,): as by
+    `folds.dealt`.
     """
 
     descriptions: Mapping[str, Any]
@@ -45,17 +39,7 @@ class DataSet:
 def training_rounds(split: str, data: DataSet) -> Iterator[tuple[int, Case]]:
     """Training poses of each fold.
 
-    Parameters
-    ----------
-    split : str
-        One of `folds.SPLITS`.
-    data : DataSet
-
-    Yields
-    ------
-    fold : int
-        From 1; the only one where another data set is the test.
-    training : Case
+    `split`: one of `folds.SPLITS`. Yields `fold`: from 1; the only one where another data set is the test.
     """
     if split == SESSION:
         yield 1, data.case()
@@ -68,18 +52,7 @@ def training_rounds(split: str, data: DataSet) -> Iterator[tuple[int, Case]]:
 def held_out_rounds(split: str, data: DataSet, others: Sequence[DataSet]) -> Iterator[tuple[int, list[Case]]]:
     """Held-out poses of each fold.
 
-    Parameters
-    ----------
-    split : str
-    data : DataSet
-    others : sequence of DataSet
-        Of the same robot, the test where `split` is by session.
-
-    Yields
-    ------
-    fold : int
-        As by `training_rounds`.
-    held_out : list of Case
+    `others`: of the same robot, the test where `split` is by session. Yields `fold`: as by `training_rounds`.
     """
     if split == SESSION:
         yield 1, [other.case() for other in others]

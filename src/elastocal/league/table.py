@@ -27,11 +27,7 @@ _AXES = ("x", "y", "z")
 class Result:
     """Entries of one method on one data set and split.
 
-    Attributes
-    ----------
-    data, split, method : str
-    entries : pandas.DataFrame
-        Rows of the entries table.
+    `entries`: rows of the entries table.
     """
 
     data: str
@@ -43,25 +39,12 @@ class Result:
 def league_table(results: Sequence[Result], robots: Mapping[str, Sequence[str]], reference: str, seed: int) -> pd.DataFrame:
     """One row for each data set, split and method.
 
-    Parameters
-    ----------
-    results : sequence of Result
-        All methods of a data set and split predict the same poses.
-    robots : dict of str to sequence of str
-        Data sets by the names of their robots.
-    reference : str
-        Method whose RMS the others' are divided by.
-    seed : int
-        Of the bootstrap over poses.
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``robot, data, split, method, poses``; ``rms_mm`` with 95 % limits over poses, ``p95_mm``, ``max_mm`` and the share of
-        all poses that stay below it at 95 % confidence; ``ratio``, the RMS over that of the reference on the same poses, with
-        95 % limits; ``ratio_to_best`` the same over the best of the row's data set and split; ``covered``, the share of
-        coordinates inside the 95 % intervals that the method states; ``outside``, the share of poses outside the range of the
-        training poses.
+    `results`: all methods of a data set and split predict the same poses. `robots`: data sets by the names of their robots.
+    `reference`: method whose RMS the others' are divided by. `seed`: of the bootstrap over poses. Returns ``robot, data, split,
+    method, poses``; ``rms_mm`` with 95 % limits over poses, ``p95_mm``, ``max_mm`` and the share of all poses that stay below
+    it at 95 % confidence; ``ratio``, the RMS over that of the reference on the same poses, with 95 % limits; ``ratio_to_best``
+    the same over the best of the row's data set and split; ``covered``, the share of coordinates inside the 95 % intervals that
+    the method states; ``outside``, the share of poses outside the range of the training poses.
     """
     robot_of = {data: robot for robot, names in robots.items() for data in names}
     rows: list[dict[str, Any]] = []
@@ -95,20 +78,9 @@ def cost_table(
 ) -> pd.DataFrame:
     """What each method costs; one that builds on a diagnosis bears its cost too.
 
-    Parameters
-    ----------
-    timings : dict of (str, str, str) to dict
-        By data set, split and method: ``seconds`` of a core and ``memory_MB`` at most, for all folds.
-    diagnosed : dict of (str, str) to dict
-        The same of the diagnoses, by data set and split.
-    folds : dict of (str, str) to int
-        Folds of a data set and split.
-    methods : dict of str to Method
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``data, split, method, seconds_per_fold, memory_MB``; tuning of a method included.
+    `timings` (str, str, str): by data set, split and method: ``seconds`` of a core and ``memory_MB`` at most, for all folds.
+    `diagnosed` (str, str): the same of the diagnoses, by data set and split. `folds` (str, str): folds of a data set and split.
+    Returns ``data, split, method, seconds_per_fold, memory_MB``; tuning of a method included.
     """
     rows = []
     for (data, split, method), own in timings.items():
@@ -122,19 +94,9 @@ def cost_table(
 def mechanism_table(found: Mapping[str, pd.DataFrame], robots: Mapping[str, Sequence[str]], folds: int) -> pd.DataFrame:
     """Mechanisms of each data set over the diagnoses of its folds.
 
-    Parameters
-    ----------
-    found : dict of str to pandas.DataFrame
-        Rows of the mechanisms table of the random split, by data set.
-    robots : dict of str to sequence of str
-        Data sets by the names of their robots.
-    folds : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``robot, data, mechanism``, and of ``probability`` and ``share`` the mean over folds, the least and the largest. A fold
-        that does not list a mechanism counts as probability and share 0.
+    `found`: rows of the mechanisms table of the random split, by data set. `robots`: data sets by the names of their robots.
+    Returns ``robot, data, mechanism``, and of ``probability`` and ``share`` the mean over folds, the least and the largest. A
+    fold that does not list a mechanism counts as probability and share 0.
     """
     rows = []
     for robot, names in robots.items():

@@ -39,21 +39,10 @@ VERDICT, ERRORS, REPORT = "verdict.json", "before_after.csv", "report.html"
 class Diagnosed:
     """A campaign and what its diagnosis found.
 
-    Attributes
-    ----------
-    name : str
-        Of the campaign.
-    case : Case
-        Of the training poses, without their gross errors.
-    calibrated : CalibratedRobot
-        By the final model, its errors as large as verdict.json says after a look at held-out poses.
-    verdict : dict
-        verdict.json.
-    errors : DataFrame
-        before_after.csv.
-    origin : dict
-        ``commit`` of the jobs that made it, ``code_sha256`` and ``data_sha256`` of all that they read of the program and of the
-        campaign, ``environment``.
+    `name`: of the campaign. `case`: of the training poses, without their gross errors. `calibrated`: by the final model, its
+    errors as large as verdict.json says after a look at held-out poses. `verdict`: verdict.json. `errors`: before_after.csv.
+    `origin`: ``commit`` of the jobs that made it, ``code_sha256`` and ``data_sha256`` of all that they read of the program and
+    of the campaign, ``environment``.
     """
 
     name: str

@@ -17,15 +17,7 @@ if TYPE_CHECKING:
 def load_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:
     """A campaign from the files of step 1.
 
-    Parameters
-    ----------
-    descriptions_path, measurements_path : str
-    part : {"held_out"}, optional
-        The campaign that holds the test, where it is another one.
-
-    Returns
-    -------
-    Case
+    `part`: the campaign that holds the test, where it is another one.
     """
     descriptions = read_json(descriptions_path)
     described = (part and descriptions[part]) or descriptions

@@ -42,14 +42,7 @@ _MODELS = {"frames": "uncorrected", "declared": "declared", "effect": "corrected
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a certificate is to state.
-
-    Attributes
-    ----------
-    tolerance_m, accepted_risk : float
-    serial, date : str
-    seed : int
-    """
+    """What a certificate is to state."""
 
     tolerance_m: float
     accepted_risk: float
@@ -69,26 +62,10 @@ def certificate(
 ) -> tuple[dict[str, Any], list[WorkspaceErrors]]:
     """Contents of a certificate.
 
-    Parameters
-    ----------
-    folder, robots_folder : str or Path
-        As in `reading.read_campaign`.
-    found : Diagnosed
-        The campaign.
-    wanted : Wanted
-    other : Diagnosed, optional
-        An earlier campaign of the same robot.
-    measured : MeasuredErrors, optional
-        Of the corrected robot; without, what is stated of it is predicted.
-    use : Use, optional
-        Where the robot is used; without, at the poses and loads of the campaign.
-
-    Returns
-    -------
-    document : dict
-        JSON-serialisable.
-    maps : list of WorkspaceErrors
-        Without load, and under the largest force of the campaign where it has any, hanging.
+    `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign. `other`: an earlier campaign of the same
+    robot. `measured`: of the corrected robot; without, what is stated of it is predicted. `use`: where the robot is used;
+    without, at the poses and loads of the campaign. Returns `document`: JSON-serialisable; `maps`: without load, and under the
+    largest force of the campaign where it has any, hanging.
     """
     calibrated, case = found.calibrated, found.case
     robot, campaign, states = calibrated.robot, case.campaign, case.observations.states

@@ -54,17 +54,7 @@ def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
 def final_parameters(facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Parameters of the final model.
 
-    Parameters
-    ----------
-    facts : dict
-        Of diagnosis.json.
-    columns : dict of str to ndarray (N,)
-        Of the steps table.
-
-    Returns
-    -------
-    dict of str to ndarray (N,)
-        Columns of the steps table, of the last step.
+    `facts`: of diagnosis.json. `columns` (N,): of the steps table. Returns (N,): columns of the steps table, of the last step.
     """
     last = len(facts["steps"]) - 1
     return {name: values[columns["step"] == last] for name, values in columns.items()}
@@ -73,18 +63,7 @@ def final_parameters(facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]
 def diagnosis_from(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Diagnosis:
     """A diagnosis from diagnosis.json and its steps table; without the evidence, which only training poses have.
 
-    Parameters
-    ----------
-    case : Case
-        Of the training poses.
-    facts : dict
-        Of `diagnosis_facts`.
-    columns : dict of str to ndarray (N,)
-        Of the steps table.
-
-    Returns
-    -------
-    Diagnosis
+    `case`: of the training poses. `facts`: of `diagnosis_facts`. `columns` (N,): of the steps table.
     """
     measurements, left_out = case.campaign.measurements, rows_left_out(case, facts)
     case = case.select(~left_out)
@@ -103,16 +82,7 @@ def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
 def step_fit(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> Fit:
     """The fit of one step; it starts where it once ended.
 
-    Parameters
-    ----------
-    case, facts, columns
-        As in `diagnosis_from`.
-    number : int
-        Of the step, from 0.
-
-    Returns
-    -------
-    Fit
+    `case`, `facts`, `columns`: as in `diagnosis_from`. `number`: of the step, from 0.
     """
     model, estimate = step_model(case, facts, columns, number)
     return fit(model, case.observations, noise_from({"noise": facts["steps"][number]["noise"]}), estimate)
@@ -121,18 +91,8 @@ def step_fit(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndar
 def step_model(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> tuple[Model, Estimate]:
     """Model and estimate of one step, without fitting it again.
 
-    Parameters
-    ----------
-    case, facts, columns
-        As in `diagnosis_from`.
-    number : int
-        Of the step, from 0.
-
-    Returns
-    -------
-    model : Model
-        With the priors under which it was fitted.
-    estimate : Estimate
+    `case`, `facts`, `columns`: as in `diagnosis_from`. `number`: of the step, from 0. Returns `model`: with the priors under
+    which it was fitted.
     """
     mine = {name: values[columns["step"] == number] for name, values in columns.items()}
     known = {effect.key: effect for effect in case.model.effects} | case.candidates

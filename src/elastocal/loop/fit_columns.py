@@ -48,15 +48,7 @@ def correlation_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
 def covariance_from(parameters: Mapping[str, np.ndarray], correlations: Mapping[str, np.ndarray]) -> np.ndarray:
     """The covariance of a fit from its tables, the inverse of `parameter_columns` and `correlation_columns`.
 
-    Parameters
-    ----------
-    parameters, correlations : dict of str to ndarray
-        Columns of one fit.
-
-    Returns
-    -------
-    ndarray (P, P)
-        Zero where held.
+    `parameters`, `correlations`: columns of one fit. Returns (P, P): zero where held.
     """
     names = [f"{owner} {parameter}" for owner, parameter in zip(parameters["owner"], parameters["parameter"], strict=True)]
     place = {name: number for number, name in enumerate(names)}
@@ -70,15 +62,7 @@ def covariance_from(parameters: Mapping[str, np.ndarray], correlations: Mapping[
 def estimate_from(columns: Mapping[str, np.ndarray], model: Model, sessions: Collection[int]) -> Estimate:
     """The estimate of a model from the columns of its parameters.
 
-    Parameters
-    ----------
-    columns : dict of str to ndarray (N,)
-    model : Model
-    sessions : sequence of int
-
-    Returns
-    -------
-    Estimate
+    `columns` (N,).
     """
     values = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
 

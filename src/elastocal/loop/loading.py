@@ -20,20 +20,8 @@ if TYPE_CHECKING:
 def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements, Measurements]:
     """Read a campaign and part its measurements.
 
-    Parameters
-    ----------
-    folder, robots_folder : str
-        As in `reading.read_campaign`.
-
-    Returns
-    -------
-    descriptions : dict
-        ``campaign`` and ``robot``, the documents; ``held_out`` with the same of the campaign that holds the test, or None.
-    training, held_out : Measurements
-
-    Raises
-    ------
-    InputError
+    `folder`, `robots_folder`: as in `reading.read_campaign`. Returns `descriptions`: ``campaign`` and ``robot``, the documents;
+    ``held_out`` with the same of the campaign that holds the test, or None. Raises `InputError`.
     """
     campaign = read_campaign(folder, robots_folder, effects())
     descriptions = _descriptions(folder, robots_folder, campaign)
@@ -48,20 +36,8 @@ def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[s
 def load_whole_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements]:
     """Read a campaign without parting its measurements.
 
-    Parameters
-    ----------
-    folder, robots_folder : str
-        As in `reading.read_campaign`.
-
-    Returns
-    -------
-    descriptions : dict
-        As by `load_campaign`, but for the campaign that holds the test.
-    measurements : Measurements
-
-    Raises
-    ------
-    InputError
+    `folder`, `robots_folder`: as in `reading.read_campaign`. Returns `descriptions`: as by `load_campaign`, but for the
+    campaign that holds the test. Raises `InputError`.
     """
     campaign = read_campaign(folder, robots_folder, effects())
     return _descriptions(folder, robots_folder, campaign), campaign.measurements

@@ -41,16 +41,8 @@ _STEPS = 8
 class MeasuredErrors:
     """Of a corrected robot.
 
-    Attributes
-    ----------
-    errors : Errors
-        Distances between wanted and measured positions, repeats averaged, noise in them; by pose.
-    noise_m : float
-        Root mean square length of the tracker's noise in them.
-    accuracy : Accuracy
-    configurations : int
-    files : dict of str to str
-        Of the campaign, by their names as a certificate lists them.
+    `errors`: distances between wanted and measured positions, repeats averaged, noise in them; by pose. `noise_m`: root mean
+    square length of the tracker's noise in them. `files`: of the campaign, by their names as a certificate lists them.
     """
 
     errors: Errors
@@ -77,11 +69,8 @@ def measured_errors(folder: str | Path, robots_folder: str | Path, found: Diagno
     positions are compared as they are; in the frame `tracker` after the best rigid placement of the base; with a target whose
     offset is unknown, after the best constant offset. The noise is that of the diagnosed campaign.
 
-    Raises
-    ------
-    InputError
-        As `read_campaign`; another robot, no or several targets on the end effector, a pose that targets.csv does not have,
-        joint angles that are not those of the target, too few poses.
+    Raises `InputError`: as `read_campaign`; another robot, no or several targets on the end effector, a pose that targets.csv
+    does not have, joint angles that are not those of the target, too few poses.
     """
     folder = Path(folder)
     robot = found.calibrated.robot

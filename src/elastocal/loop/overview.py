@@ -42,25 +42,14 @@ _FEW_ANGLES = re.compile(r"\d+ angles of joint \d+ where \d+ are needed")
 def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     """Look through a campaign.
 
-    Parameters
-    ----------
-    folder, robots_folder : str or Path
-        As in `reading.read_campaign`.
-
-    Returns
-    -------
-    dict
-        ``campaign, robot, joints, targets, frame, measured``; ``training`` and ``held_out`` with their ``poses``; ``states,
-        measurements, numbers, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad);
-        ``faults`` (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters``,
-        ``effective_parameters`` (without what priors decide) and ``held`` (those that are not identifiable); ``compliance``
-        (value, relative standard error of each joint) where identified; ``testable`` and ``untestable`` (how many candidate
-        effects, by reason); ``suspicious``, sentences; ``diagnosable``; ``accuracy`` that a robot is predicted to have which is
-        corrected by the declared model, if nothing is missing in it (`Accuracy.document`), None where the data are at fault.
-
-    Raises
-    ------
-    InputError
+    `folder`, `robots_folder`: as in `reading.read_campaign`. Returns ``campaign, robot, joints, targets, frame, measured``;
+    ``training`` and ``held_out`` with their ``poses``; ``states, measurements, numbers, loads, repeats, sessions,
+    largest_force_N``; ``noise`` (source, position_m, orientation_rad); ``faults`` (name, sentence, decisive);
+    ``residual_rms_m`` of the declared model; ``parameters``, ``effective_parameters`` (without what priors decide) and ``held``
+    (those that are not identifiable); ``compliance`` (value, relative standard error of each joint) where identified;
+    ``testable`` and ``untestable`` (how many candidate effects, by reason); ``suspicious``, sentences; ``diagnosable``;
+    ``accuracy`` that a robot is predicted to have which is corrected by the declared model, if nothing is missing in it
+    (`Accuracy.document`), None where the data are at fault. Raises `InputError`.
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
     whole, settings = case_from(descriptions, columns_of(training)), Settings()

@@ -20,20 +20,8 @@ if TYPE_CHECKING:
 def proposed(folder: str | Path, robots_folder: str | Path, poses: int, ladder: tuple[float, ...], seed: int) -> pd.DataFrame:
     """Poses that best distinguish what was found in a campaign from its alternatives.
 
-    Parameters
-    ----------
-    folder, robots_folder : str
-        As in `reading.read_campaign`.
-    poses : int
-        Read at all targets of the campaign.
-    ladder : tuple of float
-        Shares of its load at which each is read.
-    seed : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        As `proposal.table_of`.
+    `folder`, `robots_folder`: as in `reading.read_campaign`. `poses`: read at all targets of the campaign. `ladder`: shares of
+    its load at which each is read. Returns as `proposal.table_of`.
     """
     case, _ = cases_in(folder, robots_folder)
     robot, settings = case.campaign.robot, Settings()

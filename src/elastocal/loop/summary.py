@@ -26,20 +26,8 @@ def campaign_rows(
 ) -> pd.DataFrame:
     """One row for each campaign and session, and one for all folds of a campaign together.
 
-    Parameters
-    ----------
-    verdicts : dict of str to dict
-        Contents of verdict.json by campaign.
-    residuals : dict of str to pandas.DataFrame
-        Held-out rows of residuals.parquet.
-    folds : dict of str to list of str
-        Campaigns that hold out the folds of one set of measurements, by a name for all.
-    seed : int
-        Of the bootstrap over poses.
-
-    Returns
-    -------
-    pandas.DataFrame
+    `verdicts`: contents of verdict.json by campaign. `residuals`: held-out rows of residuals.parquet. `folds`: campaigns that
+    hold out the folds of one set of measurements, by a name for all. `seed`: of the bootstrap over poses.
     """
     pooled = {name for names in folds.values() for name in names}
     groups = {name: [name] for name in verdicts if name not in pooled} | folds

@@ -26,14 +26,7 @@ if TYPE_CHECKING:
 def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
     """Training and held-out cases of a campaign's folder.
 
-    Parameters
-    ----------
-    folder, robots_folder : str
-        As in `reading.read_campaign`.
-
-    Returns
-    -------
-    training, held_out : Case
+    `folder`, `robots_folder`: as in `reading.read_campaign`.
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
     return (
@@ -45,17 +38,7 @@ def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]
 def diagnosed(folder: str | Path, robots_folder: str | Path, seed: int, settings: Settings | None = None) -> dict[str, Any]:
     """Diagnose a campaign and judge it on its held-out poses.
 
-    Parameters
-    ----------
-    folder, robots_folder : str
-        As in `reading.read_campaign`.
-    seed : int
-    settings : Settings, optional
-
-    Returns
-    -------
-    dict
-        As verdict.json.
+    `folder`, `robots_folder`: as in `reading.read_campaign`. Returns as verdict.json.
     """
     training, held_out = cases_in(folder, robots_folder)
     return judged(diagnose(training, settings or Settings(), seed), held_out, seed).document

@@ -10,12 +10,10 @@ length, a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), e
 offset; its compliance is in µm/N. A joint that stands in several places, such as ``Ry(q2) Tz(l) Ry(-q2)``, moves all of them:
 what a parallelogram or another coupling does. It is where it stands first; behind a later place a passive joint turns.
 
-Such a product is an elementary transform sequence [1]_.
+Such a product is an elementary transform sequence [1].
 
-References
-----------
-.. [1] Corke, P. I., A simple and systematic approach to assigning Denavit-Hartenberg parameters, IEEE Transactions on Robotics
-   23, 2007.
+[1] Corke, P. I., A simple and systematic approach to assigning Denavit-Hartenberg parameters, IEEE Transactions on Robotics 23,
+    2007.
 """
 
 from __future__ import annotations
@@ -42,18 +40,9 @@ _NOTATION = "Tx(length) Ty(..) Tz(..) Rx(joint) Ry(..) Rz(..) Rx(90deg) and [POI
 class Transform:
     """One elementary transform along or about an axis of the moving frame, fixed or moved by a coordinate.
 
-    Attributes
-    ----------
-    kind : {"T", "R"}
-        Translation (m) or rotation (rad).
-    axis : int
-        0, 1, 2 for x, y, z.
-    constant : float
-        How far, where it is fixed (m or rad).
-    coordinate : int or None
-        Index of the coordinate that says how far, where it moves: a joint, or a spring of the extended model.
-    sign : float
-        Sense of the coordinate, +1 or -1.
+    `kind`: translation (m) or rotation (rad). `axis`: 0, 1, 2 for x, y, z. `constant`: how far, where it is fixed (m or rad).
+    `coordinate`: index of the coordinate that says how far, where it moves: a joint, or a spring of the extended model. `sign`:
+    sense of the coordinate, +1 or -1.
     """
 
     kind: str
@@ -67,13 +56,8 @@ class Transform:
 class MeasuringPoint:
     """A place on the chain where a target sits.
 
-    Attributes
-    ----------
-    name : str
-    after : int
-        How many transforms of the chain come before it.
-    offset_m : tuple of float
-        The target in the frame of the point (the paper's T_tool, without rotation).
+    `after`: how many transforms of the chain come before it. `offset_m`: the target in the frame of the point (the paper's
+    T_tool, without rotation).
     """
 
     name: str
@@ -85,13 +69,8 @@ class MeasuringPoint:
 class Chain:
     """Elementary transforms from the base to the last measuring point.
 
-    Attributes
-    ----------
-    transforms : tuple of Transform
-    points : tuple of MeasuringPoint
-        In the order of the chain; the last one is the end-effector.
-    coordinates : int
-        Number of coordinates that the transforms refer to.
+    `points`: in the order of the chain; the last one is the end-effector. `coordinates`: number of coordinates that the
+    transforms refer to.
     """
 
     transforms: tuple[Transform, ...]
@@ -130,16 +109,8 @@ class Chain:
 def with_inserted(chain: Chain, inserted: Mapping[int, Sequence[tuple[str, int]]]) -> Chain:
     """A chain with further coordinates, such as springs or errors of lengths.
 
-    Parameters
-    ----------
-    chain : Chain
-    inserted : dict of int to sequence of (kind, axis)
-        How many transforms of the chain come before them, and what moves; measuring points there come after them.
-
-    Returns
-    -------
-    Chain
-        Coordinates as before, then the inserted ones in their order along the chain.
+    `inserted` (kind, axis): how many transforms of the chain come before them, and what moves; measuring points there come
+    after them. Returns coordinates as before, then the inserted ones in their order along the chain.
     """
     transforms: list[Transform] = []
     count, new_index = chain.coordinates, {}
@@ -156,24 +127,9 @@ def with_inserted(chain: Chain, inserted: Mapping[int, Sequence[tuple[str, int]]
 def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain:
     """Read the chain notation.
 
-    Parameters
-    ----------
-    text : str
-        The chain, as in the module's docstring.
-    lengths_m : mapping of str to float
-        Named lengths.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    Chain
-
-    Raises
-    ------
-    InputError
-        A token outside the notation, an unknown or unused length, joints that are not q1..qn in order, a joint that turns in
-        one place and shifts in another, no measuring point, a measuring point named twice.
+    `text`: the chain, as in the module's docstring. `lengths_m`: named lengths. `source`: named in errors. Raises `InputError`:
+    a token outside the notation, an unknown or unused length, joints that are not q1..qn in order, a joint that turns in one
+    place and shifts in another, no measuring point, a measuring point named twice.
     """
     transforms: list[Transform] = []
     points: list[MeasuringPoint] = []
@@ -217,16 +173,7 @@ def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain
 
 
 def notation(chain: Chain) -> str:
-    """A chain in the notation that `parse_chain` reads, with its lengths as numbers.
-
-    Parameters
-    ----------
-    chain : Chain
-
-    Returns
-    -------
-    str
-    """
+    """A chain in the notation that `parse_chain` reads, with its lengths as numbers."""
     words = []
     for place in range(len(chain.transforms) + 1):
         words += [f"[{point.name}]" for point in chain.points if point.after == place]

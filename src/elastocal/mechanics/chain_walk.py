@@ -2,11 +2,9 @@
 
 Entries of the frame that a chain leaves at 0 or 1 for every configuration stay plain numbers and cost nothing.
 
-The forward recursion of the product of transforms; the axis of a moving one and a point of it make its screw [1]_.
+The forward recursion of the product of transforms; the axis of a moving one and a point of it make its screw [1].
 
-References
-----------
-.. [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
+[1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
 """
 
 from __future__ import annotations
@@ -33,16 +31,7 @@ Axes = list[Vector]
 
 
 def blocks(size: int) -> list[slice]:
-    """Cut so many configurations into blocks of `BLOCK`.
-
-    Parameters
-    ----------
-    size : int
-
-    Returns
-    -------
-    list of slice
-    """
+    """Cut so many configurations into blocks of `BLOCK`."""
     return [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
 
 
@@ -50,16 +39,8 @@ def blocks(size: int) -> list[slice]:
 class Screw:
     """A moving transform: its place in the chain, and its axis.
 
-    Attributes
-    ----------
-    place : int
-        How many transforms come before it.
-    kind, sign, coordinate
-        As of a `Transform`.
-    axis : list
-        Its direction, base frame; each component a float or an ndarray (S,).
-    origin : list or None
-        A point of it, m; None where points behind it can only turn.
+    `place`: how many transforms come before it. `kind`, `sign`, `coordinate`: as of a `Transform`. `axis`: its direction, base
+    frame; each component a float or an ndarray (S,). `origin`: a point of it, m; None where points behind it can only turn.
     """
 
     place: int
@@ -75,22 +56,9 @@ def sweep(
 ) -> tuple[list[tuple[Axes, Vector]], list[Screw]]:
     """Walk the chain up to the last of the points.
 
-    Parameters
-    ----------
-    chain : Chain
-    coordinates : ndarray (C, S)
-        rad and m.
-    points : sequence of MeasuringPoint
-    lines : bool
-        Without, the origin of a screw is None where all points behind lie on the axis and only turn; with them the walk goes on
-        to the end of the chain.
-
-    Returns
-    -------
-    frames : list of (axes, target)
-        Of each point, base frame; each component a float or an ndarray (S,).
-    screws : list of Screw
-        Of each moving transform on the way.
+    `coordinates` (C, S): rad and m. `lines`: without, the origin of a screw is None where all points behind lie on the axis and
+    only turn; with them the walk goes on to the end of the chain. Returns `frames` (axes, target): of each point, base frame;
+    each component a float or an ndarray (S,); `screws`: of each moving transform on the way.
     """
     transforms = chain.transforms if lines else chain.transforms[: max(point.after for point in points)]
     # Springs that no configuration moves cost nothing.
@@ -181,14 +149,8 @@ def _moved(origin: Vector, amount: float | np.ndarray, axis: Vector) -> Vector:
 def store_pose(axes: Axes, origin: Vector, position: np.ndarray, rotation: np.ndarray) -> None:
     """Write a frame of a walk to arrays.
 
-    Parameters
-    ----------
-    axes, origin : list
-        As `sweep` gives them.
-    position : ndarray (3, S)
-        Overwritten.
-    rotation : ndarray (3, 3, S)
-        Overwritten; columns are the axes.
+    `axes`, `origin`: as `sweep` gives them. `position` (3, S): overwritten. `rotation` (3, 3, S): overwritten; columns are the
+    axes.
     """
     for i in range(3):
         position[i] = origin[i]

@@ -4,14 +4,12 @@ Wrenches are (force, moment) in N and N m at the end-effector, base axes. Deflec
 and rad, base axes. Compliances of rotary springs are in rad/(N m).
 
 The virtual joint method: elastic joints, and six-dimensional springs at the ends of links, are joints that yield to the
-generalized forces of the wrench [1]_, [2]_. Forces are taken at the unloaded pose.
+generalized forces of the wrench [1], [2]. Forces are taken at the unloaded pose.
 
-References
-----------
-.. [1] Salisbury, J. K., Active stiffness control of a manipulator in Cartesian coordinates, IEEE Conference on Decision and
-   Control, 1980.
-.. [2] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
-   Machine Theory 44, 2009.
+[1] Salisbury, J. K., Active stiffness control of a manipulator in Cartesian coordinates, IEEE Conference on Decision and
+    Control, 1980.
+[2] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
+    Machine Theory 44, 2009.
 """
 
 from __future__ import annotations
@@ -35,18 +33,9 @@ def wrench_of_offset_force(
 ) -> np.ndarray:
     """Wrench at the end-effector of a force whose line of action is shifted from it.
 
-    Parameters
-    ----------
-    force : ndarray (..., 3)
-        N, base axes.
-    offset_m : array_like (3,)
-        From the end-effector to the point of application, m.
-    rotation : ndarray (..., 3, 3), optional
-        Orientation of the end-effector where the offset turns with the tool; without it the offset is along base axes.
-
-    Returns
-    -------
-    ndarray (..., 6)
+    `force` (..., 3): N, base axes. `offset_m` (3,): from the end-effector to the point of application, m. `rotation` (..., 3,
+    3): orientation of the end-effector where the offset turns with the tool; without it the offset is along base axes. Returns
+    (..., 6).
     """
     lever = np.asarray(offset_m, float)
     if rotation is not None:
@@ -57,21 +46,11 @@ def wrench_of_offset_force(
 def generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     """Torques (forces) on the coordinates of a chain, J^T w (the right-hand factor of equation 7).
 
-    The principle of virtual work, by which statics is dual to kinematics [1]_.
+    The principle of virtual work, by which statics is dual to kinematics [1].
 
-    Parameters
-    ----------
-    jacobian : ndarray (..., 6, n)
-        Of the point where the wrench is stated.
-    wrench : ndarray (..., 6)
+    `jacobian` (..., 6, n): of the point where the wrench is stated. `wrench` (..., 6). Returns (..., n).
 
-    Returns
-    -------
-    ndarray (..., n)
-
-    References
-    ----------
-    .. [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
+    [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
     """
     return np.asarray(sum(jacobian[..., row, :] * wrench[..., row, None] for row in range(6)))
 
@@ -79,16 +58,8 @@ def generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.ndarray:
 def loaded_point(chain: Chain, point: MeasuringPoint, wrench_at: str) -> MeasuringPoint:
     """Where the wrench acts that deflects a measuring point (interpretation R6).
 
-    Parameters
-    ----------
-    chain : Chain
-    point : MeasuringPoint
-    wrench_at : {"end_effector", "measuring_point"}
-
-    Returns
-    -------
-    MeasuringPoint
-        The end-effector itself, whatever target sits on it; or the measuring point.
+    `wrench_at`: one of "end_effector", "measuring_point". Returns the end-effector itself, whatever target sits on it; or the
+    measuring point.
     """
     return replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)) if wrench_at == "end_effector" else point
 
@@ -96,19 +67,8 @@ def loaded_point(chain: Chain, point: MeasuringPoint, wrench_at: str) -> Measuri
 def joint_torques(chain: Chain, joint_angles: np.ndarray, wrench: np.ndarray, at: MeasuringPoint) -> np.ndarray:
     """Torques that a wrench puts on the joints.
 
-    Parameters
-    ----------
-    chain : Chain
-    joint_angles : ndarray (..., n)
-        rad.
-    wrench : ndarray (..., 6)
-    at : MeasuringPoint
-        Where the wrench is stated, see `loaded_point`.
-
-    Returns
-    -------
-    ndarray (..., n)
-        N m.
+    `joint_angles` (..., n): rad. `wrench` (..., 6). `at`: where the wrench is stated, see `loaded_point`. Returns (..., n): N
+    m.
     """
     return generalized_forces(jacobians(chain, joint_angles, at), wrench)
 
@@ -116,19 +76,8 @@ def joint_torques(chain: Chain, joint_angles: np.ndarray, wrench: np.ndarray, at
 def regressor(jacobian: np.ndarray, torques: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
     """Matrix A of equation 10, with columns J_j J_j^T w, so that the deflection is A c (equation 9).
 
-    Parameters
-    ----------
-    jacobian : ndarray (..., 6, n)
-        Of the measuring point.
-    torques : ndarray (..., n)
-        N m; J^T w of the loaded point.
-    out : ndarray (..., 6, n), optional
-        Overwritten with the result; may be the Jacobian itself.
-
-    Returns
-    -------
-    ndarray (..., 6, n)
-        m or rad per rad/(N m).
+    `jacobian` (..., 6, n): of the measuring point. `torques` (..., n): N m; J^T w of the loaded point. `out` (..., 6, n):
+    overwritten with the result; may be the Jacobian itself. Returns (..., 6, n): m or rad per rad/(N m).
     """
     return np.multiply(jacobian, torques[..., None, :], out=out)
 
@@ -138,17 +87,8 @@ def exact_deflections(
 ) -> np.ndarray:
     """Deflection of a measuring point by the exact kinematics: the pose at q + theta against the pose at q.
 
-    Parameters
-    ----------
-    chain : Chain
-        May be an extended chain; then `coordinates` and `spring_deflections` cover its link springs too.
-    coordinates, spring_deflections : ndarray (..., n)
-        q (zero for link springs) and theta of equation 7, rad or m.
-    point : MeasuringPoint
-
-    Returns
-    -------
-    ndarray (..., 6)
+    `chain`: may be an extended chain; then `coordinates` and `spring_deflections` cover its link springs too. `coordinates`,
+    `spring_deflections` (..., n): q (zero for link springs) and theta of equation 7, rad or m. Returns (..., 6).
     """
     unloaded = poses(chain, coordinates, point)
     loaded = poses(chain, coordinates + spring_deflections, point)

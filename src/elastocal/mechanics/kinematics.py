@@ -24,19 +24,8 @@ if TYPE_CHECKING:
 def poses(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> tuple[np.ndarray, np.ndarray]:
     """Position and orientation of a measuring point in the base frame (equations 1-4).
 
-    Parameters
-    ----------
-    chain : Chain
-    coordinates : array_like (..., n)
-        Joint angles in rad (and springs of an extended chain in m or rad).
-    point : MeasuringPoint
-
-    Returns
-    -------
-    position : ndarray (..., 3)
-        m, base frame.
-    rotation : ndarray (..., 3, 3)
-        Columns are the axes of the point's frame in base axes.
+    `coordinates` (..., n): joint angles in rad (and springs of an extended chain in m or rad). Returns `position` (..., 3): m,
+    base frame; `rotation` (..., 3, 3): columns are the axes of the point's frame in base axes.
     """
     position, rotation = poses_of_points(chain, coordinates, [point])
     return position[0], rotation[0]
@@ -45,16 +34,7 @@ def poses(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> tuple
 def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]) -> tuple[np.ndarray, np.ndarray]:
     """Poses of several measuring points in one walk along the chain.
 
-    Parameters
-    ----------
-    chain, coordinates
-        As in `poses`.
-    points : sequence of MeasuringPoint
-
-    Returns
-    -------
-    position : ndarray (T, ..., 3)
-    rotation : ndarray (T, ..., 3, 3)
+    `chain`, `coordinates`: as in `poses`. Returns `position` (T, ..., 3); `rotation` (T, ..., 3, 3).
     """
     components, batch = _component_first(coordinates)
     size = components.shape[1]
@@ -69,15 +49,7 @@ def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[Meas
 def corners(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
     """Where an arm has corners: at its base and behind each translation.
 
-    Parameters
-    ----------
-    chain, coordinates
-        As in `poses`.
-
-    Returns
-    -------
-    ndarray (K, ..., 3)
-        m, base axes.
+    `chain`, `coordinates`: as in `poses`. Returns (K, ..., 3): m, base axes.
     """
     places = [0, *(number + 1 for number, transform in enumerate(chain.transforms) if transform.kind == "T")]
     return poses_of_points(chain, coordinates, [MeasuringPoint(str(place), place) for place in places])[0]
@@ -88,34 +60,17 @@ def poses_and_jacobians(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pose of a measuring point and its geometric Jacobian with respect to every coordinate of the chain.
 
-    Parameters
-    ----------
-    chain : Chain
-    coordinates : array_like (..., n)
-        Joint angles in rad (and springs of an extended chain in m or rad).
-    point : MeasuringPoint
-    out : tuple, optional
-        What an earlier call for as many configurations returned; the results overwrite it and no memory is allocated.
+    `coordinates` (..., n): joint angles in rad (and springs of an extended chain in m or rad). `out`: what an earlier call for
+    as many configurations returned; the results overwrite it and no memory is allocated. Returns `position` (..., 3): m, base
+    frame; `rotation` (..., 3, 3); `jacobian` (..., 6, n): rows: linear velocity of the point (m per unit of coordinate),
+    angular velocity (rad per unit), base axes. Columns of coordinates behind the point are zero.
 
-    Returns
-    -------
-    position : ndarray (..., 3)
-        m, base frame.
-    rotation : ndarray (..., 3, 3)
-    jacobian : ndarray (..., 6, n)
-        Rows: linear velocity of the point (m per unit of coordinate), angular velocity (rad per unit), base axes. Columns of
-        coordinates behind the point are zero.
-
-    Notes
-    -----
     The twist of a revolute coordinate with axis z through o is (z x (p - o), z), of a prismatic one (z, 0): the columns of the
-    geometric Jacobian [1]_, which are those of the spatial one [2]_ at the point.
+    geometric Jacobian [1], which are those of the spatial one [2] at the point.
 
-    References
-    ----------
-    .. [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
-    .. [2] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, section 3.4, CRC Press,
-       1994.
+    [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
+    [2] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, section 3.4, CRC Press,
+        1994.
     """
     components, batch = _component_first(coordinates)
     size = components.shape[1]
@@ -135,15 +90,8 @@ def poses_and_jacobians(
 def jacobians(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> np.ndarray:
     """Geometric Jacobian of a measuring point, where its pose is not needed.
 
-    Parameters
-    ----------
-    chain, coordinates, point
-        As in `poses_and_jacobians`.
-
-    Returns
-    -------
-    ndarray (..., 6, n)
-        The last of what `poses_and_jacobians` returns.
+    `chain`, `coordinates`, `point`: as in `poses_and_jacobians`. Returns (..., 6, n): the last of what `poses_and_jacobians`
+    returns.
     """
     components, batch = _component_first(coordinates)
     jacobian = np.empty((6, chain.coordinates, components.shape[1]))

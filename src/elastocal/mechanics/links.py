@@ -18,22 +18,12 @@ _SIX = tuple((kind, axis) for kind in "TR" for axis in range(3))
 
 
 def tube_compliance(tube: Tube, length_m: float) -> np.ndarray:
-    """Compliance of a cantilever tube at its tip, beam along x (Euler-Bernoulli bending [1]_, St Venant torsion [2]_).
+    """Compliance of a cantilever tube at its tip, beam along x (Euler-Bernoulli bending [1], St Venant torsion [2]).
 
-    Parameters
-    ----------
-    tube : Tube
-    length_m : float
+    Returns (6, 6): deflection (m, rad) per wrench (N, N m), both at the tip, in the frame of the beam.
 
-    Returns
-    -------
-    ndarray (6, 6)
-        Deflection (m, rad) per wrench (N, N m), both at the tip, in the frame of the beam.
-
-    References
-    ----------
-    .. [1] Przemieniecki, J. S., Theory of Matrix Structural Analysis, McGraw-Hill, 1968.
-    .. [2] Timoshenko, S. P. and Goodier, J. N., Theory of Elasticity, McGraw-Hill, 1970.
+    [1] Przemieniecki, J. S., Theory of Matrix Structural Analysis, McGraw-Hill, 1968.
+    [2] Timoshenko, S. P. and Goodier, J. N., Theory of Elasticity, McGraw-Hill, 1970.
     """
     outer, inner, length = tube.outer_diameter_m, tube.outer_diameter_m - 2 * tube.wall_m, length_m
     area = np.pi * (outer**2 - inner**2) / 4
@@ -57,13 +47,7 @@ def tube_compliance(tube: Tube, length_m: float) -> np.ndarray:
 def link_compliance(link: Link) -> np.ndarray:
     """Compliance of a link at its far end, in the frame of the chain there.
 
-    Parameters
-    ----------
-    link : Link
-
-    Returns
-    -------
-    ndarray (6, 6)
+    Returns (6, 6).
     """
     turn = beam_axes(link)
     return turn @ tube_compliance(link.tube, float(np.linalg.norm(link.vector_m))) @ turn.T
@@ -72,14 +56,7 @@ def link_compliance(link: Link) -> np.ndarray:
 def beam_axes(link: Link) -> np.ndarray:
     """Axes of a link as a beam, x along it, twice: of displacements and of rotations.
 
-    Parameters
-    ----------
-    link : Link
-
-    Returns
-    -------
-    ndarray (6, 6)
-        Columns in the frame of the chain.
+    Returns (6, 6): columns in the frame of the chain.
     """
     along = np.array(link.vector_m) / np.linalg.norm(link.vector_m)
     # A round tube has no preferred lateral axes: any right-handed triad with x along the link will do.
@@ -91,21 +68,12 @@ def beam_axes(link: Link) -> np.ndarray:
 def extended_chain(robot: Robot) -> Chain:
     """The robot's chain with Tx Ty Tz Rx Ry Rz springs (equation 5) at the far end of each link.
 
-    Links of the virtual joint method: each yields in a six-dimensional virtual joint [1]_.
+    Links of the virtual joint method: each yields in a six-dimensional virtual joint [1].
 
-    Parameters
-    ----------
-    robot : Robot
+    Returns coordinates 0..n-1 are the joints as before, then six for each link in turn.
 
-    Returns
-    -------
-    Chain
-        Coordinates 0..n-1 are the joints as before, then six for each link in turn.
-
-    References
-    ----------
-    .. [1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism
-       and Machine Theory 44, 2009.
+    [1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
+        Machine Theory 44, 2009.
     """
     return with_inserted(robot.chain, dict.fromkeys((link.after for link in robot.links), _SIX))
 
@@ -113,14 +81,7 @@ def extended_chain(robot: Robot) -> Chain:
 def spring_compliance(robot: Robot) -> np.ndarray:
     """Aggregated compliance of all springs of the extended chain, the inverse of K_theta in equation 7.
 
-    Parameters
-    ----------
-    robot : Robot
-
-    Returns
-    -------
-    ndarray (m, m)
-        Block diagonal: joints, then links. Without links, the diagonal of the joint compliances.
+    Returns (m, m): block diagonal: joints, then links. Without links, the diagonal of the joint compliances.
     """
     n = robot.joints
     compliance = np.zeros((n + 6 * len(robot.links),) * 2)
@@ -132,15 +93,5 @@ def spring_compliance(robot: Robot) -> np.ndarray:
 
 
 def with_tube(robot: Robot, tube: Tube) -> Robot:
-    """The same robot with every link made of `tube`.
-
-    Parameters
-    ----------
-    robot : Robot
-    tube : Tube
-
-    Returns
-    -------
-    Robot
-    """
+    """The same robot with every link made of `tube`."""
     return replace(robot, links=tuple(replace(link, tube=tube) for link in robot.links))

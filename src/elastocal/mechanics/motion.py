@@ -23,21 +23,13 @@ if TYPE_CHECKING:
 class Motion:
     """Poses of some points of a chain, and how each transform that moves would move everything behind it; component first.
 
-    Attributes
-    ----------
-    position : ndarray (T, 3, S)
-        m, base frame.
-    rotation : ndarray (T, 3, 3, S)
-    twist : ndarray (6, K, S)
-        For each moving transform, in the order of their coordinates, the velocity of what lies behind it, per unit of the
-        coordinate: of the body's point at the base's origin, then the angular one (the spatial twist [1]_).
-    place, coordinate : ndarray of int (K,)
-        How many transforms come before each, and the coordinate that moves it.
+    `position` (T, 3, S): m, base frame. `rotation` (T, 3, 3, S). `twist` (6, K, S): for each moving transform, in the order of
+    their coordinates, the velocity of what lies behind it, per unit of the coordinate: of the body's point at the base's
+    origin, then the angular one (the spatial twist [1]). `place`, `coordinate` (K,) of int: how many transforms come before
+    each, and the coordinate that moves it.
 
-    References
-    ----------
-    .. [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, section 3.4, CRC Press,
-       1994.
+    [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, section 3.4, CRC Press,
+        1994.
     """
 
     position: np.ndarray
@@ -49,19 +41,8 @@ class Motion:
     def jacobian(self, after: int, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)) -> np.ndarray:
         """Geometric Jacobian of points behind so many transforms of the chain.
 
-        Parameters
-        ----------
-        after : int
-        position : ndarray (3, S')
-            Where the points are, m.
-        rows : {3, 6}
-            Linear velocities alone, or also angular ones.
-        chosen : slice or ndarray of int (S',), optional
-            Configuration of each.
-
-        Returns
-        -------
-        ndarray (rows, C, S')
+        `position` (3, S'): where the points are, m. `rows`: linear velocities alone, or also angular ones. `chosen` (S',) of
+        int: configuration of each. Returns (rows, C, S').
         """
         twist = self.twist[..., chosen]
         angular, product = twist[3:], np.empty_like(twist[0])
@@ -77,15 +58,7 @@ class Motion:
     def generalized_forces(self, after: int, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
         """Force or torque on each coordinate by a wrench on what lies behind so many transforms of the chain.
 
-        Parameters
-        ----------
-        after : int
-        force, moment : ndarray (3, S)
-            The moment about the base's origin.
-
-        Returns
-        -------
-        ndarray (C, S)
+        `force`, `moment` (3, S): the moment about the base's origin. Returns (C, S).
         """
         on_each = np.einsum("ik...,i...->k...", self.twist, np.concatenate([force, moment]))
         return self._behind_none(on_each, after)
@@ -114,16 +87,7 @@ class Motion:
 def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]) -> Motion:
     """Poses of several measuring points and the twist of every transform that moves, in one walk along the chain.
 
-    Parameters
-    ----------
-    chain : Chain
-    coordinates : ndarray (S, C)
-        rad and m.
-    points : sequence of MeasuringPoint
-
-    Returns
-    -------
-    Motion
+    `coordinates` (S, C): rad and m.
     """
     components = np.ascontiguousarray(np.asarray(coordinates, float).T)
     size = components.shape[1]

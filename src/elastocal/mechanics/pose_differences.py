@@ -6,15 +6,7 @@ import numpy as np
 def pose_differences(position: np.ndarray, rotation: np.ndarray, position_0: np.ndarray, rotation_0: np.ndarray) -> np.ndarray:
     """How far one pose is from another: displacement (m) and rotation vector (rad), both in base axes.
 
-    Parameters
-    ----------
-    position, position_0 : ndarray (..., 3)
-    rotation, rotation_0 : ndarray (..., 3, 3)
-
-    Returns
-    -------
-    ndarray (..., 6)
-        Memory is component first.
+    `position`, `position_0` (..., 3), `rotation`, `rotation_0` (..., 3, 3). Returns (..., 6): memory is component first.
     """
     relative = np.empty((3, 3, *position.shape[:-1]))
     for i in range(3):
@@ -30,20 +22,11 @@ def pose_differences(position: np.ndarray, rotation: np.ndarray, position_0: np.
 def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     """Rotation vectors of rotation matrices, for angles below pi.
 
-    The logarithm on SO(3) [1]_, by the arctangent of sine and cosine, so that small angles keep their digits.
+    The logarithm on SO(3) [1], by the arctangent of sine and cosine, so that small angles keep their digits.
 
-    Parameters
-    ----------
-    rotation : ndarray (..., 3, 3)
+    `rotation` (..., 3, 3). Returns (..., 3): rad.
 
-    Returns
-    -------
-    ndarray (..., 3)
-        rad.
-
-    References
-    ----------
-    .. [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
+    [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
     """
     skew = 0.5 * np.stack(
         [

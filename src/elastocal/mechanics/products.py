@@ -11,13 +11,7 @@ if TYPE_CHECKING:
 def product(a: float | np.ndarray, b: float | np.ndarray) -> float | np.ndarray:
     """a b; by a plain 1 the other factor itself, not a copy.
 
-    Parameters
-    ----------
-    a, b : float or ndarray (S,)
-
-    Returns
-    -------
-    float or ndarray (S,)
+    `a`, `b` (S,). Returns (S,).
     """
     if type(a) is float:
         if a == 0.0:
@@ -37,13 +31,7 @@ def product_sum(
 ) -> float | np.ndarray:
     """a b + c d; the sum reuses the memory of a product that nobody else holds.
 
-    Parameters
-    ----------
-    a, b, c, d : float or ndarray (S,)
-
-    Returns
-    -------
-    float or ndarray (S,)
+    `a`, `b`, `c`, `d` (S,). Returns (S,).
     """
     first, second = product(a, b), product(c, d)
     if type(second) is float and second == 0.0:
@@ -61,13 +49,7 @@ def product_difference(
 ) -> float | np.ndarray:
     """a b - c d; the difference reuses the memory of a product that nobody else holds.
 
-    Parameters
-    ----------
-    a, b, c, d : float or ndarray (S,)
-
-    Returns
-    -------
-    float or ndarray (S,)
+    `a`, `b`, `c`, `d` (S,). Returns (S,).
     """
     first, second = product(a, b), product(c, d)
     if type(second) is float and second == 0.0:

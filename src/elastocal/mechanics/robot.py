@@ -21,12 +21,7 @@ STANDING = (0.0, 0.0, -STANDARD_GRAVITY)
 class Tube:
     """A thick-walled tube of one material.
 
-    Attributes
-    ----------
-    outer_diameter_m, wall_m : float
-        Outer diameter and wall thickness.
-    youngs_modulus_Pa, shear_modulus_Pa : float
-        Material.
+    `outer_diameter_m`, `wall_m`: outer diameter and wall thickness. `youngs_modulus_Pa`, `shear_modulus_Pa`: material.
     """
 
     outer_diameter_m: float
@@ -39,13 +34,8 @@ class Tube:
 class Link:
     """A rigid stretch of the chain between two joints, and the tube that it is taken for.
 
-    Attributes
-    ----------
-    after : int
-        How many transforms of the chain come before its far end.
-    vector_m : tuple of float
-        From its near to its far end, in the frame of the chain there.
-    tube : Tube
+    `after`: how many transforms of the chain come before its far end. `vector_m`: from its near to its far end, in the frame of
+    the chain there.
     """
 
     after: int
@@ -57,15 +47,8 @@ class Link:
 class Mass:
     """What a link weighs, as its file declares it.
 
-    Attributes
-    ----------
-    link : int
-        Carried by this joint; 0 for the column.
-    mass_kg : float
-    centre_m : tuple of float
-        Centre of mass in the frame directly behind the joint, see `robot_file`.
-    relative_std : float
-        How well this is known: of the mass, and of each component of the centre.
+    `link`: carried by this joint; 0 for the column. `centre_m`: centre of mass in the frame directly behind the joint, see
+    `robot_file`. `relative_std`: how well this is known: of the mass, and of each component of the centre.
     """
 
     link: int
@@ -78,11 +61,7 @@ class Mass:
 class Compensator:
     """A gravity compensator beside a joint.
 
-    Attributes
-    ----------
-    joint : int
-        From 1.
-    kind : {"spring", "gas"}
+    `joint`: from 1. `kind`: one of "spring", "gas".
     """
 
     joint: int
@@ -93,31 +72,14 @@ class Compensator:
 class Robot:
     """A robot as its file describes it, in SI units.
 
-    Attributes
-    ----------
-    name : str
-    chain : Chain
-    compliance : ndarray (n,)
-        Joint compliances, rad/(N m); of prismatic joints m/N. Usual ones where they are not known.
-    joint_limits : ndarray (n, 2)
-        rad; of prismatic joints m. A turn either way where they are not known.
-    links : tuple of Link
-        Elastic links of the extended model; empty for the reduced model.
-    reported_matrix, reported_offset : ndarray (n, n), (n,)
-        Joint angles from what the controller reports: q = matrix @ reported + offset (rad).
-    masses : tuple of Mass
-        In the order of the links; empty where nothing is known.
-    gravity_m_s2 : tuple of float
-        Base axes.
-    gear_ratio : tuple of float or None
-        Turns of the motor for one of the joint, None for joints where it is not known; None where no joint's is.
-    compensator : Compensator or None
-    payload_kg : float or None
-        Rated.
-    joint_names : tuple of str or None
-        What others call the joints, as in the URDF file that a robot comes from; None where they have no names.
-    compliance_known : bool
-        Whether the compliances are the robot's; else they are a scale for what is to be identified, see `usual_values`.
+    `compliance` (n,): joint compliances, rad/(N m); of prismatic joints m/N. Usual ones where they are not known.
+    `joint_limits` (n, 2): rad; of prismatic joints m. A turn either way where they are not known. `links`: elastic links of the
+    extended model; empty for the reduced model. `reported_matrix`, `reported_offset` (n, n), (n,): joint angles from what the
+    controller reports: q = matrix @ reported + offset (rad). `masses`: in the order of the links; empty where nothing is known.
+    `gravity_m_s2`: base axes. `gear_ratio`: turns of the motor for one of the joint, None for joints where it is not known;
+    None where no joint's is. `payload_kg`: rated. `joint_names`: what others call the joints, as in the URDF file that a robot
+    comes from; None where they have no names. `compliance_known`: whether the compliances are the robot's; else they are a
+    scale for what is to be identified, see `usual_values`.
     """
 
     name: str
@@ -148,28 +110,14 @@ class Robot:
     def model_angles(self, reported: np.ndarray) -> np.ndarray:
         """The chain's joint angles from those that the controller reports.
 
-        Parameters
-        ----------
-        reported : ndarray (..., n)
-            rad.
-
-        Returns
-        -------
-        ndarray (..., n)
+        `reported` (..., n): rad. Returns (..., n).
         """
         return reported @ self.reported_matrix.T + self.reported_offset
 
     def reported_angles(self, angles: np.ndarray) -> np.ndarray:
         """Joint angles as the controller reports them from the chain's.
 
-        Parameters
-        ----------
-        angles : ndarray (N, n)
-            rad.
-
-        Returns
-        -------
-        ndarray (N, n)
+        `angles` (N, n): rad. Returns (N, n).
         """
         return np.linalg.solve(self.reported_matrix, (angles - self.reported_offset).T).T
 
@@ -177,14 +125,7 @@ class Robot:
 def with_rigid_joints(robot: Robot) -> Robot:
     """A robot whose joints do not yield, whatever it weighs: what is left of one without known compliances.
 
-    Parameters
-    ----------
-    robot : Robot
-
-    Returns
-    -------
-    Robot
-        Without masses, which turn nothing.
+    Returns without masses, which turn nothing.
     """
     return replace(robot, compliance=np.zeros(robot.joints), masses=(), compliance_known=False)
 
@@ -198,17 +139,7 @@ def with_target_offset(holder: Robot, offset_m: Sequence[float]) -> Robot: ...
 
 
 def with_target_offset(holder: Chain | Robot, offset_m: Sequence[float]) -> Chain | Robot:
-    """A chain, or the robot around it, with the same target offset on every measuring point (T_tool, interpretation R5).
-
-    Parameters
-    ----------
-    holder : Chain or Robot
-    offset_m : sequence of float
-
-    Returns
-    -------
-    Chain or Robot
-    """
+    """A chain, or the robot around it, with the same target offset on every measuring point (T_tool, interpretation R5)."""
     if isinstance(holder, Robot):
         return replace(holder, chain=with_target_offset(holder.chain, offset_m))
     return replace(holder, points=tuple(replace(p, offset_m=tuple(offset_m)) for p in holder.points))

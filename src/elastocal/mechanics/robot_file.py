@@ -48,21 +48,8 @@ _LEAST_GRAVITY = 1e-6
 def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> Robot:
     """Make a robot from the contents of its file, already validated against the robot schema.
 
-    Parameters
-    ----------
-    document : mapping
-        Keys as in ``schemas/robot.yaml``.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    Robot
-
-    Raises
-    ------
-    InputError
-        Where the chain does not parse or reaches farther than any machine, or a list has another length than there are joints.
+    `document`: keys as in ``schemas/robot.yaml``. `source`: named in errors. Raises `InputError` where the chain does not parse
+    or reaches farther than any machine, or a list has another length than there are joints.
     """
     chain = parse_chain(document["chain"], document.get("lengths_m", {}), source)
     _check_reach(chain, "lengths_m" if document.get("lengths_m") else "chain", source)
@@ -94,15 +81,8 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
 def document_of(robot: Robot) -> dict[str, Any]:
     """A robot as the contents of its file, the inverse of `robot_from_document`.
 
-    Parameters
-    ----------
-    robot : Robot
-        Without elastic links: their tubes are no data of an arm but of a study.
-
-    Returns
-    -------
-    dict
-        Keys as in ``schemas/robot.yaml``; optional ones only where they say something. Lengths stand in the chain as numbers.
+    `robot`: without elastic links: their tubes are no data of an arm but of a study. Returns keys as in ``schemas/robot.yaml``;
+    optional ones only where they say something. Lengths stand in the chain as numbers.
     """
     named = {} if robot.joint_names is None else {"joint_names": list(robot.joint_names)}
     document: dict[str, Any] = {
@@ -132,15 +112,7 @@ def document_of(robot: Robot) -> dict[str, Any]:
 def joint_count(document: Mapping[str, Any], source: str = "robot") -> int:
     """Number of joints of the contents of a robot file.
 
-    Parameters
-    ----------
-    document : mapping
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    int
+    `source`: named in errors.
     """
     return parse_chain(document["chain"], document.get("lengths_m", {}), source).coordinates
 
@@ -148,23 +120,9 @@ def joint_count(document: Mapping[str, Any], source: str = "robot") -> int:
 def joint_limits(limits_deg: Sequence[Sequence[float]] | None, chain: Chain, source: str) -> np.ndarray:
     """Joint limits in rad, of prismatic joints in m.
 
-    Parameters
-    ----------
-    limits_deg : sequence of (float, float) or None
-        Lower and upper limit of each joint; of prismatic ones in metres. None where nothing is known: a turn either way.
-    chain : Chain
-        Whose joints they are.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    ndarray (n, 2)
-
-    Raises
-    ------
-    InputError
-        Where there are too few or too many, a lower limit is not below the upper one, or those of a prismatic joint lack.
+    `limits_deg` (float, float): lower and upper limit of each joint; of prismatic ones in metres. None where nothing is known:
+    a turn either way. `chain`: whose joints they are. `source`: named in errors. Returns (n, 2). Raises `InputError` where
+    there are too few or too many, a lower limit is not below the upper one, or those of a prismatic joint lack.
     """
     joints = chain.coordinates
     if limits_deg is None:

@@ -3,12 +3,10 @@
 Every physical effect moves the robot through some of these coordinates. The chain that holds them all gives exact poses, and
 its Jacobian the sensitivity of a measured point to each of them.
 
-They are virtual joints of the virtual joint method [1]_, whether a spring yields in them or an error of geometry is one.
+They are virtual joints of the virtual joint method [1], whether a spring yields in them or an error of geometry is one.
 
-References
-----------
-.. [1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
-   Machine Theory 44, 2009.
+[1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
+    Machine Theory 44, 2009.
 """
 
 from __future__ import annotations
@@ -35,38 +33,16 @@ _SHORTEST_M = 1e-6
 class Sites:
     """A chain with every coordinate in which the robot can deviate.
 
-    Attributes
-    ----------
-    chain : Chain
-        Coordinates 0..n-1 are the joints as before. All others are zero in the nominal robot.
-    joints : int
-        n.
-    base : tuple of int
-        Tx Ty Tz Rx Ry Rz of the foot, base axes.
-    tilt : tuple of tuple of int
-        For each joint Rx Ry Rz just behind it, in the frame that turns with it.
-    link_end : tuple of tuple of int
-        For each link 0..n Tx Ty Tz Rx Ry Rz at its far end, in the frame of the chain there. Link 0 is the column before joint
-        1, link n the flange behind the last joint.
-    joint_axes : tuple of int
-        0, 1, 2 for a joint about x, y, z of its frame.
-    link_vectors_m : ndarray (n + 1, 3)
-        From the near to the far end of each link, in the frame of its far end. A link ends at a passive joint; what lies behind
-        that and before the next joint belongs to no link.
-    link_rotations : ndarray (n + 1, 3, 3)
-        From the frame at the far end of each link to that at its near end: fixed rotations between two joints.
-    joint_signs : tuple of float
-        Sense in which each joint turns about its axis, +1 or -1.
-    prismatic : tuple of bool
-        Which joints shift along their axis instead; theirs are metres and newtons.
-    masses : tuple of Mass
-        What the links weigh, where the robot file says so.
-    gravity_m_s2 : tuple of float
-        Base axes.
-    gear_ratio : tuple of float or None
-    compensator : Compensator or None
-    payload_kg : float or None
-        As in `Robot`.
+    `chain`: coordinates 0..n-1 are the joints as before. All others are zero in the nominal robot. `joints`: n. `base`: tx Ty
+    Tz Rx Ry Rz of the foot, base axes. `tilt`: for each joint Rx Ry Rz just behind it, in the frame that turns with it.
+    `link_end`: for each link 0..n Tx Ty Tz Rx Ry Rz at its far end, in the frame of the chain there. Link 0 is the column
+    before joint 1, link n the flange behind the last joint. `joint_axes`: 0, 1, 2 for a joint about x, y, z of its frame.
+    `link_vectors_m` (n + 1, 3): from the near to the far end of each link, in the frame of its far end. A link ends at a
+    passive joint; what lies behind that and before the next joint belongs to no link. `link_rotations` (n + 1, 3, 3): from the
+    frame at the far end of each link to that at its near end: fixed rotations between two joints. `joint_signs`: sense in which
+    each joint turns about its axis, +1 or -1. `prismatic`: which joints shift along their axis instead; theirs are metres and
+    newtons. `masses`: what the links weigh, where the robot file says so. `gravity_m_s2`: base axes. `payload_kg`: as in
+    `Robot`.
     """
 
     chain: Chain
@@ -117,14 +93,7 @@ class Sites:
     def carried_links(self, joint: int) -> list[int]:
         """Links with a length behind a joint whose weight can turn it, as numbers from 1.
 
-        Parameters
-        ----------
-        joint : int
-            From 0.
-
-        Returns
-        -------
-        list of int
+        `joint`: from 0.
         """
         links = [k for k in range(joint + 1, self.joints + 1) if np.linalg.norm(self.link_vectors_m[k]) > _SHORTEST_M]
         return [k for k in links if self._longest_levers[k, joint] > _SHORTEST_M]
@@ -132,15 +101,7 @@ class Sites:
     def longest_weight_torque_Nm(self, joint: int) -> float:  # noqa: N802 - units in names keep their case
         """Torque on a joint by the weight of all declared masses behind it, each at its longest lever.
 
-        Parameters
-        ----------
-        joint : int
-            From 0.
-
-        Returns
-        -------
-        float
-            A mass counts as in the middle of its link.
+        `joint`: from 0. Returns a mass counts as in the middle of its link.
         """
         levers, gravity = self._longest_levers[:, joint], np.linalg.norm(self.gravity_m_s2)
         behind = [mass for mass in self.masses if mass.link > joint]
@@ -153,17 +114,7 @@ class Sites:
     def moment_turns(self, link: int, axis: int, joint: int) -> bool:
         """Whether a first moment along an axis of the frame at the far end of a link can turn a joint by its weight.
 
-        Parameters
-        ----------
-        link : int
-            0 is the column.
-        axis : int
-        joint : int
-            From 0.
-
-        Returns
-        -------
-        bool
+        `link`: 0 is the column. `joint`: from 0.
         """
         return bool(self._largest_turns[link, axis, joint] > _SHORTEST_M)
 
@@ -198,14 +149,8 @@ class Sites:
 def sites_of(holder: Robot | Chain) -> Sites:
     """Put a site at the foot, behind each joint and at the far end of each link.
 
-    Parameters
-    ----------
-    holder : Robot or Chain
-        A robot gives what is known of its masses, gears and gravity as well; a chain alone is a weightless arm on a floor.
-
-    Returns
-    -------
-    Sites
+    `holder`: a robot gives what is known of its masses, gears and gravity as well; a chain alone is a weightless arm on a
+    floor.
     """
     if isinstance(holder, Robot):
         known = (holder.masses, holder.gravity_m_s2, holder.gear_ratio, holder.compensator, holder.payload_kg)

@@ -25,16 +25,7 @@ _GRAVITY = 9.80665
 
 
 def usual_payload_kg(chain: Chain) -> float:
-    """A rated load that suits the reach of an arm.
-
-    Parameters
-    ----------
-    chain : Chain
-
-    Returns
-    -------
-    float
-    """
+    """A rated load that suits the reach of an arm."""
     return _LOAD_KG_PER_M3 * float(_reach_behind(chain)[0]) ** 3
 
 
@@ -44,16 +35,7 @@ def usual_compliance(chain: Chain, payload_kg: float | None = None) -> np.ndarra
     The published ones of KUKA and FANUC robots of 165 kg are 0.5 to 5 times these: a scale for what is to be identified, no
     value to compute with.
 
-    Parameters
-    ----------
-    chain : Chain
-    payload_kg : float, optional
-        Rated load; by `usual_payload_kg` without.
-
-    Returns
-    -------
-    ndarray (n,)
-        rad/(N m); of prismatic joints m/N.
+    `payload_kg`: rated load; by `usual_payload_kg` without. Returns (n,): rad/(N m); of prismatic joints m/N.
     """
     load_N = _GRAVITY * (usual_payload_kg(chain) if payload_kg is None else payload_kg)
     levers = np.maximum(_reach_behind(chain), _SHORTEST_LEVER_M)

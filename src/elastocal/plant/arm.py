@@ -34,12 +34,7 @@ _WORD = re.compile(r"([TR])([xyz])\((-?)([\w.]+)\)|\[([^\]]+)\]")
 class Point:
     """A measuring point on a stretch.
 
-    Attributes
-    ----------
-    name : str
-    position_m : ndarray (3,)
-        In the frame at the near end of the stretch.
-    rotation : ndarray (3, 3)
+    `position_m` (3,): in the frame at the near end of the stretch. `rotation` (3, 3).
     """
 
     name: str
@@ -51,13 +46,8 @@ class Point:
 class Stretch:
     """What is rigid between two drives.
 
-    Attributes
-    ----------
-    vector_m : ndarray (3,)
-        From its near to its far end, in the frame at its near end.
-    rotation : ndarray (3, 3)
-        Of the frame at its far end, in that at its near end.
-    points : tuple of Point
+    `vector_m` (3,): from its near to its far end, in the frame at its near end. `rotation` (3, 3): of the frame at its far end,
+    in that at its near end.
     """
 
     vector_m: np.ndarray
@@ -69,15 +59,9 @@ class Stretch:
 class LinkMass:
     """What one link weighs.
 
-    Attributes
-    ----------
-    link : int
-        0 is the column; k turns with joint k.
-    mass_kg : float
-    centre_m : tuple of float
-        In the frame directly behind the rotation of joint `link`; of the column in the axes of the base.
-    relative_std : float
-        How well the mass is known, and each component of the centre as a share of the centre's distance.
+    `link`: 0 is the column; k turns with joint k. `centre_m`: in the frame directly behind the rotation of joint `link`; of the
+    column in the axes of the base. `relative_std`: how well the mass is known, and each component of the centre as a share of
+    the centre's distance.
     """
 
     link: int
@@ -90,29 +74,13 @@ class LinkMass:
 class Arm:
     """An arm, all fixed rotations and lengths sorted into stretches.
 
-    Attributes
-    ----------
-    name : str
-    stretches : tuple of Stretch
-        n + 1 of them: the column, and one behind each drive.
-    axes : ndarray (n, 3)
-        Axis of each drive with its sense, in the frame at the far end of the stretch before it.
-    compliance : ndarray (n,)
-        rad/(N m), as the robot file states it, or usual for the size of the arm; a plant's own may differ.
-    limits : ndarray (n, 2)
-        rad; a turn either way where the robot file states none.
-    reported_matrix, reported_offset : ndarray (n, n), (n,)
-        Angles from what the controller shows: q = matrix @ shown + offset.
-    masses : tuple of LinkMass
-        As the robot file declares them; empty where it does not.
-    gravity_m_s2 : tuple of float
-        In the axes of the base.
-    rated_kg : float or None
-        Rated load, where the file has one.
-    compensated : bool
-        Whether the arm has a gravity compensator at the shoulder.
-    ratios : tuple of float
-        Turns of the motor for one of each joint, where the file has them.
+    `stretches`: n + 1 of them: the column, and one behind each drive. `axes` (n, 3): axis of each drive with its sense, in the
+    frame at the far end of the stretch before it. `compliance` (n,): rad/(N m), as the robot file states it, or usual for the
+    size of the arm; a plant's own may differ. `limits` (n, 2): rad; a turn either way where the robot file states none.
+    `reported_matrix`, `reported_offset` (n, n), (n,): angles from what the controller shows: q = matrix @ shown + offset.
+    `masses`: as the robot file declares them; empty where it does not. `gravity_m_s2`: in the axes of the base. `rated_kg`:
+    rated load, where the file has one. `compensated`: whether the arm has a gravity compensator at the shoulder. `ratios`:
+    turns of the motor for one of each joint, where the file has them.
     """
 
     name: str
@@ -173,16 +141,7 @@ class Arm:
 
 
 def arm_from_file(path: str | Path) -> Arm:
-    """Read a robot file.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Arm
-    """
+    """Read a robot file."""
     with open(path, encoding="utf-8") as file:
         return arm_from_document(yaml.safe_load(file), Path(path).as_posix())
 
@@ -190,21 +149,8 @@ def arm_from_file(path: str | Path) -> Arm:
 def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm:
     """Make an arm of the contents of a robot file.
 
-    Parameters
-    ----------
-    document : dict
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    Arm
-
-    Raises
-    ------
-    InputError
-        A word of the chain that is none, a drive that shifts or that stands in two places, or a chain that does not end in a
-        measuring point.
+    `source`: named in errors. Raises `InputError`: a word of the chain that is none, a drive that shifts or that stands in two
+    places, or a chain that does not end in a measuring point.
     """
     lengths, stretches = document.get("lengths_m", {}), []
     axes: list[np.ndarray] = []
@@ -264,17 +210,8 @@ def _link_mass(entry: Mapping[str, Any]) -> LinkMass:
 def link_frames(arm: Arm, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Frames behind the rotation of each drive.
 
-    Parameters
-    ----------
-    arm : Arm
-    angles : ndarray (S, n)
-        rad.
-
-    Returns
-    -------
-    origin : ndarray (S, n + 1, 3)
-        Of link 0, the column, and of each link behind it, base axes, m.
-    rotation : ndarray (S, n + 1, 3, 3)
+    `angles` (S, n): rad. Returns `origin` (S, n + 1, 3): of link 0, the column, and of each link behind it, base axes, m;
+    `rotation` (S, n + 1, 3, 3).
     """
     origin, rotation = [np.zeros((len(angles), 3))], [np.broadcast_to(np.eye(3), (len(angles), 3, 3))]
     for joint, (stretch, axis) in enumerate(zip(arm.stretches[:-1], arm.axes, strict=True)):
@@ -284,20 +221,11 @@ def link_frames(arm: Arm, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def turned(vector: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a rotation vector by Rodrigues' formula [1]_, R = I + sin a K + (1 - cos a) K^2.
+    """Rotation matrix of a rotation vector by Rodrigues' formula [1], R = I + sin a K + (1 - cos a) K^2.
 
-    Parameters
-    ----------
-    vector : ndarray (..., 3)
-        rad.
+    `vector` (..., 3): rad. Returns (..., 3, 3).
 
-    Returns
-    -------
-    ndarray (..., 3, 3)
-
-    References
-    ----------
-    .. [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
+    [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
     """
     vector = np.asarray(vector, float)
     angle = np.linalg.norm(vector, axis=-1)[..., None, None]

@@ -42,14 +42,8 @@ _XYZ, _TURN = ("x", "y", "z"), ("rx", "ry", "rz")
 class BadReading:
     """One slip.
 
-    Attributes
-    ----------
-    kind : str
-        Of `KINDS`.
-    rows : tuple of int
-        Of the table, from 0, in which something wrong stands.
-    sizes : tuple of float
-        Of each row; a target that a wrong angle does not move has none.
+    `rows`: of the table, from 0, in which something wrong stands. `sizes`: of each row; a target that a wrong angle does not
+    move has none.
     """
 
     kind: str
@@ -68,16 +62,7 @@ def with_bad_rows(
 ) -> tuple[Table, list[BadReading]]:
     """A measured table in which some rows, of different poses, are wrong; of swapped ones always two.
 
-    Parameters
-    ----------
-    table : dict of str to ndarray
-        As `campaigns.measured_table` gives it for this robot and schedule.
-    robot : PhysicalRobot
-    schedule : Schedule
-    kind : str
-        Of `possible_kinds`.
-    count : int
-    draws : numpy.random.Generator
+    `table`: as `campaigns.measured_table` gives it for this robot and schedule. `kind`: of `possible_kinds`.
     """
     rows = _drawn_rows(table, kind, 2 if kind == SWAPPED else count, draws)
     if kind in (JOINT_ANGLE, LOAD):

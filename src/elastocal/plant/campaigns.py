@@ -27,36 +27,15 @@ _LONG_M = 2.5
 class Design:
     """How a campaign is made, and what is written down of it.
 
-    Attributes
-    ----------
-    poses : int
-    held_out : int
-        The last poses, which no step of the analysis may see before its last.
-    force_N : float or None
-        Largest force; its direction is random in each pose. None: what suits the arm, `usual_force_N`.
-    force_times : float
-        How many times that force is really meant.
-    ladder : tuple of float
-        Shares of it, 0 first: each is a load.
-    lever_m : tuple of float
-        From the flange to where the force acts, base axes; shorter in proportion on an arm of less than 2.5 m.
-    repeats, repeated_poses : int
-        How often loads 0 and 1 of the first poses are read.
-    approach_each_load : bool
-        Whether each load is approached afresh; otherwise loads of one pose follow each other without a move.
-    seconds_per_state : float
-    points : tuple of str
-        Measuring points with a target each, or `FLANGE`; empty for all.
-    covariates : tuple of str
-        Which of `COVARIATES` are written down.
-    declared_noise : (float, float) or None
-        Standard deviations that the campaign claims, m and rad; right or wrong.
-    declared : tuple of str
-        Effects that the campaign says its model has.
-    measured : {"pose", "position"}
-    frame : {"base", "tracker"}
-    reach : float
-        Share of the joint limits, about their middle, that poses are drawn from.
+    `held_out`: the last poses, which no step of the analysis may see before its last. `force_N`: largest force; its direction
+    is random in each pose. None: what suits the arm, `usual_force_N`. `force_times`: how many times that force is really meant.
+    `ladder`: shares of it, 0 first: each is a load. `lever_m`: from the flange to where the force acts, base axes; shorter in
+    proportion on an arm of less than 2.5 m. `repeats`, `repeated_poses`: how often loads 0 and 1 of the first poses are read.
+    `approach_each_load`: whether each load is approached afresh; otherwise loads of one pose follow each other without a move.
+    `points`: measuring points with a target each, or `FLANGE`; empty for all. `covariates`: which of `COVARIATES` are written
+    down. `declared_noise` (float, float): standard deviations that the campaign claims, m and rad; right or wrong. `declared`:
+    effects that the campaign says its model has. `measured`: one of "pose", "position". `frame`: one of "base", "tracker".
+    `reach`: share of the joint limits, about their middle, that poses are drawn from.
     """
 
     poses: int = 30
@@ -88,18 +67,7 @@ def usual_force_N(arm: Arm) -> float:  # noqa: N802 - units in names keep their 
 
 
 def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
-    """Draw what is done.
-
-    Parameters
-    ----------
-    arm : Arm
-    design : Design
-    seed : int
-
-    Returns
-    -------
-    Schedule
-    """
+    """Draw what is done."""
     draws = stream(seed, "schedule")
     low, high = arm.limits.T
     angles = low + (high - low) * (0.5 + design.reach * (draws.random((design.poses, arm.joints)) - 0.5))
@@ -140,22 +108,10 @@ def continued(
 ) -> Schedule:
     """A schedule with further states after it, such as a proposed experiment; nothing of what was done before changes.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    angle : ndarray (E, n)
-        rad; equal rows that follow each other are one pose.
-    wrench : ndarray (E, 6)
-        As it shall be shown, N, N m at the flange, base axes; the moment is that of the force at a lever.
-    seconds_per_state, pause_s : float
-        Pace, and how long after the last state the first one comes.
-    ladder : tuple of float
-        Shares of its load at which each row is read, 0 first.
-
-    Returns
-    -------
-    Schedule
-        Each further state is approached afresh and none is held out. Each new pose starts without a load, as load 0.
+    `angle` (E, n): rad; equal rows that follow each other are one pose. `wrench` (E, 6): as it shall be shown, N, N m at the
+    flange, base axes; the moment is that of the force at a lever. `seconds_per_state`, `pause_s`: pace, and how long after the
+    last state the first one comes. `ladder`: shares of its load at which each row is read, 0 first. Returns each further state
+    is approached afresh and none is held out. Each new pose starts without a load, as load 0.
     """
     draws = stream(schedule.seed, f"continued after {len(schedule.pose)} states")
     angle, wrench = np.asarray(angle, float), np.asarray(wrench, float)
@@ -196,17 +152,7 @@ def measured_table(
 ) -> tuple[dict[str, np.ndarray], list[tuple[int, str]]]:
     """Columns of the file of measurements.
 
-    Parameters
-    ----------
-    robot : PhysicalRobot
-    design : Design
-    schedule : Schedule
-
-    Returns
-    -------
-    table : dict of str to ndarray (rows,)
-    outliers : list of (int, str)
-        State and target of every measurement that is one.
+    Returns `table` (rows,); `outliers` (int, str): state and target of every measurement that is one.
     """
     position, rotation = seen_poses(robot, schedule)
     position, rotation, outlier = robot.tracker.read(position, rotation, stream(schedule.seed, "readings"))

@@ -48,16 +48,8 @@ _NO_TORQUE = 0.003
 class Defect:
     """One thing that is wrong with a robot.
 
-    Attributes
-    ----------
-    effect : str
-        A key of `KINDS`.
-    joints : tuple of int
-        From 1; empty where it belongs to none.
-    size : float
-        In the unit of its kind.
-    seed : int
-        Of its details.
+    `effect`: a key of `KINDS`. `joints`: from 1; empty where it belongs to none. `size`: in the unit of its kind. `seed`: of
+    its details.
     """
 
     effect: str
@@ -70,23 +62,11 @@ class Defect:
 class Kind:
     """What all defects of one name have in common.
 
-    Attributes
-    ----------
-    unit : str
-        Of the size.
-    plausible : float
-        A size such as real robots have.
-    locations : callable
-        Joints at which it can be on an arm: list of tuples.
-    apply : callable
-        ``apply(robot, joints, size, draws)`` gives the defective robot and those parameters that the catalogue's law of this
-        effect has in common with what was done, by the catalogue's names; exactly or to first order in the size.
-    needs : tuple of str
-        Covariates without which the catalogue cannot see it.
-    largest : float
-        Size beyond which the law means nothing.
-    scale : tuple of float
-        Powers of how soft an arm is and of how large its loads are, with which the plausible size goes.
+    `unit`: of the size. `plausible`: a size such as real robots have. `locations`: joints at which it can be on an arm: list of
+    tuples. `apply`: ``apply(robot, joints, size, draws)`` gives the defective robot and those parameters that the catalogue's
+    law of this effect has in common with what was done, by the catalogue's names; exactly or to first order in the size.
+    `needs`: covariates without which the catalogue cannot see it. `largest`: size beyond which the law means nothing. `scale`:
+    powers of how soft an arm is and of how large its loads are, with which the plausible size goes.
     """
 
     unit: str
@@ -106,17 +86,7 @@ KINDS: dict[str, Kind] = {}
 
 
 def with_defects(robot: PhysicalRobot, defects: Iterable[Defect]) -> PhysicalRobot:
-    """A robot with defects, one after another.
-
-    Parameters
-    ----------
-    robot : PhysicalRobot
-    defects : sequence of Defect
-
-    Returns
-    -------
-    PhysicalRobot
-    """
+    """A robot with defects, one after another."""
     for defect in defects:
         robot = _applied(robot, defect)[0]
     return robot
@@ -136,18 +106,7 @@ def truth_of(robot: PhysicalRobot, defect: Defect) -> dict[str, Any]:
 
 
 def drawn_defect(effect: str, arm: Arm, seed: int) -> Defect:
-    """A defect of plausible size at a location that is drawn.
-
-    Parameters
-    ----------
-    effect : str
-    arm : Arm
-    seed : int
-
-    Returns
-    -------
-    Defect
-    """
+    """A defect of plausible size at a location that is drawn."""
     locations = _kind(effect).locations(arm)
     return Defect(
         effect, locations[stream(seed, f"place of {effect}").integers(len(locations))], KINDS[effect].plausible_on(arm), seed

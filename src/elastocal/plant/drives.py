@@ -15,16 +15,8 @@ _REFERENCE_C = 20.0
 class Visits:
     """What the drives went through, for S states of the arm.
 
-    Attributes
-    ----------
-    angle : ndarray (S, n)
-        As the controller believes, rad.
-    approach : ndarray of int (S,)
-        Number of the approach; states of one number were reached by the same move.
-    pose : ndarray of int (S,)
-    time_s : ndarray (S,)
-    seed : int
-        Of what is random about the drives.
+    `angle` (S, n): as the controller believes, rad. `approach` (S,) of int: number of the approach; states of one number were
+    reached by the same move. `pose` (S,) of int, `time_s` (S,). `seed`: of what is random about the drives.
     """
 
     angle: np.ndarray
@@ -53,11 +45,7 @@ class ZeroOffset:
 class TransmissionError:
     """Teeth and eccentric wheels: the sum of a_k sin(k q + phase_k).
 
-    Attributes
-    ----------
-    joint : int
-    waves : tuple of (float, float, float)
-        (order k, which need be no integer; amplitude in rad; phase in rad).
+    `waves` (float, float, float): (order k, which need be no integer; amplitude in rad; phase in rad).
     """
 
     joint: int
@@ -98,13 +86,7 @@ class CablePull:
 class SlippingZero:
     """A coupling that slips a little at some moves: a random walk from approach to approach.
 
-    Attributes
-    ----------
-    joint : int
-    step_rad : float
-        Standard deviation of a slip.
-    share : float
-        Of the moves at which it slips.
+    `step_rad`: standard deviation of a slip. `share`: of the moves at which it slips.
     """
 
     joint: int
@@ -123,13 +105,7 @@ class SlippingZero:
 class Runout:
     """One coordinate of an axis that wobbles as its bearing turns: size cos(order q - phase), (S,), rad or m.
 
-    Attributes
-    ----------
-    joint : int
-        From 0.
-    order : int
-        Times a turn.
-    size, phase_rad : float
+    `joint`: from 0. `order`: times a turn.
     """
 
     joint: int
@@ -150,13 +126,7 @@ class Castings(Protocol):
 
 @dataclass(frozen=True)
 class WarmBend:
-    """A piece of a link that bends as one side of it warms up: per_K (T - 20 °C), (S,), rad.
-
-    Attributes
-    ----------
-    per_K : float
-    warmth : Castings
-    """
+    """A piece of a link that bends as one side of it warms up: per_K (T - 20 °C), (S,), rad."""
 
     per_K: float
     warmth: Castings

@@ -31,16 +31,7 @@ DYNAMIC = Design(points=(FLANGE,), measured="position", covariates=("time",))
 def moving_angles(arm: Arm, time_s: np.ndarray, seed: int) -> np.ndarray:
     """A smooth path of all joints within their limits: a few waves of incommensurable periods each.
 
-    Parameters
-    ----------
-    arm : Arm
-    time_s : ndarray (S,)
-    seed : int
-
-    Returns
-    -------
-    ndarray (S, n)
-        rad.
+    `time_s` (S,). Returns (S, n): rad.
     """
     draws = stream(seed, "moving path")
     shape = (_WAVES, arm.joints)
@@ -61,24 +52,12 @@ def moving_angles(arm: Arm, time_s: np.ndarray, seed: int) -> np.ndarray:
 def dynamic_table(robot: PhysicalRobot, measurements: int, seed: int, rate_hz: float = 1000.0) -> dict[str, np.ndarray]:
     """Columns of the file of measurements of one uninterrupted path.
 
-    Deflections between knots are interpolated by cubic splines [1]_.
+    Deflections between knots are interpolated by cubic splines [1].
 
-    Parameters
-    ----------
-    robot : PhysicalRobot
-    measurements : int
-        Of one target; each is a pose of its own.
-    seed : int
-    rate_hz : float
+    `measurements`: of one target; each is a pose of its own. Returns (measurements,): as `campaigns.measured_table` has them:
+    pose, load, repeat, target, angles, wrench (nothing), position, time.
 
-    Returns
-    -------
-    dict of str to ndarray (measurements,)
-        As `campaigns.measured_table` has them: pose, load, repeat, target, angles, wrench (nothing), position, time.
-
-    References
-    ----------
-    .. [1] de Boor, C., A Practical Guide to Splines, Springer, 1978.
+    [1] de Boor, C., A Practical Guide to Splines, Springer, 1978.
     """
     arm, time = robot.arm, np.arange(1, measurements + 1) / rate_hz
     angle = moving_angles(arm, time, seed)

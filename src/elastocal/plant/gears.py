@@ -16,18 +16,9 @@ _REFERENCE_C = 20.0
 class GearStates:
     """What the gears of a robot are exposed to, in S states of it.
 
-    Attributes
-    ----------
-    torque, unloaded : ndarray (S, n)
-        N m, now and before the external load came on.
-    angle : ndarray (S, n)
-        Of the drives, rad.
-    approach : ndarray (S, n)
-        Sense in which each drive moved last, -1, 0, +1.
-    temperature_c : ndarray (S,)
-        Of the gears.
-    previous : ndarray of int (S,)
-        State from which the load was changed to this one without a move of the drives; -1 after a fresh approach.
+    `torque`, `unloaded` (S, n): N m, now and before the external load came on. `angle` (S, n): of the drives, rad. `approach`
+    (S, n): sense in which each drive moved last, -1, 0, +1. `temperature_c` (S,): of the gears. `previous` (S,) of int: state
+    from which the load was changed to this one without a move of the drives; -1 after a fresh approach.
     """
 
     torque: np.ndarray
@@ -69,10 +60,6 @@ class DeadBand(_AtJoint):
 
     In series with the gear's spring, so that beyond the torque tau_t that closes the gap the flanks lie on each other and the
     play adds a constant D, half of the gap. For tau_t -> 0 it is a true dead band.
-
-    Attributes
-    ----------
-    half_play_rad, closing_torque_Nm : float
     """
 
     half_play_rad: float
@@ -88,10 +75,7 @@ class StepwiseStiffening(_AtJoint):
 
     theta = - sum_k d_k sign(tau) max(|tau| - tau_k, 0).
 
-    Attributes
-    ----------
-    steps : tuple of (float, float)
-        (tau_k in N m, d_k in rad/(N m)).
+    `steps` (float, float): (tau_k in N m, d_k in rad/(N m)).
     """
 
     steps: tuple[tuple[float, float], ...]
@@ -104,17 +88,7 @@ class StepwiseStiffening(_AtJoint):
 class AngleDependentStiffness(_AtJoint):
     """A stiffness that varies with an angle: theta = c (1 / (1 + e cos(k q_m - phase)) - 1) tau.
 
-    Attributes
-    ----------
-    compliance : float
-        rad/(N m) of the joint.
-    share : float
-        e.
-    phase_rad : float
-    of : int
-        Joint m whose angle matters; the joint's own or another.
-    order : float
-        k.
+    `compliance`: rad/(N m) of the joint. `share`: e. `of`: joint m whose angle matters; the joint's own or another. `order`: k.
     """
 
     compliance: float
@@ -136,12 +110,7 @@ class CompensatorStiffness(_AtJoint):
     k (s - s0)^2 / 2, whose second derivative is k_c = k a L [cos u (1 - s0/s) + (a L sin^2 u) s0 / s^3].
     theta = (1 / (1/c + k_c) - c) tau.
 
-    Attributes
-    ----------
-    compliance : float
-    stiffness_N_per_m, anchor_m, crank_m, free_length_m : float
-    zero_rad : float
-        u0, where crank and anchor point the same way.
+    `zero_rad`: u0, where crank and anchor point the same way.
     """
 
     compliance: float
@@ -163,10 +132,7 @@ class CompensatorStiffness(_AtJoint):
 class Coupling:
     """Two gears in one housing: theta_i = c tau_j, theta_j = c tau_i.
 
-    Attributes
-    ----------
-    pair : (int, int)
-    compliance : float
+    `pair` (int, int).
     """
 
     pair: tuple[int, int]
@@ -184,26 +150,16 @@ class Coupling:
 class BoucWen(_AtJoint):
     """Friction that remembers: theta = -h z, dz = (d tau / tau_h) (1 - |z|^m (beta sign(z d tau) + 1 - beta)).
 
-    The Bouc-Wen model of hysteresis [1]_. Friction holds back: an arm that came in the sense s stays behind its drive, z = s
+    The Bouc-Wen model of hysteresis [1]. Friction holds back: an arm that came in the sense s stays behind its drive, z = s
     with all of its friction wound up. Each change of the load then moves z along a loop that depends on the order of loads and
     not on their speed, the deflection lagging behind the torque. h / tau_h must be less than the gear's compliance, or the arm
     would recede from a push.
 
-    Attributes
-    ----------
-    half_width_rad : float
-        h.
-    torque_Nm : float
-        tau_h, over which z turns round.
-    sharpness : float
-        m.
-    beta : float
-        1/2: unloading starts along the straight line of slope 1 / tau_h.
+    `half_width_rad`: h. `torque_Nm`: tau_h, over which z turns round. `sharpness`: m. `beta`: 1/2: unloading starts along the
+    straight line of slope 1 / tau_h.
 
-    References
-    ----------
-    .. [1] Wen, Y.-K., Method for random vibration of hysteretic systems, Journal of the Engineering Mechanics Division ASCE
-       102, 1976.
+    [1] Wen, Y.-K., Method for random vibration of hysteretic systems, Journal of the Engineering Mechanics Division ASCE 102,
+        1976.
     """
 
     half_width_rad: float
@@ -249,12 +205,7 @@ class Asymmetric(_AtJoint):
 class WarmSoftening(_AtJoint):
     """A gear that softens as it warms: theta = c r (T - 20 °C) tau.
 
-    Attributes
-    ----------
-    compliance : float
-        rad/(N m).
-    per_K : float
-        r.
+    `compliance`: rad/(N m). `per_K`: r.
     """
 
     compliance: float

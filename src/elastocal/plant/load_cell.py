@@ -18,23 +18,12 @@ _SETTLED_N = 1e-9
 class LoadCell:
     """A cell between the pull and the flange, and where it pulls. The default is perfect.
 
-    Attributes
-    ----------
-    scale : float
-        Shown = (1 + scale) felt.
-    turn_rad : tuple of float
-        Rotation vector by which the cell is mounted askew: it shows R(turn)^T felt.
-    bias_N : tuple of float
-        Shown without a force. It is not zeroed between poses.
-    shift_m : tuple of float
-        Where the force really acts, from where the plan says.
-    crosstalk_per_N : float
-        Quadratic: shown x gets k F_y F_z, and so on round the axes.
-    in_flange : tuple of str
-        Which of "turn", "bias" and "shift" are fixed in the flange's axes rather than in the base's.
-    mount : {"pull", "flange"}
-        In the line of pull one number is measured: a force that is wrong acts at the same lever and brings a wrong moment.
-        Between flange and tool six are: the forces may be wrong where the moments are right.
+    `scale`: shown = (1 + scale) felt. `turn_rad`: rotation vector by which the cell is mounted askew: it shows R(turn)^T felt.
+    `bias_N`: shown without a force. It is not zeroed between poses. `shift_m`: where the force really acts, from where the plan
+    says. `crosstalk_per_N`: quadratic: shown x gets k F_y F_z, and so on round the axes. `in_flange`: which of "turn", "bias"
+    and "shift" are fixed in the flange's axes rather than in the base's. `mount`: in the line of pull one number is measured: a
+    force that is wrong acts at the same lever and brings a wrong moment. Between flange and tool six are: the forces may be
+    wrong where the moments are right.
     """
 
     scale: float = 0.0
@@ -57,18 +46,9 @@ class LoadCell:
 
         By fixed-point iteration: what the display lacks is pulled more.
 
-        Parameters
-        ----------
-        force : ndarray (S, 3)
-            As shown, N, base axes; a row of zeros where nothing pulls.
-        lever : ndarray (S, 3)
-            From the flange's origin to where the plan lets the force act, m, base axes.
-        flange_rotation : ndarray (S, 3, 3)
-
-        Returns
-        -------
-        ndarray (S, 6)
-            N, N m at the flange's origin, base axes.
+        `force` (S, 3): as shown, N, base axes; a row of zeros where nothing pulls. `lever` (S, 3): from the flange's origin to
+        where the plan lets the force act, m, base axes. `flange_rotation` (S, 3, 3). Returns (S, 6): N, N m at the flange's
+        origin, base axes.
         """
         found = force.copy()
         for _ in range(_SWEEPS):

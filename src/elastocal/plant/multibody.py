@@ -3,14 +3,12 @@
 Structural springs (foot, bearings, link segments) are joints of the same tree. The springs' stiffnesses stand in the model too,
 so that MuJoCo's own inverse dynamics can judge an equilibrium that was found without them.
 
-The tree moves by the kinematics of MuJoCo [1]_; elastic links are Timoshenko beams [2]_ lumped into segments.
+The tree moves by the kinematics of MuJoCo [1]; elastic links are Timoshenko beams [2] lumped into segments.
 
-References
-----------
-.. [1] Todorov, E., Erez, T. and Tassa, Y., MuJoCo: a physics engine for model-based control, IEEE/RSJ International Conference
-   on Intelligent Robots and Systems, 2012.
-.. [2] Timoshenko, S. P., On the correction for shear of the differential equation for transverse vibrations of prismatic bars,
-   Philosophical Magazine 41, 1921.
+[1] Todorov, E., Erez, T. and Tassa, Y., MuJoCo: a physics engine for model-based control, IEEE/RSJ International Conference on
+    Intelligent Robots and Systems, 2012.
+[2] Timoshenko, S. P., On the correction for shear of the differential equation for transverse vibrations of prismatic bars,
+    Philosophical Magazine 41, 1921.
 """
 
 from __future__ import annotations
@@ -39,28 +37,12 @@ _NO_MASS, _NO_INERTIA = "1e-12", "1e-12 1e-12 1e-12"
 class Machine:
     """A compiled model and where in it what is.
 
-    Attributes
-    ----------
-    model : mujoco.MjModel
-    drive, gear : ndarray of int (n,)
-        Coordinates that are commanded, and those that spring behind them.
-    springs : dict of str to int
-        Structural coordinates by name, such as ``base_x``, ``tilt2_0``, ``link3_4_bend0``.
-    compliance : ndarray (coordinates,)
-        Of structural springs, m/N or rad/(N m); zero elsewhere.
-    sites : dict of str to int
-        Measuring points.
-    links : ndarray of int (n + 1,)
-        Bodies of the foot and of the links behind the drives.
-    beyond : ndarray of bool (coordinates, bodies)
-        Which bodies each coordinate moves: all from its own on, for the tree is a chain.
-    slides : ndarray of bool (coordinates,)
-        Which coordinates are lengths; the others are angles.
-    body_stretch, site_stretch : ndarray of int (bodies,), (sites,)
-        Stretch of whose vector the place of each body and site is a part.
-    flange : str
-    compensator : structure.Compensator or None
-    xml : str
+    `drive`, `gear` (n,) of int: coordinates that are commanded, and those that spring behind them. `springs`: structural
+    coordinates by name, such as ``base_x``, ``tilt2_0``, ``link3_4_bend0``. `compliance` (coordinates,): of structural springs,
+    m/N or rad/(N m); zero elsewhere. `sites`: measuring points. `links` (n + 1,) of int: bodies of the foot and of the links
+    behind the drives. `beyond` (coordinates, bodies) of bool: which bodies each coordinate moves: all from its own on, for the
+    tree is a chain. `slides` (coordinates,) of bool: which coordinates are lengths; the others are angles. `body_stretch`,
+    `site_stretch` (bodies,) of int, (sites,): stretch of whose vector the place of each body and site is a part.
     """
 
     model: mujoco.MjModel
@@ -119,16 +101,7 @@ class _Tree:
 def machine_of(arm: Arm, structure: Structure, gear_compliance: np.ndarray | None = None) -> Machine:
     """Build the model of an arm.
 
-    Parameters
-    ----------
-    arm : Arm
-    structure : Structure
-    gear_compliance : ndarray (n,), optional
-        rad/(N m), written into the model as the stiffness of the gears for checks by `mujoco.mj_inverse`.
-
-    Returns
-    -------
-    Machine
+    `gear_compliance` (n,): rad/(N m), written into the model as the stiffness of the gears for checks by `mujoco.mj_inverse`.
     """
     root = Element("mujoco", model="plant")
     SubElement(root, "compiler", angle="radian", autolimits="false")

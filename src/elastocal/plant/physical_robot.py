@@ -33,11 +33,7 @@ _REFERENCE_C = 20.0
 class Warmth:
     """How the robot warms up: the thermometer on a motor first, the castings after it.
 
-    Attributes
-    ----------
-    rise_K : float
-    motor_s, lag_s : float
-        Time constant of the thermometer, dT_m = rise (1 - exp(-t / T_m)), and by which the castings follow it.
+    `motor_s`, `lag_s`: time constant of the thermometer, dT_m = rise (1 - exp(-t / T_m)), and by which the castings follow it.
     """
 
     rise_K: float = 10.0
@@ -59,28 +55,11 @@ class Warmth:
 class PhysicalRobot:
     """All that is true of a robot and its instruments; the default is faultless.
 
-    Attributes
-    ----------
-    arm : Arm
-    compliance : ndarray (n,)
-        The gears' own, rad/(N m).
-    structure : Structure
-    gears : tuple of callable
-        Laws beside the linear springs; see `gears`.
-    drives : tuple of callable
-        Errors of angle; see `drives`.
-    structure_laws : tuple of (str, callable)
-        Laws of structural springs by the start of their names.
-    offsets : tuple of (str, callable)
-        By what structural coordinates are off, of `Visits`, beside what their springs do.
-    expansion_per_K : float
-    gradient_per_K : (float, float)
-        Further expansion of the column and of the flange; in between it changes evenly from stretch to stretch.
-    warmth : Warmth
-    cell : LoadCell
-    tracker : Tracker
-    nest : EccentricNest or None
-        Of the flange's target.
+    `compliance` (n,): the gears' own, rad/(N m). `gears`: laws beside the linear springs; see `gears`. `drives`: errors of
+    angle; see `drives`. `structure_laws` (str, callable): laws of structural springs by the start of their names. `offsets`
+    (str, callable): by what structural coordinates are off, of `Visits`, beside what their springs do. `gradient_per_K` (float,
+    float): further expansion of the column and of the flange; in between it changes evenly from stretch to stretch. `nest`: of
+    the flange's target.
     """
 
     arm: Arm
@@ -101,21 +80,9 @@ class PhysicalRobot:
 def specimen(arm: Arm, seed: int, spread: float = 0.15, weighs: bool = True, off_line_m: float = 0.0) -> PhysicalRobot:
     """One robot of a series: other gears than the robot file says, and other weights.
 
-    Parameters
-    ----------
-    arm : Arm
-    seed : int
-    spread : float
-        Largest share by which a gear is softer or stiffer, evenly drawn.
-    weighs : bool
-        False: an arm whose controller takes care of its weight.
-    off_line_m : float
-        By how much centres of mass lie off the lines of their links at most, across each, beyond what is declared.
-
-    Returns
-    -------
-    PhysicalRobot
-        Faultless.
+    `spread`: largest share by which a gear is softer or stiffer, evenly drawn. `weighs`: False: an arm whose controller takes
+    care of its weight. `off_line_m`: by how much centres of mass lie off the lines of their links at most, across each, beyond
+    what is declared. Returns faultless.
     """
     compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - spread, 1.0 + spread, arm.joints)
     masses = true_masses(declared_masses(arm), stream(seed, "weights")) if weighs else ()
@@ -129,23 +96,10 @@ def specimen(arm: Arm, seed: int, spread: float = 0.15, weighs: bool = True, off
 class Schedule:
     """What is done with a robot, S states in the order of time.
 
-    Attributes
-    ----------
-    angle : ndarray (S, n)
-        As the controller believes, rad.
-    force, lever : ndarray (S, 3)
-        As the load cell shall show it, N, and from the flange's origin to where it acts, m; base axes.
-    pose, load, repeat : ndarray of int (S,)
-    approach : ndarray of int (S,)
-        Number of the move that led there.
-    sense : ndarray of int (S, n)
-        In which each joint moved last.
-    previous : ndarray of int (S,)
-        State before, where only the load was changed; -1 after a move.
-    time_s : ndarray (S,)
-    training : ndarray of bool (S,)
-        Not held out for the test.
-    seed : int
+    `angle` (S, n): as the controller believes, rad. `force`, `lever` (S, 3): as the load cell shall show it, N, and from the
+    flange's origin to where it acts, m; base axes. `pose`, `load`, `repeat` (S,) of int. `approach` (S,) of int: number of the
+    move that led there. `sense` (S, n) of int: in which each joint moved last. `previous` (S,) of int: state before, where only
+    the load was changed; -1 after a move. `time_s` (S,). `training` (S,) of bool: not held out for the test.
     """
 
     angle: np.ndarray
@@ -170,18 +124,8 @@ class Schedule:
 def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: Equilibrium | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Poses of all targets as a tracker without noise reads them.
 
-    Parameters
-    ----------
-    robot : PhysicalRobot
-    schedule : Schedule
-    start : Equilibrium, optional
-        Of a robot that differs little; saves time.
-
-    Returns
-    -------
-    position : ndarray (S, targets, 3)
-        m, base frame; targets as in ``robot.arm.points``.
-    rotation : ndarray (S, targets, 3, 3)
+    `start`: of a robot that differs little; saves time. Returns `position` (S, targets, 3): m, base frame; targets as in
+    ``robot.arm.points``; `rotation` (S, targets, 3, 3).
     """
     return seen_at_rest(robot, schedule, at_rest(robot, schedule, start)[1])
 
@@ -189,15 +133,7 @@ def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: Equilibrium | No
 def at_rest(robot: PhysicalRobot, schedule: Schedule, start: Equilibrium | None = None) -> tuple[Machine, Equilibrium]:
     """The arm in equilibrium.
 
-    Parameters
-    ----------
-    robot, schedule, start
-        As in `seen_poses`.
-
-    Returns
-    -------
-    machine : Machine
-    rest : Equilibrium
+    `robot`, `schedule`, `start`: as in `seen_poses`.
     """
     machine = machine_of(robot.arm, robot.structure)
     drive, growth, warm, offsets = driven(robot, schedule, machine)
@@ -222,22 +158,8 @@ def driven(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[int, np.ndarray]]:
     """Where the drives really stand, and how warm everything is.
 
-    Parameters
-    ----------
-    robot : PhysicalRobot
-    schedule : Schedule
-    machine : Machine
-
-    Returns
-    -------
-    drive : ndarray (S, n)
-        rad.
-    growth : ndarray (S, n + 1)
-        Relative growth of all lengths of each stretch.
-    warm : ndarray (S,)
-        Temperature of the castings, °C.
-    offsets : dict of int to ndarray (S,)
-        Of structural coordinates.
+    Returns `drive` (S, n): rad; `growth` (S, n + 1): relative growth of all lengths of each stretch; `warm` (S,): temperature
+    of the castings, °C; `offsets` (S,): of structural coordinates.
     """
     visits = Visits(schedule.angle, schedule.approach, schedule.pose, schedule.time_s, schedule.seed)
     drive = schedule.angle + sum((law(visits) for law in robot.drives), np.zeros_like(schedule.angle))

@@ -8,12 +8,10 @@ declared with a standard deviation each, is
     min over b, w of |d - X b - V w|^2 + |w|^2,
 
 V in its standard deviations: what a test can find where the weights are known so well and no better. The weights come in as
-prior information of mixed estimation [1]_ does.
+prior information of mixed estimation [1] does.
 
-References
-----------
-.. [1] Theil, H. and Goldberger, A. S., On pure and mixed statistical estimation in economics, International Economic Review 2,
-   1961.
+[1] Theil, H. and Goldberger, A. S., On pure and mixed statistical estimation in economics, International Economic Review 2,
+    1961.
 """
 
 from __future__ import annotations
@@ -43,12 +41,8 @@ _SAME = 0.02
 class Signal:
     """What a defect does to the measurements.
 
-    Attributes
-    ----------
-    raw, retained : float
-        Non-centralities before and after absorption.
-    rms_m, rms_rad : float
-        Root mean square over all measurements of the length of the change of position, and of orientation.
+    `raw`, `retained`: non-centralities before and after absorption. `rms_m`, `rms_rad`: root mean square over all measurements
+    of the length of the change of position, and of orientation.
     """
 
     raw: float
@@ -60,18 +54,8 @@ class Signal:
 class Yardstick:
     """The faultless robot at a schedule, to which defective ones are compared.
 
-    Parameters
-    ----------
-    robot : PhysicalRobot
-    schedule : Schedule
-    targets : sequence of int, optional
-        Which measuring points are read; all by default.
-    orientation : bool
-        Whether orientations are read too.
-    free_frame : bool
-        Whether the analysis fits the tracker's frame.
-    declared : tuple of LinkMass
-        Weights as they are declared to the analysis.
+    `targets`: which measuring points are read; all by default. `orientation`: whether orientations are read too. `free_frame`:
+    whether the analysis fits the tracker's frame. `declared`: weights as they are declared to the analysis.
     """
 
     def __init__(
@@ -106,16 +90,7 @@ class Yardstick:
         return self._whitened(*self._change(robot))
 
     def signal(self, robot: PhysicalRobot) -> Signal:
-        """How a robot differs from the faultless one.
-
-        Parameters
-        ----------
-        robot : PhysicalRobot
-
-        Returns
-        -------
-        Signal
-        """
+        """How a robot differs from the faultless one."""
         metres, radians = self._change(robot)
         seen = self._whitened(metres, radians)[self.schedule.training].ravel()
         left = self._left_of(seen)
@@ -130,23 +105,13 @@ class Yardstick:
         return self._left_of(self.change(robot)[self.schedule.training].ravel())
 
     def angle_deg(self, robot: PhysicalRobot, others: Iterable[PhysicalRobot]) -> float:
-        """Principal angle [1]_ between what is left of a robot and all that others make together, in any proportion.
+        """Principal angle [1] between what is left of a robot and all that others make together, in any proportion.
 
-        Parameters
-        ----------
-        robot : PhysicalRobot
-        others : iterable of PhysicalRobot
-            One that is left with nothing adds no direction: a gear that stiffens at a torque that no load of these reaches.
+        `others`: one that is left with nothing adds no direction: a gear that stiffens at a torque that no load of these
+        reaches. Returns 90 where all others are left with nothing.
 
-        Returns
-        -------
-        float
-            90 where all others are left with nothing.
-
-        References
-        ----------
-        .. [1] Björck, Å. and Golub, G. H., Numerical methods for computing angles between linear subspaces, Mathematics of
-           Computation 27, 1973.
+        [1] Björck, Å. and Golub, G. H., Numerical methods for computing angles between linear subspaces, Mathematics of
+            Computation 27, 1973.
         """
         mine, theirs = self.left(robot), np.array([self.left(other) for other in others])
         theirs = theirs[theirs.any(axis=1)]
@@ -234,32 +199,10 @@ def size_for(
 ) -> tuple[float, Signal]:
     """Size of a defect at which its non-centrality is as wanted.
 
-    Parameters
-    ----------
-    yardstick : Yardstick
-    robot_of_size : callable
-        Robot with the defect of a given size.
-    start : float
-        A size to begin with.
-    target : float
-        Non-centrality.
-    quantity : {"retained", "raw"}
-    largest : float
-        No larger size is tried.
+    `robot_of_size`: robot with the defect of a given size. `start`: a size to begin with. `target`: non-centrality. `quantity`:
+    one of "retained", "raw". `largest`: no larger size is tried. Returns `signal`: as it came out. Raises `ValueError`: no size
+    has it to one per cent: the defect is absorbed whatever its size, saturates, or would be larger than allowed.
 
-    Returns
-    -------
-    size : float
-    signal : Signal
-        As it came out.
-
-    Raises
-    ------
-    ValueError
-        No size has it to one per cent: the defect is absorbed whatever its size, saturates, or would be larger than allowed.
-
-    Notes
-    -----
     The non-centrality of a linear effect grows with the square of its size; the secant of the logarithms allows for others.
     """
     size, exponent = float(start), 2.0

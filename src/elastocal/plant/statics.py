@@ -33,16 +33,9 @@ _NOTHING_KG = 1e-6
 class Loading:
     """What acts on the arm in S states.
 
-    Attributes
-    ----------
-    drive : ndarray (S, n)
-        Angles at which the drives really stand, rad.
-    wrench : ndarray (S, 6)
-        That the flange really feels, at its deflected origin, base axes; N, N m.
-    growth : ndarray (S, n + 1)
-        Relative growth of all lengths of each stretch.
-    offsets : dict of int to ndarray (S,)
-        By which structural coordinates are off beside what their springs do, rad or m.
+    `drive` (S, n): angles at which the drives really stand, rad. `wrench` (S, 6): that the flange really feels, at its
+    deflected origin, base axes; N, N m. `growth` (S, n + 1): relative growth of all lengths of each stretch. `offsets` (S,): by
+    which structural coordinates are off beside what their springs do, rad or m.
     """
 
     drive: np.ndarray
@@ -55,19 +48,9 @@ class Loading:
 class Places:
     """Where everything is, in S states; base axes, m.
 
-    Attributes
-    ----------
-    anchor, axis : ndarray (S, coordinates, 3)
-        Of the joints.
-    mass : ndarray (S, bodies, 3)
-        Centres of mass.
-    body : ndarray (S, bodies, 3)
-        Origins of the bodies.
-    body_rotation : ndarray (S, bodies, 3, 3)
-    position, rotation : ndarray (S, points, 3), (S, points, 3, 3)
-        Of the measuring points.
-    spring : ndarray (S, 2, 3)
-        Fixed and moving end of the compensator; (S, 0, 3) without.
+    `anchor`, `axis` (S, coordinates, 3): of the joints. `mass` (S, bodies, 3): centres of mass. `body` (S, bodies, 3): origins
+    of the bodies. `body_rotation` (S, bodies, 3, 3). `position`, `rotation` (S, points, 3), (S, points, 3, 3): of the measuring
+    points. `spring` (S, 2, 3): fixed and moving end of the compensator; (S, 0, 3) without.
     """
 
     anchor: np.ndarray
@@ -84,16 +67,8 @@ class Places:
 class Equilibrium:
     """Where an arm came to rest, in S states.
 
-    Attributes
-    ----------
-    coordinates : ndarray (S, coordinates)
-        rad, m.
-    gear : ndarray of int (n,)
-        Which of them are the gears' deflections.
-    torque : ndarray (S, coordinates)
-        Generalized force that each coordinate's spring transmits, N m, N.
-    where : Places
-    sweeps : int
+    `coordinates` (S, coordinates): rad, m. `gear` (n,) of int: which of them are the gears' deflections. `torque` (S,
+    coordinates): generalized force that each coordinate's spring transmits, N m, N.
     """
 
     coordinates: np.ndarray
@@ -116,16 +91,7 @@ class Equilibrium:
 def places(machine: Machine, coordinates: np.ndarray, growth: np.ndarray) -> Places:
     """MuJoCo's kinematics.
 
-    Parameters
-    ----------
-    machine : Machine
-    coordinates : ndarray (S, coordinates)
-    growth : ndarray (S, n + 1)
-        Relative growth of all lengths of each stretch.
-
-    Returns
-    -------
-    Places
+    `coordinates` (S, coordinates). `growth` (S, n + 1): relative growth of all lengths of each stretch.
     """
     model, data = machine.model, mujoco.MjData(machine.model)
     count, joints, links, points = len(coordinates), model.njnt, model.nbody, model.nsite
@@ -156,23 +122,12 @@ def places(machine: Machine, coordinates: np.ndarray, growth: np.ndarray) -> Pla
 
 
 def generalized_forces(machine: Machine, coordinates: np.ndarray, loading: Loading) -> tuple[np.ndarray, Places]:
-    """Forces on all coordinates by the principle of virtual work [1]_, and where everything is.
+    """Forces on all coordinates by the principle of virtual work [1], and where everything is.
 
-    Parameters
-    ----------
-    machine : Machine
-    coordinates : ndarray (S, coordinates)
-    loading : Loading
+    `coordinates` (S, coordinates). Returns `force` (S, coordinates): N m, N: a . (M + (p - o) x F + sum (x_k - o) x m_k g)
+    about the axis a through o, of masses m_k at x_k beyond it.
 
-    Returns
-    -------
-    force : ndarray (S, coordinates)
-        N m, N: a . (M + (p - o) x F + sum (x_k - o) x m_k g) about the axis a through o, of masses m_k at x_k beyond it.
-    where : Places
-
-    References
-    ----------
-    .. [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
+    [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
     """
     model, where = machine.model, places(machine, coordinates, loading.growth)
     flange = where.position[:, list(machine.sites).index(machine.flange), None]
@@ -217,26 +172,11 @@ def equilibrium(
 ) -> Equilibrium:
     """Where the arm comes to rest, by fixed-point iteration.
 
-    Parameters
-    ----------
-    machine : Machine
-    loading : Loading
-    gear_deflection : callable
-        ``gear_deflection(torque, unloaded)``, ndarray (S, n) each in N m, gives the deflections (S, n) of the gears in rad;
-        `unloaded` is the torque before the external wrench came on.
-    structure_laws : sequence of (str, callable)
-        Start of the names of structural springs, and what they deflect by, beyond their compliance, under a force (S,).
-    start : ndarray (S, n), optional
-        Deflections of the gears to begin with, rad, such as those of a robot that differs little.
-
-    Returns
-    -------
-    Equilibrium
-
-    Raises
-    ------
-    RuntimeError
-        Where the iteration does not settle to 1e-11 of the largest deflection.
+    `gear_deflection`: ``gear_deflection(torque, unloaded)``, ndarray (S, n) each in N m, gives the deflections (S, n) of the
+    gears in rad; `unloaded` is the torque before the external wrench came on. `structure_laws` (str, callable): start of the
+    names of structural springs, and what they deflect by, beyond their compliance, under a force (S,). `start` (S, n):
+    deflections of the gears to begin with, rad, such as those of a robot that differs little. Raises `RuntimeError` where the
+    iteration does not settle to 1e-11 of the largest deflection.
     """
     gear = machine.gear
     extra = [(index, law) for start, law in structure_laws for name, index in machine.springs.items() if name.startswith(start)]

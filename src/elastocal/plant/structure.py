@@ -10,14 +10,9 @@ from scipy.constants import g as standard_gravity
 class TaperedTube:
     """An elastic link: a thin-walled tube that gets thinner towards its far end.
 
-    Attributes
-    ----------
-    bending_Nm2, torsion_Nm2 : float
-        E I and G J at its near end.
-    axial_N, shear_N : float
-        E A and k G A; inf where the link does not stretch or shear.
-    taper : float
-        Share of the diameter that is lost at the far end; E I and G J go with its third power, E A and k G A with itself.
+    `bending_Nm2`, `torsion_Nm2`: E I and G J at its near end. `axial_N`, `shear_N`: E A and k G A; inf where the link does not
+    stretch or shear. `taper`: share of the diameter that is lost at the far end; E I and G J go with its third power, E A and k
+    G A with itself.
     """
 
     bending_Nm2: float
@@ -31,15 +26,8 @@ class TaperedTube:
 class Mass:
     """A weight on a stretch.
 
-    Attributes
-    ----------
-    stretch : int
-        0 is the column, n the flange.
-    mass_kg : float
-    along : float
-        Where on the stretch, 0 at its near end, 1 at its far end.
-    aside_m : tuple of float
-        And how far off the line, in the frame at the near end.
+    `stretch`: 0 is the column, n the flange. `along`: where on the stretch, 0 at its near end, 1 at its far end. `aside_m`: and
+    how far off the line, in the frame at the near end.
     """
 
     stretch: int
@@ -52,14 +40,8 @@ class Mass:
 class Compensator:
     """A coil spring from the carousel to the upper arm.
 
-    Attributes
-    ----------
-    anchor_m : tuple of float
-        Fixed end, from the shoulder, in the frame that turns with joint 1.
-    crank_m : tuple of float
-        Moving end, from the shoulder, in the frame of the upper arm.
-    stiffness_N_per_m, free_length_m : float
-        Pull = stiffness (length - free length).
+    `anchor_m`: fixed end, from the shoulder, in the frame that turns with joint 1. `crank_m`: moving end, from the shoulder, in
+    the frame of the upper arm. `stiffness_N_per_m`, `free_length_m`: pull = stiffness (length - free length).
     """
 
     anchor_m: tuple[float, ...]
@@ -72,28 +54,13 @@ class Compensator:
 class Structure:
     """Everything of an arm that its robot file does not declare. The default is an arm of drives alone.
 
-    Attributes
-    ----------
-    base : tuple of float or None
-        Compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)).
-    flange : tuple of float or None
-        Compliances between the last stretch and the flange along x, y, z (m/N) and about x, y, z (rad/(N m)) of its frame.
-    tilt : dict of int to (float, float)
-        Of a joint, from 1: compliances across its axis, rad/(N m), in the order of the remaining axes.
-    loose : tuple of int
-        Joints, from 1, whose bearings let the arm shift across the axis, by what `PhysicalRobot.offsets` say.
-    tubes : dict of int to TaperedTube
-        Elastic stretches.
-    segments : int
-        Into how many rigid pieces an elastic stretch is cut.
-    masses : tuple of Mass
-    payload : Mass or None
-        Its place counts from the flange: ``aside_m`` in the flange's frame.
-    compensator : Compensator or None
-    wrong_vectors_m, wrong_turns : dict of int to tuple
-        Of a stretch: by how much its vector and its far end's rotation vector (rad) differ from the robot file.
-    gravity_m_s2 : tuple of float
-        In the axes of the base.
+    `base`: compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)). `flange`: compliances between the last
+    stretch and the flange along x, y, z (m/N) and about x, y, z (rad/(N m)) of its frame. `tilt` (float, float): of a joint,
+    from 1: compliances across its axis, rad/(N m), in the order of the remaining axes. `loose`: joints, from 1, whose bearings
+    let the arm shift across the axis, by what `PhysicalRobot.offsets` say. `tubes`: elastic stretches. `segments`: into how
+    many rigid pieces an elastic stretch is cut. `payload`: its place counts from the flange: ``aside_m`` in the flange's frame.
+    `wrong_vectors_m`, `wrong_turns`: of a stretch: by how much its vector and its far end's rotation vector (rad) differ from
+    the robot file. `gravity_m_s2`: in the axes of the base.
     """
 
     base: tuple[float, ...] | None = None

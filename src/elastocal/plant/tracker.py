@@ -15,12 +15,8 @@ _TILT_RAD, _SHIFT_M = 3e-4 / np.sqrt(3.0), 2e-4 / np.sqrt(3.0)
 class Drift:
     """A stand that creeps: motion (d, r) after t hours is rate * u, u = T (1 - exp(-t / T)), so that it slows down.
 
-    Attributes
-    ----------
-    rate_m_per_h, rate_rad_per_h : tuple of float
-        At the start; along and about the base axes, seen as a motion of the measurements.
-    settling_h : float
-        T; inf for a steady drift.
+    `rate_m_per_h`, `rate_rad_per_h`: at the start; along and about the base axes, seen as a motion of the measurements.
+    `settling_h`: T; inf for a steady drift.
     """
 
     rate_m_per_h: tuple[float, ...]
@@ -39,12 +35,8 @@ class Drift:
 class Move:
     """A stand that was knocked, or put elsewhere and tied to the old frame badly: from one row on all measurements are moved.
 
-    Attributes
-    ----------
-    after_s : float
-        Measurements later than this are moved.
-    shift_m, turn_rad : tuple of float
-        Along and about the base axes through where the tracker stands.
+    `after_s`: measurements later than this are moved. `shift_m`, `turn_rad`: along and about the base axes through where the
+    tracker stands.
     """
 
     after_s: float
@@ -66,27 +58,12 @@ def misplaced_base(draws: np.random.Generator) -> Move:
 class Tracker:
     """A laser tracker; the default only has noise.
 
-    Attributes
-    ----------
-    sigma_m, sigma_m_per_m : float
-        Standard deviation of a coordinate is sigma_m + sigma_m_per_m * range.
-    sigma_rad : float
-    stand_m : tuple of float
-        Where it stands, base frame.
-    frame_turn : tuple of float
-        Rotation vector of its own axes in the base's; measurements are in the base frame unless the design says otherwise.
-    drift : Drift or None
-    move : Move or None
-    misplaced : Move or None
-        Of the base frame as the tracker has it against the robot's own, about its origin; see `misplaced_base`.
-    refraction_per_m : float
-        Bent light: a target at range r is read at r + k r^2.
-    scale : float
-        A wrong wavelength. The frame of the base was measured with it too, so that a target at x is read at (1 + s) x.
-    outliers : float
-        Share of the measurements that are off by far.
-    outlier_sigmas : float
-        Of how many standard deviations these are.
+    `sigma_m`, `sigma_m_per_m`: standard deviation of a coordinate is sigma_m + sigma_m_per_m * range. `stand_m`: where it
+    stands, base frame. `frame_turn`: rotation vector of its own axes in the base's; measurements are in the base frame unless
+    the design says otherwise. `misplaced`: of the base frame as the tracker has it against the robot's own, about its origin;
+    see `misplaced_base`. `refraction_per_m`: bent light: a target at range r is read at r + k r^2. `scale`: a wrong wavelength.
+    The frame of the base was measured with it too, so that a target at x is read at (1 + s) x. `outliers`: share of the
+    measurements that are off by far. `outlier_sigmas`: of how many standard deviations these are.
     """
 
     sigma_m: float = 60e-6
@@ -105,16 +82,8 @@ class Tracker:
     def seen(self, position: np.ndarray, rotation: np.ndarray, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Poses as read without noise, base frame.
 
-        Parameters
-        ----------
-        position : ndarray (S, targets, 3)
-            m, base frame.
-        rotation : ndarray (S, targets, 3, 3)
-        time_s : ndarray (S,)
-
-        Returns
-        -------
-        position, rotation : ndarray (S, targets, 3), (S, targets, 3, 3)
+        `position` (S, targets, 3): m, base frame. `rotation` (S, targets, 3, 3), `time_s` (S,). Returns `position`, `rotation`
+        (S, targets, 3), (S, targets, 3, 3).
         """
         sight = position - np.array(self.stand_m)
         far = np.linalg.norm(sight, axis=-1, keepdims=True)
@@ -132,15 +101,8 @@ class Tracker:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Add noise, and outliers, to poses as seen.
 
-        Parameters
-        ----------
-        position, rotation : ndarray (S, targets, 3), (S, targets, 3, 3)
-        draws : numpy.random.Generator
-
-        Returns
-        -------
-        position, rotation, outlier : ndarray (S, targets, 3), (S, targets, 3, 3), (S, targets)
-            The last one bool.
+        `position`, `rotation` (S, targets, 3), (S, targets, 3, 3). Returns `position`, `rotation`, `outlier` (S, targets, 3),
+        (S, targets, 3, 3), (S, targets): the last one bool.
         """
         # A generator each, so that measurements that come later change none that are there.
         chance, metres, radians = draws.spawn(3)
@@ -165,12 +127,8 @@ class Tracker:
 class EccentricNest:
     """A nest of the flange's target whose centre circles twice a turn of the tool, e (cos 2 q_n, sin 2 q_n) across its axis.
 
-    Attributes
-    ----------
-    radius_m : float
-        e.
-    axis : int
-        Of the target's frame, about which the tool turns; the circle goes from the next one to the one after that.
+    `radius_m`: e. `axis`: of the target's frame, about which the tool turns; the circle goes from the next one to the one after
+    that.
     """
 
     radius_m: float
@@ -186,19 +144,11 @@ class EccentricNest:
 def rotation_vector(rotation: np.ndarray) -> np.ndarray:
     """Rotation vectors of rotation matrices by way of quaternions, rad; angles up to and at a half turn.
 
-    Quaternions by Shepperd's method [1]_.
+    Quaternions by Shepperd's method [1].
 
-    Parameters
-    ----------
-    rotation : ndarray (..., 3, 3)
+    `rotation` (..., 3, 3). Returns (..., 3).
 
-    Returns
-    -------
-    ndarray (..., 3)
-
-    References
-    ----------
-    .. [1] Shepperd, S. W., Quaternion from rotation matrix, Journal of Guidance and Control 1, 1978.
+    [1] Shepperd, S. W., Quaternion from rotation matrix, Journal of Guidance and Control 1, 1978.
     """
     r = rotation
     trace = np.trace(r, axis1=-2, axis2=-1)

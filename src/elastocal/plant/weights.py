@@ -30,16 +30,7 @@ _POSES = 64
 
 
 def declared_masses(arm: Arm) -> tuple[LinkMass, ...]:
-    """What the robot file says the links weigh, or a rule where it says nothing.
-
-    Parameters
-    ----------
-    arm : Arm
-
-    Returns
-    -------
-    tuple of LinkMass
-    """
+    """What the robot file says the links weigh, or a rule where it says nothing."""
     if arm.masses:
         return arm.masses
     total = _SCALE_KG * (arm.payload_kg * arm.reach_m) ** _POWER
@@ -67,17 +58,7 @@ def allowed_centre_std_m(mass: LinkMass, reach_m: float) -> float:
 
 
 def true_masses(masses: Iterable[LinkMass], draws: np.random.Generator) -> tuple[LinkMass, ...]:
-    """Masses and centres of one specimen, drawn about the declared ones as well as these are known.
-
-    Parameters
-    ----------
-    masses : tuple of LinkMass
-    draws : numpy.random.Generator
-
-    Returns
-    -------
-    tuple of LinkMass
-    """
+    """Masses and centres of one specimen, drawn about the declared ones as well as these are known."""
     found = []
     for mass in masses:
         heavier, *moved = np.clip(draws.standard_normal(4), -_FARTHEST, _FARTHEST)
@@ -89,17 +70,7 @@ def true_masses(masses: Iterable[LinkMass], draws: np.random.Generator) -> tuple
 def off_the_line(masses: Iterable[LinkMass], arm: Arm, largest_m: float, draws: np.random.Generator) -> tuple[LinkMass, ...]:
     """Centres moved off the lines of their links by up to a distance across each, as nobody declared.
 
-    Parameters
-    ----------
-    masses : tuple of LinkMass
-    arm : Arm
-    largest_m : float
-        Of each of the two components across the link.
-    draws : numpy.random.Generator
-
-    Returns
-    -------
-    tuple of LinkMass
+    `largest_m`: of each of the two components across the link.
     """
     found = []
     for mass in masses:
@@ -113,17 +84,7 @@ def off_the_line(masses: Iterable[LinkMass], arm: Arm, largest_m: float, draws: 
 
 
 def on_stretches(masses: Iterable[LinkMass], arm: Arm) -> tuple[Mass, ...]:
-    """The same weights as a structure has them: along the line of the stretch, and aside of it.
-
-    Parameters
-    ----------
-    masses : tuple of LinkMass
-    arm : Arm
-
-    Returns
-    -------
-    tuple of Mass
-    """
+    """The same weights as a structure has them: along the line of the stretch, and aside of it."""
     found = []
     for mass in masses:
         centre, vector = np.array(mass.centre_m), arm.stretches[mass.link].vector_m
@@ -135,18 +96,7 @@ def on_stretches(masses: Iterable[LinkMass], arm: Arm) -> tuple[Mass, ...]:
 def gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: Sequence[float], angles: np.ndarray) -> np.ndarray:
     """Torque of the links' weight on each drive, by levers.
 
-    Parameters
-    ----------
-    arm : Arm
-    masses : sequence of Mass
-    gravity_m_s2 : sequence of float
-    angles : ndarray (S, n)
-        rad.
-
-    Returns
-    -------
-    ndarray (S, n)
-        N m.
+    `angles` (S, n): rad. Returns (S, n): N m.
     """
     origin, rotation = link_frames(arm, angles)
     torque = np.zeros(angles.shape)

@@ -15,12 +15,7 @@ if TYPE_CHECKING:
 
 @cache
 def regressions() -> dict[str, Regression]:
-    """Modules of the catalogue by the name of their regression.
-
-    Returns
-    -------
-    dict of str to module
-    """
+    """Modules of the catalogue by the name of their regression."""
     names = sorted(module.name for module in pkgutil.iter_modules(elastocal.remainder.__path__))
     modules = [import_module(f"elastocal.remainder.{name}") for name in names]
     return {module.NAME: cast("Regression", module) for module in modules if hasattr(module, "NAME")}

@@ -38,16 +38,9 @@ _MOST_FOR_INTERVALS = 2_000
 class Plan:
     """How a remainder is to be regressed.
 
-    Attributes
-    ----------
-    regression : str
-        Name in `catalogue`.
-    blocks : bool
-        Whether settings and intervals come from blocks of joint space, as for poses far from those fitted; else from random
-        folds.
-    within_range : bool
-        Whether nothing is corrected at poses outside the range of those fitted.
-    seed : int
+    `regression`: name in `catalogue`. `blocks`: whether settings and intervals come from blocks of joint space, as for poses
+    far from those fitted; else from random folds. `within_range`: whether nothing is corrected at poses outside the range of
+    those fitted.
     """
 
     regression: str
@@ -60,16 +53,9 @@ class Plan:
 class Corrected:
     """What a model and a regression leave of poses that they have not seen; arrays of M.
 
-    Attributes
-    ----------
-    residual : ndarray (M, 3)
-        Measured less predicted positions, m, base axes.
-    std : ndarray (M, 3) or None
-        Standard deviation stated for them, m; None where the regression states none.
-    outside : ndarray of bool (M,)
-        Whether the pose lies outside the range of those fitted.
-    setting : dict or None
-        As chosen; None where no correction was best.
+    `residual` (M, 3): measured less predicted positions, m, base axes. `std` (M, 3): standard deviation stated for them, m;
+    None where the regression states none. `outside` (M,) of bool: whether the pose lies outside the range of those fitted.
+    `setting`: as chosen; None where no correction was best.
     """
 
     residual: np.ndarray
@@ -82,26 +68,13 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
     """Predict held-out poses by a model and a regression on what it leaves of the training poses.
 
     The regression's setting and the width of its intervals come from cross-validation of the training poses, with the model
-    fitted anew to each of its parts: nested cross-validation [1]_. Poses of another campaign have their frames and targets
+    fitted anew to each of its parts: nested cross-validation [1]. Poses of another campaign have their frames and targets
     fitted to what both leave of them.
 
-    Parameters
-    ----------
-    plan : Plan
-    fitted : Fit
-        To the training poses.
-    case : Case
-        Of the training poses.
-    held_out : Case
+    `fitted`: to the training poses. `case`: of the training poses.
 
-    Returns
-    -------
-    Corrected
-
-    References
-    ----------
-    .. [1] Varma, S. and Simon, R., Bias in error estimation when using cross-validation for model selection, BMC Bioinformatics
-       7, 2006.
+    [1] Varma, S. and Simon, R., Bias in error estimation when using cross-validation for model selection, BMC Bioinformatics 7,
+        2006.
     """
     there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
     outside, elsewhere = outside_poses(fitted, case, held_out)[there.cluster], not same_campaign(case, held_out)

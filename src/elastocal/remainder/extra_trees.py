@@ -1,8 +1,6 @@
-"""Extremely randomized trees: averages of neighbours in boxes, for whatever is not smooth [1]_.
+"""Extremely randomized trees: averages of neighbours in boxes, for whatever is not smooth [1].
 
-References
-----------
-.. [1] Geurts, P., Ernst, D. and Wehenkel, L., Extremely randomized trees, Machine Learning 63, 2006.
+[1] Geurts, P., Ernst, D. and Wehenkel, L., Extremely randomized trees, Machine Learning 63, 2006.
 """
 
 from __future__ import annotations
@@ -40,14 +38,7 @@ class _Predictor:
 def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
     """Trees for all three axes together.
 
-    Parameters
-    ----------
-    inputs, residual, settings, seed
-        As in `protocol.Regression`.
-
-    Yields
-    ------
-    Predictor
+    `inputs`, `residual`, `settings`, `seed`: as in `protocol.Regression`.
     """
     for setting in settings:
         yield _Predictor(ExtraTreesRegressor(_TREES, random_state=seed, **setting).fit(inputs.columns, residual))

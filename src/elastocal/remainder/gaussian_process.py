@@ -1,10 +1,8 @@
 """A Gaussian process: smooth in all inputs, with intervals that grow away from the poses that were measured.
 
-Its variance far from all of them is that of the residuals themselves, so that what it has not seen it calls unknown [1]_.
+Its variance far from all of them is that of the residuals themselves, so that what it has not seen it calls unknown [1].
 
-References
-----------
-.. [1] Rasmussen, C. E. and Williams, C. K. I., Gaussian Processes for Machine Learning, chapters 2 and 5, MIT Press, 2006.
+[1] Rasmussen, C. E. and Williams, C. K. I., Gaussian Processes for Machine Learning, chapters 2 and 5, MIT Press, 2006.
 """
 
 from __future__ import annotations
@@ -58,15 +56,7 @@ class _Predictor:
 def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
     """One process for all three axes, each with its own size: a Matérn kernel with a length for each input, and noise.
 
-    Parameters
-    ----------
-    inputs, residual, settings, seed
-        As in `protocol.Regression`.
-
-    Yields
-    ------
-    Predictor
-        With standard deviations.
+    `inputs`, `residual`, `settings`, `seed`: as in `protocol.Regression`. Yields with standard deviations.
     """
     draws = np.random.default_rng(seed)
     scaling = make_pipeline(VarianceThreshold(_STILL**2), StandardScaler()).fit(inputs.columns)

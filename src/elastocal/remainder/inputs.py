@@ -18,19 +18,8 @@ if TYPE_CHECKING:
 def inputs_of(model: Model, estimate: Estimate, observations: Observations, elsewhere: bool) -> Inputs:
     """Inputs of observations, from the nominal chain and the places of the targets.
 
-    Parameters
-    ----------
-    model : Model
-    estimate : Estimate
-        Says where the targets sit.
-    observations : Observations
-    elsewhere : bool
-        Whether observations of another campaign are to be predicted: time then carries nothing over.
-
-    Returns
-    -------
-    Inputs
-        Without time or temperature where they were not recorded.
+    `estimate`: says where the targets sit. `elsewhere`: whether observations of another campaign are to be predicted: time then
+    carries nothing over. Returns without time or temperature where they were not recorded.
     """
     states, chain, joints = observations.states, model.sites.chain, model.sites.joints
     coordinates = np.zeros((len(states), chain.coordinates))

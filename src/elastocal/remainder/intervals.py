@@ -21,31 +21,16 @@ NORMAL_WIDTH = 1.959964
 def calibrated(regression: Regression, setting: Setting, predictor: Predictor, parts: Iterable[Part], seed: int) -> Predictor:
     """A predictor whose standard deviations are scaled by cross-validation of the training poses.
 
-    Locally weighted conformal prediction [1]_ with the residuals of a cross-validation [2]_: a regression's own standard
+    Locally weighted conformal prediction [1] with the residuals of a cross-validation [2]: a regression's own standard
     deviations say where it is less sure, residuals of poses left out say how large these must be. What the physical model errs
     by beyond its training poses is in those residuals too.
 
-    Parameters
-    ----------
-    regression : Regression
-    setting : dict
-    predictor : Predictor
-        Fitted to all training poses.
-    parts : iterable of Part
-        Of the training poses.
-    seed : int
+    `predictor`: fitted to all training poses. `parts`: of the training poses. Returns with the same mean.
 
-    Returns
-    -------
-    Predictor
-        With the same mean.
-
-    References
-    ----------
-    .. [1] Lei, J., G'Sell, M., Rinaldo, A., Tibshirani, R. J. and Wasserman, L., Distribution-free predictive inference for
-       regression, Journal of the American Statistical Association 113, 2018.
-    .. [2] Barber, R. F., Candès, E. J., Ramdas, A. and Tibshirani, R. J., Predictive inference with the jackknife+, Annals of
-       Statistics 49, 2021.
+    [1] Lei, J., G'Sell, M., Rinaldo, A., Tibshirani, R. J. and Wasserman, L., Distribution-free predictive inference for
+        regression, Journal of the American Statistical Association 113, 2018.
+    [2] Barber, R. F., Candès, E. J., Ramdas, A. and Tibshirani, R. J., Predictive inference with the jackknife+, Annals of
+        Statistics 49, 2021.
     """
     scores = []
     for part in parts:

@@ -17,15 +17,9 @@ if TYPE_CHECKING:
 class Inputs:
     """What a regression may know of an observation; arrays of M.
 
-    Attributes
-    ----------
-    joint_angles : ndarray (M, n)
-        rad.
-    others : ndarray (M, k)
-        Wrench, place of the target in its measuring point, time and temperature, as far as the measurements have them.
-    jacobian : ndarray (M, 3, C)
-        Of the target's position with respect to the joints, first, and whatever else of the chain may be displaced: base and
-        links; base axes, m per rad or m.
+    `joint_angles` (M, n): rad. `others` (M, k): wrench, place of the target in its measuring point, time and temperature, as
+    far as the measurements have them. `jacobian` (M, 3, C): of the target's position with respect to the joints, first, and
+    whatever else of the chain may be displaced: base and links; base axes, m per rad or m.
     """
 
     joint_angles: np.ndarray
@@ -49,12 +43,8 @@ class Inputs:
 class Prediction:
     """Predicted residuals.
 
-    Attributes
-    ----------
-    mean : ndarray (M, 3)
-        m, base axes.
-    std : ndarray (M, 3) or None
-        Standard deviation of a new measurement about it; None where the regression states none.
+    `mean` (M, 3): m, base axes. `std` (M, 3): standard deviation of a new measurement about it; None where the regression
+    states none.
     """
 
     mean: np.ndarray
@@ -65,11 +55,7 @@ class Prediction:
 class Part:
     """One fold of the training poses: a regression is fitted to some and judged by the others.
 
-    Attributes
-    ----------
-    fitted, judged : Inputs
-    fitted_residual, judged_residual : ndarray (M, 3)
-        Of a model that was fitted without the poses that judge, m, base axes.
+    `fitted_residual`, `judged_residual` (M, 3): of a model that was fitted without the poses that judge, m, base axes.
     """
 
     fitted: Inputs
@@ -89,14 +75,9 @@ class Predictor(Protocol):
 class Regression(Protocol):
     """A module of this package.
 
-    Attributes
-    ----------
-    NAME : str
-        As configurations name it.
-    SETTINGS : sequence of dict
-        Among which `tuning.tuned` chooses by poses that a fit has not seen; a single one where the regression chooses itself.
-    HAS_INTERVALS : bool
-        Whether it states standard deviations; `intervals.calibrated` makes them honest.
+    `NAME`: as configurations name it. `SETTINGS`: among which `tuning.tuned` chooses by poses that a fit has not seen; a single
+    one where the regression chooses itself. `HAS_INTERVALS`: whether it states standard deviations; `intervals.calibrated`
+    makes them honest.
     """
 
     NAME: str
@@ -106,13 +87,6 @@ class Regression(Protocol):
     def fitted(self, inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
         """Fit the regression with each of some settings, in their order.
 
-        Parameters
-        ----------
-        inputs : Inputs
-        residual : ndarray (M, 3)
-            m, base axes.
-        settings : sequence of dict
-        seed : int
-            Of whatever is drawn.
+        `residual` (M, 3): m, base axes. `seed`: of whatever is drawn.
         """
         ...

@@ -1,13 +1,11 @@
 """Harmonics of each joint's angle as deviations of that joint, by ridge regression.
 
 What gears, encoders and runout can do to a joint, without saying what: a Fourier series of every joint carried to the target by
-the Jacobian, all coefficients with one penalty [1]_. What a displacement of base and links takes up may be fitted once more
-beside them, as harmonics and geometry resemble each other; that has no penalty, so it is eliminated [2]_.
+the Jacobian, all coefficients with one penalty [1]. What a displacement of base and links takes up may be fitted once more
+beside them, as harmonics and geometry resemble each other; that has no penalty, so it is eliminated [2].
 
-References
-----------
-.. [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
-.. [2] Frisch, R. and Waugh, F. V., Partial time regressions as compared with individual trends, Econometrica 1, 1933.
+[1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
+[2] Frisch, R. and Waugh, F. V., Partial time regressions as compared with individual trends, Econometrica 1, 1933.
 """
 
 from __future__ import annotations
@@ -52,14 +50,7 @@ class _Predictor:
 def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
     """Ridge regression for each number of orders and penalty; one decomposition serves all penalties.
 
-    Parameters
-    ----------
-    inputs, residual, settings, seed
-        As in `protocol.Regression`; nothing is drawn.
-
-    Yields
-    ------
-    Predictor
+    `inputs`, `residual`, `settings`, `seed`: as in `protocol.Regression`; nothing is drawn.
     """
     most, joints = max(setting["orders"] for setting in settings), inputs.joint_angles.shape[1]
     harmonics, coordinates = 2 * most * joints, inputs.jacobian.shape[2]

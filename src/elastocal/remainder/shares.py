@@ -26,25 +26,12 @@ def remainder_facts(
 ) -> dict[str, Any]:
     """Held-out errors with a regression on what the final model leaves, beside those without.
 
-    Parameters
-    ----------
-    plan : Plan
-    declared, final : Fit
-        To the training poses.
-    case : Case
-        Of the training poses.
-    held_out : Case
-    draws : numpy.random.Generator
-        Of the bootstrap over poses.
-
-    Returns
-    -------
-    dict
-        ``regression``; ``errors``, the summary of `held_out.summary` with it; ``rms_ci95_m``; of the squared error that the
-        declared model leaves the shares that effects (``physics``) and the regression (``regression_share``) explain and that
-        is ``left``; ``reduction_ci95`` of the RMS by the regression alone; ``covered``, the share of coordinates inside the
-        stated 95 % intervals, and ``half_width_m``, half of their median width within and outside the range; ``outside``, poses
-        outside the range of those fitted, at which nothing is corrected.
+    `declared`, `final`: to the training poses. `case`: of the training poses. `draws`: of the bootstrap over poses. Returns
+    ``regression``; ``errors``, the summary of `held_out.summary` with it; ``rms_ci95_m``; of the squared error that the
+    declared model leaves the shares that effects (``physics``) and the regression (``regression_share``) explain and that is
+    ``left``; ``reduction_ci95`` of the RMS by the regression alone; ``covered``, the share of coordinates inside the stated 95
+    % intervals, and ``half_width_m``, half of their median width within and outside the range; ``outside``, poses outside the
+    range of those fitted, at which nothing is corrected.
     """
     before, after = (position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (declared, final))
     found = corrected(plan, final, case, held_out)

@@ -19,11 +19,7 @@ if TYPE_CHECKING:
 class Tuned:
     """A regression with the setting that poses chose.
 
-    Attributes
-    ----------
-    predictor : Predictor
-    setting : dict or None
-        None where no correction at all was best.
+    `setting`: None where no correction at all was best.
     """
 
     predictor: Predictor
@@ -31,26 +27,12 @@ class Tuned:
 
 
 def tuned(regression: Regression, parts: Iterable[Part], inputs: Inputs, residual: np.ndarray, seed: int) -> Tuned:
-    """Choose a setting by cross-validation [1]_ and fit the regression with it.
+    """Choose a setting by cross-validation [1] and fit the regression with it.
 
-    Parameters
-    ----------
-    regression : Regression
-    parts : iterable of Part
-        Of the same training poses; not asked where there is but one setting.
-    inputs : Inputs
-    residual : ndarray (M, 3)
-        m, base axes.
-    seed : int
+    `parts`: of the same training poses; not asked where there is but one setting. `residual` (M, 3): m, base axes.
 
-    Returns
-    -------
-    Tuned
-
-    References
-    ----------
-    .. [1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical
-       Society B 36, 1974.
+    [1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical Society B
+        36, 1974.
     """
     setting = regression.SETTINGS[0]
     if len(regression.SETTINGS) > 1:

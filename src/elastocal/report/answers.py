@@ -34,23 +34,10 @@ def answers(
 ) -> dict[str, Any]:
     """Facts for the report.
 
-    Parameters
-    ----------
-    comparison, expectations, table2, per_dataset, extended, solvers : DataFrame
-        Tables of the study.
-    metrics, replicates : DataFrame
-        Long, at the noise level of the tables.
-    noisiest : DataFrame
-        Long metrics at the largest noise level.
-    titles : dict of str to str
-        Names of the robots without links, by their keys.
-    cells : dict
-        noise_um, length and classical_strategy (a name) of the tables.
-
-    Returns
-    -------
-    dict
-        JSON-serialisable; strings ready to print, lists for tables.
+    `comparison`, `expectations`, `table2`, `per_dataset`, `extended`, `solvers`: tables of the study. `metrics`, `replicates`:
+    long, at the noise level of the tables. `noisiest`: long metrics at the largest noise level. `titles`: names of the robots
+    without links, by their keys. `cells`: noise_um, length and classical_strategy (a name) of the tables. Returns
+    JSON-serialisable; strings ready to print, lists for tables.
     """
     noise_um, length, classical = cells["noise_um"], cells["length"], cells["classical_strategy"]
     judged = comparison[comparison.p_value.notna()]

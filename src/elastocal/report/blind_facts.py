@@ -55,22 +55,9 @@ class _Design(Protocol):
 def blind_facts(tables: Mapping[str, pd.DataFrame], manifest: str, size: str, seed: int) -> dict[str, Any]:
     """Facts for the report of the blind proof.
 
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        ``summary``, ``settings``, ``power``, ``undetectable``, ``confusion``, ``cases``, ``follow_up`` and
-        ``sweep`` of reports/blind/.
-    manifest : str
-        Contents of the manifest.
-    size : str
-        Of the benchmark.
-    seed : int
-        Of everything that is drawn.
-
-    Returns
-    -------
-    dict
-        JSON-serialisable; strings ready to print, lists for tables.
+    `tables`: ``summary``, ``settings``, ``power``, ``undetectable``, ``confusion``, ``cases``, ``follow_up`` and ``sweep`` of
+    reports/blind/. `manifest`: contents of the manifest. `size`: of the benchmark. `seed`: of everything that is drawn. Returns
+    JSON-serialisable; strings ready to print, lists for tables.
     """
     cases, summary = tables["cases"], tables["summary"]
     robots = leading(cases.robots)

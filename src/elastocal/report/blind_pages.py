@@ -19,15 +19,7 @@ def write_blind_report(
 ) -> None:
     """Compile the report of the blind proof; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str
-        The PDF.
-    facts : dict
-        From `blind_facts.blind_facts`.
-    figures : sequence of str
-        PDF files, named targets, reliability, power, confusion, errors, coverage and sweep.
-    origin : Origin, optional
-        Named in the foot of each page.
+    `path`: the PDF. `facts`: from `blind_facts.blind_facts`. `figures`: PDF files, named targets, reliability, power,
+    confusion, errors, coverage and sweep. `origin`: named in the foot of each page.
     """
     compile_document(path, "blind.typ", {"facts": facts}, figures, origin)

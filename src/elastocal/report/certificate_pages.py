@@ -15,13 +15,6 @@ if TYPE_CHECKING:
 def write_certificate(path: str | Path, facts: Mapping[str, Any], figures: Iterable[str]) -> None:
     """Compile a certificate; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str
-        The PDF.
-    facts : dict
-        From `certificate_words.certificate_facts`.
-    figures : iterable of str
-        PDF files, named workspace and budget.
+    `path`: the PDF. `facts`: from `certificate_words.certificate_facts`. `figures`: PDF files, named workspace and budget.
     """
     compile_document(path, "certificate.typ", {"facts": facts}, figures)

@@ -43,15 +43,7 @@ def share_name(name: str) -> str:
 def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     """Facts for the pages of a certificate.
 
-    Parameters
-    ----------
-    document : dict
-        Of `loop.certificate.certificate`.
-
-    Returns
-    -------
-    dict
-        JSON-serialisable; strings ready to print, lists for tables.
+    `document`: of `loop.certificate.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
     conformity, steps = document["conformity"], document["held_out"]
     return {

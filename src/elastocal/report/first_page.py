@@ -52,14 +52,7 @@ MOST_NAMES = 8
 def sentences(verdict: Mapping[str, Any]) -> list[str]:
     """The verdict in plain words.
 
-    Parameters
-    ----------
-    verdict : dict
-        Contents of verdict.json.
-
-    Returns
-    -------
-    list of str
+    `verdict`: contents of verdict.json.
     """
     kind, found = verdict["verdict"], verdict["effects"]
     faults = [effect for effect in found if effect["family"] == OF_DATA]
@@ -112,14 +105,7 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
 def probability_sentence(probabilities: Mapping[str, Any]) -> str:
     """The most probable hypotheses in words, with their probabilities: 94 % gravity sag of joint 2, 6 % something else.
 
-    Parameters
-    ----------
-    probabilities : dict
-        As in verdict.json.
-
-    Returns
-    -------
-    str
+    `probabilities`: as in verdict.json.
     """
     shown = [entry for entry in probabilities["sets"] if entry["probability"] >= LEAST_SHOWN][:_MOST_SHOWN]
     named = zip(shown, hypotheses_words(shown), strict=True)

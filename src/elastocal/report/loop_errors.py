@@ -76,16 +76,7 @@ def as_judged(
 ) -> list[dict[str, Any]]:
     """Rows of the splits, that of the held-out poses with the intervals that stand in the table of the steps.
 
-    Parameters
-    ----------
-    splits, steps : list of dict
-        Rows of splits.csv and before_after.csv.
-    heldout : dict
-        Of verdict.json.
-
-    Returns
-    -------
-    list of dict
+    `splits`, `steps`: rows of splits.csv and before_after.csv. `heldout`: of verdict.json.
     """
     ends = [step for step in steps if step["kind"] != "frames"]
     judged = {

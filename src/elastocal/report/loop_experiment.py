@@ -18,16 +18,7 @@ if TYPE_CHECKING:
 def experiment_facts(rows: Sequence[Mapping[str, Any]], proposal: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Table of the states proposed, angles in degrees, and the sentence that justifies them.
 
-    Parameters
-    ----------
-    rows : list of dict
-        Of next_experiment.csv.
-    proposal : dict, optional
-        Of verdict.json: ``sentence``, or the ``reason`` why nothing is proposed.
-
-    Returns
-    -------
-    dict
+    `rows`: of next_experiment.csv. `proposal`: of verdict.json: ``sentence``, or the ``reason`` why nothing is proposed.
     """
     proposal = proposal or {}
     reason = proposal.get("reason")

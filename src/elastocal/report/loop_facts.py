@@ -42,21 +42,9 @@ def loop_facts(
 ) -> dict[str, Any]:
     """Facts for the report of a campaign.
 
-    Parameters
-    ----------
-    verdict : dict
-        Contents of verdict.json.
-    steps, splits, experiment : list of dict
-        Rows of before_after.csv, splits.csv and next_experiment.csv.
-    table, parameters : dict of str to ndarray (N,)
-        Columns of the residuals and of the parameters of the final model.
-    descriptions : dict
-        Contents of campaign.json.
-
-    Returns
-    -------
-    dict
-        JSON-serialisable; strings ready to print, lists for tables.
+    `verdict`: contents of verdict.json. `steps`, `splits`, `experiment`: rows of before_after.csv, splits.csv and
+    next_experiment.csv. `table`, `parameters` (N,): columns of the residuals and of the parameters of the final model.
+    `descriptions`: contents of campaign.json. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
     faulty = any(effect["family"] == OF_DATA for effect in verdict["effects"])
     # Probabilities are then those from before the measurements.

@@ -25,14 +25,7 @@ NOISE_SOURCES = {
 def made(campaign: Mapping[str, Any]) -> str:
     """What the report is of and by: serial number and date, where the campaign states them, and the version of this program.
 
-    Parameters
-    ----------
-    campaign : dict
-        Contents of campaign.yaml.
-
-    Returns
-    -------
-    str
+    `campaign`: contents of campaign.yaml.
     """
     stated = {"serial number ": campaign.get("serial_number"), "measured on ": campaign.get("measured_on")}
     parts = [*(name + value for name, value in stated.items() if value), f"report by elastocal {__version__}"]
@@ -42,16 +35,7 @@ def made(campaign: Mapping[str, Any]) -> str:
 def measured(table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]) -> list[list[str]]:
     """Rows of what was measured: name, training, held out.
 
-    Parameters
-    ----------
-    table : dict of str to ndarray (N,)
-        Columns of the residuals table.
-    descriptions : dict
-        Contents of campaign.json.
-
-    Returns
-    -------
-    list of list of str
+    `table` (N,): columns of the residuals table. `descriptions`: contents of campaign.json.
     """
     held_out = table["held_out"].astype(bool)
     campaigns = [descriptions["campaign"], (descriptions["held_out"] or descriptions)["campaign"]]
@@ -83,15 +67,7 @@ def noise_rows(noise: Mapping[str, Any], with_orientation: bool) -> list[list[st
 def misfit_sentence(misfit: Mapping[str, float] | None) -> str:
     """What the models leave on the fitted poses, against the noise.
 
-    Parameters
-    ----------
-    misfit : dict of str to float, or None
-        Of verdict.json.
-
-    Returns
-    -------
-    str
-        Empty where nothing was fitted.
+    `misfit`: of verdict.json. Returns empty where nothing was fitted.
     """
     if not misfit:
         return ""

@@ -16,16 +16,7 @@ if TYPE_CHECKING:
 def method(verdict: Mapping[str, Any], descriptions: Mapping[str, Any]) -> dict[str, str | bool]:
     """Numbers and names that the account of the method states.
 
-    Parameters
-    ----------
-    verdict : dict
-        Contents of verdict.json.
-    descriptions : dict
-        Contents of campaign.json.
-
-    Returns
-    -------
-    dict of str to str or bool
+    `verdict`: contents of verdict.json. `descriptions`: contents of campaign.json.
     """
     other, settings = descriptions["held_out"], verdict["settings"]
     declared = descriptions["campaign"]["declared"]
@@ -56,14 +47,7 @@ def setting_rows(settings: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
 def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
     """Candidates that were not tested, one row for each effect and reason.
 
-    Parameters
-    ----------
-    untestable : dict of str to str
-        Reason by candidate.
-
-    Returns
-    -------
-    list of list of str
+    `untestable`: reason by candidate.
     """
     found: dict[tuple[str, str], list[str]] = {}
     for key, reason in untestable.items():

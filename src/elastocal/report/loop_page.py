@@ -58,25 +58,10 @@ def loop_page(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """What the page of a campaign says, and what it draws.
 
-    Parameters
-    ----------
-    facts : dict
-        From `loop_facts.loop_facts`.
-    verdict : dict
-        Contents of verdict.json.
-    table : dict of str to ndarray (N,)
-        Columns of the residuals; joint angles are the model's, as in a campaign, not the controller's.
-    candidates : dict of str to ndarray (K,)
-        Columns of the candidates table.
-    robot : Robot
-        As declared.
-
-    Returns
-    -------
-    page : dict
-        Texts and tables, worded.
-    data : dict
-        JSON-serialisable: positions (m), residuals (µm), what they may be drawn against, corners of the robot (m), hypotheses.
+    `facts`: from `loop_facts.loop_facts`. `verdict`: contents of verdict.json. `table` (N,): columns of the residuals; joint
+    angles are the model's, as in a campaign, not the controller's. `candidates` (K,): columns of the candidates table. `robot`:
+    as declared. Returns `page`: texts and tables, worded; `data`: JSON-serialisable: positions (m), residuals (µm), what they
+    may be drawn against, corners of the robot (m), hypotheses.
     """
     count = len(table["x"])
     shown = _spread(count, _MOST_SHOWN)
@@ -120,14 +105,7 @@ def loop_page(
 def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str, Any], origin: Origin | None = None) -> None:
     """Write the page of a campaign; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str
-        The HTML file.
-    page, data : dict
-        From `loop_page`.
-    origin : Origin, optional
-        Named at the foot of the page.
+    `path`: the HTML file. `page`, `data`: from `loop_page`. `origin`: named at the foot of the page.
     """
     folder = resources.files("elastocal.report")
     template, script = (folder.joinpath(name).read_text(encoding="utf-8") for name in ("loop.html", "loop.js"))

@@ -17,16 +17,8 @@ if TYPE_CHECKING:
 def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence[str], origin: Origin | None = None) -> None:
     """Compile the report of a campaign; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str
-        The PDF.
-    facts : dict
-        From `loop_facts.loop_facts`.
-    figures : sequence of str
-        PDF files, named before_after, residuals, arrows, candidates and, where there are pairs, confounding.
-    origin : Origin, optional
-        Named in the foot of each page.
+    `path`: the PDF. `facts`: from `loop_facts.loop_facts`. `figures`: PDF files, named before_after, residuals, arrows,
+    candidates and, where there are pairs, confounding. `origin`: named in the foot of each page.
     """
     names = [Path(figure).stem for figure in figures]
     compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures, origin)

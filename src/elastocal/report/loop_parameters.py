@@ -38,17 +38,8 @@ def compliance_rows(compliance: Mapping[str, Sequence[float]]) -> list[list[str]
 def other_parameters(verdict: Mapping[str, Any], parameters: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Estimates of the declared model beside the compliances, and how many there are of them, of frames and of targets.
 
-    Parameters
-    ----------
-    verdict : dict
-        Contents of verdict.json.
-    parameters : dict of str to ndarray (N,)
-        Of the final model.
-
-    Returns
-    -------
-    dict
-        ``rows`` of the table, how many more there are (``left_out``), and ``placement`` in words.
+    `verdict`: contents of verdict.json. `parameters` (N,): of the final model. Returns ``rows`` of the table, how many more
+    there are (``left_out``), and ``placement`` in words.
     """
     mine = {member for effect in verdict["effects"] for member in effect.get("members", [])}
     rows: list[list[str]] = []
@@ -81,15 +72,7 @@ def held_rows(held: Iterable[str]) -> list[list[str]]:
 def left_to_priors(parameters: Mapping[str, np.ndarray]) -> list[str]:
     """Parameters about which the measurements say hardly more than their priors.
 
-    Parameters
-    ----------
-    parameters : dict of str to ndarray (N,)
-        Of the final model.
-
-    Returns
-    -------
-    list of str
-        Owner and name, as in ``held`` of verdict.json.
+    `parameters` (N,): of the final model. Returns owner and name, as in ``held`` of verdict.json.
     """
     mine = mostly_prior(parameters["std_error"], parameters["prior_std"]) & ~parameters["held"].astype(bool)
     return [f"{owner} {name}" for owner, name in zip(parameters["owner"][mine], parameters["parameter"][mine], strict=True)]
@@ -106,12 +89,6 @@ def mostly_prior(std_error: np.ndarray, prior_std: np.ndarray) -> np.ndarray: ..
 def mostly_prior(std_error: float | np.ndarray, prior_std: float | np.ndarray) -> bool | np.ndarray:
     """Whether a standard error says hardly more than the prior's.
 
-    Parameters
-    ----------
-    std_error, prior_std : float or ndarray (N,)
-
-    Returns
-    -------
-    bool or ndarray of bool (N,)
+    `std_error`, `prior_std` (N,). Returns (N,) of bool.
     """
     return std_error > _OF_THE_PRIOR * prior_std

@@ -30,17 +30,8 @@ METRIC_NAMES = {
 def score_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
     """Every metric of every strategy with its rank.
 
-    Parameters
-    ----------
-    scores : DataFrame
-        From `ranks.ranks_table`.
-    robots : iterable of str
-
-    Returns
-    -------
-    list of dict
-        robot, strategy, and for each of `METRIC_NAMES` the score and, in brackets, its rank; a dash where the robot does not
-        reach what it is used for.
+    `scores`: from `ranks.ranks_table`. Returns robot, strategy, and for each of `METRIC_NAMES` the score and, in brackets, its
+    rank; a dash where the robot does not reach what it is used for.
     """
     rows = []
     for robot in robots:
@@ -60,15 +51,7 @@ def score_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, st
 def staged_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
     """RMS error of each strategy over that of the classical one, paired by data set.
 
-    Parameters
-    ----------
-    scores, robots
-        As in `score_rows`.
-
-    Returns
-    -------
-    list of dict
-        strategy, and for each robot the ratio with its interval.
+    `scores`, `robots`: as in `score_rows`. Returns strategy, and for each robot the ratio with its interval.
     """
     mine = scores[scores.metric == REFERENCE]
     rows = []
@@ -86,16 +69,8 @@ def staged_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, s
 def metric_summary(pairs: pd.DataFrame) -> dict[str, str]:
     """How often metrics put two estimators in the other order than the RMS error of one data set does.
 
-    Parameters
-    ----------
-    pairs : DataFrame
-        From `ranks.pairs_table`.
-
-    Returns
-    -------
-    dict
-        pairs: of different estimators; reversed_by: metrics that reverse some, with how many; never: metrics that reverse none;
-        example: the most reversed pair.
+    `pairs`: from `ranks.pairs_table`. Returns pairs: of different estimators; reversed_by: metrics that reverse some, with how
+    many; never: metrics that reverse none; example: the most reversed pair.
     """
     counts = {
         name: int(pairs.reversed[pairs.metric == name].sum()) for name in METRIC_NAMES if name in {*pairs.metric} - {REFERENCE}

@@ -23,17 +23,7 @@ def write_report(
 ) -> None:
     """Compile the report; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str
-        The PDF.
-    facts : dict
-        From `answers.answers`.
-    tables : dict of str to list of list of str
-        Rows of each table, the header first.
-    figures : iterable of str
-        PDF files; the document finds them by their names.
-    origin : Origin, optional
-        Named in the foot of each page.
+    `path`: the PDF. `facts`: from `answers.answers`. `tables`: rows of each table, the header first. `figures`: PDF files; the
+    document finds them by their names. `origin`: named in the foot of each page.
     """
     compile_document(path, "study.typ", {"facts": facts, "tables": tables}, figures, origin)

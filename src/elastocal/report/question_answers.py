@@ -29,14 +29,7 @@ _INDEX_NAMES = {
 def strategy_rows(strategies: Sequence[Strategy]) -> list[dict[str, str]]:
     """What each strategy does, stage by stage.
 
-    Parameters
-    ----------
-    strategies : sequence of Strategy
-
-    Returns
-    -------
-    list of dict
-        name, stages.
+    Returns name, stages.
     """
     rows = []
     for strategy in strategies:
@@ -51,15 +44,7 @@ def strategy_rows(strategies: Sequence[Strategy]) -> list[dict[str, str]]:
 def ladder_rows(ladder: pd.DataFrame) -> list[dict[str, str]]:
     """What joints alone leave, what the best number of link springs would, and what cross-validation chooses.
 
-    Parameters
-    ----------
-    ladder : DataFrame
-        From `question_tables.ladder_table`, of one robot.
-
-    Returns
-    -------
-    list of dict
-        noise, length, joints, best, springs, chosen.
+    `ladder`: from `question_tables.ladder_table`, of one robot. Returns noise, length, joints, best, springs, chosen.
     """
     rows = []
     for (noise, length), cell in ladder.groupby(["noise_um", "length"]):
@@ -82,18 +67,8 @@ def ladder_rows(ladder: pd.DataFrame) -> list[dict[str, str]]:
 def budget_rows(budget: pd.DataFrame, pairs: pd.DataFrame, length: int, robots: Iterable[str]) -> list[dict[str, str]]:
     """Sets of points with as many configurations and with as many measurements, the latter against the end-effector alone.
 
-    Parameters
-    ----------
-    budget, pairs : DataFrame
-        From `budget_tables`.
-    length : int
-        Configurations; the budget is twice as many measurements.
-    robots : iterable of str
-
-    Returns
-    -------
-    list of dict
-        robot, points, same, configurations, equal, ratio.
+    `budget`, `pairs`: from `budget_tables`. `length`: configurations; the budget is twice as many measurements. Returns robot,
+    points, same, configurations, equal, ratio.
     """
     rows = []
     for robot in robots:
@@ -114,17 +89,7 @@ def budget_rows(budget: pd.DataFrame, pairs: pd.DataFrame, length: int, robots: 
 def needed_rows(needed: pd.DataFrame, accuracy_um: float, robots: Iterable[str]) -> list[dict[str, str]]:
     """How many random configurations reach an accuracy.
 
-    Parameters
-    ----------
-    needed : DataFrame
-        From `budget_tables.lengths_table`.
-    accuracy_um : float
-    robots : iterable of str
-
-    Returns
-    -------
-    list of dict
-        robot, points, configurations, bound, measurements.
+    `needed`: from `budget_tables.lengths_table`. Returns robot, points, configurations, bound, measurements.
     """
     rows = []
     for row in needed[(needed.accuracy_um == accuracy_um) & needed.robot.isin([*robots])].itertuples():
@@ -144,20 +109,9 @@ def needed_rows(needed: pd.DataFrame, accuracy_um: float, robots: Iterable[str])
 def design_facts(designs: pd.DataFrame, length: int, accuracy_um: float, titles: Mapping[str, str]) -> list[dict[str, str]]:
     """What chosen configurations are worth, a dictionary for each robot.
 
-    Parameters
-    ----------
-    designs : DataFrame
-        From `question_tables.designs_table`.
-    length : int
-        Configurations at which designs are compared, where there is one of this size.
-    accuracy_um : float
-    titles : dict of str to str
-
-    Returns
-    -------
-    list of dict
-        title, random, chosen and bound (µm) at the length, gain (a factor), efficiency (percent of the bound's variance), and
-        chosen_needed: the smallest size of an I-optimal design within the accuracy.
+    `designs`: from `question_tables.designs_table`. `length`: configurations at which designs are compared, where there is one
+    of this size. Returns title, random, chosen and bound (µm) at the length, gain (a factor), efficiency (percent of the
+    bound's variance), and chosen_needed: the smallest size of an I-optimal design within the accuracy.
     """
     found = []
     for robot, title in titles.items():
@@ -183,16 +137,8 @@ def design_facts(designs: pd.DataFrame, length: int, accuracy_um: float, titles:
 def observability_rows(observability: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
     """Rank correlations of the indices, a row for each index.
 
-    Parameters
-    ----------
-    observability : DataFrame
-        From `question_tables.observability_table`.
-    robots : iterable of str
-
-    Returns
-    -------
-    list of dict
-        index and, for each robot, its correlation with the bound and with the error.
+    `observability`: from `question_tables.observability_table`. Returns index and, for each robot, its correlation with the
+    bound and with the error.
     """
     rows = []
     for index, name in _INDEX_NAMES.items():
@@ -209,16 +155,8 @@ def observability_rows(observability: pd.DataFrame, robots: Iterable[str]) -> li
 def geometry_rows(geometry: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
     """Estimators of geometry and compliances.
 
-    Parameters
-    ----------
-    geometry : DataFrame
-        From `question_tables.geometry_table`.
-    robots : iterable of str
-
-    Returns
-    -------
-    list of dict
-        robot, estimator, rms, noise, leak, compliance and zero: noise and leak.
+    `geometry`: from `question_tables.geometry_table`. Returns robot, estimator, rms, noise, leak, compliance and zero: noise
+    and leak.
     """
     rows = []
     for row in geometry[geometry.robot.isin([*robots])].itertuples():
@@ -239,16 +177,7 @@ def geometry_rows(geometry: pd.DataFrame, robots: Iterable[str]) -> list[dict[st
 def weighting_rows(weighting: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
     """What equal weights cost.
 
-    Parameters
-    ----------
-    weighting : DataFrame
-        From `question_tables.weighting_table`.
-    robots : iterable of str
-
-    Returns
-    -------
-    list of dict
-        robot, orientation, range, equal, weighted, ratio.
+    `weighting`: from `question_tables.weighting_table`. Returns robot, orientation, range, equal, weighted, ratio.
     """
     rows = []
     for row in weighting[weighting.robot.isin([*robots])].itertuples():
@@ -268,15 +197,7 @@ def weighting_rows(weighting: pd.DataFrame, robots: Iterable[str]) -> list[dict[
 def stated(settings: Mapping[str, float | Sequence[float]]) -> dict[str, str]:
     """Loads and places of the configuration as the text states them.
 
-    Parameters
-    ----------
-    settings : dict
-        Numbers, and points as lists of coordinates.
-
-    Returns
-    -------
-    dict of str to str
-        Numbers as they are, coordinates with commas between them.
+    `settings`: numbers, and points as lists of coordinates. Returns numbers as they are, coordinates with commas between them.
     """
     return {name: ", ".join(f"{value:g}" for value in np.atleast_1d(values)) for name, values in settings.items()}
 
@@ -284,17 +205,9 @@ def stated(settings: Mapping[str, float | Sequence[float]]) -> dict[str, str]:
 def place_facts(places: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[str, str]]:
     """What a second target is worth on the arm, a dictionary for each robot.
 
-    Parameters
-    ----------
-    places : DataFrame
-        From `question_tables.places_table`.
-    titles : dict of str to str
-
-    Returns
-    -------
-    list of dict
-        title, least and largest: ratios with their intervals and where; better: places significantly better than further
-        configurations; turned and fixed: largest percentages of configurations in which a target on a link is seen.
+    `places`: from `question_tables.places_table`. Returns title, least and largest: ratios with their intervals and where;
+    better: places significantly better than further configurations; turned and fixed: largest percentages of configurations in
+    which a target on a link is seen.
     """
     found = []
     for robot, title in titles.items():
@@ -317,15 +230,7 @@ def place_facts(places: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[st
 def tube_rows(tubes: pd.DataFrame) -> list[dict[str, str]]:
     """Deflections and errors by the diameter of the tubes.
 
-    Parameters
-    ----------
-    tubes : DataFrame
-        From `question_tables.tubes_table`.
-
-    Returns
-    -------
-    list of dict
-        diameter, mean, std, max, left.
+    `tubes`: from `question_tables.tubes_table`. Returns diameter, mean, std, max, left.
     """
     return [
         {
@@ -344,18 +249,10 @@ def _where(place: Any) -> str:
 def summaries(ladder: pd.DataFrame, pairs: pd.DataFrame, observability: pd.DataFrame) -> dict[str, str]:
     """What the tables say in a sentence each.
 
-    Parameters
-    ----------
-    ladder, pairs, observability : DataFrame
-        Tables of these names.
-
-    Returns
-    -------
-    dict
-        excess_median and excess_largest: percent by which cross-validation's choice leaves more than the best number of link
-        springs; sets, worse, least and largest: of the ratios to the first set of points at equal measurements, worse those
-        whose interval lies above one; best_index: the index whose correlation with the bound is most negative over the
-        robots; condition: that of O2.
+    `ladder`, `pairs`, `observability`: tables of these names. Returns excess_median and excess_largest: percent by which
+    cross-validation's choice leaves more than the best number of link springs; sets, worse, least and largest: of the ratios to
+    the first set of points at equal measurements, worse those whose interval lies above one; best_index: the index whose
+    correlation with the bound is most negative over the robots; condition: that of O2.
     """
     excess = []
     for _, cell in ladder.groupby(["robot", "noise_um", "length"]):

@@ -25,18 +25,9 @@ def compile_document(
 ) -> None:
     """Compile a document; the PDF appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str
-        The PDF.
-    document : str
-        File name of the document in this folder.
-    data : dict of str to object
-        JSON-serialisable contents of the files ``<name>.json`` that the document reads.
-    figures : iterable of str
-        PDF files; the document finds them by their names.
-    origin : Origin, optional
-        What the document shows in its foot and has in its metadata: the contents of ``origin.json``, empty without.
+    `path`: the PDF. `document`: file name of the document in this folder. `data`: JSON-serialisable contents of the files
+    ``<name>.json`` that the document reads. `figures`: PDF files; the document finds them by their names. `origin`: what the
+    document shows in its foot and has in its metadata: the contents of ``origin.json``, empty without.
     """
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / document

@@ -62,15 +62,7 @@ def grouped(number: int) -> str:
 def members_words(keys: Iterable[str], most: int = 12) -> str:
     """What an effect was found as: its joints or links and variants, those of one joint together.
 
-    Parameters
-    ----------
-    keys : sequence of str
-        Keys of candidates of one effect.
-    most : int
-
-    Returns
-    -------
-    str
+    `keys`: keys of candidates of one effect.
     """
     details: dict[tuple[str, tuple[int, ...]], list[str]] = {}
     for key in sorted(keys, key=_natural):
@@ -129,17 +121,7 @@ def probability_words(probability: float) -> str:
 def scaled(value: float, error: float | None, unit: str) -> tuple[str, str]:
     """A value with its standard error in a unit that suits it.
 
-    Parameters
-    ----------
-    value : float
-    error : float or None
-        Two of its digits are given; none where it is not known or zero.
-    unit : str
-        As in the tables: rad/(N m), 1 for none.
-
-    Returns
-    -------
-    number, unit : str
+    `error`: two of its digits are given; none where it is not known or zero. `unit`: as in the tables: rad/(N m), 1 for none.
     """
     factor, shown = _unit(value, unit)
     number, error = factor * value, factor * error if error else 0.0

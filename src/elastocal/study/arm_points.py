@@ -25,17 +25,9 @@ _SHARES = (0.25, 0.5, 0.75)
 class Place:
     """Where a target sits and which way it looks.
 
-    Attributes
-    ----------
-    point : MeasuringPoint
-    joints : int
-        How many joints move it.
-    along_m : float
-        Way from the base along the chain.
-    side : str
-        Of the link, as "+y"; or `FLANGE`, or `BAR` and the side to which a bar on the flange stands out.
-    normal : tuple of float
-        Direction in which it looks, in the frame of the point.
+    `joints`: how many joints move it. `along_m`: way from the base along the chain. `side`: of the link, as "+y"; or `FLANGE`,
+    or `BAR` and the side to which a bar on the flange stands out. `normal`: direction in which it looks, in the frame of the
+    point.
     """
 
     point: MeasuringPoint
@@ -48,16 +40,7 @@ class Place:
 def places(chain: Chain, radius_m: float, bar_m: float) -> list[Place]:
     """Targets on every side of the links that a joint moves, on the flange, and on a bar that stands out from it.
 
-    Parameters
-    ----------
-    chain : Chain
-    radius_m : float
-        From the axis of a link to its surface; links no longer than this have no place of their own.
-    bar_m : float
-
-    Returns
-    -------
-    list of Place
+    `radius_m`: from the axis of a link to its surface; links no longer than this have no place of their own.
     """
     found, joints, along = list[Place](), 0, 0.0
     for index, transform in enumerate(chain.transforms):
@@ -89,28 +72,13 @@ def in_sight(
     radius_m: float,
     acceptance_deg: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Whether a target looks towards the tracker and no link stands between, by capsules about the links [1]_.
+    """Whether a target looks towards the tracker and no link stands between, by capsules about the links [1].
 
-    Parameters
-    ----------
-    chain : Chain
-    joint_angles : ndarray (N, n)
-    place : Place
-    tracker_m : sequence of float
-        Base axes.
-    radius_m : float
-        Of the links.
-    acceptance_deg : float
-        Half angle within which a reflector that nobody turns gives its beam back.
+    `joint_angles` (N, n). `tracker_m`: base axes. `radius_m`: of the links. `acceptance_deg`: half angle within which a
+    reflector that nobody turns gives its beam back. Returns `turned`, `fixed` (N,) of bool: for a reflector that somebody turns
+    to the tracker in every configuration, and for one that stays as it is.
 
-    Returns
-    -------
-    turned, fixed : ndarray of bool (N,)
-        For a reflector that somebody turns to the tracker in every configuration, and for one that stays as it is.
-
-    References
-    ----------
-    .. [1] Ericson, C., Real-Time Collision Detection, section 5.1, Morgan Kaufmann, 2005.
+    [1] Ericson, C., Real-Time Collision Detection, section 5.1, Morgan Kaufmann, 2005.
     """
     position, rotation = poses(chain, joint_angles, place.point)
     beam = np.array(tracker_m) - position

@@ -15,24 +15,13 @@ if TYPE_CHECKING:
 def bootstrap_weights(seed: int, key: str, data_sets: Sequence[int] | np.ndarray, replicates: int) -> np.ndarray:
     """How often each data set counts in each replicate: once in replicate 0, Poisson(1) times in the others.
 
-    The Poisson bootstrap [1]_, whose independent weights of mean one do not need to know how many data sets there are. They are
+    The Poisson bootstrap [1], whose independent weights of mean one do not need to know how many data sets there are. They are
     the same for every noise level and strategy, so that replicates of two of them may be compared one by one.
 
-    Parameters
-    ----------
-    seed, key
-        As in `random_streams.stream`.
-    data_sets : sequence of int
-    replicates : int
+    `seed`, `key`: as in `random_streams.stream`. Returns (1 + replicates, sets).
 
-    Returns
-    -------
-    ndarray (1 + replicates, sets)
-
-    References
-    ----------
-    .. [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using Poisson frequencies, Computer
-       Methods and Programs in Biomedicine 83, 2006.
+    [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using Poisson frequencies, Computer Methods
+        and Programs in Biomedicine 83, 2006.
     """
     counts = draw(seed, key, "bootstrap", data_sets, lambda stream: stream.poisson(1.0, replicates))
     return np.vstack([np.ones(len(counts)), counts.T])
@@ -41,15 +30,7 @@ def bootstrap_weights(seed: int, key: str, data_sets: Sequence[int] | np.ndarray
 def bootstrap_test_weights(seed: int, key: str, tests: int, replicates: int) -> np.ndarray:
     """How often each test configuration counts in each replicate, as `bootstrap_weights` for data sets.
 
-    Parameters
-    ----------
-    seed, key, replicates
-        As in `bootstrap_weights`.
-    tests : int
-
-    Returns
-    -------
-    ndarray (1 + replicates, tests)
+    `seed`, `key`, `replicates`: as in `bootstrap_weights`. Returns (1 + replicates, tests).
     """
     counts = draw(seed, key, "bootstrap of tests", [0], lambda stream: stream.poisson(1.0, (replicates, tests)))[0]
     return np.vstack([np.ones(tests), counts])

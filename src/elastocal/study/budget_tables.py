@@ -23,20 +23,9 @@ _QUANTILE = 1.96
 def budget_table(frames: Mapping[str, pd.DataFrame], point_sets: Mapping[str, Sequence[str]], length: int) -> pd.DataFrame:
     """Error of one data set by set of points: with as many configurations, and with as many measurements.
 
-    Parameters
-    ----------
-    frames : dict of str to DataFrame
-        The budget table of each robot.
-    point_sets : dict of str to sequence of str
-        Measuring points by the names of sets.
-    length : int
-        Configurations; the budget is twice as many measurements.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, points, measurements_per_configuration, configurations, crlb_rms_um, rms_um, std_error_um; without rows that
-        would take longer data sets.
+    `frames`: the budget table of each robot. `point_sets`: measuring points by the names of sets. `length`: configurations; the
+    budget is twice as many measurements. Returns robot, points, measurements_per_configuration, configurations, crlb_rms_um,
+    rms_um, std_error_um; without rows that would take longer data sets.
     """
     rows = []
     for robot, frame in frames.items():
@@ -63,16 +52,8 @@ def budget_table(frames: Mapping[str, pd.DataFrame], point_sets: Mapping[str, Se
 def paired_table(frames: Mapping[str, pd.DataFrame], point_sets: Mapping[str, Sequence[str]], length: int) -> pd.DataFrame:
     """Sets of points against the first one, at a budget of twice `length` measurements, paired by data set.
 
-    Parameters
-    ----------
-    frames, point_sets, length
-        As in `budget_table`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, points, against, measurements, configurations, configurations_against, difference_um with its standard error,
-        ratio with its 95 % interval, ratio_low and ratio_high.
+    `frames`, `point_sets`, `length`: as in `budget_table`. Returns robot, points, against, measurements, configurations,
+    configurations_against, difference_um with its standard error, ratio with its 95 % interval, ratio_low and ratio_high.
     """
     rows = []
     against = next(iter(point_sets))
@@ -112,17 +93,9 @@ def lengths_table(
 ) -> pd.DataFrame:
     """How many random configurations bring the error of one data set to a wanted accuracy; every length is looked at.
 
-    Parameters
-    ----------
-    frames, point_sets
-        As in `budget_table`.
-    accuracies_um : sequence of float
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, points, accuracy_um, configurations with their 95 % interval (configurations_low, configurations_high),
-        configurations_by_bound, measurements; infinite where the longest data set does not reach it.
+    `frames`, `point_sets`: as in `budget_table`. Returns robot, points, accuracy_um, configurations with their 95 % interval
+    (configurations_low, configurations_high), configurations_by_bound, measurements; infinite where the longest data set does
+    not reach it.
     """
     rows = []
     for robot, frame in frames.items():
@@ -150,13 +123,7 @@ def lengths_table(
 def root_mean(squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Root of the mean over data sets with its standard error by the delta method.
 
-    Parameters
-    ----------
-    squares : ndarray (sets, ...)
-
-    Returns
-    -------
-    root, std_error : ndarray (...)
+    `squares` (sets, ...). Returns `root`, `std_error` (...).
     """
     root = np.sqrt(squares.mean(axis=0))
     return root, squares.std(axis=0, ddof=1) / np.sqrt(len(squares)) / (2 * root)
@@ -165,14 +132,7 @@ def root_mean(squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def ratio_of_roots(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float, float]:
     """Ratio of two root mean squares over the same data sets with its 95 % interval, by the delta method.
 
-    Parameters
-    ----------
-    ours, theirs : ndarray (sets,)
-        Mean squares, of one data set at one place.
-
-    Returns
-    -------
-    ratio, low, high : float
+    `ours`, `theirs` (sets,): mean squares, of one data set at one place.
     """
     ratio = float(np.sqrt(ours.mean() / theirs.mean()))
     relative = (ours / ours.mean() - theirs / theirs.mean()) / 2

@@ -22,19 +22,9 @@ _TABLE4 = {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}
 class OurResults:
     """Everything that a printed figure may be compared with.
 
-    Attributes
-    ----------
-    tables : dict of str to DataFrame
-        table1 .. table4 and extended.
-    metrics, replicates : DataFrame
-        Long; of all robots and strategies.
-    noise_um : float
-    length : int
-        Noise level and data set length of the tables.
-    studies : DataFrame
-        robot and the columns of `table_schemas.repeated`: further studies of the same size.
-    initial : dict of str to DataFrame
-        The initial table of each robot.
+    `tables`: table1 .. table4 and extended. `metrics`, `replicates`: long; of all robots and strategies. `length`: noise level
+    and data set length of the tables. `studies`: robot and the columns of `table_schemas.repeated`: further studies of the same
+    size. `initial`: the initial table of each robot.
     """
 
     tables: dict[str, pd.DataFrame]
@@ -60,20 +50,11 @@ class _PrintedFigure(NamedTuple):
 def comparison_table(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
     """One row for each figure that the paper prints.
 
-    Parameters
-    ----------
-    reference : DataFrame
-        table, robot, strategy, quantity, unit, value as printed; empty strings where a figure belongs to none.
-    ours : OurResults
-
-    Returns
-    -------
-    pandas.DataFrame
-        table, robot, strategy, quantity, unit, paper, ours, mc_std, z, interpretation: `mc_std` is the standard deviation
-        between studies of this size, by bootstrap over data sets and test configurations; z = (ours - paper) / mc_std, empty
-        where one is missing. studies_mean, studies_std, p_value, p_holm: of further studies for Tables 3 and 4, of single data
-        sets for Table 2, see `printed`; without a p value where the study was fitted to the figure. What the study does not
-        cover is empty.
+    `reference`: table, robot, strategy, quantity, unit, value as printed; empty strings where a figure belongs to none. Returns
+    table, robot, strategy, quantity, unit, paper, ours, mc_std, z, interpretation: `mc_std` is the standard deviation between
+    studies of this size, by bootstrap over data sets and test configurations; z = (ours - paper) / mc_std, empty where one is
+    missing. studies_mean, studies_std, p_value, p_holm: of further studies for Tables 3 and 4, of single data sets for Table 2,
+    see `printed`; without a p value where the study was fitted to the figure. What the study does not cover is empty.
     """
     rows = []
     printed = reference[[*_PrintedFigure._fields]].itertuples(index=False, name=None)

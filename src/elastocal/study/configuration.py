@@ -26,14 +26,8 @@ _SIMULATED = ("joint_limits_deg", "compliance_urad_per_Nm")
 class Study:
     """A configuration that holds together.
 
-    Attributes
-    ----------
-    robots, strategies : dict of str to dict
-        Documents by the names of their files.
-    points : dict of str to tuple of str
-        Measuring points that each strategy reads.
-    end_effectors : dict of str to str
-        Last measuring point of each robot.
+    `robots`, `strategies`: documents by the names of their files. `points`: measuring points that each strategy reads.
+    `end_effectors`: last measuring point of each robot.
     """
 
     robots: dict[str, dict[str, Any]]
@@ -45,22 +39,8 @@ class Study:
 def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> Study:
     """Read the robots and strategies that a configuration names and check everything against everything.
 
-    Parameters
-    ----------
-    config : dict
-    folder : str or Path
-        Holds ``robots/`` and ``strategies/``.
-    source : str
-        File of the configuration, named in errors.
-
-    Returns
-    -------
-    Study
-
-    Raises
-    ------
-    InputError
-        The first fault found.
+    `folder`: holds ``robots/`` and ``strategies/``. `source`: file of the configuration, named in errors. Raises `InputError`:
+    the first fault found.
     """
     check_document(config, "config", source)
     robots = {name: named_document(folder, "robots", "robot", name, source) for name in config["robots"]}
@@ -108,20 +88,8 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
 def with_overrides(config: Mapping[str, Any], entries: Iterable[str]) -> dict[str, Any]:
     """A configuration with keys changed on the command line, numbers read as in the file.
 
-    Parameters
-    ----------
-    config : dict
-    entries : iterable of str
-        ``key=value``; a value that is a mapping changes some keys of a mapping.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    InputError
-        A value that is no YAML.
+    `entries`: ``key=value``; a value that is a mapping changes some keys of a mapping. Raises `InputError`: a value that is no
+    YAML.
     """
     changed = dict(config)
     for key, _, text in (entry.partition("=") for entry in entries):

@@ -27,15 +27,8 @@ _RANDOM_DESIGNS = 400
 class Worth:
     """RMS error that designs of one kind and size leave, m.
 
-    Attributes
-    ----------
-    kind : str
-        One of `CRITERIA`, `RANDOM` or `CONTINUOUS`.
-    configurations : int
-    rms : float
-        Of random designs, the root of the mean square.
-    low, high : float
-        5 and 95 % of random designs; else as `rms`.
+    `kind`: one of `CRITERIA`, `RANDOM` or `CONTINUOUS`. `rms`: of random designs, the root of the mean square. `low`, `high`: 5
+    and 95 % of random designs; else as `rms`.
     """
 
     kind: str
@@ -48,19 +41,9 @@ class Worth:
 def worths(rows: np.ndarray, accuracy_rows: np.ndarray, sizes: Sequence[int], draws: np.random.Generator) -> list[Worth]:
     """Random, chosen and best possible designs.
 
-    Parameters
-    ----------
-    rows : ndarray (N, rows, n)
-        Regressors of the candidates over the noise, in plausible sizes of the compliances.
-    accuracy_rows : ndarray (tests, 3, n)
-        Of the end-effector position where the robot shall be accurate, m per plausible size.
-    sizes : sequence of int
-        Configurations of a design.
-    draws : numpy.random.Generator
-
-    Returns
-    -------
-    list of Worth
+    `rows` (N, rows, n): regressors of the candidates over the noise, in plausible sizes of the compliances. `accuracy_rows`
+    (tests, 3, n): of the end-effector position where the robot shall be accurate, m per plausible size. `sizes`: configurations
+    of a design.
     """
     weight = mean_squares(accuracy_rows)
     exact = Criterion(weight)

@@ -33,15 +33,9 @@ LARGEST_TRUSTED_SPREAD = 0.25
 class Averages:
     """Averages over data sets, replicate 0 with every data set once, the others with bootstrap weights.
 
-    Attributes
-    ----------
-    compliance : ndarray (1 + replicates, lengths, n)
-        Inverse of the averaged stiffness, rad/(N m).
-    deviation : ndarray (1 + replicates, lengths)
-        Equation 15, m.
-    initial_deviation : ndarray (1 + replicates, lengths)
-        The same without any model; it does not depend on the length.
-    nonpositive_share, relative_spread : ndarray (lengths,)
+    `compliance` (1 + replicates, lengths, n): inverse of the averaged stiffness, rad/(N m). `deviation` (1 + replicates,
+    lengths): Equation 15, m. `initial_deviation` (1 + replicates, lengths): the same without any model; it does not depend on
+    the length. `nonpositive_share`, `relative_spread` (lengths,).
     """
 
     compliance: np.ndarray
@@ -57,28 +51,15 @@ def average(
     """Average the estimates over data sets (equation 12) and score the averaged model (equation 15).
 
     A replicate multiplies weights of data sets by independent weights of test configurations: the product-weight bootstrap of
-    crossed factors [1]_.
+    crossed factors [1].
 
-    Parameters
-    ----------
-    blocks : iterable of (compliance, weights)
-        Compliances (sets, lengths, n) and bootstrap weights (1 + replicates, sets).
-    judge : Judge
-    method : {"stiffness", "compliance", "median"}
-        What is averaged: 1/c or c, by its mean; or the median of c (interpretation R7).
-    deviation_of : {"averaged_model", "each_data_set"}
-        Whether equation 15 scores the averaged model or averages the scores of the data sets (interpretation R8).
-    test_weights : ndarray (1 + replicates, tests)
-        From `bootstrap.bootstrap_test_weights`: the error of equation 15 is one over data sets and over test configurations.
-        Where each data set is scored, the deviation has the weights of data sets alone.
+    `blocks` (compliance, weights): compliances (sets, lengths, n) and bootstrap weights (1 + replicates, sets). `method`: what
+    is averaged: 1/c or c, by its mean; or the median of c (interpretation R7). `deviation_of`: whether equation 15 scores the
+    averaged model or averages the scores of the data sets (interpretation R8). `test_weights` (1 + replicates, tests): from
+    `bootstrap.bootstrap_test_weights`: the error of equation 15 is one over data sets and over test configurations. Where each
+    data set is scored, the deviation has the weights of data sets alone.
 
-    Returns
-    -------
-    Averages
-
-    References
-    ----------
-    .. [1] Owen, A. B. and Eckles, D., Bootstrapping data arrays of arbitrary order, Annals of Applied Statistics 6, 2012.
+    [1] Owen, A. B. and Eckles, D., Bootstrapping data arrays of arbitrary order, Annals of Applied Statistics 6, 2012.
     """
     if method == "median":
         compliances, weights = zip(*blocks, strict=True)
@@ -112,15 +93,7 @@ def average(
 def metrics_table(averages: Averages, true_compliance: np.ndarray, first_stage_joints: Sequence[int]) -> dict[str, np.ndarray]:
     """Columns of the metrics table, one row for each length, from `average`.
 
-    Parameters
-    ----------
-    averages : Averages
-    true_compliance : ndarray (n,)
-    first_stage_joints : sequence of int
-
-    Returns
-    -------
-    dict of str to ndarray
+    `true_compliance` (n,).
     """
     replicated = {}
     relative = relative_stiffness_error(averages.compliance, true_compliance)
@@ -142,14 +115,7 @@ def replicates_table(
 ) -> dict[str, np.ndarray]:
     """Columns of the replicates table: the scores of every bootstrap replicate at every length.
 
-    Parameters
-    ----------
-    averages, true_compliance, first_stage_joints
-        As in `metrics_table`.
-
-    Returns
-    -------
-    dict of str to ndarray
+    `averages`, `true_compliance`, `first_stage_joints`: as in `metrics_table`.
     """
     replicates, lengths = averages.deviation[1:].shape
     table = {
@@ -163,17 +129,9 @@ def replicates_table(
 def accuracy_sums(compliance: np.ndarray, judge: Judge) -> np.ndarray:
     """What one data set gives, summed over the data sets of a block: add the sums of blocks for `accuracy_table`.
 
-    Parameters
-    ----------
-    compliance : ndarray (sets, lengths, n)
-        rad/(N m), of the lengths to evaluate.
-    judge : Judge
-
-    Returns
-    -------
-    ndarray (3, lengths, 4 + n)
-        Number of data sets, sum and sum of squares of: mean (m), mean square (m^2), 95th percentile and largest (m) of the
-        position error over the test configurations, squared relative error of each compliance.
+    `compliance` (sets, lengths, n): rad/(N m), of the lengths to evaluate. Returns (3, lengths, 4 + n): number of data sets,
+    sum and sum of squares of: mean (m), mean square (m^2), 95th percentile and largest (m) of the position error over the test
+    configurations, squared relative error of each compliance.
     """
     sets, lengths, _ = compliance.shape
     single = np.empty((sets, lengths, 4))
@@ -188,16 +146,7 @@ def accuracy_table(sums: np.ndarray, lengths: Sequence[int]) -> dict[str, np.nda
 
     Standard errors of roots are by the delta method.
 
-    Parameters
-    ----------
-    sums : ndarray (3, lengths, 4 + n)
-        From `accuracy_sums`, of all data sets.
-    lengths : sequence of int
-        Data set lengths that they stand for.
-
-    Returns
-    -------
-    dict of str to ndarray
+    `sums` (3, lengths, 4 + n): from `accuracy_sums`, of all data sets. `lengths`: data set lengths that they stand for.
     """
     sets, (mean, second) = sums[0, 0, 0], sums[1:] / sums[0]
     error = np.sqrt(np.maximum(second - mean**2, 0.0) / max(sets - 1, 1))
@@ -217,17 +166,9 @@ def accuracy_table(sums: np.ndarray, lengths: Sequence[int]) -> dict[str, np.nda
 def reached_length(values: np.ndarray, replicate_values: np.ndarray, limit: float) -> tuple[float, float]:
     """First length at which a metric is at most `limit`, with its Monte Carlo standard error.
 
-    Parameters
-    ----------
-    values : ndarray (lengths,)
-    replicate_values : ndarray (replicates, lengths)
-    limit : float
-
-    Returns
-    -------
-    length, std_error : float
-        The length is infinite where it is not reached; replicates that do not reach it are continued, see
-        `metrics.length_to_reach`, since leaving them out would make the error too small.
+    `values` (lengths,), `replicate_values` (replicates, lengths). Returns `length`, `std_error`: the length is infinite where
+    it is not reached; replicates that do not reach it are continued, see `metrics.length_to_reach`, since leaving them out
+    would make the error too small.
     """
     return float(first_length_below(values, limit)), float(np.std(length_to_reach(replicate_values, limit), ddof=1))
 

@@ -1,13 +1,11 @@
 """What the scores of a study are expected to be, in closed form to second order; no simulation.
 
 Let an unbiased estimate of a compliance be normal with mean c and standard deviation s. A Taylor series gives the mean of its
-inverse (the delta method to second order [1]_), E[1/c_hat] = (1 + s^2/c^2 + 3 s^4/c^4 + ...) / c, so that the averaged
+inverse (the delta method to second order [1]), E[1/c_hat] = (1 + s^2/c^2 + 3 s^4/c^4 + ...) / c, so that the averaged
 stiffness is too large by delta_k = s^2 / c^2, however many data sets there are. s^2 falls as one over the number of
 configurations, and with it every score of the averaged model.
 
-References
-----------
-.. [1] Casella, G. and Berger, R. L., Statistical Inference, section 5.5.4, 2nd edition, Duxbury, 2002.
+[1] Casella, G. and Berger, R. L., Statistical Inference, section 5.5.4, 2nd edition, Duxbury, 2002.
 """
 
 from __future__ import annotations
@@ -26,18 +24,9 @@ if TYPE_CHECKING:
 def expected_compliance(noise_free: np.ndarray, variance: np.ndarray, method: str) -> np.ndarray:
     """Expected compliance of the averaged model (equation 12).
 
-    Parameters
-    ----------
-    noise_free : ndarray (..., n)
-        Estimates without noise, which the linearisation alone takes off the truth, rad/(N m).
-    variance : ndarray (..., n)
-        Of the estimates, mean over data sets.
-    method : {"stiffness", "compliance", "median"}
-        What is averaged (interpretation R7); the mean and the median of a normal estimate have no bias.
-
-    Returns
-    -------
-    ndarray (..., n)
+    `noise_free` (..., n): estimates without noise, which the linearisation alone takes off the truth, rad/(N m). `variance`
+    (..., n): of the estimates, mean over data sets. `method`: what is averaged (interpretation R7); the mean and the median of
+    a normal estimate have no bias. Returns (..., n).
     """
     return noise_free / (1.0 + variance / noise_free**2) if method == "stiffness" else noise_free
 
@@ -46,26 +35,14 @@ def expected_deviation(judge: Judge, compliance: np.ndarray, covariance: np.ndar
     """Expected position error of a model whose compliances are normal, mean over the test configurations.
 
     The squared error is a quadratic form in normal variables; its square root has the mean that it has under the gamma
-    distribution of the same mean and variance [1]_, [2]_, which is exact where one direction dominates and in the limit of no
+    distribution of the same mean and variance [1], [2], which is exact where one direction dominates and in the limit of no
     scatter.
 
-    Parameters
-    ----------
-    judge : Judge
-    compliance : ndarray (L, n)
-        Mean.
-    covariance : ndarray (L, n, n)
+    `compliance` (L, n): mean. `covariance` (L, n, n). Returns (L,): m.
 
-    Returns
-    -------
-    ndarray (L,)
-        m.
-
-    References
-    ----------
-    .. [1] Satterthwaite, F. E., An approximate distribution of estimates of variance components, Biometrics Bulletin 2, 1946.
-    .. [2] Box, G. E. P., Some theorems on quadratic forms applied in the study of analysis of variance problems I, Annals of
-       Mathematical Statistics 25, 1954.
+    [1] Satterthwaite, F. E., An approximate distribution of estimates of variance components, Biometrics Bulletin 2, 1946.
+    [2] Box, G. E. P., Some theorems on quadratic forms applied in the study of analysis of variance problems I, Annals of
+        Mathematical Statistics 25, 1954.
     """
     forms = error_forms(judge)
     inner = forms[:, :-1, :-1]

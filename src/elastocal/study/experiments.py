@@ -9,12 +9,7 @@ import numpy as np
 class Experiments:
     """Loaded configurations of a robot.
 
-    Attributes
-    ----------
-    joint_angles : ndarray (sets, configurations, n)
-        rad.
-    wrench : ndarray (sets, configurations, 6)
-        N, N m at the end-effector, base axes.
+    `joint_angles` (sets, configurations, n): rad. `wrench` (sets, configurations, 6): N, N m at the end-effector, base axes.
     """
 
     joint_angles: np.ndarray

@@ -2,14 +2,12 @@
 
 Only an iterative solver gives a meaning to a strategy that "uses the estimate as initial condition".
 
-Steps are whole ones, each by the normal equations of the problem linearised at the last estimate [1]_; a rotation vector moves
-by Bortz's equation, to first order in the vector [2]_.
+Steps are whole ones, each by the normal equations of the problem linearised at the last estimate [1]; a rotation vector moves
+by Bortz's equation, to first order in the vector [2].
 
-References
-----------
-.. [1] Björck, Å., Numerical Methods for Least Squares Problems, SIAM, 1996.
-.. [2] Bortz, J. E., A new mathematical formulation for strapdown inertial navigation, IEEE Transactions on Aerospace and
-   Electronic Systems AES-7, 1971.
+[1] Björck, Å., Numerical Methods for Least Squares Problems, SIAM, 1996.
+[2] Bortz, J. E., A new mathematical formulation for strapdown inertial navigation, IEEE Transactions on Aerospace and
+    Electronic Systems AES-7, 1971.
 """
 
 from __future__ import annotations
@@ -45,25 +43,11 @@ def identify_exactly(
 ) -> np.ndarray:
     """Compliances by a strategy with the exact kinematics, for some prefix lengths of every data set.
 
-    Parameters
-    ----------
-    strategy : Strategy
-    chain : Chain
-    joint_angles : ndarray (configurations, sets, n)
-        rad.
-    torques : dict of str to ndarray (configurations, sets, n)
-        Joint torques behind the measurements of each point, N m.
-    deflections : dict of str to ndarray (configurations, sets, rows)
-        Measured deflection of each point, m and, where there are six rows, rad.
-    start : ndarray (n,)
-        Where joints start that no earlier stage has estimated, rad/(N m).
-    lengths : sequence of int
-        Prefix lengths to solve.
-
-    Returns
-    -------
-    ndarray (lengths, n, sets)
-        rad/(N m); not a number where the steps of a data set do not settle, as in very short prefixes near a singularity.
+    `joint_angles` (configurations, sets, n): rad. `torques` (configurations, sets, n): joint torques behind the measurements of
+    each point, N m. `deflections` (configurations, sets, rows): measured deflection of each point, m and, where there are six
+    rows, rad. `start` (n,): where joints start that no earlier stage has estimated, rad/(N m). `lengths`: prefix lengths to
+    solve. Returns (lengths, n, sets): rad/(N m); not a number where the steps of a data set do not settle, as in very short
+    prefixes near a singularity.
     """
     sets, joints = joint_angles.shape[1:]
     solved = np.empty((len(lengths), joints, sets))

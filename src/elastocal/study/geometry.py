@@ -30,14 +30,9 @@ _ROUNDING = 1e-9
 class Quality:
     """How well an estimator does, mean over data sets.
 
-    Attributes
-    ----------
-    noise, leak : float
-        RMS of the predicted loaded position, m: by noise, and by what the estimator leaves out or takes for something else.
-    compliance_noise, compliance_leak : ndarray (n,)
-        Standard deviation and root mean square leak of the compliances, of their true values.
-    zero_noise, zero_leak : ndarray (n,)
-        Of the joint zeros, rad.
+    `noise`, `leak`: RMS of the predicted loaded position, m: by noise, and by what the estimator leaves out or takes for
+    something else. `compliance_noise`, `compliance_leak` (n,): standard deviation and root mean square leak of the compliances,
+    of their true values. `zero_noise`, `zero_leak` (n,): of the joint zeros, rad.
     """
 
     noise: float
@@ -51,15 +46,7 @@ class Quality:
 def geometry_columns(chain: Chain, joint_angles: np.ndarray) -> np.ndarray:
     """Sensitivities of the end-effector's pose to joint zeros and to the lengths of the chain.
 
-    Parameters
-    ----------
-    chain : Chain
-    joint_angles : ndarray (..., n)
-
-    Returns
-    -------
-    ndarray (..., 6, n + L)
-        Per rad, and per m for each fixed translation that is not zero.
+    `joint_angles` (..., n). Returns (..., 6, n + L): per rad, and per m for each fixed translation that is not zero.
     """
     lengths = {
         number + 1: [("T", transform.axis)]
@@ -82,24 +69,10 @@ def qualities(
 ) -> dict[str, Quality]:
     """Noise and leak of every estimator.
 
-    Parameters
-    ----------
-    geometry : ndarray (sets, rows, G)
-        Columns of the joint zeros first.
-    elasticity : ndarray (sets, rows, n)
-        Of the loaded poses in the same configurations.
-    noise : float
-        Standard deviation of every row.
-    compliance : ndarray (n,)
-        True ones.
-    geometry_std : ndarray (G,)
-        Of the errors of geometry, of mean zero.
-    moment : ndarray (G + n, G + n)
-        Mean product of the sensitivities of the loaded position where the robot shall be accurate.
-
-    Returns
-    -------
-    dict of str to Quality
+    `geometry` (sets, rows, G): columns of the joint zeros first. `elasticity` (sets, rows, n): of the loaded poses in the same
+    configurations. `noise`: standard deviation of every row. `compliance` (n,): True ones. `geometry_std` (G,): of the errors
+    of geometry, of mean zero. `moment` (G + n, G + n): mean product of the sensitivities of the loaded position where the robot
+    shall be accurate.
     """
     size, n = geometry.shape[2], elasticity.shape[2]
     both = np.concatenate(

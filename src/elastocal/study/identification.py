@@ -30,12 +30,8 @@ LARGEST_CONDITION = 1e7
 class Measurements:
     """What one measuring point contributes.
 
-    Attributes
-    ----------
-    regressor : ndarray (rows, n, configurations, sets)
-        Matrix A of equation 10, base axes.
-    deflection : ndarray (rows, configurations, sets)
-        Measured deflection; rows are three displacements (m), then, where poses are measured, three rotations (rad).
+    `regressor` (rows, n, configurations, sets): matrix A of equation 10, base axes. `deflection` (rows, configurations, sets):
+    measured deflection; rows are three displacements (m), then, where poses are measured, three rotations (rad).
     """
 
     regressor: np.ndarray
@@ -46,14 +42,9 @@ class Measurements:
 class Estimates:
     """What a strategy makes of each prefix; the first axis for the prefixes 1, 2, 3 ...
 
-    Attributes
-    ----------
-    compliance : ndarray (configurations, n, sets)
-        rad/(N m); not a number where the measurements of the prefix do not determine them.
-    covariance : ndarray (configurations, sets, n, n)
-        Of the compliances for measurements with unit variance, through all stages.
-    condition : ndarray (configurations, sets)
-        2-norm condition number of the identification Jacobian, the largest of the stages.
+    `compliance` (configurations, n, sets): rad/(N m); not a number where the measurements of the prefix do not determine them.
+    `covariance` (configurations, sets, n, n): of the compliances for measurements with unit variance, through all stages.
+    `condition` (configurations, sets): 2-norm condition number of the identification Jacobian, the largest of the stages.
     """
 
     compliance: np.ndarray
@@ -64,15 +55,7 @@ class Estimates:
 def first_solvable_length(strategy: Strategy, rows: int) -> int:
     """Smallest number of configurations with at least as many measurements as unknowns in every stage.
 
-    Parameters
-    ----------
-    strategy : Strategy
-    rows : int
-        Measurements of one point in one configuration: 6 for poses, 3 for positions.
-
-    Returns
-    -------
-    int
+    `rows`: measurements of one point in one configuration: 6 for poses, 3 for positions.
     """
     return max(-(-len(stage.identified) // (rows * len(stage.points))) for stage in strategy.stages)
 
@@ -105,16 +88,8 @@ def identify(strategy: Strategy, measurements: Mapping[str, Measurements], joint
 def undetermined_prefixes(strategy: Strategy, measurements: Mapping[str, Measurements], condition: np.ndarray) -> np.ndarray:
     """Which prefixes of which data sets do not determine the compliances: too few measurements, or not the right ones.
 
-    Parameters
-    ----------
-    strategy, measurements
-        As in `identify`.
-    condition : ndarray (configurations, sets)
-        From `condition_numbers`.
-
-    Returns
-    -------
-    ndarray of bool (configurations, sets)
+    `strategy`, `measurements`: as in `identify`. `condition` (configurations, sets): from `condition_numbers`. Returns
+    (configurations, sets) of bool.
     """
     rows = next(iter(measurements.values())).regressor.shape[0]
     undetermined = ~(condition < LARGEST_CONDITION)
@@ -127,17 +102,9 @@ def estimate_compliance(
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Solve the stages of a strategy one after the other (equation 11).
 
-    Parameters
-    ----------
-    strategy, measurements, joints
-        As in `identify`.
-
-    Returns
-    -------
-    compliance : ndarray (configurations, n, sets)
-        rad/(N m); meaningless where a prefix is too short, see `first_solvable_length`.
-    triangles : list of ndarray (configurations, pivots, columns, sets)
-        Triangular factor of each stage; columns: joints identified, joints held, right-hand side.
+    `strategy`, `measurements`, `joints`: as in `identify`. Returns `compliance` (configurations, n, sets): rad/(N m);
+    meaningless where a prefix is too short, see `first_solvable_length`; `triangles` (configurations, pivots, columns, sets):
+    triangular factor of each stage; columns: joints identified, joints held, right-hand side.
     """
     *_, configurations, sets = next(iter(measurements.values())).regressor.shape
     compliance = np.full((configurations, joints, sets), np.nan)
@@ -215,23 +182,13 @@ def covariance(strategy: Strategy, measurements: Mapping[str, Measurements], tri
 def condition_numbers(strategy: Strategy, triangles: Iterable[np.ndarray]) -> np.ndarray:
     """2-norm condition number of the identification Jacobian, the largest of the stages.
 
-    Its inverse is an observability index of calibration [1]_.
+    Its inverse is an observability index of calibration [1].
 
-    Parameters
-    ----------
-    strategy : Strategy
-    triangles : iterable of ndarray
-        From `estimate_compliance`; their singular values are those of the regressor.
+    `triangles`: from `estimate_compliance`; their singular values are those of the regressor. Returns (configurations, sets):
+    infinite where the smallest singular value is zero to rounding.
 
-    Returns
-    -------
-    ndarray (configurations, sets)
-        Infinite where the smallest singular value is zero to rounding.
-
-    References
-    ----------
-    .. [1] Driels, M. R. and Pathre, U. S., Significance of observation strategy on the design of robot calibration experiments,
-       Journal of Robotic Systems 7, 1990.
+    [1] Driels, M. R. and Pathre, U. S., Significance of observation strategy on the design of robot calibration experiments,
+        Journal of Robotic Systems 7, 1990.
     """
     largest: np.ndarray = np.ones(())
     for stage, triangle in zip(strategy.stages, triangles, strict=True):
@@ -243,32 +200,18 @@ def condition_numbers(strategy: Strategy, triangles: Iterable[np.ndarray]) -> np
 
 
 def prefix_triangles(systems: Iterable[np.ndarray], configurations: int, pivots: int) -> np.ndarray:
-    """Triangular factor of the first k configurations, for every k, by Householder reflections [1]_.
+    """Triangular factor of the first k configurations, for every k, by Householder reflections [1].
 
-    Parameters
-    ----------
-    systems : iterable of ndarray (rows, columns, sets)
-        Equations of one configuration after the other: unknowns first, right-hand side last. They are overwritten, and each
-        may lie in the memory of the one before.
-    configurations : int
-        How many systems there are.
-    pivots : int
-        How many leading columns are unknowns to eliminate.
+    `systems` (rows, columns, sets): equations of one configuration after the other: unknowns first, right-hand side last. They
+    are overwritten, and each may lie in the memory of the one before. `configurations`: how many systems there are. `pivots`:
+    how many leading columns are unknowns to eliminate. Returns (configurations, pivots, columns, sets): rows of R and, in the
+    remaining columns, Q^T times them.
 
-    Returns
-    -------
-    ndarray (configurations, pivots, columns, sets)
-        Rows of R and, in the remaining columns, Q^T times them.
-
-    Notes
-    -----
-    Sequential accumulation [2]_: the factor of k configurations on top of the rows of the next one is again reduced to a
+    Sequential accumulation [2]: the factor of k configurations on top of the rows of the next one is again reduced to a
     triangle; a reflection touches one row of the triangle and the new rows only.
 
-    References
-    ----------
-    .. [1] Householder, A. S., Unitary triangularization of a nonsymmetric matrix, Journal of the ACM 5, 1958.
-    .. [2] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall, 1974.
+    [1] Householder, A. S., Unitary triangularization of a nonsymmetric matrix, Journal of the ACM 5, 1958.
+    [2] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall, 1974.
     """
     triangles: np.ndarray
     products: np.ndarray
@@ -296,14 +239,7 @@ def prefix_triangles(systems: Iterable[np.ndarray], configurations: int, pivots:
 def inverse_triangles(triangle: np.ndarray) -> np.ndarray:
     """Inverses of upper triangular matrices by back substitution.
 
-    Parameters
-    ----------
-    triangle : ndarray (configurations, m, m, sets)
-
-    Returns
-    -------
-    ndarray (configurations, m, m, sets)
-        Infinite or not a number where singular.
+    `triangle` (configurations, m, m, sets). Returns (configurations, m, m, sets): infinite or not a number where singular.
     """
     size = triangle.shape[1]
     inverse = np.zeros_like(triangle)
@@ -319,15 +255,8 @@ def inverse_triangles(triangle: np.ndarray) -> np.ndarray:
 def cholesky_triangles(information: np.ndarray) -> np.ndarray:
     """Upper triangular Cholesky factors R of symmetric matrices R^T R.
 
-    Parameters
-    ----------
-    information : ndarray (configurations, m, m, sets)
-        Only the upper triangles are read.
-
-    Returns
-    -------
-    ndarray (configurations, m, m, sets)
-        Not a number where a matrix is not positive definite to rounding, see `LARGEST_CONDITION`.
+    `information` (configurations, m, m, sets): only the upper triangles are read. Returns (configurations, m, m, sets): not a
+    number where a matrix is not positive definite to rounding, see `LARGEST_CONDITION`.
     """
     size = information.shape[1]
     triangle = np.zeros_like(information)
@@ -344,13 +273,7 @@ def cholesky_triangles(information: np.ndarray) -> np.ndarray:
 def prefix_information(regressor: np.ndarray) -> np.ndarray:
     """Sum of A^T A over the first k configurations, for every k.
 
-    Parameters
-    ----------
-    regressor : ndarray (rows, n, configurations, sets)
-
-    Returns
-    -------
-    ndarray (configurations, n, n, sets)
+    `regressor` (rows, n, configurations, sets). Returns (configurations, n, n, sets).
     """
     _, joints, configurations, sets = regressor.shape
     information = np.empty((configurations, joints, joints, sets))

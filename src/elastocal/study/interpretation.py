@@ -13,16 +13,8 @@ if TYPE_CHECKING:
 class Interpretation:
     """How the paper's open points are read, see ``schemas/config.yaml``.
 
-    Attributes
-    ----------
-    loading : Loading
-        R3, R4.
-    rows : int
-        6 where poses are measured, 3 where positions are (R5).
-    wrench_at : {"end_effector", "measuring_point"}
-        R6.
-    average, deviation_of : str
-        R7 and R8, see `evaluation.average`.
+    `loading`: R3, R4. `rows`: 6 where poses are measured, 3 where positions are (R5). `wrench_at`: R6. `average`,
+    `deviation_of`: R7 and R8, see `evaluation.average`.
     """
 
     loading: Loading
@@ -36,11 +28,7 @@ class Interpretation:
 class Size:
     """How large a study is.
 
-    Attributes
-    ----------
-    data_sets, configurations, tests : int
-    noise : float
-        Standard deviation, the same number in m and rad.
+    `noise`: standard deviation, the same number in m and rad.
     """
 
     data_sets: int

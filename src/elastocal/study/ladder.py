@@ -1,15 +1,13 @@
 """How many springs pay: from elastic joints alone, link spring by link spring, up to the extended model (RQ1).
 
 A link spring is the compliance of a beam about its own axes: six diagonal elements and the two by which bending and lateral
-deflection go together. All of them enter linearly. Which link comes next, and where to stop, is chosen by cross-validation [1]_
-within each data set, by forward selection [2]_; configurations that neither has seen judge the result.
+deflection go together. All of them enter linearly. Which link comes next, and where to stop, is chosen by cross-validation [1]
+within each data set, by forward selection [2]; configurations that neither has seen judge the result.
 
-References
-----------
-.. [1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical Society B
-   36, 1974.
-.. [2] Hastie, T., Tibshirani, R. and Friedman, J., The Elements of Statistical Learning, 2nd edition, sections 3.3 and 7.10,
-   Springer, 2009.
+[1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical Society B 36,
+    1974.
+[2] Hastie, T., Tibshirani, R. and Friedman, J., The Elements of Statistical Learning, 2nd edition, sections 3.3 and 7.10,
+    Springer, 2009.
 """
 
 from __future__ import annotations
@@ -38,11 +36,7 @@ _RIDGE = 1e-10
 class Products:
     """Normal equations of some measurements, K columns.
 
-    Attributes
-    ----------
-    gram : ndarray (..., K, K)
-    along : ndarray (..., K)
-    squares : ndarray (...)
+    `gram` (..., K, K), `along` (..., K), `squares` (...).
     """
 
     gram: np.ndarray
@@ -59,14 +53,9 @@ class Products:
 class Ladder:
     """Models of each data set, from no link spring to all.
 
-    Attributes
-    ----------
-    order : ndarray of int (sets, L)
-        Links in the order in which they were added.
-    cross_validated : ndarray (sets, L + 1)
-        Sum of squares left in the folds that were left out.
-    coefficients : ndarray (sets, L + 1, K)
-        Of the model with so many links, fitted to the whole data set.
+    `order` (sets, L) of int: links in the order in which they were added. `cross_validated` (sets, L + 1): sum of squares left
+    in the folds that were left out. `coefficients` (sets, L + 1, K): of the model with so many links, fitted to the whole data
+    set.
     """
 
     order: np.ndarray
@@ -82,15 +71,7 @@ class Ladder:
 def spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray:
     """Deflection of the end-effector per unit of each spring element: joints first, then eight for each link.
 
-    Parameters
-    ----------
-    robot : Robot
-        With links.
-    experiments : Experiments
-
-    Returns
-    -------
-    ndarray (sets, configurations, 6, n + 8 L)
+    `robot`: with links. Returns (sets, configurations, 6, n + 8 L).
     """
     chain, n = extended_chain(robot), robot.joints
     coordinates = np.zeros((*experiments.joint_angles.shape[:-1], chain.coordinates))
@@ -110,15 +91,7 @@ def spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray:
 def products_of(columns: np.ndarray, deflection: np.ndarray) -> Products:
     """Normal equations of each data set.
 
-    Parameters
-    ----------
-    columns : ndarray (sets, configurations, rows, K)
-    deflection : ndarray (sets, configurations, rows)
-
-    Returns
-    -------
-    Products
-        Of shape (sets,).
+    `columns` (sets, configurations, rows, K), `deflection` (sets, configurations, rows). Returns of shape (sets,).
     """
     left = columns.reshape(len(columns), -1, columns.shape[-1])
     right = deflection.reshape(len(deflection), -1)
@@ -129,15 +102,7 @@ def products_of(columns: np.ndarray, deflection: np.ndarray) -> Products:
 def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
     """Add link springs one by one, in each data set that which cross-validation likes best.
 
-    Parameters
-    ----------
-    parts : list of Products
-        Of each fold, of shape (sets,).
-    joints, links : int
-
-    Returns
-    -------
-    Ladder
+    `parts`: of each fold, of shape (sets,).
     """
     whole = Products(*(sum(getattr(part, name) for part in parts) for name in ("gram", "along", "squares")))
     sets, size = whole.along.shape

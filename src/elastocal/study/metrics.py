@@ -24,14 +24,9 @@ MODELS_AT_A_TIME = 400
 class Judge:
     """Loaded configurations that no identification has seen, ready to score any compliances.
 
-    Attributes
-    ----------
-    reference : ndarray (n,)
-        Compliances about which the prediction is linear, rad/(N m).
-    quadratic_forms : ndarray (tests, (n + 1)(n + 2) / 2)
-        Squared position error at each test configuration as a quadratic form in (c - reference, 1).
-    initial_errors : ndarray (tests,)
-        Position error without any elastostatic model: the deflection itself, m.
+    `reference` (n,): compliances about which the prediction is linear, rad/(N m). `quadratic_forms` (tests, (n + 1)(n + 2) /
+    2): squared position error at each test configuration as a quadratic form in (c - reference, 1). `initial_errors` (tests,):
+    position error without any elastostatic model: the deflection itself, m.
     """
 
     reference: np.ndarray
@@ -42,22 +37,9 @@ class Judge:
 def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarray, wrench_at: str = "end_effector") -> Judge:
     """Score sheet of the reduced model on test configurations.
 
-    Parameters
-    ----------
-    robot : Robot
-        Its joint compliances are the reference.
-    experiments : Experiments
-    true_deflection : ndarray (..., 6)
-        Of the end-effector, as simulated with the robot's full model.
-    wrench_at : {"end_effector", "measuring_point"}
-        Interpretation R6; it matters where a target is offset from the end-effector.
+    `robot`: its joint compliances are the reference. `true_deflection` (..., 6): of the end-effector, as simulated with the
+    robot's full model. `wrench_at`: interpretation R6; it matters where a target is offset from the end-effector.
 
-    Returns
-    -------
-    Judge
-
-    Notes
-    -----
     The position error of a model c is (exact prediction at the reference - true position) + A (c - reference); what this leaves
     out is of second order in the compliance *error*, below a thousandth of the error itself.
     """
@@ -77,14 +59,7 @@ def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarr
 def error_moment(judge: Judge) -> np.ndarray:
     """Mean over the test configurations of A^T A: the quadratic form of the mean squared position error.
 
-    Parameters
-    ----------
-    judge : Judge
-
-    Returns
-    -------
-    ndarray (n, n)
-        m^2 per (rad/(N m))^2.
+    Returns (n, n): m^2 per (rad/(N m))^2.
     """
     return mean_form(judge)[:-1, :-1]
 
@@ -97,17 +72,8 @@ def mean_form(judge: Judge) -> np.ndarray:
 def mean_square_errors(form: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Mean squared position error of models over the test configurations.
 
-    Parameters
-    ----------
-    form : ndarray (n + 1, n + 1)
-        From `mean_form`.
-    error : ndarray (..., n, models)
-        Compliances less the reference, rad/(N m).
-
-    Returns
-    -------
-    ndarray (..., models)
-        m^2.
+    `form` (n + 1, n + 1): from `mean_form`. `error` (..., n, models): compliances less the reference, rad/(N m). Returns (...,
+    models): m^2.
     """
     whole = np.concatenate([error, np.ones_like(error[..., :1, :])], axis=-2)
     return (whole * (form @ whole)).sum(axis=-2)
@@ -116,13 +82,7 @@ def mean_square_errors(form: np.ndarray, error: np.ndarray) -> np.ndarray:
 def error_forms(judge: Judge) -> np.ndarray:
     """Matrices of the quadratic forms of the squared position error in (c - reference, 1).
 
-    Parameters
-    ----------
-    judge : Judge
-
-    Returns
-    -------
-    ndarray (tests, n + 1, n + 1)
+    Returns (tests, n + 1, n + 1).
     """
     size = len(judge.reference) + 1
     first, second = np.triu_indices(size)
@@ -134,15 +94,7 @@ def error_forms(judge: Judge) -> np.ndarray:
 def scored_parts(groups: int, models: int) -> list[slice]:
     """Slices of groups of models, small enough for the errors of one to stay in the cache.
 
-    Parameters
-    ----------
-    groups : int
-    models : int
-        In each group.
-
-    Returns
-    -------
-    list of slice
+    `models`: in each group.
     """
     size = max(1, MODELS_AT_A_TIME // models)
     return [slice(start, start + size) for start in range(0, groups, size)]
@@ -151,16 +103,7 @@ def scored_parts(groups: int, models: int) -> list[slice]:
 def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
     """End-effector position error of models at every test configuration.
 
-    Parameters
-    ----------
-    judge : Judge
-    compliance : ndarray (models, n)
-        rad/(N m).
-
-    Returns
-    -------
-    ndarray (models, tests)
-        m.
+    `compliance` (models, n): rad/(N m). Returns (models, tests): m.
     """
     error = np.column_stack([compliance - judge.reference, np.ones(len(compliance))])
     first, second = np.triu_indices(error.shape[1])
@@ -171,17 +114,8 @@ def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
 def mean_deviation(judge: Judge, compliance: np.ndarray, test_weights: np.ndarray | None = None) -> np.ndarray:
     """Equation 15: position error of models, mean over the test configurations.
 
-    Parameters
-    ----------
-    judge : Judge
-    compliance : ndarray (groups, models, n)
-    test_weights : ndarray (groups, tests), optional
-        How often each test configuration counts for a group of models; once without.
-
-    Returns
-    -------
-    ndarray (groups, models)
-        m.
+    `compliance` (groups, models, n). `test_weights` (groups, tests): how often each test configuration counts for a group of
+    models; once without. Returns (groups, models): m.
     """
     if test_weights is None:
         test_weights = np.ones((len(compliance), len(judge.initial_errors)))
@@ -196,15 +130,7 @@ def mean_deviation(judge: Judge, compliance: np.ndarray, test_weights: np.ndarra
 def relative_stiffness_error(compliance: np.ndarray, true_compliance: np.ndarray) -> np.ndarray:
     """Equation 13, (k - k0) / k0 in percent, with k = 1 / c.
 
-    Parameters
-    ----------
-    compliance : ndarray (..., n)
-        Inverse of the averaged stiffness.
-    true_compliance : ndarray (n,)
-
-    Returns
-    -------
-    ndarray (..., n)
+    `compliance` (..., n): inverse of the averaged stiffness. `true_compliance` (n,). Returns (..., n).
     """
     return 100.0 * (true_compliance / compliance - 1.0)
 
@@ -212,16 +138,7 @@ def relative_stiffness_error(compliance: np.ndarray, true_compliance: np.ndarray
 def k_sigma(compliance: np.ndarray, true_compliance: np.ndarray, joints: Sequence[int] | slice = slice(None)) -> np.ndarray:
     """Equation 14: sum of the relative stiffness errors over joints, in percent.
 
-    Parameters
-    ----------
-    compliance, true_compliance
-        As in `relative_stiffness_error`.
-    joints : sequence of int, optional
-        Only these (interpretation R10).
-
-    Returns
-    -------
-    ndarray (...)
+    `compliance`, `true_compliance`: as in `relative_stiffness_error`. `joints`: only these (interpretation R10). Returns (...).
     """
     return relative_stiffness_error(compliance, true_compliance)[..., joints].sum(axis=-1)
 
@@ -229,16 +146,8 @@ def k_sigma(compliance: np.ndarray, true_compliance: np.ndarray, joints: Sequenc
 def first_length_below(values: np.ndarray, limit: float) -> np.ndarray:
     """First data set length at which a metric is at most `limit` in absolute value.
 
-    Parameters
-    ----------
-    values : ndarray (..., lengths)
-        For the lengths 1, 2, 3 ...; not-a-number counts as above.
-    limit : float
-
-    Returns
-    -------
-    ndarray (...)
-        Infinite where no length reaches it.
+    `values` (..., lengths): for the lengths 1, 2, 3 ...; not-a-number counts as above. Returns (...): infinite where no length
+    reaches it.
     """
     below = np.abs(values) <= limit
     return np.where(below.any(axis=-1), below.argmax(axis=-1) + 1.0, np.inf)
@@ -247,17 +156,8 @@ def first_length_below(values: np.ndarray, limit: float) -> np.ndarray:
 def length_to_reach(values: np.ndarray, limit: float) -> np.ndarray:
     """Data set length at which a metric comes down to `limit`, past the longest one if need be.
 
-    Parameters
-    ----------
-    values : ndarray (..., lengths)
-        For the lengths 1, 2, 3 ...
-    limit : float
-
-    Returns
-    -------
-    ndarray (...)
-        As `first_length_below`; where that is infinite, the metric is continued as a bias of second order, which falls as
-        1 / length.
+    `values` (..., lengths): for the lengths 1, 2, 3 ... Returns (...): as `first_length_below`; where that is infinite, the
+    metric is continued as a bias of second order, which falls as 1 / length.
     """
     first, longest = first_length_below(values, limit), values.shape[-1]
     return np.where(np.isfinite(first), first, longest * np.maximum(np.abs(values[..., -1]) / limit, 1.0))

@@ -1,12 +1,10 @@
 """Observability indices: which number tells the worth of configurations beforehand (RQ3).
 
-They are numbers of the singular values s_1 >= ... >= s_m of the identification Jacobian of k configurations [1]_:
+They are numbers of the singular values s_1 >= ... >= s_m of the identification Jacobian of k configurations [1]:
 O1 = (s_1 ... s_m)^(1/m) / sqrt(k), O2 = s_m / s_1, O3 = s_m, O4 = s_m^2 / s_1, O5 = 1 / sum 1/s_i.
 
-References
-----------
-.. [1] Sun, Y. and Hollerbach, J. M., Observability index selection for robot calibration, IEEE International Conference on
-   Robotics and Automation, 2008.
+[1] Sun, Y. and Hollerbach, J. M., Observability index selection for robot calibration, IEEE International Conference on
+    Robotics and Automation, 2008.
 """
 
 from __future__ import annotations
@@ -19,15 +17,7 @@ INDICES = ("O1", "O2", "O3", "O4", "O5")
 def observability(information: np.ndarray, configurations: int) -> dict[str, np.ndarray]:
     """Observability indices of identification Jacobians.
 
-    Parameters
-    ----------
-    information : ndarray (..., m, m)
-        Their products J'J, in whatever units the parameters have.
-    configurations : int
-
-    Returns
-    -------
-    dict of str to ndarray (...)
+    `information` (..., m, m): their products J'J, in whatever units the parameters have. Returns (...).
     """
     values = np.sqrt(np.clip(np.linalg.eigvalsh(information), np.finfo(float).tiny, None))
     smallest, largest = values[..., 0], values[..., -1]

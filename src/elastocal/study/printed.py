@@ -1,14 +1,12 @@
 """The paper's printed figures against how studies of the same size scatter.
 
 The paper is one study. Where k studies of one size have a mean m and a standard deviation s, a further one lies at
-m + s sqrt(1 + 1/k) t, with t of Student's distribution with k - 1 degrees of freedom [1]_: its density at a printed figure is
+m + s sqrt(1 + 1/k) t, with t of Student's distribution with k - 1 degrees of freedom [1]: its density at a printed figure is
 how well an interpretation predicts it, and its tails are the p value of the difference. Many figures are judged at once by
-Holm's procedure [2]_.
+Holm's procedure [2].
 
-References
-----------
-.. [1] Geisser, S., Predictive Inference: An Introduction, Chapman and Hall, 1993.
-.. [2] Holm, S., A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6, 1979.
+[1] Geisser, S., Predictive Inference: An Introduction, Chapman and Hall, 1993.
+[2] Holm, S., A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6, 1979.
 """
 
 from __future__ import annotations
@@ -36,13 +34,7 @@ _DIGIT = {"c": 1e-3, "k_sigma": 1e-3, "dev_": 1e-3, "n_": 1.0}
 class Predicted:
     """How studies of one size scatter in one figure.
 
-    Attributes
-    ----------
-    values : ndarray (k,)
-        Of each study; lengths as logarithms.
-    logarithmic : bool
-    digit : float
-        Last printed one: a printed figure is rounded.
+    `values` (k,): of each study; lengths as logarithms. `digit`: last printed one: a printed figure is rounded.
     """
 
     values: np.ndarray
@@ -83,22 +75,9 @@ def predicted(
 ) -> Predicted | None:
     """How one figure of Table 3 or 4 scatters between studies.
 
-    Parameters
-    ----------
-    studies : DataFrame
-        robot and the columns of `table_schemas.repeated`.
-    robot, strategy : str
-    quantity : str
-        c1.., k_sigma_20, dev_20, n_k_sigma_1_percent, n_dev_2_um: with its length or its limit.
-    length : int
-        Data set length of figures that name none.
-    first_stage : bool
-        Whether k_sigma counts the joints of the first stage alone (interpretation R10).
-
-    Returns
-    -------
-    Predicted or None
-        None where the studies do not have it.
+    `studies`: robot and the columns of `table_schemas.repeated`. `quantity`: c1.., k_sigma_20, dev_20, n_k_sigma_1_percent,
+    n_dev_2_um: with its length or its limit. `length`: data set length of figures that name none. `first_stage`: whether
+    k_sigma counts the joints of the first stage alone (interpretation R10). Returns None where the studies do not have it.
     """
     rows = studies[(studies.robot == robot) & (studies.strategy == strategy)]
     if rows.empty or not (quantity[1:].isdigit() or quantity.startswith(("k_sigma_", "dev_", "n_"))):

@@ -21,16 +21,9 @@ MILLI = 1e3
 def ladder_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Error of one data set on configurations that it has not seen, by number of link springs.
 
-    Parameters
-    ----------
-    frames : dict of str to DataFrame
-        The ladder table of each robot with links.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, noise_um, length, link_springs (a number, or `CHOSEN`), rms_um with its standard error, chosen_percent: share of
-        data sets in which cross-validation stops there, and usual_link: the link added most often at this step, from 1.
+    `frames`: the ladder table of each robot with links. Returns robot, noise_um, length, link_springs (a number, or `CHOSEN`),
+    rms_um with its standard error, chosen_percent: share of data sets in which cross-validation stops there, and usual_link:
+    the link added most often at this step, from 1.
     """
     rows: list[dict[str, Any]] = []
     for robot, frame in frames.items():
@@ -51,15 +44,8 @@ def ladder_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def designs_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Random against optimal configurations.
 
-    Parameters
-    ----------
-    frames : dict of str to DataFrame
-        The designs table of each robot.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, joint_range, design, configurations, rms_um, low_um and high_um: 5 and 95 % of random designs.
+    `frames`: the designs table of each robot. Returns robot, joint_range, design, configurations, rms_um, low_um and high_um: 5
+    and 95 % of random designs.
     """
     parts = []
     for robot, frame in frames.items():
@@ -72,16 +58,9 @@ def designs_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def observability_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """How well an observability index of random configurations tells their worth, by rank correlation.
 
-    Parameters
-    ----------
-    frames : dict of str to DataFrame
-        The observability table of each robot.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, index (the bound among them), rank_correlation_with_bound and rank_correlation_with_error, each with its standard
-        error by a normal approximation; -1 where a larger index always means a smaller error.
+    `frames`: the observability table of each robot. Returns robot, index (the bound among them), rank_correlation_with_bound
+    and rank_correlation_with_error, each with its standard error by a normal approximation; -1 where a larger index always
+    means a smaller error.
     """
     rows = []
     for robot, frame in frames.items():
@@ -98,16 +77,8 @@ def observability_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def geometry_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Geometry and compliances together, one after the other, or alone.
 
-    Parameters
-    ----------
-    frames : dict of str to DataFrame
-        The geometry table of each robot.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, estimator, rms_um and its parts noise_um and leak_um, compliance_noise_percent, compliance_leak_percent,
-        zero_noise_urad, zero_leak_urad.
+    `frames`: the geometry table of each robot. Returns robot, estimator, rms_um and its parts noise_um and leak_um,
+    compliance_noise_percent, compliance_leak_percent, zero_noise_urad, zero_leak_urad.
     """
     parts = []
     for robot, frame in frames.items():
@@ -125,15 +96,7 @@ def geometry_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def weighting_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """What equal weights cost.
 
-    Parameters
-    ----------
-    frames : dict of str to DataFrame
-        The weighting table of each robot.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, orientation_ratio, per_metre_um, equal_um, weighted_um, ratio.
+    `frames`: the weighting table of each robot. Returns robot, orientation_ratio, per_metre_um, equal_um, weighted_um, ratio.
     """
     parts = []
     for robot, frame in frames.items():
@@ -147,16 +110,9 @@ def weighting_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def places_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """A second target at each place of the arm, against the end-effector in twice as many configurations.
 
-    Parameters
-    ----------
-    frames : dict of str to DataFrame
-        The places table of each robot.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, joints, along_m, side, ratio of the bounds at as many measurements with its 95 % interval, ratio_low and
-        ratio_high; seen_turned_percent and seen_fixed_percent: configurations in which a tracker sees the target.
+    `frames`: the places table of each robot. Returns robot, joints, along_m, side, ratio of the bounds at as many measurements
+    with its 95 % interval, ratio_low and ratio_high; seen_turned_percent and seen_fixed_percent: configurations in which a
+    tracker sees the target.
     """
     rows: list[dict[str, Any]] = []
     for robot, frame in frames.items():
@@ -173,16 +129,8 @@ def places_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def tubes_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Deflections before calibration in single data sets, and what joint springs alone leave, by the diameter of the tubes.
 
-    Parameters
-    ----------
-    frames : dict of str to DataFrame
-        The tubes table of each robot with links.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, diameter_mm; mean_mm, std_mm and max_mm of single data sets, each with the standard deviation between data sets
-        (mean_mm_between ...); left_um with its standard error.
+    `frames`: the tubes table of each robot with links. Returns robot, diameter_mm; mean_mm, std_mm and max_mm of single data
+    sets, each with the standard deviation between data sets (mean_mm_between ...); left_um with its standard error.
     """
     rows: list[dict[str, Any]] = []
     for robot, frame in frames.items():

@@ -2,12 +2,10 @@
 
 All strategies see the same data sets, so that their scores go up and down together: what counts is the ratio of two of them,
 data set by data set. For a score that is a smooth function of means over data sets its influence values give the variance of
-the logarithm of a ratio (delta method [1]_; of a quantile by Bahadur's representation); the paper's scores of averaged models
+the logarithm of a ratio (delta method [1]; of a quantile by Bahadur's representation); the paper's scores of averaged models
 have the bootstrap replicates, whose weights all strategies share.
 
-References
-----------
-.. [1] van der Vaart, A. W., Asymptotic Statistics, chapters 3 and 21, Cambridge University Press, 1998.
+[1] van der Vaart, A. W., Asymptotic Statistics, chapters 3 and 21, Cambridge University Press, 1998.
 """
 
 from __future__ import annotations
@@ -38,13 +36,8 @@ _AVERAGED |= {"dev_um": ("deviation", MICRO)}
 class Score:
     """A score of one strategy.
 
-    Attributes
-    ----------
-    value : float
-    relative : ndarray (N,)
-        Deviations of its logarithm, of data sets or replicates that all strategies share.
-    spread : float
-        The standard error over the standard deviation of `relative`: 1 over the root of N for data sets, 1 for replicates.
+    `relative` (N,): deviations of its logarithm, of data sets or replicates that all strategies share. `spread`: the standard
+    error over the standard deviation of `relative`: 1 over the root of N for data sets, 1 for replicates.
     """
 
     value: float
@@ -65,18 +58,8 @@ class Score:
 def scores(uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, length: int) -> dict[str, dict[str, Score]]:
     """Scores of one robot's strategies by every metric.
 
-    Parameters
-    ----------
-    uses : DataFrame
-        The uses table.
-    metrics, replicates : DataFrame
-        Long, of the robot at the noise of the tables.
-    length : int
-
-    Returns
-    -------
-    dict of str to dict of str to Score
-        Metric, strategy; without metrics at places that the robot does not reach.
+    `uses`: the uses table. `metrics`, `replicates`: long, of the robot at the noise of the tables. Returns metric, strategy;
+    without metrics at places that the robot does not reach.
     """
     found: dict[str, dict[str, Score]] = {}
     for strategy in dict.fromkeys(uses.strategy):
@@ -95,18 +78,8 @@ def scores(uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, 
 def ranks_table(found: Mapping[str, Mapping[str, Mapping[str, Score]]], classical: str) -> pd.DataFrame:
     """Every strategy by every metric, its rank, and its ratio to the classical strategy.
 
-    Parameters
-    ----------
-    found : dict
-        `scores` of each robot.
-    classical : str
-        Name of a strategy.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, metric, strategy, value, value_std_error, ratio with its 95 % interval (ratio_low, ratio_high), rank from 1; one
-        estimator under two names has one rank.
+    `found`: `scores` of each robot. `classical`: name of a strategy. Returns robot, metric, strategy, value, value_std_error,
+    ratio with its 95 % interval (ratio_low, ratio_high), rank from 1; one estimator under two names has one rank.
     """
     rows = []
     for robot, by_metric in found.items():
@@ -134,16 +107,8 @@ def ranks_table(found: Mapping[str, Mapping[str, Mapping[str, Score]]], classica
 def pairs_table(found: Mapping[str, Mapping[str, Mapping[str, Score]]]) -> pd.DataFrame:
     """Every two different estimators by every metric and by the RMS error of one data set.
 
-    Parameters
-    ----------
-    found : dict
-        As in `ranks_table`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, metric, strategy, other, ratio, ratio_low, ratio_high, rms_ratio, rms_ratio_low, rms_ratio_high, and reversed:
-        both intervals exclude one, on opposite sides.
+    `found`: as in `ranks_table`. Returns robot, metric, strategy, other, ratio, ratio_low, ratio_high, rms_ratio,
+    rms_ratio_low, rms_ratio_high, and reversed: both intervals exclude one, on opposite sides.
     """
     rows = []
     for robot, by_metric in found.items():

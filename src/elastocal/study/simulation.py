@@ -27,16 +27,9 @@ if TYPE_CHECKING:
 class Loading:
     """How the robot is moved and loaded.
 
-    Attributes
-    ----------
-    force_N : float
-        Magnitude; the direction is uniform on the sphere.
-    offset_m : tuple of float
-        From the end-effector to where the force acts.
-    offset_frame : {"base", "tool"}
-        Axes of the offset (interpretation R4).
-    joint_range : {"full_turn", "limits"}
-        Joint angles uniform in +-pi or within the robot's limits (interpretation R3).
+    `force_N`: magnitude; the direction is uniform on the sphere. `offset_m`: from the end-effector to where the force acts.
+    `offset_frame`: axes of the offset (interpretation R4). `joint_range`: joint angles uniform in +-pi or within the robot's
+    limits (interpretation R3).
     """
 
     force_N: float
@@ -57,31 +50,14 @@ def random_experiments(
 ) -> Experiments:
     """Random configurations and wrenches.
 
-    Forces have the directions of normal vectors, which are uniform on the sphere [1]_.
+    Forces have the directions of normal vectors, which are uniform on the sphere [1].
 
-    Parameters
-    ----------
-    chain : Chain
-    limits : ndarray (n, 2)
-        Joint limits in rad.
-    seed : int
-    key : str
-        Name of the robot's file; part of the name of the random streams.
-    loading : Loading
-    purpose : str
-        Part of the name of the random streams: data that identify and data that judge never share one.
-    data_sets : sequence of int
-    configurations : int
-        In each data set; the first k of them do not depend on how many there are.
+    `limits` (n, 2): joint limits in rad. `key`: name of the robot's file; part of the name of the random streams. `purpose`:
+    part of the name of the random streams: data that identify and data that judge never share one. `configurations`: in each
+    data set; the first k of them do not depend on how many there are.
 
-    Returns
-    -------
-    Experiments
-
-    References
-    ----------
-    .. [1] Muller, M. E., A note on a method for generating points uniformly on n-dimensional spheres, Communications of the ACM
-       2, 1959.
+    [1] Muller, M. E., A note on a method for generating points uniformly on n-dimensional spheres, Communications of the ACM 2,
+        1959.
     """
     n = chain.coordinates
     turns = draw(seed, key, f"{purpose}/joint angles", data_sets, lambda stream: stream.random((configurations, n)))
@@ -98,20 +74,8 @@ def true_deflections(robot: Robot, experiments: Experiments, point: MeasuringPoi
 
     The virtual joint method, see `mechanics.elastostatics`.
 
-    Parameters
-    ----------
-    robot : Robot
-        Reduced or, where it has links, extended.
-    experiments : Experiments
-    point : MeasuringPoint
-        Of the robot's chain.
-    wrench_at : {"end_effector", "measuring_point"}
-        Where the wrench that deflects a partial point is taken to act (interpretation R6).
-
-    Returns
-    -------
-    ndarray (sets, configurations, 6)
-        m, rad.
+    `robot`: reduced or, where it has links, extended. `point`: of the robot's chain. `wrench_at`: where the wrench that
+    deflects a partial point is taken to act (interpretation R6). Returns (sets, configurations, 6): m, rad.
     """
     chain = extended_chain(robot)
     unloaded = np.zeros((*experiments.joint_angles.shape[:-1], chain.coordinates))
@@ -127,22 +91,10 @@ def measurement_noise(
 ) -> np.ndarray:
     """Standard normal noise of the six components at one measuring point; times the noise level it is the measurement error.
 
-    The same numbers serve every noise level, so that levels differ by scale alone: common random numbers [1]_.
+    The same numbers serve every noise level, so that levels differ by scale alone: common random numbers [1].
 
-    Parameters
-    ----------
-    seed, key
-        As in `random_experiments`.
-    point_name : str
-    data_sets : sequence of int
-    configurations : int
+    `seed`, `key`: as in `random_experiments`. Returns (sets, configurations, 6).
 
-    Returns
-    -------
-    ndarray (sets, configurations, 6)
-
-    References
-    ----------
-    .. [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random numbers, Management Science 38, 1992.
+    [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random numbers, Management Science 38, 1992.
     """
     return draw(seed, key, f"noise/{point_name}", data_sets, lambda stream: stream.standard_normal((configurations, 6)))

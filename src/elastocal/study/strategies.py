@@ -17,14 +17,9 @@ if TYPE_CHECKING:
 class Stage:
     """One least-squares problem of a strategy.
 
-    Attributes
-    ----------
-    points : tuple of str
-        Measuring points whose measurements it uses, with equal weight.
-    identified : tuple of int
-        Joint indices, from 0, that it estimates; estimates of an earlier stage are where an iterative solver starts.
-    held : tuple of int
-        Joint indices whose estimates it takes over from earlier stages.
+    `points`: measuring points whose measurements it uses, with equal weight. `identified`: joint indices, from 0, that it
+    estimates; estimates of an earlier stage are where an iterative solver starts. `held`: joint indices whose estimates it
+    takes over from earlier stages.
     """
 
     points: tuple[str, ...]
@@ -36,11 +31,7 @@ class Stage:
 class Strategy:
     """A named sequence of stages that together estimate every joint.
 
-    Attributes
-    ----------
-    name : str
-        As printed in the paper.
-    stages : tuple of Stage
+    `name`: as printed in the paper.
     """
 
     name: str
@@ -61,14 +52,7 @@ class Strategy:
 def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
     """Make a strategy from the contents of its file, already validated against the strategy schema.
 
-    Parameters
-    ----------
-    document : mapping
-        Keys as in ``schemas/strategy.yaml``; joints count from 1.
-
-    Returns
-    -------
-    Strategy
+    `document`: keys as in ``schemas/strategy.yaml``; joints count from 1.
     """
     stages = [
         Stage(
@@ -84,16 +68,8 @@ def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
 def without_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:
     """What of a strategy the solution of equation 11 depends on: a stage that identifies every joint forgets those before it.
 
-    Parameters
-    ----------
-    strategy : Strategy
-    joints : int
-        Number of joints, n.
-
-    Returns
-    -------
-    Strategy
-        Its points are those of the stages that are left. An iterative solver needs all stages, to start from.
+    `joints`: number of joints, n. Returns its points are those of the stages that are left. An iterative solver needs all
+    stages, to start from.
     """
     first = max([0, *(index for index, stage in enumerate(strategy.stages) if len(stage.identified) == joints)])
     return replace(strategy, stages=strategy.stages[first:])
@@ -102,18 +78,8 @@ def without_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:
 def check_strategy(strategy: Strategy, chain: Chain, source: str) -> None:
     """Refuse a strategy that the chain cannot carry out.
 
-    Parameters
-    ----------
-    strategy : Strategy
-    chain : Chain
-    source : str
-        Named in errors.
-
-    Raises
-    ------
-    InputError
-        An unknown point or joint; a joint that moves a measured point but is neither identified nor held; a held joint that
-        no earlier stage identified; a joint that no stage identifies.
+    `source`: named in errors. Raises `InputError`: an unknown point or joint; a joint that moves a measured point but is
+    neither identified nor held; a held joint that no earlier stage identified; a joint that no stage identifies.
     """
     known: set[int] = set()
     names = [p.name for p in chain.points]

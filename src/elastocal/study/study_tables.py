@@ -28,24 +28,10 @@ def expectations_table(
 ) -> pd.DataFrame:
     """Expectation, further studies and the paper, side by side.
 
-    Parameters
-    ----------
-    studies : DataFrame
-        robot and the columns of `table_schemas.repeated`.
-    expected : DataFrame
-        Long, of `table_schemas.expected`, at the noise of the tables.
-    reference : DataFrame
-        The printed figures.
-    length : int
-        Data set length of the scores.
-    strategies : sequence of str
-        In the order of rows.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, strategy, quantity, expected, studies, studies_mean, studies_std, paper, p_value. Of the two counts of joints in
-        k_sigma, the paper's figure is taken for that of the first stage (interpretation R10).
+    `studies`: robot and the columns of `table_schemas.repeated`. `expected`: long, of `table_schemas.expected`, at the noise of
+    the tables. `reference`: the printed figures. `length`: data set length of the scores. `strategies`: in the order of rows.
+    Returns robot, strategy, quantity, expected, studies, studies_mean, studies_std, paper, p_value. Of the two counts of joints
+    in k_sigma, the paper's figure is taken for that of the first stage (interpretation R10).
     """
     printed = reference[reference.table == "4"].set_index(["robot", "strategy", "quantity"]).value
     rows = []
@@ -74,26 +60,13 @@ def interpretations_table(
 ) -> pd.DataFrame:
     """What each interpretation moves, and how well it predicts the printed figures of Tables 3 and 4.
 
-    Parameters
-    ----------
-    studies : dict of str to DataFrame
-        By interpretation; robot and the columns of `table_schemas.repeated`.
-    reference : DataFrame
-        The printed figures.
-    length : int
-        Data set length of the tables.
-    usual : str
-        The interpretation as it is configured, among `studies`.
-    classical : str
-        Strategy whose scores are shown.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row for each interpretation, and one for the other count of joints in k_sigma (R10): the scores of the classical
-        strategy on each robot, mean over studies; the sum of log predictive densities of the printed figures over that of the
-        usual interpretation, in all (with its standard error) and by group; cells and how many of them differ after Holm's
-        correction. Figures of one robot move together, so that the sums order interpretations and are no probabilities.
+    `studies`: by interpretation; robot and the columns of `table_schemas.repeated`. `reference`: the printed figures. `length`:
+    data set length of the tables. `usual`: the interpretation as it is configured, among `studies`. `classical`: strategy whose
+    scores are shown. Returns one row for each interpretation, and one for the other count of joints in k_sigma (R10): the
+    scores of the classical strategy on each robot, mean over studies; the sum of log predictive densities of the printed
+    figures over that of the usual interpretation, in all (with its standard error) and by group; cells and how many of them
+    differ after Holm's correction. Figures of one robot move together, so that the sums order interpretations and are no
+    probabilities.
     """
     printed = reference[reference.table.isin(["3", "4"])]
     found = [(name, frame, True) for name, frame in studies.items()]

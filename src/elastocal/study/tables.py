@@ -25,14 +25,7 @@ MICRO, MILLI = 1e6, 1e3
 def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
     """Joint compliances that the study takes as true.
 
-    Parameters
-    ----------
-    robots : dict of str to Robot
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, c1.. in µrad/(N m).
+    Returns robot, c1.. in µrad/(N m).
     """
     rows = [{"robot": name} | _numbered("c", MICRO * robot.compliance) for name, robot in robots.items()]
     return pd.DataFrame(rows)
@@ -41,19 +34,9 @@ def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
 def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray]) -> pd.DataFrame:
     """End-effector deviation before calibration, over all configurations of all data sets.
 
-    Parameters
-    ----------
-    initial : dict of str to DataFrame
-        The initial table of each robot.
-    weights : dict of str to ndarray (1 + replicates, sets)
-        Bootstrap weights of each robot's data sets.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, mean_mm, std_mm with standard errors, max_mm without one, as the bootstrap has none for a maximum; and the spread
-        of the same figures between single data sets,
-        ``mean_mm_one_set`` (average) and ``mean_mm_one_set_std``.
+    `initial`: the initial table of each robot. `weights` (1 + replicates, sets): bootstrap weights of each robot's data sets.
+    Returns robot, mean_mm, std_mm with standard errors, max_mm without one, as the bootstrap has none for a maximum; and the
+    spread of the same figures between single data sets, ``mean_mm_one_set`` (average) and ``mean_mm_one_set_std``.
     """
     rows = []
     for robot, frame in initial.items():
@@ -78,19 +61,7 @@ def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray
 def table3(metrics: pd.DataFrame, robots: Iterable[str], strategy: str, noise_um: float, length: int) -> pd.DataFrame:
     """Compliances from the averaged stiffness (equation 12) by one strategy.
 
-    Parameters
-    ----------
-    metrics : DataFrame
-        Long.
-    robots : sequence of str
-    strategy : str
-    noise_um : float
-    length : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, c1.. in µrad/(N m), with standard errors.
+    `metrics`: long. Returns robot, c1.. in µrad/(N m), with standard errors.
     """
     rows = []
     for robot in robots:
@@ -115,21 +86,9 @@ def table4(
 ) -> pd.DataFrame:
     """Comparison of the strategies at one noise level.
 
-    Parameters
-    ----------
-    metrics, replicates : DataFrame
-        Long.
-    robots, strategies : sequence of str
-    noise_um : float
-    length : int
-        Data set length of the first and third figure.
-    k_sigma_limit_percent, deviation_limit_um : float
-        Limits whose data set lengths are the second and fourth figure.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A length that no data set reaches is infinite.
+    `metrics`, `replicates`: long. `length`: data set length of the first and third figure. `k_sigma_limit_percent`,
+    `deviation_limit_um`: limits whose data set lengths are the second and fourth figure. Returns a length that no data set
+    reaches is infinite.
     """
     limit = f"{k_sigma_limit_percent:g}_percent"
     rows = []
@@ -162,18 +121,8 @@ def extended_table(
 ) -> pd.DataFrame:
     """What the reduced model leaves of the deviation of robots with elastic links.
 
-    Parameters
-    ----------
-    metrics, replicates : DataFrame
-        Long.
-    robots, strategies : sequence of str
-    noise_um : float
-    length : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        strategy, initial_mean_mm, residual_mean_um, share_compensated_percent with standard errors; robot where several.
+    `metrics`, `replicates`: long. Returns strategy, initial_mean_mm, residual_mean_um, share_compensated_percent with standard
+    errors; robot where several.
     """
     rows = []
     for robot in robots:
@@ -202,17 +151,7 @@ def share_compensated(
 ) -> tuple[float, float]:
     """Share of the initial deviation that calibration removes, in percent, with its standard error; NaN where not studied.
 
-    Parameters
-    ----------
-    metrics, replicates : DataFrame
-        Long.
-    robot, strategy : str
-    noise_um : float
-    length : int
-
-    Returns
-    -------
-    share, std_error : float
+    `metrics`, `replicates`: long.
     """
     cell = _by_length(metrics, robot, noise_um, strategy)
     if cell.empty:
@@ -227,17 +166,7 @@ def deviation_ratio(
 ) -> tuple[float, float]:
     """How many times smaller the deviation of `over` is than that of `strategy`, with its error; NaN where not studied.
 
-    Parameters
-    ----------
-    metrics, replicates : DataFrame
-        Long.
-    robot, strategy, over : str
-    noise_um : float
-    length : int
-
-    Returns
-    -------
-    ratio, std_error : float
+    `metrics`, `replicates`: long.
     """
     values, drawn = [], []
     for name in (strategy, over):
@@ -254,21 +183,10 @@ def per_dataset_table(
 ) -> pd.DataFrame:
     """What one data set gives: accuracy on test configurations beside the Cramér-Rao bound of the same measurements.
 
-    Parameters
-    ----------
-    accuracy : DataFrame
-        Long.
-    bounds : dict of str to DataFrame
-        The bounds table of each robot.
-    points : dict of str to tuple of str
-        Measuring points that each strategy, by its name, reads.
-
-    Returns
-    -------
-    pandas.DataFrame
-        strategy, robot, noise_um, ds, mean_um, rms_um, p95_um, max_um, crlb_rms_um, efficiency, their errors and the relative
-        error of each compliance. The efficiency is (crlb_rms / rms)^2: at most one for an unbiased estimator, empty without
-        noise.
+    `accuracy`: long. `bounds`: the bounds table of each robot. `points`: measuring points that each strategy, by its name,
+    reads. Returns strategy, robot, noise_um, ds, mean_um, rms_um, p95_um, max_um, crlb_rms_um, efficiency, their errors and the
+    relative error of each compliance. The efficiency is (crlb_rms / rms)^2: at most one for an unbiased estimator, empty
+    without noise.
     """
     frame = accuracy.rename(columns={"length": "ds"}).copy()
     limits = pd.concat([bound.assign(robot=robot) for robot, bound in bounds.items()]).rename(columns={"length": "ds"})
@@ -289,16 +207,8 @@ def per_dataset_table(
 def solver_summary(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Which strategies are the same estimator, under either solver.
 
-    Parameters
-    ----------
-    frames : dict of str to DataFrame
-        The solvers table of each robot.
-
-    Returns
-    -------
-    pandas.DataFrame
-        robot, strategy, closest_strategy (under Gauss-Newton), the largest relative difference to it under each solver, and
-        that between the solvers, which is the second-order error of equation 11.
+    `frames`: the solvers table of each robot. Returns robot, strategy, closest_strategy (under Gauss-Newton), the largest
+    relative difference to it under each solver, and that between the solvers, which is the second-order error of equation 11.
     """
     rows = []
     for robot, frame in frames.items():
@@ -329,15 +239,7 @@ def solver_summary(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
     """The same table for people: each value with its standard error behind a ± sign, an infinite length as "not reached".
 
-    Parameters
-    ----------
-    frame : DataFrame
-    digits : int
-        Significant digits of a value without error.
-
-    Returns
-    -------
-    pandas.DataFrame of str
+    `digits`: significant digits of a value without error.
     """
     shown = {}
     for column in frame.columns:
@@ -349,16 +251,7 @@ def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
 
 
 def headed_rows(frame: pd.DataFrame) -> list[list[str]]:
-    """The table for people as rows of words, its header first, with names of columns that break at blanks.
-
-    Parameters
-    ----------
-    frame : DataFrame
-
-    Returns
-    -------
-    list of list of str
-    """
+    """The table for people as rows of words, its header first, with names of columns that break at blanks."""
     shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set")])
     return [[column_head(name) for name in shown.columns], *shown.to_numpy().tolist()]
 
@@ -366,14 +259,7 @@ def headed_rows(frame: pd.DataFrame) -> list[list[str]]:
 def column_head(name: str) -> str:
     """Name of a column or a quantity for people, with its unit.
 
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    str
-        Names that are not of the paper's quantities with blanks.
+    Returns names that are not of the paper's quantities with blanks.
     """
     stage = ", first stage" if name.endswith("_first_stage") else ""
     for pattern, words in _HEADS:
@@ -395,17 +281,7 @@ _HEADS = (
 def worded(value: float | str, error: float, digits: int = 3) -> str:
     """A value for people, with two digits of its standard error.
 
-    Parameters
-    ----------
-    value : float or str
-    error : float
-        Not a number or zero where there is none.
-    digits : int
-        Significant digits of a value without error.
-
-    Returns
-    -------
-    str
+    `error`: not a number or zero where there is none. `digits`: significant digits of a value without error.
     """
     if isinstance(value, str):
         return value

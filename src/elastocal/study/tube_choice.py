@@ -21,26 +21,12 @@ def diameter_for_mean_deflection(
 ) -> float:
     """Outer diameter of the tubes, at the wall that they have, for which the mean end-effector deflection comes out.
 
-    By Brent's method [1]_.
+    By Brent's method [1].
 
-    Parameters
-    ----------
-    robot : Robot
-        With links, all of one tube.
-    experiments : Experiments
-    target_m : float
-        Mean over the experiments of the norm of the displacement, m.
-    between_m : tuple of float
-        Diameters to search.
+    `robot`: with links, all of one tube. `target_m`: mean over the experiments of the norm of the displacement, m. `between_m`:
+    diameters to search. Returns m.
 
-    Returns
-    -------
-    float
-        m.
-
-    References
-    ----------
-    .. [1] Brent, R. P., Algorithms for Minimization without Derivatives, Prentice-Hall, 1973.
+    [1] Brent, R. P., Algorithms for Minimization without Derivatives, Prentice-Hall, 1973.
     """
 
     def excess(diameter: float) -> float:

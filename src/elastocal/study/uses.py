@@ -1,12 +1,10 @@
 """What a robot is used for: the poses of ISO 9283 under its load, and a path under a cutting force.
 
-An accuracy on random configurations says little to whom the robot works in one corner of its space. ISO 9283 [1]_ has five
+An accuracy on random configurations says little to whom the robot works in one corner of its space. ISO 9283 [1] has five
 poses in a cube and one orientation; the accuracy of a pose is the distance of the mean of the reached positions from the
 commanded one. A model that corrects the command leaves its own error there, as repeatability averages out.
 
-References
-----------
-.. [1] ISO 9283:1998, Manipulating industrial robots: Performance criteria and related test methods.
+[1] ISO 9283:1998, Manipulating industrial robots: Performance criteria and related test methods.
 """
 
 from __future__ import annotations
@@ -33,19 +31,8 @@ _DOWN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 def iso_9283(robot: Robot, centre_m: Sequence[float], edge_m: float, weight_N: float) -> Experiments | None:
     """The five poses in the sloped plane of a cube, under a weight.
 
-    Parameters
-    ----------
-    robot : Robot
-    centre_m : sequence of float
-        Of the cube, base axes.
-    edge_m : float
-    weight_N : float
-        Downwards, at the end-effector.
-
-    Returns
-    -------
-    Experiments or None
-        One set of five configurations within the joint limits; None where the robot does not reach them all.
+    `centre_m`: of the cube, base axes. `weight_N`: downwards, at the end-effector. Returns one set of five configurations
+    within the joint limits; None where the robot does not reach them all.
     """
     reach = 0.5 * edge_m * (1 - 2 * _FROM_ENDS)
     corners = np.array([[0, 0, 0], [-1, -1, -1], [-1, 1, -1], [1, 1, 1], [1, -1, 1]])
@@ -55,16 +42,8 @@ def iso_9283(robot: Robot, centre_m: Sequence[float], edge_m: float, weight_N: f
 def milling_path(robot: Robot, centre_m: Sequence[float], length_m: float, cutting_N: float) -> Experiments | None:
     """A straight level path across, the cutting force half against the feed and half upwards off the part.
 
-    Parameters
-    ----------
-    robot, centre_m
-        As in `iso_9283`.
-    length_m, cutting_N : float
-
-    Returns
-    -------
-    Experiments or None
-        One set of configurations within the joint limits; None where the robot does not reach all of the path.
+    `robot`, `centre_m`: as in `iso_9283`. Returns one set of configurations within the joint limits; None where the robot does
+    not reach all of the path.
     """
     along = np.array([0.0, 1.0, 0.0])
     position = np.array(centre_m) + length_m * np.linspace(-0.5, 0.5, _PATH_POSES)[:, None] * along

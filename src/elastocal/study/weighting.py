@@ -1,9 +1,7 @@
-"""What equal weights cost where measurements are not equally certain: ordinary against generalized least squares [1]_.
+"""What equal weights cost where measurements are not equally certain: ordinary against generalized least squares [1].
 
-References
-----------
-.. [1] Aitken, A. C., On least squares and linear combination of observations, Proceedings of the Royal Society of Edinburgh 55,
-   1935.
+[1] Aitken, A. C., On least squares and linear combination of observations, Proceedings of the Royal Society of Edinburgh 55,
+    1935.
 """
 
 from __future__ import annotations
@@ -14,18 +12,8 @@ import numpy as np
 def expected_errors(regressor: np.ndarray, deviation: np.ndarray, moment: np.ndarray) -> tuple[float, float]:
     """RMS error by equal weights and by those of the noise.
 
-    Parameters
-    ----------
-    regressor : ndarray (sets, rows, n)
-    deviation : ndarray (sets, rows)
-        Standard deviation of each measurement, m or rad.
-    moment : ndarray (n, n)
-        From `metrics.error_moment`.
-
-    Returns
-    -------
-    equal, weighted : float
-        m; the latter is the Cramér-Rao bound.
+    `regressor` (sets, rows, n). `deviation` (sets, rows): standard deviation of each measurement, m or rad. `moment` (n, n):
+    from `metrics.error_moment`. Returns `equal`, `weighted`: m; the latter is the Cramér-Rao bound.
     """
     across = regressor.swapaxes(1, 2)
     inverse = np.linalg.inv(across @ regressor)
@@ -40,16 +28,7 @@ def expected_errors(regressor: np.ndarray, deviation: np.ndarray, moment: np.nda
 def pose_deviation(position_m: np.ndarray | float, orientation_rad: float, shape: tuple[int, ...]) -> np.ndarray:
     """Standard deviations of the six components of poses.
 
-    Parameters
-    ----------
-    position_m : float or ndarray (sets, configurations)
-    orientation_rad : float
-    shape : tuple of int
-        (sets, configurations).
-
-    Returns
-    -------
-    ndarray (sets, 6 configurations)
+    `position_m` (sets, configurations). `shape`: (sets, configurations). Returns (sets, 6 configurations).
     """
     found = np.empty((*shape, 6))
     found[..., :3] = np.broadcast_to(position_m, shape)[..., None]
@@ -60,17 +39,6 @@ def pose_deviation(position_m: np.ndarray | float, orientation_rad: float, shape
 def range_noise(position_m: np.ndarray, tracker_m: np.ndarray, base_m: float, per_metre: float) -> np.ndarray:
     """Standard deviation of a tracker's positions, which grows with the range: root of the sum of the squares of its parts.
 
-    Parameters
-    ----------
-    position_m : ndarray (..., 3)
-        Of the target.
-    tracker_m : ndarray (3,)
-    base_m : float
-    per_metre : float
-
-    Returns
-    -------
-    ndarray (...)
-        m.
+    `position_m` (..., 3): of the target. `tracker_m` (3,). Returns (...): m.
     """
     return np.hypot(base_m, per_metre * np.linalg.norm(position_m - tracker_m, axis=-1))

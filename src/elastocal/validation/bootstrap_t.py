@@ -21,15 +21,7 @@ _ROUNDING = 1e-12
 def drawn_poses(poses: int, replicates: int, stream: np.random.Generator) -> np.ndarray | None:
     """How often each pose counts in each replicate.
 
-    Parameters
-    ----------
-    poses, replicates : int
-    stream : numpy.random.Generator
-
-    Returns
-    -------
-    ndarray of float (B, P) or None
-        None where Student's t is taken instead.
+    Returns (B, P) of float: None where Student's t is taken instead.
     """
     if not _FEWEST_TO_DRAW <= poses <= _MOST_TO_DRAW:
         return None
@@ -43,20 +35,8 @@ def log_ratio_interval(
 ) -> tuple[np.ndarray, float]:
     """Interval of the logarithm of a ratio of totals over poses.
 
-    Parameters
-    ----------
-    over, under : ndarray (P,)
-        Of each pose.
-    weights : ndarray (B, P) or None
-        From `drawn_poses`.
-    ends : ndarray (2,)
-        Probabilities below the lower and the upper end.
-
-    Returns
-    -------
-    interval : ndarray (2,)
-        Not a number with a single pose.
-    std_error : float
+    `over`, `under` (P,): of each pose. `weights` (B, P): from `drawn_poses`. `ends` (2,): probabilities below the lower and the
+    upper end. Returns `interval` (2,): not a number with a single pose.
     """
     poses = len(over)
     if poses < 2:
@@ -77,16 +57,7 @@ def risk_above(over: np.ndarray, under: np.ndarray, weights: np.ndarray | None, 
 
     The level at which the upper end of a one-sided interval is the limit.
 
-    Parameters
-    ----------
-    over, under, weights
-        As in `log_ratio_interval`.
-    log_limit : float
-
-    Returns
-    -------
-    float
-        Between 0 and 1; not a number with a single pose.
+    `over`, `under`, `weights`: as in `log_ratio_interval`. Returns between 0 and 1; not a number with a single pose.
     """
     poses = len(over)
     if poses < 2:

@@ -20,24 +20,11 @@ PASS, FAIL, UNDECIDED = "pass", "fail", "undecided"
 class Conformity:
     """A robot against a tolerance on its root mean square position error.
 
-    Attributes
-    ----------
-    decision : {"pass", "fail", "undecided"}
-    tolerance_m, rms_m : float
-    limit_m : float
-        What is compared with the tolerance to pass: the RMS is larger with the accepted risk.
-    guard_band_m : float
-        By how much the RMS must stay below the tolerance to pass.
-    risk_above : float
-        Risk that the RMS over all poses like these lies above the tolerance.
-    accepted_risk : float
-    poses : int
-    poses_inside : int or None
-        Poses of which no measurement lies beyond the tolerance; None where nobody measured.
-    share_inside : float or None
-        Of all poses like these at least this share lies inside, at 95 % confidence.
-    poses_needed : int or None
-        Validation poses with which an undecided one would be decided; None where it is decided.
+    `decision`: one of "pass", "fail", "undecided". `limit_m`: what is compared with the tolerance to pass: the RMS is larger
+    with the accepted risk. `guard_band_m`: by how much the RMS must stay below the tolerance to pass. `risk_above`: risk that
+    the RMS over all poses like these lies above the tolerance. `poses_inside`: poses of which no measurement lies beyond the
+    tolerance; None where nobody measured. `share_inside`: of all poses like these at least this share lies inside, at 95 %
+    confidence. `poses_needed`: validation poses with which an undecided one would be decided; None where it is decided.
     """
 
     decision: str
@@ -73,32 +60,17 @@ def conformity(
     """Decide whether errors keep a tolerance.
 
     The robot passes where the risk that its RMS over all poses lies above the tolerance is at most the accepted one, fails
-    where the risk that it lies below is, and is undecided between: acceptance and rejection with guard bands [1]_. The risk is
+    where the risk that it lies below is, and is undecided between: acceptance and rejection with guard bands [1]. The risk is
     that of the bootstrap-t over poses, see `held_out.intervals`. Noise of the tracker is taken off as squares: the mean
     square is compared with the sum of both squares. Beside it, free of any distribution and with the noise in it, the share of
-    poses inside [2]_.
+    poses inside [2].
 
-    Parameters
-    ----------
-    errors : Errors
-        As measured.
-    tolerance_m : float
-    accepted_risk : float
-    replicates : int
-    stream : numpy.random.Generator
-    noise_m : float
-        Root mean square length of the noise in the errors.
+    `errors`: as measured. `noise_m`: root mean square length of the noise in the errors.
 
-    Returns
-    -------
-    Conformity
-
-    References
-    ----------
-    .. [1] JCGM 106:2012, Evaluation of measurement data: the role of measurement uncertainty in conformity assessment,
-       section 8.3.
-    .. [2] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
-       Biometrika 26, 1934.
+    [1] JCGM 106:2012, Evaluation of measurement data: the role of measurement uncertainty in conformity assessment, section
+        8.3.
+    [2] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
+        Biometrika 26, 1934.
     """
     poses = errors.poses
     counts = np.bincount(errors.cluster).astype(float)

@@ -34,22 +34,12 @@ def outside_fitted_range(
     predicts the position less surely than it would have predicted any pose it was fitted to, had that pose been left out. The
     second finds what ranges joint by joint miss: corners between the poses, loads, times and temperatures beyond those fitted.
     Poses drawn like the fitted ones pass that maximum with probability 1 / (P + 1) at most, as all are exchangeable: the
-    argument of conformal prediction [1]_.
+    argument of conformal prediction [1].
 
-    Parameters
-    ----------
-    fitted_states, states : States
-    fitted_variance : ndarray (P,), optional
-        As the two of `predictive_variances`; only the angles are judged without.
-    variance : ndarray (S,), optional
+    `fitted_variance` (P,): as the two of `predictive_variances`; only the angles are judged without. `variance` (S,). Returns
+    (S,) of bool.
 
-    Returns
-    -------
-    ndarray of bool (S,)
-
-    References
-    ----------
-    .. [1] Vovk, V., Gammerman, A. and Shafer, G., Algorithmic Learning in a Random World, Springer, 2005.
+    [1] Vovk, V., Gammerman, A. and Shafer, G., Algorithmic Learning in a Random World, Springer, 2005.
     """
     outside = beyond_range(_angles_of_poses(fitted_states), states.joint_angles)
     if fitted_variance is None or variance is None:
@@ -65,17 +55,7 @@ def _angles_of_poses(states: States | Measurements) -> np.ndarray:
 def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
     """Which poses lie outside the range of those that a model was fitted to, see `outside_fitted_range`.
 
-    Parameters
-    ----------
-    fitted : Fit
-    case : Case
-        Which it was fitted to.
-    held_out : Case
-
-    Returns
-    -------
-    ndarray of bool (P,)
-        By `Observations.cluster`.
+    `case`: which it was fitted to. Returns (P,) of bool: by `Observations.cluster`.
     """
     unseen = held_out.observations
     if not same_campaign(case, held_out):
@@ -97,18 +77,8 @@ def repeat_warnings(fitted_states: States | Measurements, states: States | Measu
 def beyond_campaign(fitted_states: States, joint_angles: np.ndarray, wrench: np.ndarray | None) -> np.ndarray:
     """Poses and loads beyond those that a campaign measured, before any fit is at hand.
 
-    Parameters
-    ----------
-    fitted_states : States
-    joint_angles : ndarray (N, n)
-        Of the chain, rad.
-    wrench : ndarray (N, 6) or None
-        N, N m; none where nothing loads the robot.
-
-    Returns
-    -------
-    ndarray of bool (N,)
-        By the joint angles as in `outside_fitted_range`, or by a force or moment larger than any of the campaign.
+    `joint_angles` (N, n): of the chain, rad. `wrench` (N, 6): N, N m; none where nothing loads the robot. Returns (N,) of bool:
+    by the joint angles as in `outside_fitted_range`, or by a force or moment larger than any of the campaign.
     """
     outside = beyond_range(_angles_of_poses(fitted_states), joint_angles)
     if wrench is None:
@@ -129,30 +99,15 @@ def predictive_variances(
     measurements do not identify is as uncertain as that, and a pose that alone identifies a parameter does not make all
     others look sure.
 
-    The variance of a prediction is its leverage, here in m². Poses are left out by case deletion [1]_ with Woodbury's identity
-    [2]_.
+    The variance of a prediction is its leverage, here in m². Poses are left out by case deletion [1] with Woodbury's identity
+    [2].
 
-    Parameters
-    ----------
-    fitted : Fit
-    observations : Observations
-        Which it was fitted to.
-    model : Model
-    estimate : Estimate
-        Of the fit, for the other observations. Frames and targets count only where they are those of the fit.
-    unseen : Observations
+    `observations`: which it was fitted to. `estimate`: of the fit, for the other observations. Frames and targets count only
+    where they are those of the fit. Returns `own` (P,): m², of the least sure reading of each pose; `other` (S,): m², of the
+    least sure reading of each state. Zero without parameters.
 
-    Returns
-    -------
-    own : ndarray (P,)
-        m², of the least sure reading of each pose.
-    other : ndarray (S,)
-        m², of the least sure reading of each state. Zero without parameters.
-
-    References
-    ----------
-    .. [1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, Chapman and Hall, 1982.
-    .. [2] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
+    [1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, Chapman and Hall, 1982.
+    [2] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
     """
     listed = fitted.parameters
     if not listed:

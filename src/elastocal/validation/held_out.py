@@ -36,12 +36,7 @@ _ROUNDING = 1e-12
 class Errors:
     """Position errors of observations.
 
-    Attributes
-    ----------
-    distance : ndarray (M,)
-        m.
-    cluster : ndarray (M,)
-        Pose of each, 0 .. P-1.
+    `distance` (M,): m. `cluster` (M,): pose of each, 0 .. P-1.
     """
 
     distance: np.ndarray
@@ -72,15 +67,7 @@ def position_errors(model: Model, estimate: Estimate, observations: Observations
 def position_residuals(model: Model, estimate: Estimate, observations: Observations) -> np.ndarray:
     """Measured less predicted positions, in parts that fit into memory.
 
-    Parameters
-    ----------
-    model, estimate, observations
-        As in `position_errors`.
-
-    Returns
-    -------
-    ndarray (M, 3)
-        m, base axes.
+    `model`, `estimate`, `observations`: as in `position_errors`. Returns (M, 3): m, base axes.
     """
     off = np.empty((len(observations), 3))
     for states, seen in parts_of(observations, observations_at_once(observations.rows, 0)):
@@ -92,13 +79,7 @@ def position_residuals(model: Model, estimate: Estimate, observations: Observati
 def summary(distance: np.ndarray) -> dict[str, np.ndarray]:
     """Mean, RMS, 95th percentile and maximum.
 
-    Parameters
-    ----------
-    distance : ndarray (..., M)
-
-    Returns
-    -------
-    dict of str to ndarray (...)
+    `distance` (..., M). Returns (...).
     """
     return {
         "mean_m": distance.mean(axis=-1),
@@ -112,11 +93,7 @@ def summary(distance: np.ndarray) -> dict[str, np.ndarray]:
 class Reduction:
     """Share by which the RMS falls from one model to another on the same poses.
 
-    Attributes
-    ----------
-    low, high : float
-        95 % interval.
-    std_error : float
+    `low`, `high`: 95 % interval.
     """
 
     low: float
@@ -184,20 +161,11 @@ def intervals(
 def share_below_largest(poses: int) -> float:
     """Share of all poses whose errors stay below the largest error seen, at 95 % confidence; free of any distribution.
 
-    The one-sided tolerance limit of a sample's maximum [1]_.
+    The one-sided tolerance limit of a sample's maximum [1].
 
-    Parameters
-    ----------
-    poses : int
-        Poses drawn as those of later use are.
+    `poses`: poses drawn as those of later use are.
 
-    Returns
-    -------
-    float
-
-    References
-    ----------
-    .. [1] Wilks, S. S., Determination of sample sizes for setting tolerance limits, Annals of Mathematical Statistics 12, 1941.
+    [1] Wilks, S. S., Determination of sample sizes for setting tolerance limits, Annals of Mathematical Statistics 12, 1941.
     """
     return float((1.0 - _CONFIDENCE) ** (1.0 / poses))
 
@@ -231,18 +199,7 @@ def _quantile_interval(errors: Errors) -> np.ndarray:
 def noise_floor(fitted: Fit, observations: Observations, model: Model, estimate: Estimate) -> float:
     """RMS position error that the noise alone leaves in observations.
 
-    Parameters
-    ----------
-    fitted : Fit
-        Holds the noise.
-    observations : Observations
-    model : Model
-    estimate : Estimate
-
-    Returns
-    -------
-    float
-        m; not a number where the noise is not known.
+    `fitted`: holds the noise. Returns m; not a number where the noise is not known.
     """
     if fitted.noise.source == "residual":
         return float("nan")
@@ -260,17 +217,8 @@ def noise_floor(fitted: Fit, observations: Observations, model: Model, estimate:
 def errors_by_range(errors: Mapping[str, Errors], outside: np.ndarray) -> dict[str, Any]:
     """Errors before and after, inside and outside the range of the fitted poses.
 
-    Parameters
-    ----------
-    errors : dict of str to Errors
-        By stage, for the same observations.
-    outside : ndarray of bool (P,)
-        See `fitted_range.outside_fitted_range`; by pose.
-
-    Returns
-    -------
-    dict
-        ``poses`` outside, and summaries of every stage ``inside`` and ``outside``, None where there is no such pose.
+    `errors`: by stage, for the same observations. `outside` (P,) of bool: see `fitted_range.outside_fitted_range`; by pose.
+    Returns ``poses`` outside, and summaries of every stage ``inside`` and ``outside``, None where there is no such pose.
     """
     found: dict[str, Any] = {"poses": int(outside.sum())}
     for name, poses in (("inside", ~outside), ("outside", outside)):
@@ -284,14 +232,5 @@ def _floats(values: Mapping[str, np.ndarray]) -> dict[str, float]:
 
 
 def grown(before: Mapping[str, float | np.ndarray], after: Mapping[str, float | np.ndarray]) -> list[str]:
-    """Metrics of a summary that got worse.
-
-    Parameters
-    ----------
-    before, after : dict of str to float
-
-    Returns
-    -------
-    list of str
-    """
+    """Metrics of a summary that got worse."""
     return [name for name in METRICS if after[name] > before[name]]

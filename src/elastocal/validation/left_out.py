@@ -1,11 +1,9 @@
 """Errors of configurations that a fit was not given, without fitting again: leave-one-out cross-validation in closed form.
 
 In a generalized ridge regression the residual of rows that are left out is (I - H)^-1 times that of the fit, where H is their
-block of the hat matrix [1]_. Priors and noise stay those of the fit.
+block of the hat matrix [1]. Priors and noise stay those of the fit.
 
-References
-----------
-.. [1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, section 2.2, Chapman and Hall, 1982.
+[1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, section 2.2, Chapman and Hall, 1982.
 """
 
 from __future__ import annotations

@@ -20,18 +20,7 @@ if TYPE_CHECKING:
 def placed(fitted: Fit, case: Case, part: Case) -> tuple[Model, Estimate]:
     """Model and estimate for other measurements: as fitted, or with frames and targets of another campaign.
 
-    Parameters
-    ----------
-    fitted : Fit
-    case : Case
-        Which it was fitted to.
-    part : Case
-        Measurements of the same campaign or of another one.
-
-    Returns
-    -------
-    model : Model
-    estimate : Estimate
+    `case`: which it was fitted to. `part`: measurements of the same campaign or of another one.
     """
     if same_campaign(case, part):
         return fitted.model, placed_estimate(fitted, part.observations)
@@ -50,15 +39,6 @@ def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
 
     A tracker set up anew stands somewhere else: the frame of such a session is fitted to the very observations that test it,
     six numbers of each session, and so its errors come out slightly too small. Everything else stays.
-
-    Parameters
-    ----------
-    fitted : Fit
-    observations : Observations
-
-    Returns
-    -------
-    Estimate
     """
     found = fitted.estimate
     unseen = ~np.isin(observations.states.session, found.sessions)
@@ -78,16 +58,7 @@ def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
 def carried_over(fitted: Fit, model: Model, states: States) -> Fit:
     """A fit without the effects that another campaign cannot have, or does not record: a wandering tracker, a temperature.
 
-    Parameters
-    ----------
-    fitted : Fit
-    model : Model
-    states : States
-        Of the other campaign.
-
-    Returns
-    -------
-    Fit
+    `states`: of the other campaign.
     """
     there = model.offered(states) | {"load", "external load"}
     kept = [n for n, effect in enumerate(fitted.model.effects) if not effect.of_setup and effect.needs <= there]

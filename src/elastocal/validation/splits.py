@@ -1,13 +1,11 @@
 """Cross-validation over blocks of joint space and over sessions: how far a model carries, from the training poses alone.
 
 Poses drawn at random have neighbours among those fitted, so their errors say how well a model interpolates; whole blocks of
-joint space left out say how well it extrapolates (block cross-validation [1]_). The effects stay those that were chosen with
+joint space left out say how well it extrapolates (block cross-validation [1]). The effects stay those that were chosen with
 all training poses: what is refitted is their size, so the errors carry the selection's optimism.
 
-References
-----------
-.. [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic
-   structure, Ecography 40, 2017.
+[1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic structure,
+    Ecography 40, 2017.
 """
 
 from __future__ import annotations
@@ -41,13 +39,7 @@ JOINT_SPACE_BLOCKS = 4
 class Split:
     """A partition of the states of observations.
 
-    Attributes
-    ----------
-    name : str
-    labels : tuple
-        Name of each part.
-    part : ndarray of int (S,)
-        Index into `labels`, of every state.
+    `labels`: name of each part. `part` (S,) of int: index into `labels`, of every state.
     """
 
     name: str
@@ -58,14 +50,7 @@ class Split:
 def splits_of(states: States) -> list[Split]:
     """The partitions that some states allow: blocks of joint space and, where there are several, sessions.
 
-    Parameters
-    ----------
-    states : States
-
-    Returns
-    -------
-    list of Split
-        Without those that leave too few configurations to fit.
+    Returns without those that leave too few configurations to fit.
     """
     pose = state_clusters(states)
     configuration = configurations(states.joint_angles, pose)[pose]
@@ -81,15 +66,7 @@ def splits_of(states: States) -> list[Split]:
 class Refit:
     """A model fitted without one part of some observations.
 
-    Attributes
-    ----------
-    within : ndarray of bool (S,)
-        States of the part left out.
-    rest, left_out : Observations
-    estimate : Estimate
-        Fitted to the rest.
-    there : Estimate
-        The same for the part left out.
+    `within` (S,) of bool: states of the part left out. `estimate`: fitted to the rest. `there`: the same for the part left out.
     """
 
     within: np.ndarray
@@ -105,17 +82,7 @@ def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterato
     A refit starts from the nominal robot, so that a parameter that only the part left out identifies does not keep its value,
     and keeps the shapes of the fit. A session that is left out has its frame fitted to itself, see `placing.placed_estimate`.
 
-    Parameters
-    ----------
-    fitted : Fit
-    observations : Observations
-        Which it was fitted to, or some of them.
-    part : ndarray of int (S,)
-        Of each state.
-
-    Yields
-    ------
-    Refit
+    `observations`: which it was fitted to, or some of them. `part` (S,) of int: of each state.
     """
     for number in np.unique(part):
         within = part == number
@@ -130,14 +97,7 @@ def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -
 
     Leave-one-block-out cross-validation, see `refits`.
 
-    Parameters
-    ----------
-    fitted, observations, part
-        As in `refits`.
-
-    Returns
-    -------
-    Errors
+    `fitted`, `observations`, `part`: as in `refits`.
     """
     distance = np.empty(len(observations))
     for refit in refits(fitted, observations, part):
@@ -151,25 +111,12 @@ def split_rows(
 ) -> list[dict[str, Any]]:
     """Cross-validated errors of the declared and the final model over every split that the training poses allow.
 
-    Parameters
-    ----------
-    declared, final : Fit
-    observations : Observations
-        Training poses, which both were fitted to.
-    replicates : int
-        Of the bootstrap over poses.
-    stream : numpy.random.Generator
+    `observations`: training poses, which both were fitted to. `replicates`: of the bootstrap over poses. Returns rows of
+    splits.csv: each part of each split, and "all" parts together. Intervals take poses as independent, which refits that share
+    most of their poses make only nearly true [1].
 
-    Returns
-    -------
-    list of dict
-        Rows of splits.csv: each part of each split, and "all" parts together. Intervals take poses as independent, which refits
-        that share most of their poses make only nearly true [1]_.
-
-    References
-    ----------
-    .. [1] Bengio, Y. and Grandvalet, Y., No unbiased estimator of the variance of K-fold cross-validation, Journal of Machine
-       Learning Research 5, 2004.
+    [1] Bengio, Y. and Grandvalet, Y., No unbiased estimator of the variance of K-fold cross-validation, Journal of Machine
+        Learning Research 5, 2004.
     """
     rows = []
     for split in splits_of(observations.states):
@@ -186,20 +133,7 @@ def split_rows(
 def error_row(
     split: str, block: str | int, before: Errors, after: Errors, replicates: int, stream: np.random.Generator
 ) -> dict[str, Any]:
-    """One row of splits.csv.
-
-    Parameters
-    ----------
-    split : str
-    block : str or int
-    before, after : Errors
-    replicates : int
-    stream : numpy.random.Generator
-
-    Returns
-    -------
-    dict
-    """
+    """One row of splits.csv."""
     limits, reductions = intervals([before, after], replicates, stream)
     row: dict[str, Any] = {"split": split, "block": block, "poses": before.poses}
     rms = [summary(errors.distance)["rms_m"] for errors in (before, after)]

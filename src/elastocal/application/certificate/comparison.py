@@ -22,13 +22,8 @@ if TYPE_CHECKING:
 class Change:
     """A parameter that both campaigns have.
 
-    Attributes
-    ----------
-    owner, name, unit : str
-    before, after, std_error : float
-        Standard error of the difference.
-    p_value : float
-        That it did not change, adjusted for all that are compared (Holm).
+    `before`, `after`, `std_error`: standard error of the difference. `p_value`: that it did not change, adjusted for all that
+    are compared (Holm).
     """
 
     owner: str
@@ -44,17 +39,9 @@ class Change:
 class Comparison:
     """How two campaigns differ.
 
-    Attributes
-    ----------
-    rms_m : float
-        Of the distance between both robots' positions over some poses, unloaded, after the best rigid motion of their bases.
-    expected_m : float
-        The same where nothing changed, by the uncertainty of both: median.
-    p_value : float
-        That nothing changed.
-    largest_m : float
-    changes : tuple of Change
-        Most certain first; empty where the campaigns leave different parameters at their values.
+    `rms_m`: of the distance between both robots' positions over some poses, unloaded, after the best rigid motion of their
+    bases. `expected_m`: the same where nothing changed, by the uncertainty of both: median. `p_value`: that nothing changed.
+    `changes`: most certain first; empty where the campaigns leave different parameters at their values.
     """
 
     rms_m: float
@@ -69,30 +56,13 @@ def compared(
 ) -> Comparison:
     """Compare what two campaigns found of one robot.
 
-    Positions are compared after the best rigid motion [1]_: where the tracker was set up is no property of the robot. The same
-    distance is drawn as it would be if nothing had changed, from the covariances of both; its rank is the p-value [2]_.
+    Positions are compared after the best rigid motion [1]: where the tracker was set up is no property of the robot. The same
+    distance is drawn as it would be if nothing had changed, from the covariances of both; its rank is the p-value [2].
 
-    Parameters
-    ----------
-    before, after : CalibratedRobot
-    reported_angles : ndarray (N, n)
-        rad, over the workspace.
-    draws : int
-    stream : numpy.random.Generator
+    `reported_angles` (N, n): rad, over the workspace. Raises `InputError`: two robots of different chains.
 
-    Returns
-    -------
-    Comparison
-
-    Raises
-    ------
-    InputError
-        Two robots of different chains.
-
-    References
-    ----------
-    .. [1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta Crystallographica A32, 1976.
-    .. [2] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge, 1997.
+    [1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta Crystallographica A32, 1976.
+    [2] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge, 1997.
     """
     if before.robot.chain != after.robot.chain:
         raise InputError("--compare", "", f"another robot, {before.robot.name}", f"a campaign of {after.robot.name}")

@@ -24,14 +24,8 @@ _ENDS = (0.025, 0.975)
 class Share:
     """A line of the budget.
 
-    Attributes
-    ----------
-    name : str
-        An effect by its name in the catalogue, ``joint_compliance``, or `TOTAL`, `UNCERTAINTY`, `REPEATABILITY`,
-        `FORM` or `NOT_COMMANDED`.
-    rms_m : float
-    low_m, high_m : float or None
-        95 % interval by the covariance of the parameters; None where the line has none.
+    `name`: an effect by its name in the catalogue, ``joint_compliance``, or `TOTAL`, `UNCERTAINTY`, `REPEATABILITY`, `FORM` or
+    `NOT_COMMANDED`. `low_m`, `high_m`: 95 % interval by the covariance of the parameters; None where the line has none.
     """
 
     name: str
@@ -55,20 +49,8 @@ def error_budget(
 
     Lines do not add up: effects may work against each other, and loads meet springs.
 
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
-    reported_angles : ndarray (N, n)
-        rad, as the controller reports them.
-    operating : OperatingConditions
-    draws : int
-        Of the parameters, for the intervals.
-    stream : numpy.random.Generator
-
-    Returns
-    -------
-    list of Share
-        What is missed without any correction; each effect, largest first; what a correction leaves, by `accuracy.predicted`.
+    `reported_angles` (N, n): rad, as the controller reports them. `draws`: of the parameters, for the intervals. Returns what
+    is missed without any correction; each effect, largest first; what a correction leaves, by `accuracy.predicted`.
     """
     model, estimate = calibrated.model, calibrated.estimate
     whole, turned = forward(calibrated, reported_angles, operating)

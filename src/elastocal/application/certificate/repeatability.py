@@ -28,15 +28,8 @@ _CONFIDENCE = 0.975
 class Repeatability:
     """Pose repeatability RP, pooled over the poses that were approached again.
 
-    Attributes
-    ----------
-    position_m : float
-    position_interval_m : tuple of float
-        95 % interval over poses.
-    orientation_rad : float or None
-        The same of angles; None where positions are measured.
-    approaches, poses : int
-        Approaches and poses behind it.
+    `position_interval_m`: 95 % interval over poses. `orientation_rad`: the same of angles; None where positions are measured.
+    `approaches`, `poses`: approaches and poses behind it.
     """
 
     position_m: float
@@ -49,26 +42,15 @@ class Repeatability:
 def repeatability(measurements: Measurements, targets: Sequence[Target], point: str) -> Repeatability | None:
     """Repeatability of the end effector.
 
-    ISO 9283:1998, section 7.2.2 [1]_: mean distance of the attained positions from their barycentre plus three standard
+    ISO 9283:1998, section 7.2.2 [1]: mean distance of the attained positions from their barycentre plus three standard
     deviations of these distances; here pooled over poses of few repeats, whose distances count by sqrt(k / (k - 1)) for the
     degree of freedom that the barycentre takes. The interval is by the jackknife over poses on the logarithm. What the sensor
     scatters is in it.
 
-    Parameters
-    ----------
-    measurements : Measurements
-    targets : sequence of Target
-    point : str
-        Measuring point of the end effector; all targets count where none sits on it.
+    `point`: measuring point of the end effector; all targets count where none sits on it. Returns None without two poses that
+    were approached again.
 
-    Returns
-    -------
-    Repeatability or None
-        None without two poses that were approached again.
-
-    References
-    ----------
-    .. [1] ISO 9283:1998, Manipulating industrial robots - Performance criteria and related test methods.
+    [1] ISO 9283:1998, Manipulating industrial robots - Performance criteria and related test methods.
     """
     there = np.array([target.point == point for target in targets])[measurements.target]
     some = measurements.select(there) if there.any() else measurements

@@ -20,18 +20,9 @@ if TYPE_CHECKING:
 class WorkspaceErrors:
     """Errors at poses drawn over the workspace.
 
-    Attributes
-    ----------
-    joint_angles : ndarray (N, n)
-        As the controller reports them, rad.
-    position : ndarray (N, 3)
-        m, base axes.
-    uncorrected_m : ndarray (N,)
-        Distance of the robot from where its file has it, less what the placement of its base takes up.
-    bound_m : ndarray (N,)
-        Below which the corrected robot misses 95 % of the time, all told.
-    outside : ndarray of bool (N,)
-        Beyond the range of the fitted poses.
+    `joint_angles` (N, n): as the controller reports them, rad. `position` (N, 3): m, base axes. `uncorrected_m` (N,): distance
+    of the robot from where its file has it, less what the placement of its base takes up. `bound_m` (N,): below which the
+    corrected robot misses 95 % of the time, all told. `outside` (N,) of bool: beyond the range of the fitted poses.
     """
 
     joint_angles: np.ndarray
@@ -54,19 +45,8 @@ def workspace_errors(
 
     What a corrected robot misses is what `accuracy.predicted` says of these poses.
 
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
-    reported_angles : ndarray (N, n)
-        rad.
-    wrench : ndarray (6,)
-        N, N m, at the last measuring point, base axes.
-    fitted_angles : ndarray (P, n)
-        Of the campaign, of the chain, rad.
-
-    Returns
-    -------
-    WorkspaceErrors
+    `reported_angles` (N, n): rad. `wrench` (6,): N, N m, at the last measuring point, base axes. `fitted_angles` (P, n): of the
+    campaign, of the chain, rad.
     """
     operating = OperatingConditions(np.asarray(wrench, float)[None])
     position, rotation = forward(calibrated, reported_angles, operating)

@@ -1,14 +1,12 @@
 """How far a design is from the best that any weights on the candidates could be: the general equivalence theorem.
 
 For a concave criterion f of M(w) = I + n sum w_i Z_i' Z_i no weights have more than f(M) + n max_i s_i - n sum w_i s_i, with
-s_i the slope of f along candidate i: Kiefer and Wolfowitz's theorem [1]_ as a bound that holds for any w. The weights come from
-the multiplicative algorithm [2]_.
+s_i the slope of f along candidate i: Kiefer and Wolfowitz's theorem [1] as a bound that holds for any w. The weights come from
+the multiplicative algorithm [2].
 
-References
-----------
-.. [1] Kiefer, J. and Wolfowitz, J., The equivalence of two extremum problems, Canadian Journal of Mathematics 12, 1960.
-.. [2] Silvey, S. D., Titterington, D. M. and Torsney, B., An algorithm for optimal designs on a finite design space,
-   Communications in Statistics - Theory and Methods 7, 1978.
+[1] Kiefer, J. and Wolfowitz, J., The equivalence of two extremum problems, Canadian Journal of Mathematics 12, 1960.
+[2] Silvey, S. D., Titterington, D. M. and Torsney, B., An algorithm for optimal designs on a finite design space,
+    Communications in Statistics - Theory and Methods 7, 1978.
 """
 
 from __future__ import annotations
@@ -31,18 +29,8 @@ _SUPPORT, _ROUNDS = 300, 2
 def best_value(rows: np.ndarray, count: int, criterion: Criterion, chosen: list[int]) -> float:
     """A value of the criterion that no design of so many configurations exceeds.
 
-    Parameters
-    ----------
-    rows : ndarray (N, k, P)
-    count : int
-        Configurations of the design, each as often as it likes.
-    criterion : Criterion
-    chosen : list of int
-        A good design, on which the weights start.
-
-    Returns
-    -------
-    float
+    `rows` (N, k, P). `count`: configurations of the design, each as often as it likes. `chosen`: a good design, on which the
+    weights start.
     """
     slopes = criterion.slopes(rows, matrix_of(rows, chosen))
     support = np.union1d(np.argsort(-slopes)[:_SUPPORT], chosen)
@@ -60,18 +48,8 @@ def best_value(rows: np.ndarray, count: int, criterion: Criterion, chosen: list[
 def efficiency(criterion: Criterion, matrix: np.ndarray, bound: float) -> float:
     """Share of the best design's worth that a design is sure to have.
 
-    Parameters
-    ----------
-    criterion : Criterion
-    matrix : ndarray (P, P)
-        Of the design.
-    bound : float
-        As by `best_value`.
-
-    Returns
-    -------
-    float
-        D: by determinants, per parameter that the measurements tell more of than the prior; A, I: of variances.
+    `matrix` (P, P): of the design. `bound`: as by `best_value`. Returns D: by determinants, per parameter that the measurements
+    tell more of than the prior; A, I: of variances.
     """
     if criterion.weight is None:
         learned = float(np.trace(np.eye(len(matrix)) - np.linalg.inv(matrix)))

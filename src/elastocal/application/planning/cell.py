@@ -31,14 +31,8 @@ _CARRIER = 2.5
 class Cell:
     """What stands around the robot.
 
-    Attributes
-    ----------
-    boxes : tuple of ndarray (3, 2)
-        Lower and upper corner by axis, base axes, m.
-    tracker_m : ndarray (3,) or None
-        Where the tracker stands, base axes; None where nothing hides its targets.
-    radius_m : float
-        Of the links.
+    `boxes` (3, 2): lower and upper corner by axis, base axes, m. `tracker_m` (3,): where the tracker stands, base axes; None
+    where nothing hides its targets. `radius_m`: of the links.
     """
 
     boxes: tuple[np.ndarray, ...]
@@ -49,18 +43,7 @@ class Cell:
 def allowed(cell: Cell, robot: Robot, targets: tuple[Target, ...], reported_angles: np.ndarray) -> dict[str, np.ndarray]:
     """Whether each configuration is allowed, by what might forbid it.
 
-    Parameters
-    ----------
-    cell : Cell
-    robot : Robot
-    targets : tuple of Target
-    reported_angles : ndarray (N, n)
-        rad.
-
-    Returns
-    -------
-    dict of str to ndarray of bool (N,)
-        "boxes": no link in a box. "sight": the tracker sees every target.
+    `reported_angles` (N, n): rad. Returns (N,) of bool: "boxes": no link in a box. "sight": the tracker sees every target.
     """
     angles = robot.model_angles(reported_angles)
     links = link_points(robot, angles)
@@ -79,16 +62,7 @@ def allowed(cell: Cell, robot: Robot, targets: tuple[Target, ...], reported_angl
 def link_points(robot: Robot, angles: np.ndarray) -> np.ndarray:
     """Points along the moving links.
 
-    Parameters
-    ----------
-    robot : Robot
-    angles : ndarray (N, n)
-        Of the chain, rad.
-
-    Returns
-    -------
-    ndarray (K, N, 3)
-        m, base axes.
+    `angles` (N, n): of the chain, rad. Returns (K, N, 3): m, base axes.
     """
     transforms = robot.chain.transforms
     first = next(place for place, transform in enumerate(transforms) if transform.coordinate is not None)

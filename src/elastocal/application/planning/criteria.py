@@ -1,15 +1,13 @@
 """Criteria of optimal design, and what each candidate adds to a design.
 
 With M the information matrix in units of the plausible sizes, which a prior of one plausible size each makes I without any
-measurement (Bayesian designs [1]_, for which no parameter need be identifiable), a candidate with rows Z makes it M + Z' Z, and
+measurement (Bayesian designs [1], for which no parameter need be identifiable), a candidate with rows Z makes it M + Z' Z, and
 
 - D: log det M grows by log det (I + Z M^-1 Z'), by the matrix determinant lemma;
 - A and I: tr C M^-1 falls by tr (I + Z M^-1 Z')^-1 Z M^-1 C M^-1 Z', by Woodbury's identity; C is the identity over the number
   of parameters for A, and for I the mean of G' G over where the robot shall be accurate, G the sensitivities there.
 
-References
-----------
-.. [1] Chaloner, K. and Verdinelli, I., Bayesian experimental design: a review, Statistical Science 10, 1995.
+[1] Chaloner, K. and Verdinelli, I., Bayesian experimental design: a review, Statistical Science 10, 1995.
 """
 
 from __future__ import annotations
@@ -29,10 +27,7 @@ _AT_ONCE = 1000
 class Criterion:
     """What makes a design good.
 
-    Attributes
-    ----------
-    weight : ndarray (P, P) or None
-        C of A and I; None for D.
+    `weight` (P, P): C of A and I; None for D.
     """
 
     weight: np.ndarray | None
@@ -46,14 +41,7 @@ class Criterion:
     def gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
         """By how much the value grows with each candidate.
 
-        Parameters
-        ----------
-        rows : ndarray (N, k, P)
-        matrix : ndarray (P, P)
-
-        Returns
-        -------
-        ndarray (N,)
+        `rows` (N, k, P), `matrix` (P, P). Returns (N,).
         """
         return np.concatenate([self._gains(part, matrix) for part in np.split(rows, range(_AT_ONCE, len(rows), _AT_ONCE))])
 
@@ -82,15 +70,7 @@ class Criterion:
 def criterion(kind: str, accuracy_rows: np.ndarray) -> Criterion:
     """One of `CRITERIA`.
 
-    Parameters
-    ----------
-    kind : {"D", "A", "I"}
-    accuracy_rows : ndarray (N, 3, P)
-        As by `survey.accuracy_rows`.
-
-    Returns
-    -------
-    Criterion
+    `kind`: one of "D", "A", "I". `accuracy_rows` (N, 3, P): as by `survey.accuracy_rows`.
     """
     if kind == "D":
         return Criterion(None)

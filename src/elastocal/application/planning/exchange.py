@@ -1,8 +1,6 @@
-"""The best few of many candidates: greedy choice, then Fedorov's exchange [1]_.
+"""The best few of many candidates: greedy choice, then Fedorov's exchange [1].
 
-References
-----------
-.. [1] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
+[1] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
 """
 
 from __future__ import annotations
@@ -43,15 +41,7 @@ def matrix_of(rows: np.ndarray, chosen: np.ndarray | list[int]) -> np.ndarray:
 def greedy(rows: np.ndarray, count: int, criterion: Criterion) -> list[int]:
     """Candidates, each that which adds most to those before it.
 
-    Parameters
-    ----------
-    rows : ndarray (N, k, P)
-    count : int
-    criterion : Criterion
-
-    Returns
-    -------
-    list of int
+    `rows` (N, k, P).
     """
     chosen: list[int] = []
     for _ in range(count):
@@ -64,16 +54,7 @@ def greedy(rows: np.ndarray, count: int, criterion: Criterion) -> list[int]:
 def exchanged(rows: np.ndarray, chosen: list[int], criterion: Criterion) -> list[int]:
     """A design in which no single candidate of a short list would be better than one that is in it.
 
-    Parameters
-    ----------
-    rows : ndarray (N, k, P)
-    chosen : list of int
-    criterion : Criterion
-
-    Returns
-    -------
-    list of int
-        In the place of each the one that took it.
+    `rows` (N, k, P). Returns in the place of each the one that took it.
     """
     found = list(chosen)
     gains = criterion.gains(rows, matrix_of(rows, found))

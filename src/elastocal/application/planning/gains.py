@@ -38,25 +38,11 @@ _UNKNOWN = 6
 def gains(survey: Survey, cell: Cell, loads: Loads, poses: int, count: int, seed: int) -> dict[str, Any]:
     """A plan against random poses.
 
-    Parameters
-    ----------
-    survey : Survey
-    cell : Cell
-    loads : Loads
-    poses : int
-        Of the plan.
-    count : int
-        Of candidates.
-    seed : int
-
-    Returns
-    -------
-    dict
-        ``planned_mm, random_mm`` with 5 and 95 % limits over random designs of as many poses; ``random_poses`` that it takes to
-        be as good as the plan, with the same limits; ``fitted_planned_mm, fitted_random_mm``: errors over the workspace of
-        models fitted to simulated measurements, RMS over robots, with ``fitted_ratio`` and its 95 % limits by a bootstrap over
-        robots; ``robust_efficiency``: D-efficiency of the plan on robots that are off their file, beside plans made with full
-        knowledge of each, the mean and the smallest.
+    `poses`: of the plan. `count`: of candidates. Returns ``planned_mm, random_mm`` with 5 and 95 % limits over random designs
+    of as many poses; ``random_poses`` that it takes to be as good as the plan, with the same limits; ``fitted_planned_mm,
+    fitted_random_mm``: errors over the workspace of models fitted to simulated measurements, RMS over robots, with
+    ``fitted_ratio`` and its 95 % limits by a bootstrap over robots; ``robust_efficiency``: D-efficiency of the plan on robots
+    that are off their file, beside plans made with full knowledge of each, the mean and the smallest.
     """
     draws = np.random.default_rng(seed)
     some = allowed_candidates(survey, cell, loads, count, seed)

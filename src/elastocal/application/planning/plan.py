@@ -34,12 +34,7 @@ _DRAWS = 4
 class Loads:
     """With what the robot is loaded.
 
-    Attributes
-    ----------
-    force_N : float
-        0 for none.
-    pulled : bool
-        By a pull in any direction; otherwise by a weight that hangs down.
+    `force_N`: 0 for none. `pulled`: by a pull in any direction; otherwise by a weight that hangs down.
     """
 
     force_N: float
@@ -64,12 +59,7 @@ class Loads:
 class Candidates:
     """Configurations among which a plan is made.
 
-    Attributes
-    ----------
-    joint_angles : ndarray (N, n)
-        As the controller reports them, rad.
-    force : ndarray (N, 3)
-        N, base axes.
+    `joint_angles` (N, n): as the controller reports them, rad. `force` (N, 3): N, base axes.
     """
 
     joint_angles: np.ndarray
@@ -84,17 +74,11 @@ class Candidates:
 class Plan:
     """What to measure.
 
-    Attributes
-    ----------
-    fitted, held_out : Candidates
-        Configurations that choose the parameters, in the order of a short tour; those that judge them, which are random.
-    efficiency : float
-        Share of the best possible design's worth that the fitted ones are sure to have, by the criterion.
-    accuracy_m : ndarray (poses,)
-        Root mean square error of the end effector over the workspace that the parameters' uncertainty leaves, as `accuracy`
-        counts it, with the first 1, 2, .. of them, best first.
-    random_m : ndarray (designs, poses)
-        The same with random configurations.
+    `fitted`, `held_out`: configurations that choose the parameters, in the order of a short tour; those that judge them, which
+    are random. `efficiency`: share of the best possible design's worth that the fitted ones are sure to have, by the criterion.
+    `accuracy_m` (poses,): root mean square error of the end effector over the workspace that the parameters' uncertainty
+    leaves, as `accuracy` counts it, with the first 1, 2, .. of them, best first. `random_m` (designs, poses): the same with
+    random configurations.
     """
 
     fitted: Candidates
@@ -107,24 +91,8 @@ class Plan:
 def allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int, seed: int) -> Candidates:
     """Configurations within the limits that the cell allows.
 
-    Parameters
-    ----------
-    survey : Survey
-    cell : Cell
-    loads : Loads
-    count : int
-        Of candidates; fewer where the cell allows fewer.
-    seed : int
-        Of Halton's sequence, scrambled, and of the directions of the loads.
-
-    Returns
-    -------
-    Candidates
-
-    Raises
-    ------
-    InputError
-        Where the cell allows none.
+    `count`: of candidates; fewer where the cell allows fewer. `seed`: of Halton's sequence, scrambled, and of the directions of
+    the loads. Raises `InputError` where the cell allows none.
     """
     robot = survey.robot
     low, high = robot.joint_limits.T
@@ -144,23 +112,8 @@ def allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int, see
 def planned(survey: Survey, some: Candidates, poses: int, held_out: int, kind: str, seed: int) -> Plan:
     """Choose configurations.
 
-    Parameters
-    ----------
-    survey : Survey
-    some : Candidates
-    poses, held_out : int
-        To fit, and to judge.
-    kind : {"D", "A", "I"}
-    seed : int
-
-    Returns
-    -------
-    Plan
-
-    Raises
-    ------
-    InputError
-        Fewer candidates than poses, poses that measure fewer numbers than there are parameters, or targets that no joint moves.
+    `poses`, `held_out`: to fit, and to judge. `kind`: one of "D", "A", "I". Raises `InputError`: fewer candidates than poses,
+    poses that measure fewer numbers than there are parameters, or targets that no joint moves.
     """
     count, draws = len(some.joint_angles), np.random.default_rng(seed)
     if count < poses + held_out:
@@ -205,11 +158,9 @@ def poses_needed(curve_m: np.ndarray, accuracy_m: float) -> int | None:
 
 
 def tour(joint_angles: np.ndarray, chosen: list[int]) -> list[int]:
-    """An order in which joints move little: nearest neighbour, then 2-opt [1]_ by the largest angle of a move.
+    """An order in which joints move little: nearest neighbour, then 2-opt [1] by the largest angle of a move.
 
-    References
-    ----------
-    .. [1] Croes, G. A., A method for solving traveling-salesman problems, Operations Research 6, 1958.
+    [1] Croes, G. A., A method for solving traveling-salesman problems, Operations Research 6, 1958.
     """
     if len(chosen) < 3:
         return list(chosen)

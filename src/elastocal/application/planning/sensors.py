@@ -1,15 +1,13 @@
 """What reads the targets, and the noise that a plan assumes of it.
 
 Standard deviations of one reading are half of what the maker permits as the largest error, which a tracker's manual calls
-typical [1]_; the angles of its probe are from [2]_, those of cameras from [3]_.
+typical [1]; the angles of its probe are from [2], those of cameras from [3].
 
-References
-----------
-.. [1] Hexagon, Leica Absolute Tracker AT500 User Manual, section 2.8: transverse error at most 15 um + 6 um/m, typical results
-   half of that.
-.. [2] Hexagon, data sheet of the Leica T-Mac: rotation angles to 0.01 deg, which is 18 um at 100 mm.
-.. [3] Krumpek, O., Kroeger, O. and Mohr, S., Reproducible Optical Tracking Precision: Evaluating a Static, Near-Parallel
-   Support Structure for OptiTrack PrimeX22 Cameras, arXiv:2502.21189, 2025: 0.12 mm across the line of sight.
+[1] Hexagon, Leica Absolute Tracker AT500 User Manual, section 2.8: transverse error at most 15 um + 6 um/m, typical results
+    half of that.
+[2] Hexagon, data sheet of the Leica T-Mac: rotation angles to 0.01 deg, which is 18 um at 100 mm.
+[3] Krumpek, O., Kroeger, O. and Mohr, S., Reproducible Optical Tracking Precision: Evaluating a Static, Near-Parallel Support
+    Structure for OptiTrack PrimeX22 Cameras, arXiv:2502.21189, 2025: 0.12 mm across the line of sight.
 """
 
 from __future__ import annotations
@@ -22,14 +20,8 @@ from dataclasses import dataclass
 class Sensor:
     """Standard deviations of one component of a reading; no orientation where it reads positions only.
 
-    Attributes
-    ----------
-    words : str
-        Which instrument it stands for, and where the values are from.
-    measured : tuple of str
-        What it reads, "position" or "pose", the usual first.
-    position_m : float
-    orientation_rad : float or None
+    `words`: which instrument it stands for, and where the values are from. `measured`: what it reads, "position" or "pose", the
+    usual first.
     """
 
     words: str

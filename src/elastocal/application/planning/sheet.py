@@ -21,18 +21,10 @@ REPEATED_POSES, REPEATS = 10, 4
 def sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
     """Rows of measurements.csv.
 
-    Parameters
-    ----------
-    survey : Survey
-    plan : Plan
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``pose`` (fitted ones first, from 1), ``load`` (0 without), ``repeat``, ``target``, ``done``, empty, ``q1_deg..qn_deg``
-        (``_mm`` of prismatic joints) as the controller shows them, ``q1..qn`` the same in rad (m), wrench (N, N m), and
-        ``x, y, z`` and ``rx, ry, rz``, empty. The first poses are repeated, unloaded and under the first load: each repeat is a
-        fresh approach.
+    Returns ``pose`` (fitted ones first, from 1), ``load`` (0 without), ``repeat``, ``target``, ``done``, empty,
+    ``q1_deg..qn_deg`` (``_mm`` of prismatic joints) as the controller shows them, ``q1..qn`` the same in rad (m), wrench (N, N
+    m), and ``x, y, z`` and ``rx, ry, rz``, empty. The first poses are repeated, unloaded and under the first load: each repeat
+    is a fresh approach.
     """
     rows = []
     configurations = [*zip(plan.fitted.joint_angles, plan.fitted.force, strict=True)]
@@ -57,18 +49,7 @@ def sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
 def campaign_document(name: str, robot_file: str, survey: Survey, plan: Plan) -> dict[str, Any]:
     """Contents of the campaign.yaml that goes with a sheet.
 
-    Parameters
-    ----------
-    name : str
-        Of the campaign.
-    robot_file : str
-        Beside it.
-    survey : Survey
-    plan : Plan
-
-    Returns
-    -------
-    dict
+    `name`: of the campaign. `robot_file`: beside it.
     """
     fitted, judged = len(plan.fitted.joint_angles), len(plan.held_out.joint_angles)
     targets = {

@@ -37,18 +37,9 @@ _AT_ONCE = 1000
 class Survey:
     """What is measured in each configuration.
 
-    Attributes
-    ----------
-    robot : Robot
-    targets : tuple of Target
-        All are read under each load.
-    unknown_base : bool
-        Whether the tracker's frame is fitted.
-    measured : {"position", "pose"}
-    shares : tuple of float
-        Shares of the force of a configuration under which it is read; (0,) without loads.
-    position_m, orientation_rad : float
-        Standard deviation of each component of a measurement.
+    `targets`: all are read under each load. `unknown_base`: whether the tracker's frame is fitted. `measured`: one of
+    "position", "pose". `shares`: shares of the force of a configuration under which it is read; (0,) without loads.
+    `position_m`, `orientation_rad`: standard deviation of each component of a measurement.
     """
 
     robot: Robot
@@ -79,12 +70,8 @@ class Survey:
 class Information:
     """What candidates tell, in units of the plausible size of each parameter.
 
-    Attributes
-    ----------
-    rows : ndarray (N, k, P)
-        Whitened sensitivities of the k numbers measured in each of N configurations; information is ``rows.T @ rows``.
-    names : list of (str, str)
-        What each parameter belongs to, and its name.
+    `rows` (N, k, P): whitened sensitivities of the k numbers measured in each of N configurations; information is ``rows.T @
+    rows``. `names` (str, str): what each parameter belongs to, and its name.
     """
 
     rows: np.ndarray
@@ -92,17 +79,7 @@ class Information:
 
 
 def model_of(survey: Survey) -> tuple[Model, Estimate]:
-    """The model that a campaign of this survey declares, at the values of the robot file.
-
-    Parameters
-    ----------
-    survey : Survey
-
-    Returns
-    -------
-    model : Model
-    estimate : Estimate
-    """
+    """The model that a campaign of this survey declares, at the values of the robot file."""
     robot, sites = survey.robot, sites_of(survey.robot)
     springs = (joint_compliance(sites),) if survey.loaded else ()
     weight = (declared_weight.candidate(sites),) if sites.masses else ()
@@ -129,19 +106,8 @@ def count_parameters(survey: Survey) -> int:
 def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray, about: Estimate | None = None) -> Information:
     """What each configuration tells.
 
-    Parameters
-    ----------
-    survey : Survey
-    reported_angles : ndarray (N, n)
-        rad.
-    force : ndarray (N, 3)
-        N, base axes, at the last measuring point; read at each of the shares.
-    about : Estimate, optional
-        Values at which the model is linearized; those of the robot file without.
-
-    Returns
-    -------
-    Information
+    `reported_angles` (N, n): rad. `force` (N, 3): N, base axes, at the last measuring point; read at each of the shares.
+    `about`: values at which the model is linearized; those of the robot file without.
     """
     model, estimate = model_of(survey)
     estimate = about or estimate
@@ -166,18 +132,8 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     Where the base is unknown, less its best placement over these configurations; where the offset of the reflectors on the end
     effector is, less the best constant offset there. Base and reflectors themselves do not move the robot.
 
-    Parameters
-    ----------
-    survey : Survey
-    reported_angles : ndarray (N, n)
-        Where it shall be known, rad.
-    force : ndarray (N, 3)
-        Under which it works there, N, base axes.
-
-    Returns
-    -------
-    ndarray (N, 3, P)
-        m, per plausible size of each parameter.
+    `reported_angles` (N, n): where it shall be known, rad. `force` (N, 3): under which it works there, N, base axes. Returns
+    (N, 3, P): m, per plausible size of each parameter.
     """
     alone = replace(survey, shares=(1.0,) if survey.loaded else (0.0,))
     end = survey.robot.chain.end_effector

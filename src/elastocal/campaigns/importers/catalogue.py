@@ -19,14 +19,9 @@ if TYPE_CHECKING:
 class Importer(Protocol):
     """A module of this package that makes campaigns of a public source.
 
-    Attributes
-    ----------
-    FILES : dict of str to PublicFile
-        Of the source, by the names that a campaign of config/campaigns has for them.
-    ROBOTS : tuple of str
-        Robots of config/robots that its campaigns name or that it reads.
-    write_campaign : callable
-        ``write_campaign(*paths, folder, name=..., holdout=...)``, with the paths of the files that the campaign names.
+    `FILES`: of the source, by the names that a campaign of config/campaigns has for them. `ROBOTS`: robots of config/robots
+    that its campaigns name or that it reads. `write_campaign`: ``write_campaign(*paths, folder, name=..., holdout=...)``, with
+    the paths of the files that the campaign names.
     """
 
     FILES: Mapping[str, PublicFile]
@@ -37,21 +32,7 @@ class Importer(Protocol):
 def importer(name: str, source: str | Path) -> Importer:
     """An importer by its name.
 
-    Parameters
-    ----------
-    name : str
-        Of its module.
-    source : str or Path
-        File that names it, for the message.
-
-    Returns
-    -------
-    module
-
-    Raises
-    ------
-    InputError
-        There is none of this name.
+    `name`: of its module. `source`: file that names it, for the message. Raises `InputError`: there is none of this name.
     """
     if name not in _modules() or not hasattr(module := _module(name), "FILES"):
         raise _unknown(name, source)
@@ -61,26 +42,14 @@ def importer(name: str, source: str | Path) -> Importer:
 def check_importer(name: str, source: str | Path) -> None:
     """Refuse a name that no module has, without the time that it takes to import one.
 
-    Parameters
-    ----------
-    name : str
-    source : str or Path
-
-    Raises
-    ------
-    InputError
+    Raises `InputError`.
     """
     if name not in _modules():
         raise _unknown(name, source)
 
 
 def importers() -> dict[str, Importer]:
-    """All of them by their names.
-
-    Returns
-    -------
-    dict of str to module
-    """
+    """All of them by their names."""
     modules = {name: _module(name) for name in _modules()}
     return {name: cast("Importer", module) for name, module in modules.items() if hasattr(module, "FILES")}
 

@@ -20,25 +20,9 @@ _DECIMAL_WORDS = {",": "a number with a decimal comma, not infinite", ".": "a nu
 def read_columns(path: str | Path, separator: str, needed: Iterable[str], kind: str) -> dict[str, tuple[str, ...]]:
     """Cells of a table, column by column; blank lines are left out.
 
-    Parameters
-    ----------
-    path : str or Path
-    separator : str
-        Between the cells of a line.
-    needed : iterable of str
-        Columns that must be there.
-    kind : str
-        What the file should be, for the message where a column is missing.
-
-    Returns
-    -------
-    dict of str to tuple of str
-        By the names of the header.
-
-    Raises
-    ------
-    InputError
-        No file, no row, rows of different lengths, a column that is missing.
+    `separator`: between the cells of a line. `needed`: columns that must be there. `kind`: what the file should be, for the
+    message where a column is missing. Returns by the names of the header. Raises `InputError`: no file, no row, rows of
+    different lengths, a column that is missing.
     """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
@@ -62,22 +46,7 @@ def read_columns(path: str | Path, separator: str, needed: Iterable[str], kind: 
 def numbers(path: str | Path, name: str, cells: Sequence[str], decimal: str = ".") -> np.ndarray:
     """Numbers of one column.
 
-    Parameters
-    ----------
-    path : str or Path
-    name : str
-        Of the column.
-    cells : sequence of str
-    decimal : {".", ","}
-
-    Returns
-    -------
-    ndarray (N,)
-
-    Raises
-    ------
-    InputError
-        A cell that is no finite number.
+    `name`: of the column. `decimal`: one of ".", ",". Returns (N,). Raises `InputError`: a cell that is no finite number.
     """
     values = np.full(len(cells), np.nan)
     for index, cell in enumerate(cells):
@@ -91,18 +60,6 @@ def numbers(path: str | Path, name: str, cells: Sequence[str], decimal: str = ".
 def table(path: str | Path, cells: Mapping[str, Sequence[str]], names: Iterable[str], decimal: str = ".") -> np.ndarray:
     """Numbers of some columns, ndarray (N, k).
 
-    Parameters
-    ----------
-    path : str or Path
-    cells : dict of str to sequence of str
-        From `read_columns`.
-    names : iterable of str
-        Of the columns.
-    decimal : {".", ","}
-
-    Raises
-    ------
-    InputError
-        As `numbers`.
+    `cells`: from `read_columns`. `names`: of the columns. `decimal`: one of ".", ",". Raises `InputError`: as `numbers`.
     """
     return np.column_stack([numbers(path, name, cells[name], decimal) for name in names])

@@ -36,21 +36,8 @@ NOISE = {"position_m": 5.2e-5}
 def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Measurements of the text file.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    joint_angles : ndarray (N, 6)
-        As the controller reports them, in rad.
-    positions : dict of str to ndarray (N, 3)
-        m, tracker frame.
-
-    Raises
-    ------
-    InputError
-        No file, a row of another length, something that is no number.
+    Returns `joint_angles` (N, 6): as the controller reports them, in rad; `positions` (N, 3): m, tracker frame. Raises
+    `InputError`: no file, a row of another length, something that is no number.
     """
     try:
         with open(path, encoding="utf-8") as file:
@@ -80,18 +67,6 @@ def write_campaign(
 ) -> None:
     """Write the text file as a campaign's folder.
 
-    Parameters
-    ----------
-    path : str or Path
-        ``N1N2N3Jval.csv``.
-    folder : str or Path
-    name : str
-    holdout : dict, optional
-        As in ``campaign.yaml``.
-
-    Raises
-    ------
-    InputError
-        As in `read`.
+    `path`: ``N1N2N3Jval.csv``. `holdout`: as in ``campaign.yaml``. Raises `InputError`: as in `read`.
     """
     write_reflectors(folder, name, ROBOT, *read(path), holdout, NOISE)

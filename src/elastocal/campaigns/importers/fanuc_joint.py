@@ -34,21 +34,9 @@ def write_campaign(
 ) -> None:
     """Write both sources as the sessions 0 (static) and 1 (cpa) of one campaign.
 
-    Parameters
-    ----------
-    static_path, cpa_path : str or Path
-        As for `fanuc_static` and `fanuc_cpa`.
-    folder : str or Path
-    robots_folder : str or Path
-        Holds the robot files of both sources, which say how each counts its angles.
-    name : str
-    holdout : dict, optional
-        As in ``campaign.yaml``.
-
-    Raises
-    ------
-    InputError
-        As in the ``read`` of both, and a robot file that is not there.
+    `static_path`, `cpa_path`: as for `fanuc_static` and `fanuc_cpa`. `robots_folder`: holds the robot files of both sources,
+    which say how each counts its angles. `holdout`: as in ``campaign.yaml``. Raises `InputError`: as in the ``read`` of both,
+    and a robot file that is not there.
     """
     tables = []
     for session, (source, path) in enumerate(((fanuc_static, static_path), (fanuc_cpa, cpa_path))):

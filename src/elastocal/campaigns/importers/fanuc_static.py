@@ -33,21 +33,8 @@ ROBOTS = (ROBOT,)
 def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Measurements of the MAT file.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    joint_angles : ndarray (N, 6)
-        As in the file, rad.
-    positions : dict of str to ndarray (N, 3)
-        m, tracker frame.
-
-    Raises
-    ------
-    InputError
-        No MAT file, a variable that is missing or has another shape.
+    Returns `joint_angles` (N, 6): as in the file, rad; `positions` (N, 3): m, tracker frame. Raises `InputError`: no MAT file,
+    a variable that is missing or has another shape.
     """
     names = ("q", *(f"m{target}" for target in TARGETS))
     found = read_mat(path, names)
@@ -63,18 +50,6 @@ def write_campaign(
 ) -> None:
     """Write the MAT file as a campaign's folder.
 
-    Parameters
-    ----------
-    path : str or Path
-        ``calibration_dataset.mat``.
-    folder : str or Path
-    name : str
-    holdout : dict, optional
-        As in ``campaign.yaml``.
-
-    Raises
-    ------
-    InputError
-        As in `read`.
+    `path`: ``calibration_dataset.mat``. `holdout`: as in ``campaign.yaml``. Raises `InputError`: as in `read`.
     """
     write_reflectors(folder, name, ROBOT, *read(path), holdout)

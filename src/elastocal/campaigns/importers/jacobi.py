@@ -66,22 +66,10 @@ COMMANDED, DIFFERENCE = ("x_t", "y_t", "z_t"), ("x_dif", "y_dif", "z_dif")
 def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Measurements of one file.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    joint_angles : ndarray (N, n)
-        As commanded, rad.
-    position : ndarray (N, 3)
-        m, in the frame in which the tracker was set to the robot's base. The source does not state the sign of the difference;
-        with this one the sums have six decimals of a millimetre, as the tracker gives them, with the other one fifteen.
-
-    Raises
-    ------
-    InputError
-        No file, a column that is missing, something that is no number, another number of joints.
+    Returns `joint_angles` (N, n): as commanded, rad; `position` (N, 3): m, in the frame in which the tracker was set to the
+    robot's base. The source does not state the sign of the difference; with this one the sums have six decimals of a
+    millimetre, as the tracker gives them, with the other one fifteen. Raises `InputError`: no file, a column that is missing,
+    something that is no number, another number of joints.
     """
     kind = "a file of serial_robots_datasets"
     cells = read_columns(path, ",", (*COMMANDED, *DIFFERENCE), kind)
@@ -103,21 +91,8 @@ def write_campaign(
 ) -> None:
     """Write one file as a campaign's folder.
 
-    Parameters
-    ----------
-    path : str or Path
-        ``3D_..._uncalibrated_grid_cleaned.csv`` or ``..._random_cleaned.csv``.
-    folder : str or Path
-    name : str
-    holdout : dict, optional
-        As in ``campaign.yaml``.
-    noise : dict or None
-        The same.
-
-    Raises
-    ------
-    InputError
-        As in `read`.
+    `path`: ``3D_..._uncalibrated_grid_cleaned.csv`` or ``..._random_cleaned.csv``. `holdout`: as in ``campaign.yaml``. `noise`:
+    the same. Raises `InputError`: as in `read`.
     """
     angles, position = read(path)
     pose, repeat = pose_and_repeat(angles)

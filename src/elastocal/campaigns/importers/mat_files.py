@@ -23,20 +23,8 @@ LARGEST_BYTES = 200_000_000
 def read_mat(path: str | Path, names: Sequence[str]) -> dict[str, Any]:
     """Some variables of a MAT file.
 
-    Parameters
-    ----------
-    path : str or Path
-    names : sequence of str
-        Of the variables; any that the file does not have is left out.
-
-    Returns
-    -------
-    dict of str to ndarray
-
-    Raises
-    ------
-    InputError
-        No file, or one that scipy cannot read as a whole.
+    `names`: of the variables; any that the file does not have is left out. Raises `InputError`: no file, or one that scipy
+    cannot read as a whole.
     """
     content = read_bytes(path, LARGEST_BYTES, KIND)
     # The stubs of scipy know paths alone.

@@ -56,22 +56,9 @@ _STILL_RAD = 1e-3
 def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Measurements of one file.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    joint_angles : ndarray (P, 6)
-        Of the right arm, rad.
-    position : ndarray (P, 3)
-        m, tracker frame. Poses whose reflector the tracker did not see are left out,
-        and so is the one that the source's own reader leaves out.
-
-    Raises
-    ------
-    InputError
-        No MAT file, another shape, or a turntable that turns.
+    Returns `joint_angles` (P, 6): of the right arm, rad; `position` (P, 3): m, tracker frame. Poses whose reflector the tracker
+    did not see are left out, and so is the one that the source's own reader leaves out. Raises `InputError`: no MAT file,
+    another shape, or a turntable that turns.
     """
     found = read_mat(path, [_NAME])
     rows = np.asarray(found.get(_NAME, np.zeros(0)))
@@ -98,21 +85,8 @@ def write_campaign(
 ) -> None:
     """Write one file as a campaign's folder.
 
-    Parameters
-    ----------
-    path : str or Path
-        ``updated_leica_dataset.mat`` or ``leica_right_hand_6x6x6_dataset.mat``.
-    folder : str or Path
-    name : str
-    holdout : dict, optional
-        As in ``campaign.yaml``.
-    noise : dict or None
-        The same.
-
-    Raises
-    ------
-    InputError
-        As in `read`.
+    `path`: ``updated_leica_dataset.mat`` or ``leica_right_hand_6x6x6_dataset.mat``. `holdout`: as in ``campaign.yaml``.
+    `noise`: the same. Raises `InputError`: as in `read`.
     """
     angles, position = read(path)
     count = len(angles)

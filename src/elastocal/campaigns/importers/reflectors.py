@@ -25,19 +25,8 @@ def reflector_table(
 ) -> dict[str, np.ndarray]:
     """Columns of measurements, one row for each reflector of each measurement.
 
-    Parameters
-    ----------
-    pose, repeat : ndarray of int (N,)
-    joint_angles : ndarray (N, n)
-        rad.
-    positions : dict of str to ndarray (N, 3)
-        m, by reflector.
-    session : int, optional
-        No such column without.
-
-    Returns
-    -------
-    dict of str to ndarray (N * reflectors,)
+    `pose`, `repeat` (N,) of int. `joint_angles` (N, n): rad. `positions` (N, 3): m, by reflector. `session`: no such column
+    without. Returns (N * reflectors,).
     """
     names, count = list(positions), len(pose)
     measurements = np.stack([positions[name] for name in names], axis=1).reshape(-1, 3)
@@ -59,16 +48,8 @@ def write_reflectors(
 ) -> None:
     """Write measurements of one session as a campaign's folder.
 
-    Parameters
-    ----------
-    folder : str or Path
-    name, robot : str
-    joint_angles : ndarray (N, n)
-        As the controller reports them, rad.
-    positions : dict of str to ndarray (N, 3)
-        m, by reflector.
-    holdout, noise : dict, optional
-        As in ``campaign.yaml``.
+    `joint_angles` (N, n): as the controller reports them, rad. `positions` (N, 3): m, by reflector. `holdout`, `noise`: as in
+    ``campaign.yaml``.
     """
     table = reflector_table(*pose_and_repeat(joint_angles), joint_angles, positions)
     document = unloaded_document(name, robot, "position", positions, holdout, noise)

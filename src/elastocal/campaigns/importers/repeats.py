@@ -9,24 +9,13 @@ from scipy.spatial import KDTree
 def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Number poses by their joint angles.
 
-    Single-linkage clusters [1]_ by the largest difference of angles, cut at the tolerance.
+    Single-linkage clusters [1] by the largest difference of angles, cut at the tolerance.
 
-    Parameters
-    ----------
-    joint_angles : ndarray (N, n)
-        rad.
-    tolerance_rad : float
-        Rows whose angles all lie this close are one pose, and so is a chain of such rows.
+    `joint_angles` (N, n): rad. `tolerance_rad`: rows whose angles all lie this close are one pose, and so is a chain of such
+    rows. Returns `pose`, `repeat` (N,): poses from 0 in the order in which they first come, repeats of each from 0.
 
-    Returns
-    -------
-    pose, repeat : ndarray of int32 (N,)
-        Poses from 0 in the order in which they first come, repeats of each from 0.
-
-    References
-    ----------
-    .. [1] Gower, J. C. and Ross, G. J. S., Minimum spanning trees and single linkage cluster analysis, Applied Statistics 18,
-       1969.
+    [1] Gower, J. C. and Ross, G. J. S., Minimum spanning trees and single linkage cluster analysis, Applied Statistics 18,
+        1969.
     """
     count = len(joint_angles)
     pairs = KDTree(joint_angles).query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")

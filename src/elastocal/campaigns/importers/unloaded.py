@@ -23,18 +23,7 @@ def unloaded_document(
 ) -> dict[str, Any]:
     """Contents of ``campaign.yaml``: targets on the flange whose offsets nobody knows.
 
-    Parameters
-    ----------
-    name, robot : str
-    measured : {"position", "pose"}
-    targets : iterable of str
-    holdout, noise : dict, optional
-    point : str
-        Measuring point of the chain to which the targets belong: its last.
-
-    Returns
-    -------
-    dict
+    `measured`: one of "position", "pose". `point`: measuring point of the chain to which the targets belong: its last.
     """
     document = {
         "campaign": name,

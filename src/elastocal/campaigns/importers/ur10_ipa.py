@@ -64,20 +64,9 @@ _TIME_FORMAT = "%Y%m%d%H%M%S"
 def read(path: str | Path) -> dict[str, np.ndarray]:
     """Measurements of one series.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    dict of str to ndarray
-        ``joint_angles`` (N, 6) rad, ``position`` (N, 3) m, ``rotation_vector`` (N, 3) rad, ``temperature_c`` (N,) where it is
-        there, ``time_s`` (N,) since the first row where the time stamps are whole.
-
-    Raises
-    ------
-    InputError
-        No file, a column that is missing, something that is no number.
+    Returns ``joint_angles`` (N, 6) rad, ``position`` (N, 3) m, ``rotation_vector`` (N, 3) rad, ``temperature_c`` (N,) where it
+    is there, ``time_s`` (N,) since the first row where the time stamps are whole. Raises `InputError`: no file, a column that
+    is missing, something that is no number.
     """
     cells = read_columns(path, ";", (*ANGLES, *POSITION, *ORIENTATION), "a series of ipa-robot-accuracy")
     angles, position, orientation = (table(path, cells, names, ",") for names in (ANGLES, POSITION, ORIENTATION))
@@ -101,21 +90,8 @@ def write_campaign(
 ) -> None:
     """Write one series as a campaign's folder.
 
-    Parameters
-    ----------
-    path : str or Path
-        ``measurements_grid.csv`` or ``measurements_joint_configurations.csv``.
-    folder : str or Path
-    name : str
-    holdout : dict, optional
-        As in ``campaign.yaml``.
-    noise : dict or None
-        The same.
-
-    Raises
-    ------
-    InputError
-        As in `read`.
+    `path`: ``measurements_grid.csv`` or ``measurements_joint_configurations.csv``. `holdout`: as in ``campaign.yaml``. `noise`:
+    the same. Raises `InputError`: as in `read`.
     """
     measurements = read(path)
     angles = measurements["joint_angles"]

@@ -21,19 +21,9 @@ if TYPE_CHECKING:
 def place_columns(study: StudyInMemory, tracker_m: Sequence[float], arm: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Cramér-Rao bounds of the end-effector and a second target, against the end-effector in twice as many configurations.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-        With as many configurations as both are measured in.
-    tracker_m : sequence of float
-    arm : dict
-        sets, radius_m, bar_m, acceptance_deg; see `arm_points`.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Columns joints, along (m), side, data_set, bound and bound_end_effector (m^2), turned and fixed: shares of the
-        configurations of the data set in which the target is seen.
+    `study`: with as many configurations as both are measured in. `arm`: sets, radius_m, bar_m, acceptance_deg; see
+    `arm_points`. Returns columns joints, along (m), side, data_set, bound and bound_end_effector (m^2), turned and fixed:
+    shares of the configurations of the data set in which the target is seen.
     """
     chain, length, sets = study.robot.chain, study.size.configurations, np.arange(arm["sets"])
     drawn, moment = study.experiments(sets, 2 * length), error_moment(study.judge())

@@ -23,17 +23,9 @@ if TYPE_CHECKING:
 def geometry_rows(study: StudyInMemory, zero_rad: float, length_m: float) -> dict[str, np.ndarray]:
     """Geometry and compliances from as many unloaded as loaded poses of the end-effector, by each estimator.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-    zero_rad, length_m : float
-        Standard deviations of the errors of joint zeros and link lengths.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Columns estimator, noise, leak (m), compliance_noise and compliance_leak (percent) and zero_noise and zero_leak (rad):
-        root mean squares over the joints.
+    `zero_rad`, `length_m`: standard deviations of the errors of joint zeros and link lengths. Returns columns estimator, noise,
+    leak (m), compliance_noise and compliance_leak (percent) and zero_noise and zero_leak (rad): root mean squares over the
+    joints.
     """
     robot, size, drawn, tests = study.robot, study.size, study.experiments(range(study.size.data_sets)), study.tests()
     geometry, there = geometry_columns(robot.chain, drawn.joint_angles), geometry_columns(robot.chain, tests.joint_angles)
@@ -61,21 +53,9 @@ def weighting_rows(
 ) -> dict[str, np.ndarray]:
     """Equal weights against those of the noise, measured at the end-effector.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-        The noise of its size is that of positions.
-    orientation_ratios : sequence of float
-        Noise of orientations over that of positions, rad per m.
-    tracker_m : sequence of float
-        Where the tracker stands.
-    per_metre : sequence of float
-        By which the noise of positions grows with the range, m per m.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Columns orientation_ratio, per_metre, equal and weighted (m).
+    `study`: the noise of its size is that of positions. `orientation_ratios`: noise of orientations over that of positions, rad
+    per m. `tracker_m`: where the tracker stands. `per_metre`: by which the noise of positions grows with the range, m per m.
+    Returns columns orientation_ratio, per_metre, equal and weighted (m).
     """
     robot, size, drawn = study.robot, study.size, study.experiments(range(study.size.data_sets))
     columns, shape = study.regressor(drawn).reshape(size.data_sets, -1, robot.joints), drawn.joint_angles.shape[:2]

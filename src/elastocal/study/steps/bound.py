@@ -28,21 +28,8 @@ def bound_blocks(
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Cramér-Rao bound of the RMS end-effector error for each set of measuring points and each length.
 
-    Parameters
-    ----------
-    experiment_blocks : iterable of dict
-        Blocks of the experiments table.
-    chain : Chain
-    point_sets : iterable of tuple of str
-    rows : int
-        6 where poses are measured, 3 where positions are.
-    wrench_at : {"end_effector", "measuring_point"}
-    judge : Judge
-
-    Yields
-    ------
-    dict
-        Columns of one block of the bounds table.
+    `experiment_blocks`: blocks of the experiments table. `rows`: 6 where poses are measured, 3 where positions are.
+    `wrench_at`: one of "end_effector", "measuring_point". Yields columns of one block of the bounds table.
     """
     distinct = list(dict.fromkeys(tuple(sorted(points)) for points in point_sets))
     names = sorted({name for points in distinct for name in points})

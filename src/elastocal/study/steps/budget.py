@@ -27,17 +27,8 @@ _AGAIN = "/again"
 def budget_blocks(study: StudyInMemory, point_sets: Mapping[str, Sequence[str]]) -> Iterator[dict[str, np.ndarray | str]]:
     """Squared error of each data set, and the least that an unbiased estimator could have.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-    point_sets : dict of str to sequence of str
-        Measuring points by the names of sets; a point may stand in a set twice. Sets with a point that the robot lacks are left
-        out.
-
-    Yields
-    ------
-    dict
-        Columns of one block of the budget table: one set of points in one block of data sets.
+    `point_sets`: measuring points by the names of sets; a point may stand in a set twice. Sets with a point that the robot
+    lacks are left out. Yields columns of one block of the budget table: one set of points in one block of data sets.
     """
     robot, n, form = study.robot, study.robot.joints, mean_form(study.judge())
     there = {point.name for point in robot.chain.points}

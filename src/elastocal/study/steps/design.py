@@ -32,22 +32,10 @@ if TYPE_CHECKING:
 class Design:
     """Regressors of one block of data sets, configuration before data set.
 
-    Parameters
-    ----------
-    experiments : Experiments
-    chain : Chain
-    points : collection of str
-    rows : int
-        6 where poses are measured, 3 where positions are.
-    wrench_at : {"end_effector", "measuring_point"}
-        Interpretation R6.
+    `joint_angles` (configurations, sets, n). `torques` (configurations, sets, n): joint torques behind the measurements of each
+    point, N m. `regressors` (rows, n, configurations, sets).
 
-    Attributes
-    ----------
-    joint_angles : ndarray (configurations, sets, n)
-    torques : dict of str to ndarray (configurations, sets, n)
-        Joint torques behind the measurements of each point, N m.
-    regressors : dict of str to ndarray (rows, n, configurations, sets)
+    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: interpretation R6.
     """
 
     def __init__(self, experiments: Experiments, chain: Chain, points: Collection[str], rows: int, wrench_at: str) -> None:
@@ -69,17 +57,8 @@ def design_blocks(
 ) -> Iterator[dict[str, np.ndarray]]:
     """Covariances for measurements of unit variance and condition numbers of a strategy, in blocks.
 
-    Parameters
-    ----------
-    experiment_blocks : iterable of dict
-        Blocks of the experiments table.
-    chain, strategy, rows, wrench_at
-        As in `Design`.
-
-    Yields
-    ------
-    dict
-        Columns of one block of the design table.
+    `experiment_blocks`: blocks of the experiments table. `chain`, `strategy`, `rows`, `wrench_at`: as in `Design`. Yields
+    columns of one block of the design table.
     """
     for block in experiment_blocks:
         sets = data_sets(block)

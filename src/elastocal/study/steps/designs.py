@@ -22,18 +22,8 @@ JOINT_RANGES = ("full_turn", "limits")
 def design_worths(study: StudyInMemory, candidates: int, sizes: Sequence[int]) -> dict[str, np.ndarray]:
     """Random against optimal configurations, measured at the end-effector.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-    candidates : int
-        Random configurations among which is chosen.
-    sizes : sequence of int
-        Configurations of a design.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Columns joint_range: of candidates and validation configurations, design, configurations, rms, low and high (m).
+    `candidates`: random configurations among which is chosen. `sizes`: configurations of a design. Returns columns joint_range:
+    of candidates and validation configurations, design, configurations, rms, low and high (m).
     """
     found, ranges = [], []
     for joint_range in JOINT_RANGES:

@@ -18,18 +18,9 @@ if TYPE_CHECKING:
 def estimates(study: StudyInMemory, strategies: Sequence[Strategy], number: int = 0) -> dict[str, list[np.ndarray]]:
     """Estimates of all data sets of a study, block by block.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-    strategies : sequence of Strategy
-        Those that are one estimator under equation 11 are worked out once and share their arrays.
-    number : int
-        Of the study.
-
-    Returns
-    -------
-    dict of str to list of ndarray (sets, lengths, n)
-        By the names of the strategies; rad/(N m), not a number where a length does not determine them.
+    `strategies`: those that are one estimator under equation 11 are worked out once and share their arrays. `number`: of the
+    study. Returns (sets, lengths, n): by the names of the strategies; rad/(N m), not a number where a length does not determine
+    them.
     """
     joints = study.robot.joints
     stages = {strategy.name: without_forgotten_stages(strategy, joints).stages for strategy in strategies}

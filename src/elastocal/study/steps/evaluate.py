@@ -42,24 +42,9 @@ def evaluated(
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Tables of metrics, bootstrap replicates and accuracy of one strategy.
 
-    Parameters
-    ----------
-    identified_blocks : iterable of dict
-        Blocks of the identified table.
-    weight_blocks : iterable of dict
-        Blocks of the weights table for the same data sets.
-    test_weights : dict
-        The block of the weights table for the test configurations.
-    judge : Judge
-    first_stage_joints : sequence of int
-    method, deviation_of
-        Interpretations R7 and R8, see `evaluation.average`.
-    lengths : sequence of int
-        For the accuracy of one data set.
-
-    Returns
-    -------
-    metrics, replicates, accuracy : dict of str to ndarray
+    `identified_blocks`: blocks of the identified table. `weight_blocks`: blocks of the weights table for the same data sets.
+    `test_weights`: the block of the weights table for the test configurations. `method`, `deviation_of`: interpretations R7 and
+    R8, see `evaluation.average`. `lengths`: for the accuracy of one data set.
     """
     joints, evaluated_rows = len(judge.reference), np.asarray(lengths) - 1
     sums: list[np.ndarray] = []

@@ -30,24 +30,10 @@ def expected_scores(
 ) -> dict[str, np.ndarray]:
     """Expectations at every length.
 
-    Parameters
-    ----------
-    design_blocks : iterable of dict
-        Blocks of the design table.
-    noise_free : ndarray (lengths, n) or None
-        Compliances of the averaged model without noise, rad/(N m): what the linearisation does. None: the true ones.
-    noise : float
-        Standard deviation, the same number in m and rad.
-    robot : Robot
-    judge : Judge
-    first_stage_joints : sequence of int
-    method, deviation_of
-        Interpretations R7 and R8, see `evaluation.average`.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Columns of the expected table; not a number where some data set does not determine the compliances.
+    `design_blocks`: blocks of the design table. `noise_free` (lengths, n): compliances of the averaged model without noise,
+    rad/(N m): what the linearisation does. None: the true ones. `noise`: standard deviation, the same number in m and rad.
+    `method`, `deviation_of`: interpretations R7 and R8, see `evaluation.average`. Returns columns of the expected table; not a
+    number where some data set does not determine the compliances.
     """
     n, sets, total = robot.joints, 0, np.zeros(())
     for block in design_blocks:

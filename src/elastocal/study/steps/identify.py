@@ -23,16 +23,7 @@ def paired_blocks(
 ) -> Iterator[tuple[dict[str, np.ndarray], dict[str, dict[str, np.ndarray]]]]:
     """Blocks of the experiments with those of the deflections of the same data sets.
 
-    Parameters
-    ----------
-    experiments : iterable of dict
-    deflections : dict of str to iterable of dict
-        For each measuring point.
-
-    Yields
-    ------
-    experiments : dict
-    deflections : dict of str to dict
+    `deflections`: for each measuring point.
     """
     for block, *measured in zip(experiments, *deflections.values(), strict=True):
         yield block, dict(zip(deflections, measured, strict=True))
@@ -49,25 +40,10 @@ def identified_blocks(
 ) -> Iterator[dict[str, np.ndarray]]:
     """Compliances in blocks; not a number where the design says that a prefix does not determine them.
 
-    Parameters
-    ----------
-    blocks : iterable of (dict, dict of str to dict)
-        Blocks of the experiments table and, for each measuring point, of the deflections table.
-    designs : iterable of dict
-        Blocks of the design table of the strategy, for the same data sets.
-    chain : Chain
-    strategy : Strategy
-    rows : int
-        6 where poses are measured, 3 where positions are.
-    wrench_at : {"end_effector", "measuring_point"}
-        Interpretation R6.
-    start : float, optional
-        Given, compliances come from Gauss-Newton on the exact kinematics, started there (rad/(N m)); else from equation 11.
-
-    Yields
-    ------
-    dict
-        Columns of one block of the identified table.
+    `blocks` (dict, dict of str to dict): blocks of the experiments table and, for each measuring point, of the deflections
+    table. `designs`: blocks of the design table of the strategy, for the same data sets. `rows`: 6 where poses are measured, 3
+    where positions are. `wrench_at`: interpretation R6. `start`: given, compliances come from Gauss-Newton on the exact
+    kinematics, started there (rad/(N m)); else from equation 11. Yields columns of one block of the identified table.
     """
     for (experiments, deflections), design in zip(blocks, designs, strict=True):
         sets = data_sets(experiments)
@@ -85,17 +61,9 @@ def identified_blocks(
 class Situation:
     """Measurements of one block, configuration before data set, ready for either solver.
 
-    Parameters
-    ----------
-    experiments : dict
-    deflections : dict of str to dict
-    chain, strategy, rows, wrench_at
-        As in `identified_blocks`.
+    `measurements`: for equation 11.
 
-    Attributes
-    ----------
-    measurements : dict of str to Measurements
-        For equation 11.
+    `chain`, `strategy`, `rows`, `wrench_at`: as in `identified_blocks`.
     """
 
     def __init__(

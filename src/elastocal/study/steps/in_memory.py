@@ -35,15 +35,7 @@ class StudyInMemory:
     Studies have numbers; that of the tables is 0. The data sets of one follow on those of the one before, and each has test
     configurations of its own.
 
-    Attributes
-    ----------
-    robot : Robot
-        With the offset of its targets.
-    key : str
-        Name of the robot's file; part of the name of the random streams.
-    seed : int
-    interpretation : Interpretation
-    size : Size
+    `robot`: with the offset of its targets. `key`: name of the robot's file; part of the name of the random streams.
     """
 
     robot: Robot
@@ -102,18 +94,8 @@ class StudyInMemory:
     def measured(self, sets: np.ndarray, points: Sequence[str], repeat: str = "") -> dict[str, Measurements]:
         """What each measuring point contributes to some data sets.
 
-        Parameters
-        ----------
-        sets : ndarray of int
-            Numbers of the data sets.
-        points : sequence of str
-            Names of measuring points.
-        repeat : str
-            Tells measurements of the same configurations apart: part of the name of the noise's stream.
-
-        Returns
-        -------
-        dict of str to Measurements
+        `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`: tells measurements of the same
+        configurations apart: part of the name of the noise's stream.
         """
         drawn, rows = self.experiments(sets), self.interpretation.rows
         regressors = Design(drawn, self.robot.chain, points, rows, self.interpretation.wrench_at).regressors
@@ -138,21 +120,8 @@ def study_in_memory(
 ) -> StudyInMemory:
     """Study from what configuration and robot file say.
 
-    Parameters
-    ----------
-    key : str
-        Name of the robot's file.
-    robot : dict
-        The robot's file.
-    seed : int
-    tool_offset_m : sequence of float
-        Of the targets (interpretation R5).
-    loading, interpretation, size : dict
-        Attributes of `Loading`, of `Interpretation` beside its loading, and of `Size`.
-
-    Returns
-    -------
-    StudyInMemory
+    `key`: name of the robot's file. `robot`: the robot's file. `tool_offset_m`: of the targets (interpretation R5). `loading`,
+    `interpretation`, `size`: attributes of `Loading`, of `Interpretation` beside its loading, and of `Size`.
     """
     conventions = Interpretation(Loading(**loading), **interpretation)
     return StudyInMemory(with_target_offset(robot_from_document(robot), tool_offset_m), key, seed, conventions, Size(**size))

@@ -15,15 +15,7 @@ if TYPE_CHECKING:
 def initial_blocks(ideal_blocks: Iterable[Mapping[str, np.ndarray]]) -> Iterator[dict[str, np.ndarray]]:
     """Statistics of the end-effector's displacement in each data set.
 
-    Parameters
-    ----------
-    ideal_blocks : iterable of dict
-        Blocks of the deflections table of the end-effector.
-
-    Yields
-    ------
-    dict
-        Columns of one block of the initial table.
+    `ideal_blocks`: blocks of the deflections table of the end-effector. Yields columns of one block of the initial table.
     """
     for block in ideal_blocks:
         displacement = np.linalg.norm(to_deflections(block)[..., :3], axis=-1)

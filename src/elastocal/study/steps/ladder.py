@@ -19,19 +19,9 @@ FOLDS = 5
 def ladder_blocks(study: StudyInMemory, lengths: Sequence[int], noises: Sequence[float]) -> Iterator[dict[str, np.ndarray]]:
     """Models with more and more link springs, in each data set of the study of the tables.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-        Of a robot with links; the noise of its size is not looked at.
-    lengths : sequence of int
-        Configurations from which to identify.
-    noises : sequence of float
-        Standard deviations, the same number in m and rad.
-
-    Yields
-    ------
-    dict
-        Columns of one block of the ladder table: a noise and a length in one block of data sets.
+    `study`: of a robot with links; the noise of its size is not looked at. `lengths`: configurations from which to identify.
+    `noises`: standard deviations, the same number in m and rad. Yields columns of one block of the ladder table: a noise and a
+    length in one block of data sets.
     """
     robot, tests = study.robot, study.tests()
     judged = products_of(spring_columns(robot, tests)[:, :, :3], study.deflections(tests)[..., :3])

@@ -19,20 +19,8 @@ def measured_blocks(
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Deflections as measured: ideal plus independent normal noise on every component.
 
-    Parameters
-    ----------
-    ideal_blocks : iterable of dict
-        Blocks of the deflections table.
-    key : str
-        Name of the robot's file.
-    seed : int
-    noise : float
-        Standard deviation, the same number in m and rad.
-
-    Yields
-    ------
-    dict
-        Columns of one block of the deflections table.
+    `ideal_blocks`: blocks of the deflections table. `key`: name of the robot's file. `noise`: standard deviation, the same
+    number in m and rad. Yields columns of one block of the deflections table.
     """
     for block in ideal_blocks:
         _, configurations = block_shape(block)

@@ -21,15 +21,7 @@ def observability_columns(study: StudyInMemory) -> dict[str, np.ndarray]:
 
     Compliances are in units of their true values, so that an index does not depend on the units of measurement.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-        With as many configurations as are looked at.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Columns data_set, O1 to O5, bound and mean_square (m^2).
+    `study`: with as many configurations as are looked at. Returns columns data_set, O1 to O5, bound and mean_square (m^2).
     """
     robot, size, sets = study.robot, study.size, np.arange(study.size.data_sets)
     point, n, form = robot.chain.end_effector.name, robot.joints, mean_form(study.judge())

@@ -26,17 +26,7 @@ def repeated_blocks(
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Scores of studies.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-    studies : iterable of int
-        Their numbers.
-    strategies : sequence of Strategy
-
-    Yields
-    ------
-    dict
-        Columns of one block of the repeated table: one strategy in one study.
+    `studies`: their numbers. Yields columns of one block of the repeated table: one strategy in one study.
     """
     robot, interpretation = study.robot, study.interpretation
     for number in studies:
@@ -56,18 +46,7 @@ def score_columns(
 ) -> dict[str, np.ndarray]:
     """Columns of the scores of an averaged model, one row for each length.
 
-    Parameters
-    ----------
-    compliance : ndarray (lengths, n)
-        rad/(N m).
-    deviation : ndarray (lengths,)
-        m.
-    robot : Robot
-    first_stage_joints : sequence of int
-
-    Returns
-    -------
-    dict of str to ndarray
+    `compliance` (lengths, n): rad/(N m). `deviation` (lengths,): m.
     """
     return {
         "length": np.arange(1, len(compliance) + 1),

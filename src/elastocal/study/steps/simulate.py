@@ -22,23 +22,8 @@ def experiment_blocks(
 ) -> Iterator[dict[str, np.ndarray]]:
     """Random experiments, in blocks of data sets.
 
-    Parameters
-    ----------
-    chain : Chain
-    limits : ndarray (n, 2)
-        Joint limits in rad.
-    key : str
-        Name of the robot's file.
-    seed : int
-    loading : Loading
-    purpose : {"identification", "test"}
-        Data that identify and data that judge come from different random streams.
-    data_sets, configurations : int
-
-    Yields
-    ------
-    dict
-        Columns of one block of the experiments table.
+    `limits` (n, 2): joint limits in rad. `key`: name of the robot's file. `purpose`: data that identify and data that judge
+    come from different random streams. Yields columns of one block of the experiments table.
     """
     for sets in blocks_of_sets(data_sets):
         yield experiment_columns(sets, random_experiments(chain, limits, seed, key, loading, purpose, sets, configurations))
@@ -49,18 +34,8 @@ def ideal_blocks(
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Deflections without noise of every measuring point.
 
-    Parameters
-    ----------
-    experiments : iterable of dict
-        Blocks of the experiments table.
-    robot : Robot
-    wrench_at : {"end_effector", "measuring_point"}
-        Interpretation R6.
-
-    Yields
-    ------
-    dict
-        Columns of one block of the deflections table: one point in one block of data sets.
+    `experiments`: blocks of the experiments table. `wrench_at`: interpretation R6. Yields columns of one block of the
+    deflections table: one point in one block of data sets.
     """
     for block in experiments:
         loaded, sets = to_experiments(block), data_sets(block)

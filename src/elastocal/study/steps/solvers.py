@@ -28,23 +28,9 @@ def solver_table(
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Estimates of both solvers at one length, for each strategy.
 
-    Parameters
-    ----------
-    blocks : iterable of (dict, dict of str to dict)
-        As in `identify.identified_blocks`, with the points of all strategies.
-    chain : Chain
-    strategies : sequence of Strategy
-    rows : int
-    wrench_at : str
-    length : int
-        Configurations used.
-    start : float
-        Where Gauss-Newton starts, rad/(N m).
-
-    Yields
-    ------
-    dict
-        Columns of one block of the solvers table: one strategy in one block of data sets.
+    `blocks` (dict, dict of str to dict): as in `identify.identified_blocks`, with the points of all strategies. `length`:
+    configurations used. `start`: where Gauss-Newton starts, rad/(N m). Yields columns of one block of the solvers table: one
+    strategy in one block of data sets.
     """
     for experiments, deflections in blocks:
         experiments, deflections = _first(experiments, length), {n: _first(d, length) for n, d in deflections.items()}

@@ -21,19 +21,8 @@ if TYPE_CHECKING:
 def tube_blocks(study: StudyInMemory, factors: Sequence[float], length: int) -> Iterator[dict[str, np.ndarray]]:
     """Deflection before calibration and what joints alone leave, for each diameter.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-        Of a robot with links, all of one tube.
-    factors : sequence of float
-        By which the diameter is another one.
-    length : int
-        Configurations from which the compliances of the joints are identified.
-
-    Yields
-    ------
-    dict
-        Columns of one block of the tubes table: one diameter.
+    `study`: of a robot with links, all of one tube. `factors`: by which the diameter is another one. `length`: configurations
+    from which the compliances of the joints are identified. Yields columns of one block of the tubes table: one diameter.
     """
     tube, point = study.robot.links[0].tube, study.robot.chain.end_effector.name
     n, sets = study.robot.joints, np.arange(study.size.data_sets)

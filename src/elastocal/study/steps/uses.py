@@ -26,17 +26,8 @@ def use_blocks(
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Errors of the models of all data sets, strategy by strategy, from all configurations of a data set.
 
-    Parameters
-    ----------
-    study : StudyInMemory
-    strategies : sequence of Strategy
-    uses : dict
-        centre_m, edge_m, weight_N, path_m and cutting_N, see `uses`.
-
-    Yields
-    ------
-    dict
-        Columns of one block of the uses table: one strategy; not a number for uses out of the robot's reach.
+    `uses`: centre_m, edge_m, weight_N, path_m and cutting_N, see `uses`. Yields columns of one block of the uses table: one
+    strategy; not a number for uses out of the robot's reach.
     """
     robot, at = study.robot, study.interpretation.wrench_at
     cube = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])

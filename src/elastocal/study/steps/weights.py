@@ -18,19 +18,8 @@ DATA_SETS, TESTS = "data sets", "test configurations"
 def weight_blocks(key: str, seed: int, data_sets: int, tests: int, replicates: int) -> Iterator[dict[str, np.ndarray | str]]:
     """How often each data set and each test configuration counts in each bootstrap replicate, in blocks.
 
-    Parameters
-    ----------
-    key : str
-        Name of the robot's file.
-    seed : int
-    data_sets, tests : int
-        How many there are.
-    replicates : int
-
-    Yields
-    ------
-    dict
-        Columns of one block of the weights table: data sets in the blocks of the experiments, then all test configurations.
+    `key`: name of the robot's file. `data_sets`, `tests`: how many there are. Yields columns of one block of the weights table:
+    data sets in the blocks of the experiments, then all test configurations.
     """
     for sets in blocks_of_sets(data_sets):
         yield _columns(DATA_SETS, sets, bootstrap_weights(seed, key, sets, replicates))
