@@ -17,7 +17,7 @@ def with_plain_references(text: str) -> str:
     listed = _REFERENCE.sub(lambda found: f"- [{found[1]}] {' '.join(found[2].split())}", text)
     plain = re.sub(r"\[(\d+)\]_", r"[\1]", listed)
     # Determinants and absolute values are no substitutions.
-    return "\n".join(line if "`" in line else line.replace("|", r"\|") for line in plain.split("\n"))
+    return "`".join(part if code % 2 else part.replace("|", r"\|") for code, part in enumerate(plain.split("`")))
 
 
 def _of_member(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
