@@ -1,6 +1,8 @@
 """While it works Snakemake says one line a job; at the end, reports and verdicts, or last of all why a job failed."""
 
 import json
+import re
+from collections import Counter
 
 import pytest
 
@@ -15,6 +17,19 @@ def test_a_job_is_one_line_without_lists_of_files(finished):
     assert "1 jobs" in said
     assert [line for line in said if line.startswith("1 of 1: identify")] == ["1 of 1: identify kuka 200 6DoF"]
     assert max(map(len, said)) < 200
+
+
+def test_a_dry_run_is_a_summary_and_every_job_is_listed_on_request(unstarted):
+    done = unstarted.snakemake("-n")
+    assert done.returncode == 0, done.stderr
+    first, *listed, last = done.stdout.splitlines()
+    jobs = unstarted.planned()
+    assert (
+        first == f"{len(jobs)} jobs would run:" and last == "Nothing was run. `snakemake -n -p` lists every job with its files."
+    )
+    counts = re.findall(r"(\d+) (\w+)", " ".join(listed))
+    assert {rule: int(count) for count, rule in counts} == Counter(rule for rule, *_ in jobs)
+    assert len(listed) < 25 and max(map(len, listed)) <= 80
 
 
 def test_the_outcome_names_reports_and_verdicts(tmp_path, monkeypatch):

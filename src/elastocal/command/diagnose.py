@@ -29,7 +29,10 @@ def diagnose(
     folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
     cores: Annotated[int, typer.Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs at a time.")] = 2,
 ) -> None:
-    """Find what the model of a robot lacks, and report the error before and after on held-out poses."""
+    """Find which effects the robot's model lacks; write the report.
+
+    The report compares the error before and after on held-out poses. It is the Snakemake target `diagnose` of this campaign.
+    """
     campaign = str(folder.resolve())
     # Braces are wildcards to Snakemake, the others mapping and comment of YAML.
     if mark := next((mark for mark in ("{", "}", ": ", " #") if mark in campaign), steering(campaign)):
