@@ -1,7 +1,7 @@
 """What `snakemake` prints while it works: one line a job, and last of all why a job failed. The profile chooses it.
 
-Snakemake finds the module by its name. A dry run prints how many jobs of each rule would run; with `-p` or `--verbose` it prints
-all that Snakemake prints by itself, as does its log file.
+Snakemake finds the module by its name. A dry run prints how many jobs of each rule would run; with `-p` or `--verbose` all
+that Snakemake prints by itself, which its log file has too.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.pipeline import pipeline, workplace
-from elastocal.command.printed import iso_date, printed
+from elastocal.command.printed import iso_date, print_answer, printed
 from elastocal.command.quantities import LARGEST_SEED, length_m
 from elastocal.errors import InputError
 

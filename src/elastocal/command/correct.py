@@ -121,7 +121,9 @@ def correct(
     if beyond.any():
         share = f"{beyond.sum():,} of {len(beyond):,} targets"
         lines.append(f"! {share} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
-    following = f"command the targets, measure 12 or more of them, then elastocal certificate {folder} --tolerance 0.2mm --measured AFTER"
+    following = (
+        f"command the targets, measure 12 or more, then elastocal certificate {folder} --tolerance 0.2mm --measured AFTER"
+    )
     print_answer(not len(bad), answer, [*lines, *map(str, files)], following, console)
 
 

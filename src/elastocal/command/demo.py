@@ -18,7 +18,10 @@ from elastocal.command.quantities import LARGEST_SEED
 
 _ROBOT, _TARGETS, _PATH = "kuka", "targets.csv", "path.csv"
 # Fewer candidates than a real plan takes, for a demonstration of a minute.
-_PLAN = "--poses 25 --candidates 2000 --force 1000 --pull --base-known --measured pose --target 6DoF=0,0,0 --target 3DoF=0,0,0"
+_PLAN = (
+    "--poses 25 --candidates 2000 --force 1000 --pull --base-known --measured pose --noise 60um --orientation-noise 60urad "
+    "--target 6DoF=0,0,0 --target 3DoF=0,0,0"
+)
 _TOLERANCE = "0.2mm"
 
 

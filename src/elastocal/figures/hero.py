@@ -1,4 +1,4 @@
-"""The robot with the errors that it makes at poses that no step has seen, before and after: the picture at the top of README."""
+"""The robot with its errors at held-out poses, before and after: the picture at the top of README."""
 
 from __future__ import annotations
 
