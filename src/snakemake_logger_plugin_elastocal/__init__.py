@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # Beginnings of lines that are no news.
 _NO_NEWS = (
+    "Building DAG of jobs",
+    "Config file ",
     "Select jobs to execute",
     "Execute ",
     "Assuming unrestricted shared filesystem",

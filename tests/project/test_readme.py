@@ -9,7 +9,10 @@ ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 MOST_LINES, MOST_WORDS, FIRST_SCREEN = 120, 1200, 25
 # A figure with decimals, or one with a unit; "two commands" and "R-2000iC" are none.
-FIGURE = re.compile(r"(?<![\w.–])(?:\d[\d,]*\.\d+(?:–[\d.]+\d)?|\d{1,3}(?:,\d{3})+|\d+–\d+(?=\))|\d+ of \d+|\d+(?= (?:%|µm|mm|rows|points)))")
+FIGURE = re.compile(
+    r"(?<![\w.–])(?:\d[\d,]*\.\d+(?:–[\d.]+\d)?|\d{1,3}(?:,\d{3})+|\d+–\d+(?=\))|\d+ of \d+"
+    r"|\d+(?= (?:%|µm|mm|rows|points)))"
+)
 # What a run takes is measured by whoever runs it.
 DURATION = re.compile(r"\d+ minutes?")
 

@@ -121,9 +121,8 @@ def correct(
     if beyond.any():
         share = f"{beyond.sum():,} of {len(beyond):,} targets"
         lines.append(f"! {share} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
-    following = (
-        f"command the targets, measure 12 or more, then elastocal certificate {folder} --tolerance 0.2mm --measured AFTER"
-    )
+    certify = f"elastocal certificate {folder} --tolerance 0.2mm"
+    following = f"{certify}; or command 12 targets or more, measure them, and add --measured AFTER"
     print_answer(not len(bad), answer, [*lines, *map(str, files)], following, console)
 
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 # What `snakemake_logger_plugin_elastocal` writes when a job starts.
 _JOB = re.compile(r"(\d+) of (\d+): (.+)")
 _JOBS = re.compile(r"\d+ jobs")
+# Snakemake prints it before its logger begins.
+_NO_NEWS = "Using workflow specific profile"
 
 
 def diagnose(
@@ -57,5 +59,5 @@ def follow(lines: Iterable[str], console: Console) -> None:
             job = _JOB.fullmatch(line)
             if job and console.is_terminal:
                 progress.update(bar, completed=int(job[1]) - 1, total=int(job[2]), description=job[3])
-            elif not (_JOBS.fullmatch(line) and console.is_terminal):
+            elif not line.startswith(_NO_NEWS) and not (_JOBS.fullmatch(line) and console.is_terminal):
                 print_lines([line], console)
