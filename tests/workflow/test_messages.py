@@ -42,8 +42,11 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path, monkeypatch):
     monkeypatch.setattr("elastocal.report.first_page.sentences", lambda document: [document["verdict"], "more"])
     made = ["reports/study.pdf", "reports/loop/cell7/report.pdf", "reports/tables/table1.csv"]
     first, worth, *rest = outcome(made)
-    assert first == "cell7: not_testable" and "from 4.00\u00a0mm to 1.00\u00a0mm, by 75 %" in worth
-    assert rest == ["    reports/loop/cell7/report.pdf", "the study: reports/study.pdf"]
+    assert first == "! cell7: not_testable" and "from 4.00\u00a0mm to 1.00\u00a0mm, by 75 %" in worth
+    following = 'next: "What to do now" on the first page of the report'
+    assert rest == ["  report: reports/loop/cell7/report.pdf", "the study: reports/study.pdf", following]
+    (folder / "verdict.json").write_text(json.dumps(verdict | {"verdict": "named"}), encoding="utf-8")
+    assert outcome(made)[0] == "✓ cell7: named" and outcome(made)[-1] == "next: elastocal correct, elastocal certificate"
 
 
 @pytest.mark.parametrize(
