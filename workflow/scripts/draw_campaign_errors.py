@@ -1,7 +1,8 @@
 """Held-out errors of all campaigns of one kind, before and after."""
 
-import pandas as pd
 from job import Job, origin_of, run
+
+import pandas as pd
 
 from elastocal.figures.campaign_errors import campaign_errors
 from elastocal.figures.style import save
