@@ -2,43 +2,31 @@
 
 from __future__ import annotations
 
-import tempfile
 from typing import TYPE_CHECKING
 
 from elastocal.campaigns.measurements import SHOWN
-from elastocal.figures.plan import plan_picture, pose_pictures
-from elastocal.figures.style import save
 from elastocal.report.typesetting import compile_document
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
     from typing import Any
 
     import pandas as pd
 
-    from elastocal.application.planning.cell import Cell
     from elastocal.application.planning.plan import Plan
     from elastocal.application.planning.survey import Survey
 
 _UNITS = {"deg": "°", "mm": "mm"}
 
 
-def write_plan_sheet(
-    path: str | Path, survey: Survey, cell: Cell, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]
-) -> None:
+def write_plan_sheet(path: str | Path, facts: Mapping[str, Any], figures: Mapping[str, str]) -> None:
     """Typeset the sheet; the file appears whole or not at all.
 
-    `path`: the PDF. `rows`: from `planning.sheet.sheet`. `worth`: sentences about the accuracy that is expected.
+    `path`: the PDF. `facts`: from `plan_facts`. `figures`: PDF files by their names, "overview" and pages of poses.
     """
-    facts = plan_facts(survey, plan, rows, worth)
-    with tempfile.TemporaryDirectory() as scratch:
-        drawn = {"overview": plan_picture(survey.robot, cell, plan)}
-        drawn |= {f"poses{page}": figure for page, figure in enumerate(pose_pictures(survey.robot, plan))}
-        for name, figure in drawn.items():
-            save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")
-        facts["pictures"] = [name for name in drawn if name != "overview"]
-        compile_document(path, "plan.typ", {"facts": facts}, [f"{scratch}/{name}.pdf" for name in drawn])
+    pictures = [name for name in figures if name != "overview"]
+    compile_document(path, "plan.typ", {"facts": {**facts, "pictures": pictures}}, figures.values())
 
 
 def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]) -> dict[str, Any]:
