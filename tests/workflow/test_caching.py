@@ -286,9 +286,8 @@ for script in sys.argv[2:]:
         imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))]
         exec(compile(ast.Module(imports, []), script, "exec"), {})
         # A catalogue looks up the modules beside it when it is asked.
-        for module in [m for m in sys.modules.values() if hasattr(m, "pkgutil") and m.__name__.startswith("elastocal.")]:
-            for name in module.pkgutil.iter_modules([str(Path(module.__file__).parent)]):
-                importlib.import_module(f"{module.__package__}.{name.name}")
+        for module in [m for m in sys.modules.values() if hasattr(m, "modules_with")]:
+            module.modules_with("__name__", importlib.import_module(module.__package__))
         files = [Path(m.__file__) for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
         own = sorted(f.relative_to(root).as_posix() for f in files if f.is_relative_to(root))
         os.write(write, json.dumps(own).encode())

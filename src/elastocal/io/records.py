@@ -1,8 +1,8 @@
 """What each job read and wrote, when, and from which commit, configuration, seed and environment: a record beside every output.
 
-A record has the SHA-256 of its output and of all that the job read, of scripts and modules as `io.sources` has it: whoever reads
-a file next finds a byte that was altered, in it or in anything behind it. `python -m elastocal.io.records | sha256sum --check`
-judges all files, with the name of one behind `records` this one.
+A record has the SHA-256 of its output and of all that the job read, of modules as `io.sources` has it: whoever reads a file
+next finds a byte that was altered, in it or in anything behind it. `python -m elastocal.io.records | sha256sum --check` judges
+all files, with the name of one behind `records` this one.
 """
 
 from __future__ import annotations
