@@ -29,7 +29,7 @@ from elastocal.data_checks.placement import (
 from elastocal.data_checks.protocol import Fault, Value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements, Target
     from elastocal.data_checks.placement import Placement
@@ -153,24 +153,22 @@ def placements(campaign: Campaign) -> list[Change]:
     found = []
     if campaign.frame == "base":
         found.append(Change("wrong_frame", "", lambda c, r: (replace(c, frame="tracker"), r), placement="frame"))
+    unknown: list[dict[str, None]] = []
+    if campaign.measured == "pose" and any(target.rotation is not None for target in campaign.targets):
+        unknown.append({"rotation": None})
     if any(target.offset_m is not None for target in campaign.targets):
-
-        def unknown(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
-            seen = set(measurements.target.tolist())
-            targets = [replace(t, offset_m=None) if number in seen else t for number, t in enumerate(campaign.targets)]
-            return replace(campaign, targets=tuple(targets)), measurements
-
-        found.append(Change("wrong_target", "", unknown, placement="targets"))
-    return found
+        unknown.append({"offset_m": None, "rotation": None})
+    return [*found, *(Change("wrong_target", "", _with_unknown(parts), placement="targets") for parts in unknown)]
 
 
 def pairs(campaign: Campaign) -> list[tuple[Change, ...]]:
     """Two changes at once, where neither alone lets the measurements fit."""
     placed_elsewhere = placements(campaign)
-    found = [tuple(placed_elsewhere)] if len(placed_elsewhere) == 2 else []
+    found: list[tuple[Change, ...]] = []
     for change in placed_elsewhere:
         if change.placement == "frame":
             oriented = campaign.measured == "pose"
+            found += [(change, other) for other in placed_elsewhere if other is not change]
             found += [(change, other) for other in single_changes(replace(campaign, frame="tracker"))]
             if oriented:
                 found += [(change, other) for other in _axes(True, False)]
@@ -432,6 +430,15 @@ def _with_rotations(
     return correct
 
 
+def _with_unknown(parts: Mapping[str, None]) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
+    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
+        seen = set(measurements.target.tolist())
+        targets = [replace(t, **parts) if number in seen else t for number, t in enumerate(campaign.targets)]
+        return replace(campaign, targets=tuple(targets)), measurements
+
+    return correct
+
+
 def _with_offsets(names: Iterable[str], factor: float) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
     def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
         targets = [
@@ -465,22 +472,25 @@ def _frame_fault(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str
 
 
 def _target_fault(targets: Sequence[Target], written: Estimate, fitted: Estimate) -> tuple[str, tuple[Value, ...]]:
-    parameters, farthest, turned = [], ("", 0.0), 0.0
-    for number, target in enumerate(targets):
-        offset = fitted.target_offset[number]
-        vector = Rotation.from_matrix(fitted.target_rotation[number]).as_rotvec()
-        away = float(np.linalg.norm(offset - written.target_offset[number]))
-        turned = max(turned, float(np.linalg.norm(vector)))
-        farthest = max(farthest, (target.name, away), key=lambda pair: pair[1])
-        parameters += [
-            Value(f"{target.name} offset {axis}", float(value), "m") for axis, value in zip("xyz", offset, strict=True)
-        ]
-        if vector.any():
+    """Sentence and numbers of targets that sit elsewhere or are turned, and which keys of campaign.yaml are to be unknown."""
+    parameters: list[Value] = []
+    turns = Rotation.from_matrix(written.target_rotation.transpose(0, 2, 1) @ fitted.target_rotation).magnitude()
+    away = np.linalg.norm(fitted.target_offset - written.target_offset, axis=1)
+    vectors = Rotation.from_matrix(fitted.target_rotation).as_rotvec()
+    for target, offset, vector in zip(targets, fitted.target_offset, vectors, strict=True):
+        for name, unit, part in (("offset", "m", offset), ("rotation vector", "rad", vector)):
             parameters += [
-                Value(f"{target.name} rotation vector {axis}", float(value), "rad")
-                for axis, value in zip("xyz", vector, strict=True)
+                Value(f"{target.name} {name} {axis}", float(value), unit)
+                for axis, value in zip("xyz", part, strict=True)
+                if part is offset or part.any()
             ]
-    name, away = farthest
-    words = f"{name} would sit {1e3 * away:.3g} mm from there" if away > IMPLAUSIBLE_M else ""
-    words += f"{' and ' if words else 'it would be '}turned by {np.degrees(turned):.3g}°" if turned > IMPLAUSIBLE_RAD else ""
-    return f"targets do not sit where the campaign says: {words}", tuple(parameters)
+    words, keys = [], []
+    if away.max() > IMPLAUSIBLE_M:
+        words.append(f"{targets[np.argmax(away)].name} would sit {1e3 * away.max():.3g} mm from there")
+        keys.append("offset_m")
+    if turns.max() > IMPLAUSIBLE_RAD:
+        words.append(f"{targets[np.argmax(turns)].name} would be turned by {np.degrees(turns.max()):.3g}°")
+        keys.append("rotation")
+    remedy = " and ".join(f"{key}: unknown" for key in keys)
+    fits = f"; where its mount is not as stated, {remedy} in campaign.yaml fits it, and known values may stand there"
+    return f"targets do not sit where the campaign says: {' and '.join(words)}{fits if keys else ''}", tuple(parameters)

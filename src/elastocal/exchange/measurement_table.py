@@ -36,9 +36,12 @@ from elastocal.exchange.column_names import (
     recognized,
     unit_of_joint,
     unit_scale,
+    units_in,
     units_of,
 )
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
+from elastocal.exchange.joint_states import joints_by_name
+from elastocal.exchange.markers import chosen_markers, has_position, markers_in, one_row_each
 from elastocal.exchange.planned_sheet import sheet_options
 from elastocal.exchange.rotations import (
     ALLOWED,
@@ -86,8 +89,8 @@ class ImportOptions:
     `separator`, `decimal`, `header`, `encoding`, `thousands`: as in `csv_dialect.Dialect`. `ignore`: headers of columns that
     are left out. `columns`: headers by the names of `column_names`. `units`: units by the same names; ``angles`` and
     ``lengths`` for all that have no other. `rotation`: notation of `rotations`. `target`: name for all rows where no column has
-    it. `wrench`: what the forces act on; those that the robot exerts are turned round. `skip_empty`: whether rows without a
-    position are left out.
+    it. `targets`: markers of rows that hold several, by the names of the targets that they are; see `markers`. `wrench`: what
+    the forces act on; those that the robot exerts are turned round. `skip_empty`: whether rows without a position are left out.
     """
 
     separator: str | None = None
@@ -102,6 +105,7 @@ class ImportOptions:
     encoding: str | None = None
     thousands: str | None = None
     ignore: Sequence[str] | None = None
+    targets: Mapping[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -135,13 +139,17 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
 
     def is_header(cells: Sequence[str]) -> bool:
         names = {recognized(cell)[0] for cell in cells} | {name for name, header in mapped.items() if header in cells}
-        return set(POSITION) <= names or set(_TRANSLATION) <= names
+        return has_position(names) or bool(markers_in(cells))
 
     dialect = Dialect(options.separator, options.decimal, options.header, options.encoding, options.thousands)
-    text = read_text_table(path, is_header, dialect, options.ignore or ())
+    text = read_text_table(path, is_header, dialect, options.ignore or (), units_in=units_in)
     options = sheet_options(text, options)
-    mapped = dict(options.columns or {})
-    columns, stated, notes = _columns(text, mapped, robot)
+    mapped, notes = dict(options.columns or {}), [f"units in the row under the header: {len(text.units)}"] if text.units else []
+    if targets := chosen_markers(text, options.target, options.targets, mapped):
+        text, mapped, of_targets = one_row_each(text, targets, mapped)
+        options, notes = replace(options, target=None, targets=targets), [*notes, *of_targets]
+    columns, stated, counted = _columns(text, mapped, robot)
+    notes += counted
     rotation = _rotation(text, columns, mapped, options.rotation)
     position = _TRANSLATION if rotation == HOMOGENEOUS_MATRICES else POSITION
     angles = joints_in(columns)
@@ -165,11 +173,12 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     resolved = replace(
         options,
         **asdict(text.dialect),
-        columns={name: header for name, header in columns.items() if name in used},
+        columns={name: header for name, header in columns.items() if name in used and not (name == "target" and targets)},
         units=units,
         rotation=rotation,
     )
-    ignored = tuple(header for header in text.columns if header not in (resolved.columns or {}).values())
+    read_headers = {columns[name] for name in columns if name in used}
+    ignored = tuple(header for header in text.columns if header not in read_headers)
     skipped = len(text.lines) - len(read.kept)
     return ImportedMeasurements(
         table, len(angles), resolved, (*ignored, *(options.ignore or ())), skipped, (*text.left_out, *notes)
@@ -185,13 +194,15 @@ def _columns(
         if header not in text.columns:
             raise InputError(text.path, "header", f"no column {header!r}", closest_first(header, list(text.columns)))
         found[name] = header
-    guesses = {header: recognized(header) for header in text.columns}
+    guesses = {header: (name, _unit(text, header, unit)) for header in text.columns for name, unit in [recognized(header)]}
     by_name = {}
     for joint, called in enumerate((robot and robot.joint_names) or (), 1):
         for header in text.columns:
             is_joint, unit = unit_of_joint(header, called)
             if is_joint:
-                guesses[header], by_name[header] = (f"q{joint}", unit), called
+                guesses[header], by_name[header] = (f"q{joint}", _unit(text, header, unit)), called
+    for header, name in joints_by_name(text, (robot and robot.joint_names) or (), {*mapped.values()}).items():
+        guesses[header], by_name[header] = (name, guesses[header][1]), name
     free = [header for header in text.columns if header not in by_name and guesses[header][0] not in mapped]
     joints, notes = _counted_joints(text, free, {*mapped.values()})
     guesses |= {header: (name, guesses[header][1]) for header, name in joints.items()}
@@ -212,6 +223,15 @@ def _columns(
         if unit is not None:
             stated[meant] = unit
     return found, stated, notes
+
+
+def _unit(text: TextTable, header: str, stated: str | None) -> str | None:
+    """Unit of a column by its header or by the row under it, which may not contradict each other."""
+    below = text.units.get(header)
+    if stated and below and stated != below:
+        allowed = f"one unit; --ignore {header!r}, or a table with one of them"
+        raise InputError(text.path, "header", f"{header!r} and {below!r} in the row under it", allowed)
+    return stated or below
 
 
 def _counted_joints(text: TextTable, headers: Sequence[str], mapped: set[str]) -> tuple[dict[str, str], list[str]]:
@@ -356,8 +376,9 @@ def _kept(text: TextTable, columns: Mapping[str, str], position: Sequence[str], 
     """Rows that have a position."""
     filled = np.array([[bool(cell) for cell in text.columns[columns[name]]] for name in position]).all(axis=0)
     if not filled.all() and not skip_empty:
-        line = text.lines[int(np.argmin(filled))]
-        raise InputError(text.path, f"line {line}", "no position", "three numbers, or --skip-empty to leave such rows out")
+        row = int(np.argmin(filled))
+        of = f" of {text.columns[columns['target']][row]}" if "target" in columns else ""
+        raise InputError(text.path, f"line {text.lines[row]}", f"no position{of}", "three numbers, or --skip-empty to leave such rows out")
     if not filled.any():
         raise InputError(text.path, "", "no position in any row", "at least one measurement")
     return np.flatnonzero(filled)
