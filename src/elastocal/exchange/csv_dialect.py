@@ -146,7 +146,7 @@ def read_text_table(
     left_out = _left_out(
         {
             "rows of empty cells": len(table) - len(rows) - bool(units),
-            "lines above the header": sum(number < header for number, _ in kept) - named_above,
+            "lines above the header": sum(number < header for number, _ in filled) - named_above,
             "lines of comments below the header": sum(number > header for number, _ in comments),
             "columns without name and values": len(names) - len(places) - sum(name in ignored for name in names),
         }
