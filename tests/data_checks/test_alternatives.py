@@ -293,6 +293,8 @@ def test_a_slightly_turned_mount_is_a_warning_as_the_zero_of_a_joint_may_be_it(f
     turn = Rotation.from_rotvec([0.0, 0.0, np.radians(degrees)])
     mine = campaign.measurements.target == 3
     measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
-    found = find(campaign, with_measured(campaign, vectors=np.where(mine[:, None], (measured * turn).as_rotvec(), measured.as_rotvec())))
+    found = find(
+        campaign, with_measured(campaign, vectors=np.where(mine[:, None], (measured * turn).as_rotvec(), measured.as_rotvec()))
+    )
     assert [(fault.name, fault.decisive) for fault in found] == [("wrong_target", False)] * named
     assert all("T6DoF would be turned by 4°" in fault.detail and "rotation: unknown" in fault.detail for fault in found)

@@ -1,4 +1,4 @@
-"""Campaigns of any robot in any dialect: the same numbers come back, or one line asks what is ambiguous; never another number."""
+"""Campaigns of any robot in any dialect: the same numbers come back, or one line asks what is ambiguous; no other number."""
 
 from dataclasses import replace
 
@@ -62,7 +62,11 @@ def test_a_campaign_is_read_as_it_was_measured_where_what_is_ambiguous_is_stated
         raise AssertionError(f"{error}\n{made.dialect}\n{made.content[:600]!r}") from error
 
 
-@given(written_campaigns(), st.sets(st.sampled_from(["units", "rotation", "target", "targets", "decimal", "thousands", "separator"])), st.booleans())
+@given(
+    written_campaigns(),
+    st.sets(st.sampled_from(["units", "rotation", "target", "targets", "decimal", "thousands", "separator"])),
+    st.booleans(),
+)
 def test_what_is_not_stated_is_found_out_rightly_or_asked_for(path, made, dropped, known):
     options = {key: value for key, value in made.options.items() if key not in dropped}
     outcome = []

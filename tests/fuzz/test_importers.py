@@ -132,7 +132,9 @@ ANGLE_CELLS = ("pi/0", "1e9*pi", "-pi/2", "0*pi/0", "9" * 200 + "pi", "1e308", "
 def robot_of_table(folder, content, modified=False, angles="rad"):
     path = folder / "arm.csv"
     path.touch()
-    over(path, content, lambda: quietly(lambda: imported(folder, lambda: robot_from_dh(path, modified, DhOptions(angles, "m")))))
+    over(
+        path, content, lambda: quietly(lambda: imported(folder, lambda: robot_from_dh(path, modified, DhOptions(angles, "m"))))
+    )
 
 
 @given(BYTES | tables(DH.encode()) | damaged(DH.encode()), st.booleans(), st.sampled_from(["deg", "rad"]))

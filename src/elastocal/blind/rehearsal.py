@@ -71,8 +71,8 @@ def filled_sheet(
     """A measurement sheet with what a tracker reads.
 
     `sheet`: columns of measurements.csv but for those of the tracker, which may be there and empty. `document`: of
-    campaign.yaml. `seed`: of the noise, and of where reflectors sit whose offset or rotation is unknown. `source`: named in errors. Returns
-    the same rows. Raises `InputError`: a moment that is not that of the row's force at a lever.
+    campaign.yaml. `seed`: of the noise, and of where reflectors sit whose offset or rotation is unknown. `source`: named in
+    errors. Returns the same rows. Raises `InputError`: a moment that is not that of the row's force at a lever.
     """
     states = sheet.drop_duplicates(_STATE)
     number = pd.MultiIndex.from_frame(states[_STATE]).get_indexer(pd.MultiIndex.from_frame(sheet[_STATE]))

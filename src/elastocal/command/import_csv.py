@@ -96,7 +96,9 @@ def csv(
         key: value for key, value in (("angles", angles), ("lengths", lengths)) if value is not None
     }
     several = target if target and (len(target) > 1 or "=" in target[0]) else []
-    markers = {name.strip(): (marker if equals else name).strip() for name, equals, marker in (t.partition("=") for t in several)}
+    markers = {
+        name.strip(): (marker if equals else name).strip() for name, equals, marker in (t.partition("=") for t in several)
+    }
     if len(markers) < len(several) or "" in markers:
         raise InputError("--target", "", ", ".join(several), "a name for each marker, such as A, or A=MARKER")
     chosen = ImportOptions(

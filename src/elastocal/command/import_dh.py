@@ -66,7 +66,8 @@ def dh(
     2, 0, 0, -0.425, 0, R
     """
     refuse_existing(output, force)
-    stated = (None if option is None else option.value for option in (angles, lengths, decimal))
-    result = robot_from_dh(file, modified, DhOptions(*stated, tuple(ignore or ())), name, mass_std)
+    units = (angles.value if angles else None, lengths.value if lengths else None)
+    options = DhOptions(*units, decimal.value if decimal else None, tuple(ignore or ()))
+    result = robot_from_dh(file, modified, options, name, mass_std)
     write_robot(result, output)
     typer.echo("\n".join(map(printable, [*summary(result), f"written: {output.as_posix()}"])))

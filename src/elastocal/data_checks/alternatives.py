@@ -139,7 +139,7 @@ def _one_after_the_other(campaign: Campaign, some: Measurements) -> list[Fault]:
 
 
 def _slightly_turned(campaign: Campaign, some: Measurements) -> list[Fault]:
-    """A mount that is turned by no more than the zero of a joint may be, but by more than one should be: for physics to tell."""
+    """A mount turned by as much as the zero of a joint may be off, but seldom is: for physics to tell, and a warning."""
     (freed, _) = _with_unknown({"rotation": None})(campaign, some)
     written, fitted = robustly_placed(campaign, some), robustly_placed(freed, some)
     detail, parameters = _target_fault(campaign.targets, written.estimate, fitted.estimate, np.inf, _NEAR_RAD)

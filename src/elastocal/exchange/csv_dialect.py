@@ -93,8 +93,8 @@ def read_text_table(
 
     `is_header`: of the cells of a line, whether they name the columns; the first such line does where no line is stated, else
     one behind a comment mark. `wanted`: what a header has, for messages. `ignored`: names of columns that are left out whatever
-    they hold. `units_in`: the units of a row of cells that is nothing but units, such as one under the header. Raises `InputError`: a file that cannot be read or has no header, a row of another length, or numbers that may be
-    read in two ways.
+    they hold. `units_in`: the units of a row of cells that is nothing but units, such as one under the header. Raises
+    `InputError`: a file that cannot be read or has no header, a row of another length, or numbers that may be read in two ways.
     """
     source = Path(path).as_posix()
     lines, encoding = _lines(path, stated.encoding)
@@ -285,7 +285,9 @@ def cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
     """
     mark = SEPARATORS.get(separator, separator)
     if mark == " ":
-        return line.split()
+        if '"' not in line:
+            return line.split()
+        line = " ".join(line.split("\t")).strip()
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True, strict=True))
     except csv.Error as error:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.exchange.dh_table import FIXED, PRISMATIC, REVOLUTE, DhOptions, read_dh_table
+from elastocal.exchange.dh_table import AS_STATED, FIXED, PRISMATIC, REVOLUTE, read_dh_table
 from elastocal.exchange.fixed_transforms import rotation_about, shift_word, turn_word
 from elastocal.exchange.robot_text import imported
 from elastocal.exchange.ros_kinematics import KINEMATICS, robot_from_kinematics
@@ -30,7 +30,7 @@ from elastocal.mechanics.usual_values import UNLIMITED_DEG
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from elastocal.exchange.dh_table import DhRow
+    from elastocal.exchange.dh_table import DhOptions, DhRow
     from elastocal.exchange.robot_text import Imported
     from elastocal.exchange.slid_frames import Piece
 
@@ -45,7 +45,7 @@ _MUCH_SHORTER = 0.5
 def robot_from_dh(
     path: str | Path,
     modified: bool = False,
-    options: DhOptions = DhOptions(),
+    options: DhOptions = AS_STATED,
     name: str | None = None,
     relative_std: float = RELATIVE_STD,
 ) -> Imported:
@@ -62,7 +62,9 @@ def robot_from_dh(
             if modified:
                 raise InputError("--modified", "", f"a file of {KINEMATICS}, which is no table", "the file without --modified")
             if options.ignore:
-                raise InputError("--ignore", "", f"a file of {KINEMATICS}, of which nothing is left out", "the file without --ignore")
+                raise InputError(
+                    "--ignore", "", f"a file of {KINEMATICS}, of which nothing is left out", "the file without --ignore"
+                )
             return robot_from_kinematics(described, path, name)
     rows, understood = read_dh_table(path, options)
     joints = [row for row in rows if row.kind != FIXED]

@@ -11,10 +11,11 @@ One row for each joint, or for what is fixed before, between or behind joints::
     6,     0,                0.0996, 0,       0,         R
 
 is a UR5e in the standard notation. ``type`` is R (revolute, also where the column is left out), P (prismatic) or F (fixed). A
-column of angles or lengths ends in ``_deg``, ``_rad``, ``_m`` or ``_mm``, has ``[mm]`` behind its name or a row of units under the
-header; without, an option says which. In radians ``pi/2`` may stand for a number. Optional columns: ``lower`` and ``upper`` (joint limits; of prismatic joints lengths),
-``compliance_urad_per_Nm``, ``mass_kg`` with ``cx``, ``cy``, ``cz`` (centre of mass in the frame of the row), and ``point``
-(name of a measuring point at the frame of the row). In YAML the table is a list of rows with the same keys.
+column of angles or lengths ends in ``_deg``, ``_rad``, ``_m`` or ``_mm``, has ``[mm]`` behind its name or a row of units under
+the header; without, an option says which. In radians ``pi/2`` may stand for a number. Optional columns: ``lower`` and ``upper``
+(joint limits; of prismatic joints lengths), ``compliance_urad_per_Nm``, ``mass_kg`` with ``cx``, ``cy``, ``cz`` (centre of mass
+in the frame of the row), and ``point`` (name of a measuring point at the frame of the row). In YAML the table is a list of rows
+with the same keys.
 """
 
 from __future__ import annotations
@@ -88,7 +89,10 @@ class DhOptions:
     ignore: Collection[str] = ()
 
 
-def read_dh_table(path: str | Path, options: DhOptions = DhOptions()) -> tuple[list[DhRow], list[str]]:
+AS_STATED = DhOptions()
+
+
+def read_dh_table(path: str | Path, options: DhOptions = AS_STATED) -> tuple[list[DhRow], list[str]]:
     """Rows of a Denavit-Hartenberg table, and notes how they were understood and what was left out.
 
     `path`: ends in ``.csv``, ``.yaml`` or ``.yml``. Raises `InputError`: file, line and column of what cannot be read, or a
@@ -219,7 +223,9 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
         turns = name in _ANGLES or (name in _LIMITS and kind != PRISMATIC)
         if name not in _PLAIN and not (meaning.angle if turns else meaning.length):
             option = "--angles deg or rad" if turns else "--lengths m or mm"
-            raise InputError(source, f"{where}, {column}", f"a limit without a unit of {'angles' if turns else 'lengths'}", option)
+            raise InputError(
+                source, f"{where}, {column}", f"a limit without a unit of {'angles' if turns else 'lengths'}", option
+            )
         value = _number(text(name), turns and meaning.angle == "rad")
         largest = MOST_TURNS * (2.0 * math.pi if meaning.angle == "rad" else 360.0) if turns else LARGEST_NUMBER
         if value is None or abs(value) > largest:

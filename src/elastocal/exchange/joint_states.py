@@ -12,7 +12,7 @@ import re
 from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
-from elastocal.exchange.column_names import recognized, unit_of_joint
+from elastocal.exchange.column_names import recognized, unit_of_joint, without_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,7 +30,7 @@ def joints_by_name(text: TextTable, joint_names: Sequence[str], mapped: set[str]
     """
     families: dict[tuple[str, str], dict[int, str]] = {}
     for header in text.columns:
-        if match := _COUNTED.fullmatch(header):
+        if match := _COUNTED.fullmatch(without_unit(header)[0]):
             families.setdefault((match[1], match[2].lower()), {})[int(match[3])] = header
     found: dict[str, str] = {}
     for (prefix, kind), names in families.items():
@@ -49,6 +49,8 @@ def joints_by_name(text: TextTable, joint_names: Sequence[str], mapped: set[str]
                 found[positions[number]] = joint
         if not found:
             called = ", ".join(text.columns[header][0] for header in names.values())
-            allowed = f"--robot FILE whose joint_names are these, or --column q1={[*positions.values()][0]!r} …, each joint's"
+            allowed = (
+                f"--robot FILE whose joint_names are these, or --column q1={next(iter(positions.values()))!r} …, each joint's"
+            )
             raise InputError(text.path, "header", f"joints called {called}, in an order that need not be the arm's", allowed)
     return found

@@ -56,7 +56,7 @@ def markers_in(headers: Iterable[str]) -> Markers:
     return {marker: named for marker, named in found.items() if has_position(named)}
 
 
-def has_position(names: Collection[str]) -> bool:
+def has_position(names: Collection[str | None]) -> bool:
     """Whether names of columns are those of a position, by itself or in a homogeneous matrix."""
     return set(POSITION) <= set(names) or {"t14", "t24", "t34"} <= set(names)
 
@@ -82,7 +82,9 @@ def _bare(marker: str) -> str:
     return re.sub(rf"^{_BETWEEN}|{_BETWEEN}$", "", marker)
 
 
-def chosen_markers(text: TextTable, target: str | None, targets: Mapping[str, str] | None, mapped: Collection[str]) -> dict[str, str]:
+def chosen_markers(
+    text: TextTable, target: str | None, targets: Mapping[str, str] | None, mapped: Collection[str]
+) -> dict[str, str]:
     """Markers of a table by the names of the targets that they are; empty where rows hold one position.
 
     `target`: name of the target of all rows; where a marker is called so, it is meant. `targets`: markers by the names of
@@ -94,11 +96,15 @@ def chosen_markers(text: TextTable, target: str | None, targets: Mapping[str, st
         for name, marker in targets.items():
             if marker not in markers:
                 known = ", ".join(map(_called, markers)) or "none, each with columns for x, y and z"
-                raise InputError(text.path, "header", f"no marker {marker!r}, target {name!r}", f"markers of the table: {known}")
+                raise InputError(
+                    text.path, "header", f"no marker {marker!r}, target {name!r}", f"markers of the table: {known}"
+                )
         return dict(targets)
     if has_position(mapped):
         return {}
-    usual = [marker for marker, named in markers.items() if all(recognized(named.get(axis, axis))[0] == axis for axis in POSITION)]
+    usual = [
+        marker for marker, named in markers.items() if all(recognized(named.get(axis, axis))[0] == axis for axis in POSITION)
+    ]
     if target and target in markers and target not in usual:
         return {target: target}
     # Beside plain x, y, z a number makes another marker; x_cmd and such are no measurements.
@@ -111,7 +117,7 @@ def chosen_markers(text: TextTable, target: str | None, targets: Mapping[str, st
             text.path,
             "header",
             f"positions of {', '.join(map(_called, asked[:4]))}{' …' if len(asked) > 4 else ''} in each row",
-            f"{options} for those that are targets (--target NAME={first} gives one another name), or --column x=NAME … for one",
+            f"{options} for those that are targets (NAME={first} gives one another name), or --column x=NAME … for one",
         )
     return {}
 
@@ -136,7 +142,9 @@ def one_row_each(
         other = markers[targets[name]]
         for what in sorted({*named} ^ {*other}):
             header, of = (named[what], first) if what in named else (other[what], name)
-            raise InputError(text.path, "header", f"{header!r} of {of} alone", f"--ignore {header!r}, or the same of each target")
+            raise InputError(
+                text.path, "header", f"{header!r} of {of} alone", f"--ignore {header!r}, or the same of each target"
+            )
         for what, header in named.items():
             units = [text.units.get(each) or recognized(each)[1] or "no unit" for each in (header, other[what])]
             if units[0] != units[1]:

@@ -50,7 +50,10 @@ def robot_from_urdf(
     chain = chain_between(urdf, base, tip, points, source)
     weights = weights_of(urdf, chain, relative_std)
     gravity = gravity_in_base(urdf, base)
-    notes = [f"read: {', '.join(f'q{number} from {joint.name!r}' for number, joint in enumerate(chain.joints, 1))}", *weights.notes]
+    notes = [
+        f"read: {', '.join(f'q{number} from {joint.name!r}' for number, joint in enumerate(chain.joints, 1))}",
+        *weights.notes,
+    ]
     limits = [_limits(joint, limits_in, notes, source) for joint in chain.joints]
     if limits_in == DEG:
         notes.append("limits read in degrees, as the option says")

@@ -87,9 +87,7 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
         for session in estimate.sessions:
             in_session = (observations.states.session == session).astype(float)
             laws += [{coordinate: in_session} for coordinate in model.sites.base]
-    columns = [
-        _target_columns(rotation, rows, observations.target == index)[..., parts] for index, parts in model.fitted_parts
-    ]
+    columns = [_target_columns(rotation, rows, observations.target == index)[..., parts] for index, parts in model.fitted_parts]
     target_columns = np.concatenate([np.zeros((count, rows, 0)), *columns], axis=2)
     of_targets = len(laws) + np.arange(target_columns.shape[2])
     laws += [{} for _ in of_targets]

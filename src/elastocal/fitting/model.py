@@ -24,12 +24,13 @@ if TYPE_CHECKING:
 class Model:
     """What is taken to make the measurements.
 
-    `targets`: as in the campaign; offsets and rotations that they do not have are fitted. `fitted_frames`: whether the placement of the base is
-    unknown, one for each session. `rows`: 3 where positions are measured, 6 where poses are. `nominal_compliance` (n,): rad/(N
-    m). `effects`: joint compliances, where they are identified, and errors of declared masses, where there are any, among them.
-    `time_zero_s`: from which effects count the time: the first measurement to be fitted. `row_span` (int, int): first and last
-    row of the measurements to be fitted, between which the campaign made its progress. `compliance_known`: whether the nominal
-    compliances are those of the robot file; else they are usual ones, or 0 of joints taken as rigid.
+    `targets`: as in the campaign; offsets and rotations that they do not have are fitted. `fitted_frames`: whether the
+    placement of the base is unknown, one for each session. `rows`: 3 where positions are measured, 6 where poses are.
+    `nominal_compliance` (n,): rad/(N m). `effects`: joint compliances, where they are identified, and errors of declared
+    masses, where there are any, among them. `time_zero_s`: from which effects count the time: the first measurement to be
+    fitted. `row_span` (int, int): first and last row of the measurements to be fitted, between which the campaign made its
+    progress. `compliance_known`: whether the nominal compliances are those of the robot file; else they are usual ones, or 0 of
+    joints taken as rigid.
     """
 
     sites: Sites

@@ -109,9 +109,7 @@ def _part(part: Mapping[str, np.ndarray], campaign: Mapping[str, Any]) -> dict[s
         "states (pose and load)": grouped(states),
         "loads": loads,
         "targets": listed(
-            (
-                f"{name} on {target['point']}{_mount(target, campaign['measured'] == 'pose')}" for name, target in used
-            ),
+            (f"{name} on {target['point']}{_mount(target, campaign['measured'] == 'pose')}" for name, target in used),
             12,
         ),
         "repeats of a state": str(each.min())
