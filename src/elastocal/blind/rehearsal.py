@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
 from elastocal.mechanics.components import WRENCH
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from elastocal.plant.arm import Arm
 
 # What every arm has that was never calibrated, at each of its joints, beside other gears and weights than its file says.
+_NOT_TURNED = (0.0, 0.0, 0.0)
 ERRORS_OF_GEOMETRY = ("joint_offset", "link_geometry")
 _COMPENSATORS = ("compensator_stiffness", "compensator_torque")
 # 10 µm at the end of an arm of 2 m.
@@ -69,9 +71,9 @@ def filled_sheet(
     """A measurement sheet with what a tracker reads.
 
     `sheet`: columns of measurements.csv but for those of the tracker, which may be there and empty. `document`: of
-    campaign.yaml. `seed`: of the noise, and of where reflectors sit whose offset is unknown. `source`: named in errors. Returns
-    the same rows. Raises `InputError`: a column that is missing or no number, a target that the campaign does not have, or a
-    moment that is not that of the row's force at a lever.
+    campaign.yaml. `seed`: of the noise, and of where reflectors sit whose offset or rotation is unknown. `source`: named in
+    errors. Returns the same rows. Raises `InputError`: a column that is missing or no number, a target that the campaign does
+    not have, or a moment that is not that of the row's force at a lever.
     """
     require_numbers(sheet, [*_STATE, *(f"q{j + 1}" for j in range(robot.arm.joints)), *_WRENCH], source)
     if "target" not in sheet:
@@ -86,9 +88,12 @@ def filled_sheet(
     position, rotation = seen_poses(robot, schedule)
     names = list(document["targets"])
     at = [robot.arm.points.index(document["targets"][name]["point"]) for name in names]
-    offsets = np.array([_offset(name, document["targets"][name]["offset_m"], seed) for name in names])
+    targets = document["targets"].items()
+    offsets = np.array([_stated(target["offset_m"], seed, f"reflector {name}", 0.1) for name, target in targets])
+    mounts = [_stated(target.get("rotation", _NOT_TURNED), seed, f"mount {name}", np.pi / 2) for name, target in targets]
+    turns = Rotation.from_rotvec(mounts).as_matrix()
     position = position[:, at] + (rotation[:, at] @ offsets[..., None])[..., 0]
-    position, rotation, _ = robot.tracker.read(position, rotation[:, at], stream(seed, "readings"))
+    position, rotation, _ = robot.tracker.read(position, rotation[:, at] @ turns, stream(seed, "readings"))
     if document["frame"] == "tracker":
         position, rotation = robot.tracker.in_own_frame(position, rotation)
     seen = number, pd.Index(names).get_indexer(sheet["target"])
@@ -192,8 +197,6 @@ def _schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedul
     )
 
 
-def _offset(name: str, stated: str | Sequence[float], seed: int) -> np.ndarray:
-    """Where a reflector sits on its point, m; within 0.1 m where the campaign does not know."""
-    if isinstance(stated, str):
-        return stream(seed, f"reflector {name}").uniform(-0.1, 0.1, 3)
-    return np.array(stated, float)
+def _stated(value: str | Sequence[float], seed: int, name: str, within: float) -> np.ndarray:
+    """What a campaign states of a target's place or mount (3,), or a draw within bounds where it does not know."""
+    return stream(seed, name).uniform(-within, within, 3) if isinstance(value, str) else np.array(value, float)
