@@ -119,7 +119,7 @@ def test_what_is_no_table_is_refused(tmp_path, name, text):
 
 
 def test_a_file_that_is_not_there_or_no_text_is_refused(tmp_path):
-    with refused(tmp_path / "none.csv", "", "No such file"):
+    with refused(tmp_path / "none.csv", "", "no such file"):
         read_dh_table(tmp_path / "none.csv", PLAIN)
     (tmp_path / "latin.csv").write_bytes(b"d,a,alpha\n\xff")
     with refused(tmp_path / "latin.csv", "line 2", "byte 10", "UTF-8"):

@@ -54,10 +54,11 @@ def dh(
     ] = RELATIVE_STD,
     force: Annotated[bool, typer.Option("--force", help="Replace the file that is there.")] = False,
 ) -> None:
-    """Make a robot file of a Denavit-Hartenberg table, one row for each joint.
+    """Make a robot file of a Denavit-Hartenberg table.
 
-    Columns: theta_offset_deg, d_m, a_m, alpha_deg; and if you like joint, type (R, P or F), lower_deg, upper_deg,
-    compliance_urad_per_Nm, mass_kg, cx_m, cy_m, cz_m, point. The first two rows of a UR5e, standard notation:
+    The table has one row for each joint. Columns: theta_offset_deg, d_m, a_m, alpha_deg; optionally joint, type (R, P or F),
+    lower_deg, upper_deg, compliance_urad_per_Nm, mass_kg, cx_m, cy_m, cz_m, point. The first two rows of a UR5e, standard
+    notation:
 
     joint, theta_offset_deg, d_m, a_m, alpha_deg, type
 

@@ -42,7 +42,7 @@ def test_a_damaged_file_is_one_line_without_the_words_of_a_library(tmp_path, con
 
 
 def test_a_missing_file_a_folder_and_a_larger_one_are_one_line(tmp_path, monkeypatch):
-    with refused(tmp_path / "none.mat", "", "found No such file or directory"):
+    with refused(tmp_path / "none.mat", "", "found no such file"):
         read_mat(tmp_path / "none.mat", ["q"])
     with refused(tmp_path, "", "a folder"):
         read_mat(tmp_path, ["q"])

@@ -1,0 +1,37 @@
+"""Files of a rehearsal, from an empty sheet to by how much the robot misses a path."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from analysed_robots import ROBOTS, analysed
+
+from elastocal.blind.rehearsal import hidden_robot
+from elastocal.blind.rehearsal_files import fill_sheet, measured_errors, write_milling_path
+from elastocal.exchange.target_path import read_target_path
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return hidden_robot(ROBOTS / "ur10.yaml", 4, ["joint_tilt"])[0]
+
+
+def test_a_sheet_is_filled_in_place(robot, tmp_path):
+    state = {"pose": 1, "load": 0, "repeat": 0, "target": "T"} | dict.fromkeys(["fx", "fy", "fz", "mx", "my", "mz"], 0.0)
+    path = tmp_path / "measurements.csv"
+    pd.DataFrame([state | {f"q{j}": 0.1 * j for j in range(1, 7)}]).to_csv(path, index=False)
+    document = {"targets": {"T": {"point": "6DoF", "offset_m": [0, 0, 0]}}, "frame": "base", "measured": "position"}
+    assert fill_sheet(path, document, robot, 1) == 1
+    assert np.isfinite(pd.read_csv(path)[["x", "y", "z"]].to_numpy()).all()
+
+
+def test_uncorrected_and_corrected_targets_are_judged_at_the_wanted_poses(robot, tmp_path):
+    path, targets = tmp_path / "path.csv", tmp_path / "targets.csv"
+    assert write_milling_path(path, analysed("ur10"), robot, 1) == 50
+    wanted = read_target_path(path, 6)
+    assert len(wanted) == 50 and wanted.wrench[:, 2].min() > 0
+    # Where the second set of targets is another robot's posture it misses by more.
+    angles = pd.read_csv(path)[[f"q{j}" for j in range(1, 7)]]
+    angles.join(angles.add_suffix("_uncorrected") + 1e-2).to_csv(targets, index=False)
+    missed = measured_errors(path, targets, robot, 1)
+    assert {name: off.shape for name, off in missed.items()} == {"uncorrected": (50,), "corrected": (50,)}
+    assert missed["uncorrected"].mean() > 2 * missed["corrected"].mean()
