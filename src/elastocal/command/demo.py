@@ -75,7 +75,7 @@ def demo(
     report = workplace() / "reports" / "loop" / folder.resolve().name / "report.html"
     answer = (
         f"The simulated robot follows a milling path under load: position error {missed['uncorrected']:.2f} mm RMS before, "
-        f"{missed['corrected']:.3f} mm after; the tracker's noise and the robot's repeatability alone: {missed['noise alone']:.3f} mm"
+        f"{missed['corrected']:.3f} mm after (noise and repeatability alone: {missed['noise alone']:.3f} mm)"
     )
     details = [f"hidden in it: {hidden}, beside errors of every link, joint zero, gear and weight", f"report: {report}"]
     print_lines([""], console)
