@@ -6,7 +6,8 @@ import pytest
 from analysed_robots import ROBOTS, analysed
 
 from elastocal.blind.rehearsal import hidden_robot
-from elastocal.blind.rehearsal_files import fill_sheet, missed_m, write_milling_path
+from elastocal.blind.rehearsal_files import fill_sheet, lose_beam, measured_errors, write_milling_path
+from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
 
 
@@ -32,6 +33,35 @@ def test_uncorrected_and_corrected_targets_are_judged_at_the_wanted_poses(robot,
     # Where the second set of targets is another robot's posture it misses by more.
     angles = pd.read_csv(path)[[f"q{j}" for j in range(1, 7)]]
     angles.join(angles.add_suffix("_uncorrected") + 1e-2).to_csv(targets, index=False)
-    missed = missed_m(path, targets, robot, 1)
-    assert {name: off.shape for name, off in missed.items()} == {"uncorrected": (50,), "corrected": (50,)}
+    missed = measured_errors(path, targets, robot, 1)
+    assert {name: off.shape for name, off in missed.items()} == dict.fromkeys(
+        ["uncorrected", "corrected", "noise alone"], (50,)
+    )
     assert missed["uncorrected"].mean() > 2 * missed["corrected"].mean()
+    # Three coordinates with 60 µm of noise: 104 µm, with 5 % of standard error.
+    assert 0.8e-4 < np.sqrt((missed["noise alone"] ** 2).mean()) < 1.3e-4
+
+
+def test_one_row_of_a_sheet_reads_zeros_after_a_lost_beam(tmp_path):
+    path = tmp_path / "measurements.csv"
+    before = pd.DataFrame({"x": [1.0, 2.0, 3.0], "y": [1.0, 2.0, 3.0], "z": [1.0, 2.0, 3.0]})
+    before.to_csv(path, index=False)
+    line = lose_beam(path, 1)
+    after = pd.read_csv(path)
+    assert (after.iloc[line - 2] == 0).all() and after.drop(line - 2).equals(before.drop(line - 2))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "No columns"),
+        ("pose\n1\n", "'load'"),
+        ("pose,load,repeat\n1,x,0\n", "load, line 2"),
+        ("a,b\n1,2,3\n1\n", "columns"),
+    ],
+)
+def test_a_sheet_that_is_none_is_one_line(robot, tmp_path, text, words):
+    path = tmp_path / "measurements.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=words):
+        fill_sheet(path, {"targets": {}, "frame": "base", "measured": "pose"}, robot, 1)

@@ -29,7 +29,11 @@ def run(monkeypatch, tmp_path):
     stand_ins = {
         "fill_sheet": lambda *_: 12,
         "write_milling_path": lambda *_: 50,
-        "missed_m": lambda *_: {"uncorrected": np.full(3, 2e-3), "corrected": np.full(3, 1e-4)},
+        "measured_errors": lambda *_: {
+            "uncorrected": np.full(3, 2e-3),
+            "corrected": np.full(3, 1e-4),
+            "noise alone": np.full(3, 9e-5),
+        },
     }
     for name, stand_in in stand_ins.items():
         monkeypatch.setattr(f"elastocal.blind.rehearsal_files.{name}", stand_in)

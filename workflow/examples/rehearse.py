@@ -5,7 +5,8 @@
     python workflow/examples/rehearse.py move FOLDER PATH.csv OUT.csv    goes along it, uncorrected and corrected
 
 FOLDER is the campaign; PATH.csv has the wanted poses and OUT.csv the joint targets of `elastocal correct`. The robot follows
-from the robot file of the campaign, --seed and --effect, and is the same in both.
+from the robot file of the campaign, --seed and --effect, and is the same in all three. Errors of `move` are what
+the tracker reads, in the campaign's frame of the base; its noise and the repeatability alone leave those of the last line.
 """
 
 import argparse
@@ -14,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.blind.rehearsal import hidden_robot
-from elastocal.blind.rehearsal_files import fill_sheet, missed_m, write_milling_path
+from elastocal.blind.rehearsal import hidden_robot, with_misplaced_base
+from elastocal.blind.rehearsal_files import fill_sheet, lose_beam, measured_errors, write_milling_path
 from elastocal.campaigns.measurements import CSV
 from elastocal.campaigns.reading import read_descriptions, read_robot
 from elastocal.errors import InputError
@@ -26,6 +27,8 @@ ROBOTS = Path("config/robots")
 def measure(given, robot, document):
     path = given.folder / CSV
     print(f"{fill_sheet(path, document, robot, given.seed)} measurements in {path}")
+    if given.lost_beam:
+        print(f"the beam is lost in line {lose_beam(path, given.seed)}")
 
 
 def path(given, robot, document):
@@ -34,7 +37,7 @@ def path(given, robot, document):
 
 
 def move(given, robot, document):
-    missed = missed_m(given.path, given.targets, robot, given.seed)
+    missed = measured_errors(given.path, given.targets, robot, given.seed)
     rms = {name: 1e3 * np.sqrt((off**2).mean()) for name, off in missed.items()}
     for name, off in missed.items():
         print(f"{name:12} position error: RMS {rms[name]:.3f} mm, largest {1e3 * off.max():.3f} mm")
@@ -50,16 +53,21 @@ if __name__ == "__main__":
         command.add_argument("folder", type=Path)
         if run is not measure:
             command.add_argument("path", type=Path)
+        if run is measure:
+            command.add_argument("--lost-beam", action="store_true", help="one row, which is drawn, reads zeros")
         if run is move:
             command.add_argument("targets", type=Path)
         command.add_argument("--seed", type=int, default=1)
         command.add_argument("--effect", action="append", default=[], help="a hidden effect; one is drawn without")
+        command.add_argument("--misplaced-base", action="store_true", help="the tracker's base frame is not quite the robot's")
         command.add_argument("--reveal", action="store_true", help="say what was hidden")
         command.set_defaults(run=run)
     given = parser.parse_args()
     try:
         document, robot_file = read_descriptions(given.folder, ROBOTS)
         robot, defects = hidden_robot(robot_file, given.seed, given.effect)
+        if given.misplaced_base:
+            robot = with_misplaced_base(robot, given.seed)
         given.run(given, robot, document)
     except InputError as error:
         sys.exit(str(error))
