@@ -31,11 +31,10 @@ def write_plan_sheet(path: str | Path, facts: Mapping[str, Any], figures: Mappin
 
 def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]) -> dict[str, Any]:
     """What the sheet states: sentences, the heads of the table, and for each pose its cells and how often each load is read."""
-    angles = [name for name in rows if name.startswith("q") and name.rpartition("_")[2] in SHOWN]
+    angles = [name for name in map(str, rows) if name.startswith("q") and name.rpartition("_")[2] in SHOWN]
     heads = ["pose", *(f"{name.partition('_')[0]} ({_UNITS[name.partition('_')[2]]})" for name in angles)]
     forces = ["fx", "fy", "fz"] if survey.loaded else []
     heads += [f"F{name[1]} (N)" for name in forces] + ["measured"]
-    first = dict(enumerate(survey.shares))
     poses = []
     for pose, part in rows.groupby("pose"):
         pulled = part[part["load"] == 1] if survey.loaded else part
@@ -45,7 +44,9 @@ def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[s
             *(f"{round(pulled[name].iloc[0]) + 0:d}" for name in forces),
         ]
         visits = [
-            {"load": _load_name(first[load]), "count": int(group["repeat"].nunique())} for load, group in part.groupby("load")
+            {"load": _load_name(share), "count": int(part.loc[part["load"] == load, "repeat"].nunique())}
+            for load, share in enumerate(survey.shares)
+            if (part["load"] == load).any()
         ]
         poses.append({"cells": cells, "visits": visits})
     targets = ", ".join(target.name for target in survey.targets)
