@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -20,9 +20,6 @@ from elastocal.command.init import init
 from elastocal.command.plan import plan
 from elastocal.command.printed import example
 from elastocal.errors import InputError, fault_of_machine
-
-if TYPE_CHECKING:
-    from click import Context
 
 # Each subcommand with an example, in the order in which a calibration needs them; `import` is a group of its own.
 COMMANDS = {
@@ -41,7 +38,7 @@ _ORDER = ("demo", "import", *(command.__name__ for command in COMMANDS))
 class InOrder(TyperGroup):
     """Lists subcommands in the order of the work; typer would list groups last."""
 
-    def list_commands(self, ctx: Context) -> list[str]:
+    def list_commands(self, ctx: Any) -> list[str]:
         """Names of all subcommands."""
         return sorted(super().list_commands(ctx), key=_ORDER.index)
 
