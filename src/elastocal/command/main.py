@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -21,8 +21,11 @@ from elastocal.command.plan import plan
 from elastocal.command.printed import example
 from elastocal.errors import InputError, fault_of_machine
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 # Each subcommand with an example, in the order in which a calibration needs them; `import` is a group of its own.
-COMMANDS = {
+COMMANDS: dict[Callable[..., None], str] = {
     demo: "elastocal demo",
     init: "elastocal init campaigns/cell --robot robot.yaml",
     plan: "elastocal plan robot.yaml --folder campaigns/cell --force 200 --pull",
