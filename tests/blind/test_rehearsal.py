@@ -13,7 +13,6 @@ from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot_file import robot_from_document
 
 UR10 = ROBOTS / "ur10.yaml"
-POINT = "6DoF"
 WRENCH = ["fx", "fy", "fz", "mx", "my", "mz"]
 
 
