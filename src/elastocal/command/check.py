@@ -65,6 +65,9 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("declared model", f"leaves {1e3 * facts['residual_rms_m']:.3f} mm RMS on the poses that it was fitted to"),
         ("identified", f"{facts['parameters']} parameters, effectively {facts['effective_parameters']:.0f}{left}"),
     ]
+    for mount in facts.get("mounts", []):
+        rotation = ", ".join(f"{value:.4f}" for value in mount["rotation_rad"])
+        found.append(("mount", f"{mount['target']}: rotation [{rotation}] rad in the frame of its point, fitted"))
     for joint, spring in enumerate(facts.get("compliance", []), 1):
         error = spring["relative_std_error"]
         words = "not identifiable" if error is None else f"± {100 * error:.1f} %"
