@@ -89,6 +89,9 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("declared model", f"residual of {1e3 * facts['residual_rms_m']:.3f} mm RMS on the fitted poses"),
         ("identified", f"{facts['parameters']} parameters, effectively {facts['effective_parameters']:.0f}{left}"),
     ]
+    for mount in facts.get("mounts", []):
+        rotation = ", ".join(f"{value:.4f}" for value in mount["rotation_rad"])
+        found.append(("mount", f"{mount['target']}: rotation [{rotation}] rad in the frame of its point, fitted"))
     for joint, spring in enumerate(facts.get("compliance", []), 1):
         error = spring["relative_std_error"]
         words = "not identifiable" if error is None else f"± {100 * error:.1f} %"
