@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.stats import chi2
-from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
+from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, chain_of, robot_of
 from synthetic import (
     NOISE,
     conditions_on,
@@ -175,12 +175,18 @@ def test_growth_of_gravity_with_each_correction_is_its_slope_on_the_coordinates_
 def test_priors_are_those_of_the_robot_file(fanuc):
     robot = replace(fanuc, masses=(Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1), Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2)))
     found = candidate(sites_of(robot)).parameters
-    # A centre is off by its relative error times its distance from the joint, or times the width of a link: a tenth of the arm.
+    # A centre is off by its relative error times its distance from the joint, and lies anywhere in the girth of its link.
     width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
-    first, second = (20.0 * max(0.5, width)), (10.0 * width)
+    first, second = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5), np.hypot(10.0 * 0.01, 50.0 * width / 12**0.5)
     assert [p.prior_std for p in found] == pytest.approx([20.0, *[first] * 3, 10.0, *[second] * 3])
     assert [p.name for p in found[:2]] == ["mass_error_of_link_2", "moment_error_x_of_link_2"]
+
+
+def test_centre_of_a_slender_link_may_lie_forty_millimetres_off_all_the_same():
+    arm = chain_of("Rz(q1) Tz(0.3) Ry(q2) Tz(0.3) [hand]")
+    sites = replace(sites_of(arm), masses=(Mass(2, 4.0, (0.0, 0.0, 0.0), 0.1),))
+    assert [p.prior_std for p in candidate(sites).parameters] == pytest.approx([0.4, *[4.0 * 0.04] * 3])
 
 
 def test_robot_without_masses_bears_the_external_load_alone(fanuc):

@@ -30,6 +30,6 @@ def test_joints_are_rigid_where_their_compliances_are_neither_stated_nor_identif
     described = {"campaign": {"compliance": compliance, "declared": []}, "held_out": None, "robot": {"name": "x"}}
     if stated:
         described["robot"]["compliance_urad_per_Nm"] = [1.0]
-    settings = {name: {"value": 0.1} for name in ("alarm_draws", "alarm_level", "mechanism_probability", "named_probability")}
+    settings = {name: {"value": 0.1} for name in ("alarm_draws", "alarm_level", "mechanism_probability", "ambiguity_loss")}
     verdict = {"settings": settings, "candidates_tested": 1, "untestable": {}, "heldout": {"poses": 3}}
     assert method(verdict, described)["rigid"] == rigid

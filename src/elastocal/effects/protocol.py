@@ -149,6 +149,12 @@ class Candidate:
         return f"{self.effect}{where}" + (f"[{self.detail}]" if self.detail else "")
 
 
+def moved_and_turned(shift: float, turn: float, per: str = "") -> tuple[Parameter, ...]:
+    """Parameters of a shift along and a turn about each axis, of plausible sizes in m and rad; `per` follows their units."""
+    sizes = (("d", "m", shift), ("r", "rad", turn))
+    return tuple(Parameter(f"{letter}{axis}", unit + per, size) for letter, unit, size in sizes for axis in "xyz")
+
+
 def at_shapes(key: str, shapes: Iterable[float]) -> str:
     """Unique name of a candidate at values of its shapes: with all the digits of each."""
     return key + "".join(f" {float(shape)!r}" for shape in shapes)

@@ -21,6 +21,7 @@ from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.motion import Motion, motion
 from elastocal.mechanics.robot import STANDING, Compensator, Mass, Robot
+from elastocal.mechanics.usual_values import usual_compliance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +43,7 @@ class Sites:
     frame at the far end of each link to that at its near end: fixed rotations between two joints. `joint_signs`: sense in which
     each joint turns about its axis, +1 or -1. `prismatic`: which joints shift along their axis instead; theirs are metres and
     newtons. `masses`: what the links weigh, where the robot file says so. `gravity_m_s2`: base axes. `payload_kg`: as in
-    `Robot`.
+    `Robot`. `compliance` (n,): of the joints as in `Robot`, usual ones of rigid joints: the scale of what yields beside them.
     """
 
     chain: Chain
@@ -60,6 +61,7 @@ class Sites:
     gear_ratio: tuple[float | None, ...] | None = None
     compensator: Compensator | None = None
     payload_kg: float | None = None
+    compliance: tuple[float, ...] = ()
 
     def far_end(self, link: int) -> MeasuringPoint:
         """The far end of a link, 0 for the column, as a measuring point."""
@@ -153,9 +155,11 @@ def sites_of(holder: Robot | Chain) -> Sites:
     floor.
     """
     if isinstance(holder, Robot):
-        known = (holder.masses, holder.gravity_m_s2, holder.gear_ratio, holder.compensator, holder.payload_kg)
+        usual = usual_compliance(holder.chain, holder.payload_kg)
+        compliance = tuple(np.where(holder.compliance > 0.0, holder.compliance, usual).tolist())
+        known = (holder.masses, holder.gravity_m_s2, holder.gear_ratio, holder.compensator, holder.payload_kg, compliance)
         return _sites_of(holder.chain, *known)
-    return _sites_of_chain(holder)
+    return replace(_sites_of_chain(holder), compliance=tuple(usual_compliance(holder).tolist()))
 
 
 # Every part of a diagnosis asks for the sites of its robot; what a run has to do with are a few robots.
@@ -167,6 +171,7 @@ def _sites_of(
     gear_ratio: tuple[float | None, ...] | None,
     compensator: Compensator | None,
     payload_kg: float | None,
+    compliance: tuple[float, ...],
 ) -> Sites:
     return replace(
         _sites_of_chain(chain),
@@ -175,6 +180,7 @@ def _sites_of(
         gear_ratio=gear_ratio,
         compensator=compensator,
         payload_kg=payload_kg,
+        compliance=compliance,
     )
 
 
