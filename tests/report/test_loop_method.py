@@ -10,7 +10,7 @@ def test_every_setting_is_listed_with_value_and_reason():
     rows = facts_of(CAMPAIGNS["named"])["settings"]
     assert len(rows) == len(CAMPAIGNS["named"]["settings"]) and all(map(all, rows))
     assert ["alarm level", "0.02"] in [row[:2] for row in rows]
-    assert ["scales", "0.01, 0.03, 0.1, 0.3, 1"] in [row[:2] for row in rows]
+    assert ["scales", "0.01, 0.03, 0.1, 0.3, 1, 3"] in [row[:2] for row in rows]
 
 
 def test_candidates_that_cannot_be_tested_are_gathered_by_reason():
