@@ -57,9 +57,9 @@ def test_without_an_alarm_the_model_is_adequate_whatever_the_posterior_prefers()
 
 
 def test_one_mechanism_with_enough_of_the_probability_is_named():
-    found = conclusion(((OFFSET_2,), 0.5), ((OFFSET_3,), 0.2), ((PAYLOAD,), 0.2))
+    found = conclusion(((OFFSET_2,), 0.6), ((OFFSET_3,), 0.25), ((PAYLOAD,), 0.1))
     assert found.verdict == NAMED and found.best.mechanisms == ("offset",)
-    assert found.best.probability == pytest.approx(0.7) and found.best.model == 0
+    assert found.best.probability == pytest.approx(0.85) and found.best.model == 0
     # One that is named has no alternatives.
     assert found.alternatives == {"offset": ()}
     assert list(found.mechanisms) == ["offset", "payload"]
@@ -72,9 +72,9 @@ def test_what_is_enough_is_a_setting(more, verdict):
 
 
 def test_a_missed_effect_costs_more_than_a_class():
-    """Losses of a class: 0.35 and what it misses; of no statement five times the probability that there is an effect."""
-    assert conclusion(((OFFSET_2,), 0.08)).verdict == CLASS
-    assert conclusion(((OFFSET_2,), 0.06)).verdict == UNEXPLAINED
+    """Losses of a class: 0.2 and what it misses; of no statement five times the probability that there is an effect."""
+    assert conclusion(((OFFSET_2,), 0.05)).verdict == CLASS
+    assert conclusion(((OFFSET_2,), 0.03)).verdict == UNEXPLAINED
 
 
 def test_the_alarm_decides_that_something_is_missing_and_the_posterior_what():

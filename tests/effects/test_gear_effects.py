@@ -9,6 +9,7 @@ from synthetic import candidate_on, conditions_on, displacements, equipped, made
 
 from elastocal.effects import transmission_harmonic
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.mechanics.sites import sites_of
 
 COUNT = 6
@@ -203,9 +204,9 @@ def test_torques_of_laws_are_shares_of_the_full_torque_of_the_joint(key, lowest,
     ("key", "name", "unit", "plausible", "sign", "needs"),
     [
         # Play opens with the torque and a gear gets stiffer with it; friction may hold back either way.
-        ("lost_motion@1", "half_play", "rad", 1e-4, 1, {"load"}),
-        ("stiffening@1", "beyond", "rad/(N m)", 1e-3 / FULL_NM, -1, {"load"}),
-        ("stiffening@1[two slopes]", "beyond", "rad/(N m)", 1e-3 / FULL_NM, -1, {"load"}),
+        ("lost_motion@1", "half_play", "rad", 1e-4, 1, LOADED_JOINTS),
+        ("stiffening@1", "beyond", "rad/(N m)", 1e-3 / FULL_NM, -1, LOADED_JOINTS),
+        ("stiffening@1[two slopes]", "beyond", "rad/(N m)", 1e-3 / FULL_NM, -1, LOADED_JOINTS),
         ("hysteresis@1", "half_width", "rad", 1e-4, 0, {"approach"}),
     ],
 )

@@ -59,15 +59,19 @@ class Settings:
     missed_loss: float = _setting(
         5.0,
         "loss of an effect that is not stated after an alarm, in losses of a wrong name: the alarm is exact, so that a class is"
-        " stated unless the odds for nothing are twelve to one",
+        " stated unless the odds for nothing are twenty-four to one",
     )
     ambiguity_loss: float = _setting(
-        0.35,
-        "loss of a class in losses of a wrong name: what a further experiment costs, over what a wrong repair does",
+        0.2,
+        "loss of a class in losses of a wrong name, so that names below some 80 % are not stated alone: a further experiment"
+        " costs a fifth of a wrong repair",
     )
     width_loss: float = _setting(
         0.02,
         "loss of each further hypothesis that a class lists, in wrong names: what is less probable is not worth an experiment",
+    )
+    useful: float = _setting(
+        1.96, "standard errors by which the expected gain of what was found exceeds nothing where it enters the model (95 %)"
     )
     law_tolerance: float = _setting(
         0.2,

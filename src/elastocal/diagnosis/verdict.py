@@ -31,6 +31,8 @@ ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
 UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
 # Family of what any measurements test, even of a single pose: that nothing of it shows says nothing of the robot.
 _OF_THE_SETUP = "drift"
+# Models below this move no probability that is stated.
+_TELLING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
 def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tuple[bool, Sequence[Hypothesis]]:
     """Whether to state the first of some hypotheses alone, and which to state where not: a Bayes decision [2].
 
-    A wrong name costs one, and so does a class that does not hold the truth; a class costs something by itself, and for each
+    A wrong name costs one, and so does a class that does not hold what is so; a class costs something by itself, and for each
     line. To state none costs what a missed effect does. `ranked`: without "nothing", which a class leaves open.
     """
     probability = np.array([hypothesis.probability for hypothesis in ranked])
@@ -133,17 +135,17 @@ def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, .
     """
     found: dict[tuple[str, ...], tuple[float, int]] = {(): (0.0, -1)}
     for number, (model, probability) in enumerate(zip(posterior.models, posterior.probabilities, strict=True)):
-        names = tuple(sorted(_mechanisms_of(problem, model)))
+        names = tuple(sorted(_mechanisms_of(problem, model, probability)))
         held, best = found.get(names, (0.0, number))
         found[names] = held + float(probability), number if best < 0 else best
     ranked = sorted(found.items(), key=lambda item: -item[1][0])
     return tuple(Hypothesis(names, probability, model) for names, (probability, model) in ranked)
 
 
-def _mechanisms_of(problem: Problem, model: Model) -> set[str]:
+def _mechanisms_of(problem: Problem, model: Model, probability: float) -> set[str]:
     """Mechanisms of a model, without a smooth error that the tolerance of the other laws allows for."""
     names = {problem.units[unit].mechanism for unit in model.units}
-    if OTHER in names and len(names) > 1:
+    if OTHER in names and len(names) > 1 and probability > _TELLING:
         explained = squares_explained(problem, model)
         if explained[OTHER] < problem.settings.law_tolerance**2 * max(explained.values()):
             names.remove(OTHER)

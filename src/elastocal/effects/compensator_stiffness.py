@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.effects import compensator_torque
-from elastocal.effects.protocol import Candidate
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -40,4 +40,4 @@ def candidates(sites: Sites) -> list[Candidate]:
         torque = conditions.total[:, joint]
         return [{joint: torque * wave} for wave in compensator_torque.waves(conditions.joint_angles[:, joint])]
 
-    return [Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))]
+    return [Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, LOADED_JOINTS)]

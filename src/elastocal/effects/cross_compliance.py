@@ -12,7 +12,7 @@ from __future__ import annotations
 from itertools import combinations
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate
 from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def candidates(sites: Sites) -> list[Candidate]:
         def displacement(conditions: Conditions) -> Displacements:
             return [{one: conditions.total[:, other], other: conditions.total[:, one]}]
 
-        return Candidate(NAME, FAMILY, (one + 1, other + 1), "", parameters, displacement, frozenset({"load"}))
+        return Candidate(NAME, FAMILY, (one + 1, other + 1), "", parameters, displacement, LOADED_JOINTS)
 
     revolute = [joint for joint in range(sites.joints) if not sites.prismatic[joint]]
     return [of(one, other) for one, other in combinations(revolute, 2)]

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate
 from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def candidates(sites: Sites) -> list[Candidate]:
     def turning(conditions: Conditions) -> Displacements:
         return displacement(conditions)[3:]
 
-    load = frozenset({"load"})
+    load = LOADED_JOINTS
     return [
         Candidate(NAME, FAMILY, (), "", (*shifts, *turns), displacement, load),
         Candidate(NAME, FAMILY, (), "turns", turns, turning, load),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate
 from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
@@ -31,4 +31,4 @@ def candidates(sites: Sites) -> list[Candidate]:
     def displacement(conditions: Conditions) -> Displacements:
         return [dict(enumerate(conditions.joint_deflections(conditions.wrench).T))]
 
-    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, frozenset({"load"}))]
+    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, LOADED_JOINTS)]

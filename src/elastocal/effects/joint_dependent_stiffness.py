@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, per_joint
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, per_joint
 from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
@@ -34,6 +34,6 @@ def candidates(sites: Sites) -> list[Candidate]:
             angle, torque = conditions.joint_angles[:, joint], conditions.total[:, joint]
             return [{joint: torque * np.cos(angle)}, {joint: torque * np.sin(angle)}]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, LOADED_JOINTS)
 
     return per_joint(sites, at)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.full_load import full_torque_Nm
-from elastocal.effects.protocol import Candidate, Shape, per_joint
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Shape, per_joint
 from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
@@ -40,6 +40,6 @@ def candidates(sites: Sites) -> list[Candidate]:
         def displacement(conditions: Conditions, torque: float) -> Displacements:
             return [{joint: np.tanh(conditions.total[:, joint] / torque)}]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}), (taken_up,))
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, LOADED_JOINTS, (taken_up,))
 
     return per_joint(sites, at)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Parameter
 from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
@@ -53,7 +53,9 @@ def candidates(sites: Sites) -> list[Candidate]:
         Parameter("mass", "kg", plausible),
         *(Parameter(f"moment_{axis}", "kg m", _LEVER_M * plausible) for axis in "xyz"),
     )
+    # Where neither a load nor what the links weigh is known, what hangs on the flange is not distinguishable from that.
+    known = LOADED_JOINTS - {"load"}
     return [
-        Candidate(NAME, FAMILY, (), "", parameters, displacement),
-        Candidate(NAME, FAMILY, (), "mass", parameters[:1], mass),
+        Candidate(NAME, FAMILY, (), "", parameters, displacement, known),
+        Candidate(NAME, FAMILY, (), "mass", parameters[:1], mass, known),
     ]

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.full_load import full_torque_Nm
-from elastocal.effects.protocol import Candidate, Shape, per_joint
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Shape, per_joint
 from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
@@ -57,4 +57,4 @@ def _candidate(sites: Sites, joint: int, detail: str) -> Candidate:
         load = conditions.total[:, joint]
         return [{joint: load - as_at_rest(load, torque)}]
 
-    return Candidate(NAME, FAMILY, (joint + 1,), detail, beyond, displacement, frozenset({"load"}), (meeting,))
+    return Candidate(NAME, FAMILY, (joint + 1,), detail, beyond, displacement, LOADED_JOINTS, (meeting,))
