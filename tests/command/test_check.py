@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from analysed_robots import analysed
+from analysed_robots import ROBOTS, analysed
 from made_folders import made_folder, made_table
 from typer.testing import CliRunner
 
@@ -24,8 +24,21 @@ def run(*words):
 def test_headings_say_what_was_read_identified_and_testable(folder):
     result = run(folder)
     assert result.exit_code == 0, result.output
-    for words in ("read", "held out", "noise", "compliance", "testable", "suspicious", "diagnosable"):
-        assert words in result.output
+    answer, *rest = result.output.splitlines()
+    assert answer.startswith("✓ made can be diagnosed: ")
+    for words in ("read", "held out", "noise", "compliance", "testable"):
+        assert any(line.startswith(f"  {words}") or words in line for line in rest), words
+    assert any(line.startswith("! ") for line in rest)
+    assert rest[-1] == f"next: elastocal diagnose {folder}"
+
+
+def test_labels_of_loads_are_counted_and_not_printed_as_newtons(folder):
+    from elastocal.command.check import lines
+    from elastocal.loop.overview import overview
+
+    facts = overview(folder, ROBOTS) | {"loads": [0, 1, 7], "largest_force_N": 1234.0}
+    words = " ".join(text for _, text in lines(facts))
+    assert "3 loads, forces up to 1,234 N" in words and "0, 1, 7" not in words
 
 
 def test_json_is_all_of_it(folder):
@@ -38,7 +51,8 @@ def test_faults_of_the_data_end_in_exit_code_one(tmp_path):
     table["q3"] = -table["q3"]
     result = run(made_folder(tmp_path / "made", analysed("kuka"), table=table))
     assert result.exit_code == 1
-    assert "the data are at fault" in result.output
+    assert result.output.startswith("! made cannot be diagnosed: the data are at fault")
+    assert "next: mend the data" in result.output
 
 
 def test_a_sheet_that_is_not_filled_in_is_refused_with_its_row(tmp_path):

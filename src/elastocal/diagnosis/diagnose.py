@@ -223,7 +223,7 @@ def _explained(
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
-        tell(_summary_of(conclusion, alarm))
+        tell(f"selection step {round_number + 1}, so far {_summary_of(conclusion, alarm)}")
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from elastocal.fitting.memory import kept_conditions
 from elastocal.fitting.observations import sample_of
@@ -67,12 +68,14 @@ def fit_frames(fitted: Fit, model: Model, observations: Observations, noise: Noi
     """
     found = fitted.estimate
     if not own_targets:
-        known = [replace(t, offset_m=tuple(at)) for t, at in zip(model.targets, found.target_offset, strict=True)]
+        turns = Rotation.from_matrix(found.target_rotation).as_rotvec()
+        known = [
+            replace(target, offset_m=tuple(at), rotation=tuple(turn))
+            for target, at, turn in zip(model.targets, found.target_offset, turns, strict=True)
+        ]
         model = replace(model, targets=tuple(known))
     start = registered(model, observations)
     start = replace(start, coefficients=found.coefficients, shapes=found.shapes)
-    if not own_targets:
-        start = replace(start, target_rotation=found.target_rotation)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
     around = kept_conditions(model, start, observations)
     return robustly(model, observations, around, noise, start, frozen).estimate
