@@ -76,6 +76,7 @@ def made_document(decision="pass", comparison=None, repeats=True, measured=False
             line("repeatability", 0.0, False),
         ],
         "budget_states": 100,
+        "tracker_rms_m": 1.5e-4,
         "workspace": [
             {"force_N": force, "uncorrected": quantiles, "bound": quantiles, "bound_inside": inside, "share_outside": 0.3}
             for force, inside in ((0.0, quantiles), (100.0, None))

@@ -86,8 +86,8 @@ def certificate(
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             forces = [each["force_N"] for each in document["workspace"]]
             drawn = {
-                "workspace": workspace_map(maps, forces),
-                "budget": budget_bars(document["budget"], [row[0] for row in facts["budget"]], limit),
+                "workspace": workspace_map(maps, forces, limit),
+                "budget": budget_bars(document["budget"], [row[0] for row in facts["budget"]], limit, document["tracker_rms_m"]),
             }
             for name, figure in drawn.items():
                 save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")

@@ -156,6 +156,10 @@ def _dots(axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[fl
         color, marker, _ = LOOKS[key]
         for row in _rows(_Rate, rows[rows.robots == key]):
             place = names.index(row.quantity) + 0.32 * (number - (len(robots) - 1) / 2)
+            if not np.isfinite(row.rate):
+                # The interval of nothing is everything, which would look like a result.
+                axis.annotate("no cases", (0.01, place), xycoords=("axes fraction", "data"), va="center", color=color, fontsize=7)
+                continue
             axis.plot([scaled(row.low), scaled(row.high)], [place, place], color=color, linewidth=1.2)
             axis.plot(scaled(row.rate), place, marker, color=color, markersize=4.2)
     axis.set(yticks=range(len(names)), ylim=(len(names) - 0.4, -0.6))

@@ -116,6 +116,7 @@ def certificate(
         },
         "budget": [asdict(share) for share in error_budget(calibrated, *poses, _DRAWS, draws("budget"))],
         "budget_states": accuracy.poses,
+        "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
         "workspace": [_summary(force, each) for force, each in zip(forces, maps, strict=True)],
         "comparison": None,
     }

@@ -118,18 +118,19 @@ def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str
 
 
 def _candidates(table: Mapping[str, np.ndarray]) -> list[dict[str, str]]:
-    """The leading candidates, worded; of one that was tried in several shapes the best."""
-    factors = np.nan_to_num(table["log_bayes_factor"], nan=-np.inf)
+    """The leading candidates, worded; of one that was tried in several shapes the best, and the probability of them all."""
     keys, of_key = np.unique(table["candidate"].astype(str), return_inverse=True)
-    best, probable, chosen = (np.full(len(keys), -np.inf) for _ in range(3))
-    for most, values in ((best, factors), (probable, table["probability"]), (chosen, table["chosen"])):
-        np.fmax.at(most, of_key, np.asarray(values, float))
+    best, probability, chosen = np.full(len(keys), -np.inf), np.zeros(len(keys)), np.zeros(len(keys), bool)
+    np.fmax.at(best, of_key, table["log_bayes_factor"])
+    # A model holds one shape of a candidate at most: their probabilities add up.
+    np.add.at(probability, of_key, np.nan_to_num(table["probability"]))
+    np.logical_or.at(chosen, of_key, np.asarray(table["chosen"], bool))
     return [
         {
             "name": capital(candidate_words(keys[key])),
             "factor": minus(f"{best[key]:.1f}"),
-            "words": probability_words(probable[key]),
-            "chosen": "yes" if chosen[key] == 1 else "",
+            "words": probability_words(probability[key]),
+            "chosen": "yes" if chosen[key] else "",
         }
         for key in np.argsort(-best, kind="stable")[:_LEADING]
         if np.isfinite(best[key])
