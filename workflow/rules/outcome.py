@@ -12,7 +12,7 @@ _REPORTS = {"reports/study.pdf": "the study", "reports/blind/blind.pdf": "the bl
 def outcome(made: Iterable[str]) -> list[str]:
     """Lines about the reports among the files that a run has made."""
     # Only a run that has made a report needs what makes its sentences.
-    from elastocal.report.first_page import sentences, worth_sentence
+    from elastocal.report.first_page import headline, headline_sentence, sentences
 
     lines = []
     for path in sorted(map(str, made)):
@@ -20,5 +20,7 @@ def outcome(made: Iterable[str]) -> list[str]:
             lines.append(f"{_REPORTS[path]}: {path}")
         if match := _CAMPAIGN.fullmatch(path):
             verdict = json.loads(Path(path).with_name("verdict.json").read_text(encoding="utf-8"))
-            lines += [f"{match[1]}: {sentences(verdict)[0]}", f"    {worth_sentence(verdict['heldout'])}", f"    {path}"]
+            stated = headline(verdict)
+            errors = [f"    {headline_sentence(stated)}"] if stated else []
+            lines += [f"{match[1]}: {sentences(verdict)[0]}", *errors, f"    {path}"]
     return lines

@@ -114,13 +114,13 @@ def coverage_by_effect(coverage: pd.DataFrame) -> Figure:
         marker = _COMPARABLE[row.comparable][0]
         axis.plot([_PER_CENT * row.low, _PER_CENT * row.high], [place, place], color=PALETTE[0], linewidth=1.2)
         axis.plot(_PER_CENT * row.rate, place, marker, color=PALETTE[0], markersize=4.5)
-        axis.annotate(f"{row.cases}", (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=6.5)
+        axis.annotate(f"{row.cases}", (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7)
     lowest = min([_PER_CENT * row.low for row in order])
     axis.set(yticks=range(len(order)), ylim=(len(order) - 0.5, -0.5), xlim=(min(80.0, lowest - 2), 100.5))
     axis.set_yticklabels([_coverage_name(row) for row in order], fontsize=7)
     axis.set_xlabel("95 % intervals that contain the true value (%)")
     axis.annotate(
-        "intervals", (1.01, -0.9), xycoords=("axes fraction", "data"), va="center", fontsize=6.5, annotation_clip=False
+        "intervals", (1.01, -0.9), xycoords=("axes fraction", "data"), va="center", fontsize=7, annotation_clip=False
     )
     axis.grid(visible=False, axis="y")
     present = {row.comparable for row in order}

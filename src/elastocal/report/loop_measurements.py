@@ -33,7 +33,7 @@ def made(campaign: Mapping[str, Any]) -> str:
 
 
 def measured(table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]) -> list[list[str]]:
-    """Rows of what was measured: name, training, held out.
+    """Rows of what was measured: name, at fitted poses, at validation poses.
 
     `table` (N,): columns of the residuals table. `descriptions`: contents of campaign.json.
     """
@@ -110,7 +110,9 @@ def _part(part: Mapping[str, np.ndarray], campaign: Mapping[str, Any]) -> dict[s
         "loads": loads,
         "targets": listed(
             (
-                f"{name} on {target['point']}" + (", place fitted" if target["offset_m"] == "unknown" else "")
+                ("" if name == target["point"] else f"{name} ")
+                + f"at the measuring point {target['point']}"
+                + (", place fitted" if target["offset_m"] == "unknown" else "")
                 for name, target in used
             ),
             12,
