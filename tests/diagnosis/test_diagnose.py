@@ -107,9 +107,7 @@ def test_progress_has_the_measurements_first_and_then_what_leads_in_each_search_
     _, lines = found
     assert lines[0] == f"declared model fitted to {len(case.observations)} measurements"
     most = Settings().linearizations
-    assert lines[1:] == [
-        f"search {number} of at most {most}: leading so far, zero offset" for number in range(1, len(lines))
-    ]
+    assert lines[1:] == [f"search {number} of at most {most}: leading so far, zero offset" for number in range(1, len(lines))]
     assert 2 <= len(lines) <= 1 + most
 
 

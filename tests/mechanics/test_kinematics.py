@@ -21,8 +21,8 @@ from elastocal.mechanics import chain_walk
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import (
     corners,
-    joint_axes,
     jacobians,
+    joint_axes,
     poses,
     poses_and_jacobians,
     poses_of_points,

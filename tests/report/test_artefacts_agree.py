@@ -14,12 +14,13 @@ import pytest
 from drawn_figures import empty_pictures
 from made_loop_facts import CAMPAIGNS, facts_of, plainly
 from made_loop_tables import candidate_table, residual_table
-from outcome import outcome
 
 from elastocal.errors import InputError
 from elastocal.io.records import check_sources, jobs_behind
 from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.loop_pages import write_loop_report
+
+from outcome import outcome
 
 PICTURES = ["arrows", "before_after", "residuals", "candidates", "confounding"]
 DIAGNOSED = sorted(Path("reports/loop").glob("*/report.html"))
@@ -68,7 +69,7 @@ def assert_agree(folder):
         stated = [] if faulty else re.findall(r"([\d.]+) ?→ ?([\d.]+) mm(?: ?\(noise ([\d.]+)\))?", text)
         assert faulty or len(stated) == 1, name
         for value, expected in zip(stated[0] if stated else (), (before, after, errors["noise_floor_rms_m"]), strict=False):
-            assert not value and not expected or close(value, 1e3 * expected), name
+            assert (not value and not expected) or close(value, 1e3 * expected), name
     for name, text in texts.items():
         for effect in [] if faulty else verdict["effects"]:
             # On page 1 its probability and its cost follow each other.

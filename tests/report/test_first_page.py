@@ -81,9 +81,7 @@ def test_the_first_page_says_what_calibration_is_worth_against_doing_nothing():
 def test_the_headline_is_the_robot_as_it_was_and_as_it_is_in_mm_beside_the_noise():
     verdict = CAMPAIGNS["named"]
     stated = headline(verdict)
-    assert plainly(headline_sentence(stated)) == (
-        "0.171 → 0.084 mm (noise 0.050), RMS position error on 10 validation poses"
-    )
+    assert plainly(headline_sentence(stated)) == ("0.171 → 0.084 mm (noise 0.050), RMS position error on 10 validation poses")
     assert headline(CAMPAIGNS["noise not known"])["noise"] == "" and headline(CAMPAIGNS["fault of the data"]) is None
     large = verdict["heldout"] | {"uncalibrated": {"rms_m": 1.184e-3}}
     assert headline(verdict | {"heldout": large})["before"] == "1.18"

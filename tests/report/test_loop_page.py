@@ -142,7 +142,11 @@ def test_a_candidate_of_several_shapes_has_the_factor_of_the_best_and_the_probab
     best = table["candidate"] == key
     table["probability"] = np.where(best, 0.62, table["probability"])
     lesser = {name: values[best][:1].copy() for name, values in table.items()}
-    lesser |= {"log_bayes_factor": lesser["log_bayes_factor"] - 1, "probability": np.array([0.379]), "chosen": np.zeros(1, bool)}
+    lesser |= {
+        "log_bayes_factor": lesser["log_bayes_factor"] - 1,
+        "probability": np.array([0.379]),
+        "chosen": np.zeros(1, bool),
+    }
     twice = {name: np.concatenate([lesser[name], values]) for name, values in table.items()}
     once, both = (
         loop_page(facts_of(CAMPAIGNS["named"]), residual_table(), some, kuka)[0]["candidates"] for some in (table, twice)
@@ -201,7 +205,9 @@ def test_texts_of_other_people_stay_texts(kuka, tmp_path):
 
 def test_the_page_names_nothing_that_a_browser_would_fetch(written):
     text = re.sub(r"<script>.*?</script>", "", written.read_text(encoding="utf-8"), flags=re.DOTALL)
-    assert re.findall(r'(?:src|href)="(?!data:)([^"]*)', text) == ["report.pdf"] and "@import" not in text and "url(" not in text
+    assert (
+        re.findall(r'(?:src|href)="(?!data:)([^"]*)', text) == ["report.pdf"] and "@import" not in text and "url(" not in text
+    )
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Debian's chromium is not installed")

@@ -6,8 +6,8 @@ from elastocal.diagnosis.words import listed
 from elastocal.report.wording import (
     counted,
     length,
-    millimetres,
     members_words,
+    millimetres,
     plain,
     probability_words,
     scaled,

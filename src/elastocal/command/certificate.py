@@ -87,7 +87,9 @@ def certificate(
             forces = [each["force_N"] for each in document["workspace"]]
             drawn = {
                 "workspace": workspace_map(maps, forces, limit),
-                "budget": budget_bars(document["budget"], [row[0] for row in facts["budget"]], limit, document["tracker_rms_m"]),
+                "budget": budget_bars(
+                    document["budget"], [row[0] for row in facts["budget"]], limit, document["tracker_rms_m"]
+                ),
             }
             for name, figure in drawn.items():
                 save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")

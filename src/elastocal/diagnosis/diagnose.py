@@ -225,7 +225,8 @@ def _explained(
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
         # No verdict yet, and no probability: a later search, or the poses left out, may say otherwise.
-        tell(f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {hypothesis_words(conclusion.best.mechanisms)}")
+        leading = hypothesis_words(conclusion.best.mechanisms)
+        tell(f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}")
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above

@@ -82,8 +82,8 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
 def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Figure:
     """Residuals as arrows where the measurements were taken, from the side and from above.
 
-    `table`: columns of the residuals table. `arm` (K, 3): corners of the robot in one pose, m. Returns repeats are averaged; where states are still many, one of each cell of a
-    grid is drawn.
+    `table`: columns of the residuals table. `arm` (K, 3): corners of the robot in one pose, m. Repeats are averaged; where
+    states are still many, one of each cell of a grid is drawn.
     """
     place, off, stages = *_states(table), _stages(table)
     size = np.linalg.norm(off["before"], axis=1)

@@ -56,9 +56,9 @@ def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected robot and the cost of each effect.
 
-    ``accuracy`` is predicted, ``cost_m`` of an effect is the RMS error over the campaign's poses and loads if it alone were left
-    out of the correction. Both are None where the data are at fault, the cost also of an effect that is not in the final model
-    or moves no robot.
+    ``accuracy`` is predicted, ``cost_m`` of an effect is the RMS error over the campaign's poses and loads if it alone were
+    left out of the correction. Both are None where the data are at fault, the cost also of an effect that is not in the final
+    model or moves no robot.
     """
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
     accuracy, costs = None, dict[str, float]()

@@ -53,9 +53,9 @@ LEAST_SHOWN, _MOST_SHOWN = 0.01, 4
 _SURE = 0.95
 # Causes of which page 1 has a bar, if they are not part of the verdict.
 _MOST_CAUSES = 6
-# A cause is negligible below this share of the corrected robot's error: squares add up, so that leaving it uncorrected raises the
-# error by 5 % at most. Ellison, S. L. R. and Williams, A. (eds.), EURACHEM/CITAC Guide CG 4, 2012, section 7.2.2: components
-# below a third of the largest need no closer look.
+# A cause is negligible below this share of the corrected robot's error: squares add up, so that leaving it uncorrected raises
+# the error by 5 % at most. Ellison, S. L. R. and Williams, A. (eds.), EURACHEM/CITAC Guide CG 4, 2012, section 7.2.2:
+# components below a third of the largest need no closer look.
 NEGLIGIBLE = 1 / 3
 MOST_NAMES = 8
 _COST = "the RMS error at the poses and loads of the campaign if it alone is left uncorrected"
@@ -104,7 +104,11 @@ def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
     if stated is None:
         return []
     rows = [(_found(effect), effect["probability"], cost_words(effect, verdict["heldout"])) for effect in found.values()]
-    others = [(UNKNOWN if name == OTHER else physical_name(name), value, "") for name, value in stated["mechanisms"].items() if name not in found]
+    others = [
+        (UNKNOWN if name == OTHER else physical_name(name), value, "")
+        for name, value in stated["mechanisms"].items()
+        if name not in found
+    ]
     others = [*others, (NOTHING, stated["nothing"], "")]
     others = sorted((row for row in others if row[1] >= LEAST_SHOWN), key=lambda row: -row[1])[:_MOST_CAUSES]
     return [
@@ -160,7 +164,12 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
             for name, effect in zip(named, found, strict=True)
         )
         first = f"The declared model lacks {counted(len(found), 'mechanism')}: {each}."
-        return [first, f"In brackets: how probable it is; its cost, {_COST}.", *(_ambiguity(effect) for effect in found if effect["alternatives"]), alarm]
+        return [
+            first,
+            f"In brackets: how probable it is; its cost, {_COST}.",
+            *(_ambiguity(effect) for effect in found if effect["alternatives"]),
+            alarm,
+        ]
     (effect,) = found
     if kind == "class":
         first = [f"The declared model lacks one mechanism, most probably {named[0]}.", _ambiguity(effect)]
@@ -197,8 +206,8 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
         ]
     if kind == "not_testable":
         return [
-            "Measure more: more poses all over the joint ranges, repeats, loads if the robot carries any. The table of what could "
-            "not be tested says what each mechanism needs."
+            "Measure more: more poses all over the joint ranges, repeats, loads if the robot carries any. The table of what "
+            "could not be tested says what each mechanism needs."
         ]
     if kind == "adequate":
         error = length(heldout["after"]["rms_m"])
@@ -217,8 +226,8 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
         low, high = heldout["reduction_ci95"]
         if low > 0:
             advice.append(
-                "Use the corrected model: on poses that it was not fitted to it is more accurate. The command elastocal correct corrects "
-                "targets by it, elastocal export writes the calibrated robot."
+                "Use the corrected model: on poses that it was not fitted to it is more accurate. The command elastocal correct "
+                "corrects targets by it, elastocal export writes the calibrated robot."
             )
         elif high < 0:
             advice.append("Do not use the corrected model: on poses that it was not fitted to it is less accurate.")

@@ -22,7 +22,8 @@ class WorkspaceErrors:
 
     `joint_angles` (N, n): as the controller reports them, rad. `position` (N, 3): m, base axes. `uncorrected_m` (N,): distance
     of the robot from where its file has it, less what the placement of its base takes up. `corrected_m` (N,): RMS error that is
-    predicted of the corrected robot. `bound_m` (N,): below which that one misses 95 % of the time, all told. `outside` (N,) of bool: beyond the range of the fitted poses.
+    predicted of the corrected robot. `bound_m` (N,): below which that one misses 95 % of the time, all told. `outside` (N,) of
+    bool: beyond the range of the fitted poses.
     """
 
     joint_angles: np.ndarray
