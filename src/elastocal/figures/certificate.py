@@ -56,7 +56,7 @@ def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], to
         row[0].set_ylabel("height above the base (m)")
     for axis in axes[-1]:
         axis.set_xlabel("distance from the base's vertical axis (m)")
-    bar = figure.colorbar(image, ax=axes.ravel().tolist(), label="RMS position error (mm)")
+    bar = figure.colorbar(image, ax=axes.ravel().tolist(), label="predicted RMS position error (mm)")
     bar.ax.yaxis.set_major_formatter("{x:g}")
     bar.ax.axhline(_MILLI * tolerance_m, color="black", lw=1.6)
     handles = [
@@ -120,7 +120,7 @@ def budget_bars(budget: Sequence[Mapping[str, Any]], names: Sequence[str], toler
             axis.plot([_MILLI * line["low_m"], end], [row, row], color="black", lw=1.2)
         axis.annotate(f"{size:.3f}", (max(size, end), row), (3, 0), textcoords="offset points", va="center", fontsize=7)
     axis.axvline(_MILLI * tolerance_m, color=PALETTE[1], ls="--", zorder=0, label=f"tolerance {_MILLI * tolerance_m:g} mm")
-    axis.set(xlim=(0, 1.1 * max(axis.get_xlim()[1], _MILLI * tolerance_m)), xlabel="position error, RMS (mm)")
+    axis.set(xlim=(0, 1.1 * max(axis.get_xlim()[1], _MILLI * tolerance_m)), xlabel="predicted RMS position error (mm)")
     axis.set_yticks(range(len(shown)), [name for name, _ in shown])
     axis.invert_yaxis()
     axis.grid(visible=False, axis="y")
