@@ -1,4 +1,4 @@
-"""What stands in several artefacts of a campaign is the same in all: report.pdf, report.html, verdict.json and the terminal.
+"""What stands in several artefacts of a campaign is the same in all: PDF, HTML, verdict.json and the terminal.
 
 Of made campaigns of every verdict, and of all campaigns that are diagnosed in this checkout: after `make` those are all shipped.
 """

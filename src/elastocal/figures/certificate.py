@@ -118,7 +118,8 @@ def budget_bars(budget: Sequence[Mapping[str, Any]], names: Sequence[str], toler
         axis.barh(row, size, height=0.6, color=_KINDS[kind][0], edgecolor="black" if kind == TRACKER else None, linewidth=0.6)
         if line["low_m"] is not None:
             axis.plot([_MILLI * line["low_m"], end], [row, row], color="black", lw=1.2)
-        axis.annotate(f"{size:.3f}", (max(size, end), row), (3, 0), textcoords="offset points", va="center", fontsize=7)
+        style: dict[str, Any] = {"fontsize": 7, "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.6}}
+        axis.annotate(f"{size:.3f}", (max(size, end), row), (4, 0), textcoords="offset points", va="center", **style)
     axis.axvline(_MILLI * tolerance_m, color=PALETTE[1], ls="--", zorder=0, label=f"tolerance {_MILLI * tolerance_m:g} mm")
     axis.set(xlim=(0, 1.1 * max(axis.get_xlim()[1], _MILLI * tolerance_m)), xlabel="predicted RMS position error (mm)")
     axis.set_yticks(range(len(shown)), [name for name, _ in shown])

@@ -226,8 +226,8 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
         low, high = heldout["reduction_ci95"]
         if low > 0:
             advice.append(
-                "Use the corrected model: on poses that it was not fitted to it is more accurate. The command elastocal correct "
-                "corrects targets by it, elastocal export writes the calibrated robot."
+                "Use the corrected model: on poses that it was not fitted to it is more accurate. The command elastocal "
+                "correct corrects targets by it, elastocal export writes the calibrated robot."
             )
         elif high < 0:
             advice.append("Do not use the corrected model: on poses that it was not fitted to it is less accurate.")
