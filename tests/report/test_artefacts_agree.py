@@ -1,6 +1,6 @@
 """What stands in several artefacts of a campaign is the same in all: PDF, HTML, verdict.json and the terminal.
 
-Of made campaigns of every verdict, and of all campaigns that are diagnosed in this checkout: after `make` those are all shipped.
+Of made campaigns of every verdict, and of all campaigns that this checkout has diagnosed: after `make` all that are shipped.
 """
 
 import html
