@@ -50,6 +50,12 @@ def test_an_effect_without_words_falls_back_on_its_name():
         ("cross_compliance", ["joints 2 and 3", "joints 4 and 5"], "elastic coupling of joints 2 and 3 and of joints 4 and 5"),
         ("transmission_harmonic", ["joint 4 orders 1-2", "joint 4 orders 3-6"], "of joint 4 (orders 1-2, orders 3-6)"),
         ("transmission_harmonic", [f"joint {k} orders 1-2" for k in (4, 2, 10)], "error of joints 2, 4 and 10"),
+        (
+            "link_weight",
+            ["off the line", "joint 5"],
+            "gravity sag of the whole arm (centres of mass off the links' axes) and of joint 5",
+        ),
+        ("link_weight", ["joint 5", ""], "gravity sag of joint 5 and of the whole arm"),
         ("payload", [""], "weight of an undeclared payload"),
         ("payload", [], "weight of an undeclared payload"),
     ],

@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.diagnosis.words import candidate_words, listed, parameter_words
 from elastocal.effects.protocol import effect_of
-from elastocal.report.wording import capital, scaled
+from elastocal.report.wording import capital, pm, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -30,8 +30,9 @@ def compliance_rows(compliance: Mapping[str, Sequence[float]]) -> list[list[str]
         if not error:
             rows.append([str(joint), f"{before:.4g}", f"{after:.4g}"])
             continue
-        decimals = max(0, 1 - int(np.floor(np.log10(error))))
-        rows.append([str(joint), f"{before:.{decimals}f}", f"{after:.{decimals}f} ± {error:.{decimals}f}"])
+        stated = pm(after, error)
+        decimals = len(stated.rpartition(".")[2]) if "." in stated else 0
+        rows.append([str(joint), f"{before:.{decimals}f}", stated])
     return rows
 
 
