@@ -8,6 +8,7 @@ from analysed_robots import ROBOTS, analysed
 from made_folders import made_folder, made_table
 from typer.testing import CliRunner
 
+from elastocal.command.check import lines
 from elastocal.command.main import app
 from elastocal.errors import InputError
 
@@ -44,6 +45,13 @@ def test_labels_of_loads_are_counted_and_not_printed_as_newtons(folder):
 def test_json_is_all_of_it(folder):
     result = run(folder, "--json")
     assert json.loads(result.stdout)["campaign"] == "made"
+
+
+def test_a_fitted_mount_is_shown_with_its_rotation(folder):
+    facts = json.loads(run(folder, "--json").stdout)
+    assert facts["mounts"] == [] and not any(name == "mount" for name, _ in lines(facts))
+    shown = lines(facts | {"mounts": [{"target": "TMAC", "rotation_rad": [0.0, 0.1, 1.5707963]}]})
+    assert ("mount", "TMAC: rotation [0.0000, 0.1000, 1.5708] rad in the frame of its point, fitted") in shown
 
 
 def test_faults_of_the_data_end_in_exit_code_one(tmp_path):
