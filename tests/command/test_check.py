@@ -8,6 +8,7 @@ from analysed_robots import analysed
 from made_folders import made_folder, made_table
 from typer.testing import CliRunner
 
+from elastocal.command.check import lines
 from elastocal.command.main import app
 from elastocal.errors import InputError
 
@@ -24,13 +25,27 @@ def run(*words):
 def test_headings_say_what_was_read_identified_and_testable(folder):
     result = run(folder)
     assert result.exit_code == 0, result.output
-    for words in ("read", "held out", "noise", "compliance", "testable", "suspicious", "diagnosable"):
+    for words in ("read", "validation poses", "noise", "compliance", "testable", "suspicious", "diagnosable"):
         assert words in result.output
 
 
 def test_json_is_all_of_it(folder):
     result = run(folder, "--json")
     assert json.loads(result.stdout)["campaign"] == "made"
+
+
+@pytest.mark.parametrize(
+    ("loads", "force", "words"),
+    [
+        ([0, 1, 2], 1000.0, "unloaded and 2 loads of up to 1000 N; "),
+        ([7], 150.4, "1 load of up to 150 N; "),
+        ([0], 0.0, "unloaded; "),
+    ],
+)
+def test_loads_are_counted_for_their_numbers_are_labels(folder, loads, force, words):
+    facts = json.loads(run(folder, "--json").stdout) | {"loads": loads, "largest_force_N": force}
+    read = [each for _, each in lines(facts)][:3]
+    assert read[2].startswith(words)
 
 
 def test_faults_of_the_data_end_in_exit_code_one(tmp_path):
