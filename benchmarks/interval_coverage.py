@@ -1,17 +1,19 @@
 """How often 95 % intervals of held-out errors contain the true value: `python benchmarks/interval_coverage.py`, two minutes.
 
-Prints the table of docs/held_out_intervals.md.
+Prints the table of docs/held_out_intervals.md; `--draw PAGE` draws the table of that page beside it instead.
 """
 
 import argparse
 import sys
 import warnings
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 from common import ROOT
 from scipy.stats import bootstrap
 
+from elastocal.figures.style import PALETTE, panels, styled
 from elastocal.validation.held_out import Errors, intervals
 
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
@@ -26,7 +28,11 @@ def main() -> None:
     """Print one line for each kind of errors and number of poses."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--campaigns", type=int, default=400, help="of each line")
-    campaigns = parser.parse_args().campaigns
+    parser.add_argument("--draw", type=Path, help="a page whose table is drawn")
+    given = parser.parse_args()
+    if given.draw:
+        return draw(given.draw)
+    campaigns = given.campaigns
     print("| errors | poses |" + "|".join(f" {name.removesuffix('_m')} " for name in FIGURES) + "| p95 open above |")
     print("|---" * (3 + len(FIGURES)) + "|")
     for kind in KINDS:
@@ -35,6 +41,24 @@ def main() -> None:
             held, open_above = covered(kind, poses, campaigns, truth)
             cells = [" / ".join(f"{100 * held[name, method]:.0f}" for method in METHODS) for name in FIGURES]
             print(f"| {kind} | {poses} | " + " | ".join(cells) + f" | {100 * open_above:.0f} % |", flush=True)
+
+
+@styled
+def draw(page: Path) -> None:
+    """Draw how often the intervals of the RMS error contain the true value, by the table of a page, as a picture beside it."""
+    lines = [line.strip("| \n").split(" | ") for line in page.read_text(encoding="utf-8").splitlines() if " / " in line]
+    figure, axes = panels(1, len(KINDS), 58, sharey=True)
+    for axis, kind in zip(axes[0], KINDS, strict=True):
+        rows = [line for line in lines if line[0] == kind]
+        values = np.array([[float(cell) for cell in row[2 + FIGURES.index("rms_m")].split(" / ")] for row in rows])
+        for column, method in enumerate(METHODS):
+            name = "in use" if method == "ours" else method
+            axis.plot([int(row[1]) for row in rows], values[:, column], "o-", color=PALETTE[2 - column], ms=4, label=name)
+        axis.axhline(95, color="black", lw=0.8, ls=":")
+        axis.set(title=kind, xlabel="held-out poses", xticks=POSES)
+    axes[0, 0].set_ylabel("intervals with the true value (%)")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.savefig(page.with_suffix(".png"), metadata={"Software": None}, dpi=150)
 
 
 def covered(kind: str, poses: int, campaigns: int, truth: Mapping[str, float]) -> tuple[dict[tuple[str, str], float], float]:

@@ -11,6 +11,8 @@ import shutil
 import sys
 from pathlib import Path
 
+import gallery
+
 import catalogue
 import commands
 import file_formats
@@ -47,7 +49,8 @@ def made_pages() -> dict[str, str]:
         "reference/commands.md": commands.page(),
         "reference/interpretations.md": interpretations.page(),
         **{f"reference/files/{name}": text for name, text in file_formats.pages().items()},
-        **{f"reference/interface/{name}": text for name, text in interface.pages().items()},
+        "reference/interface.rst": interface.page(),
+        "reference/gallery.rst": gallery.page(repository_pages()),
     }
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import yaml
+from gallery import anchor, thumbnail, thumbnails
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.effects.catalogue import effects
@@ -71,7 +72,7 @@ def page() -> str:
         raise KeyError(
             f"docs/site: words of families in catalogue.py and effect_formulas.yaml differ from the catalogue in {differ}"
         )
-    parts = [HEAD]
+    parts = [HEAD, thumbnails(thumbnail(f"/signatures/{n}.svg", e.WORDS, f"#{anchor(n)}") for n, e in listed.items())]
     for family, words in FAMILIES.items():
         parts.append(_headed(words, "-"))
         parts += [_section(effect) for effect in listed.values() if family == effect.FAMILY]

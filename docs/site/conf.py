@@ -10,7 +10,7 @@ import elastocal
 project = "elastocal"
 copyright = "the elastocal developers"
 release = elastocal.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "docstrings", "formulas"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "accessible", "docstrings", "formulas"]
 
 myst_enable_extensions = ["dollarmath"]
 # Links to headings, as the hosting site makes them too.
@@ -26,7 +26,7 @@ suppress_warnings = ["ref.python"]
 autodoc_default_options = {"members": True}
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
-# The contents of a page list modules; with all of their members they would be longer than the page.
+# The contents of the page list what people want to do, not each function.
 toc_object_entries = False
 napoleon_google_docstring = False
 napoleon_use_rtype = False

@@ -77,8 +77,13 @@ def fault_of_machine(error: OSError | MemoryError | ImportError, place: str = "d
         return InputError("memory", "", "none left", "a smaller file, more memory, or fewer jobs at a time (-j1)")
     if isinstance(error, ImportError):
         return InputError("Python", "", str(error), "an environment with every package of this version")
-    found, allowed = error.strerror or str(error), _REMEDIES.get(error.errno or 0, "a disk that can be read and written")
+    found, allowed = reason_of(error), _REMEDIES.get(error.errno or 0, "a disk that can be read and written")
     return InputError(str(error.filename or place), "", found, allowed)
+
+
+def reason_of(error: OSError) -> str:
+    """What was found where something could not be read or written, in words that fit a sentence."""
+    return "no such file" if error.errno == errno.ENOENT else error.strerror or str(error)
 
 
 def _shortened(text: str, longest: int) -> str:

@@ -1,12 +1,15 @@
-"""What `snakemake` says while it works: one line a job, and last of all why a job failed. The profile chooses it.
+"""What `snakemake` prints while it works: one line a job, and last of all why a job failed. The profile chooses it.
 
-Snakemake finds the module by its name. Dry runs and `--verbose` say all that Snakemake says by itself, as does its log file.
+Snakemake finds the module by its name. A dry run prints how many jobs of each rule would run; with `-p` or `--verbose` all
+that Snakemake prints by itself, which its log file has too.
 """
 
 from __future__ import annotations
 
 import sys
+from logging import WARNING
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, cast
 
 from snakemake_interface_logger_plugins.base import LogHandlerBase
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
 
 # Beginnings of lines that are no news.
 _NO_NEWS = (
+    "Building DAG of jobs",
+    "Config file ",
     "Select jobs to execute",
     "Execute ",
     "Assuming unrestricted shared filesystem",
@@ -35,6 +40,7 @@ _NO_NEWS = (
     "Rules claiming more threads",
 )
 _LOCKED = "Directory cannot be locked"
+_NOTHING = "Nothing to be done"
 _FAILED = "At least one job did not complete successfully."
 
 
@@ -59,8 +65,17 @@ class LogHandler(LogHandlerBase):
 
     def _lines(self, record: _Record) -> list[str]:
         event = getattr(record, "event", None)
-        if self.common_settings.dryrun or self.common_settings.verbose:
+        dry, all_of_it = self.common_settings.dryrun, self.common_settings.verbose or self.common_settings.printshellcmds
+        if self.common_settings.verbose or (dry and all_of_it):
             return [self.format(record)]
+        if dry and event == LogEvent.RUN_INFO:
+            # Snakemake gives the counts at the beginning and at the end.
+            lines = [] if self._total else _counts(record.stats)
+            self._total = record.stats["total"]
+            return lines
+        if dry and event != LogEvent.ERROR:
+            # Reasons why jobs would run name every rule and file a second time.
+            return [self.format(record)] if record.levelno >= WARNING or _NOTHING in record.getMessage() else []
         if event == LogEvent.RUN_INFO:
             self._total = record.stats.get("total", 0)
             return [f"{self._total} jobs"]
@@ -81,6 +96,13 @@ class LogHandler(LogHandlerBase):
         if event in (LogEvent.JOB_STARTED, LogEvent.JOB_FINISHED, LogEvent.PROGRESS, LogEvent.WORKFLOW_STARTED):
             return []
         return [] if str(record.msg).startswith(_NO_NEWS) else [self.format(record)]
+
+
+def _counts(stats: Mapping[str, int]) -> list[str]:
+    """How many jobs a run has, and of which rules, those with the most jobs first."""
+    rules = sorted((rule for rule in stats if rule != "total"), key=lambda rule: -stats[rule])
+    listed = fill(", ".join(f"{stats[rule]} {rule}" for rule in rules), 80, initial_indent="  ", subsequent_indent="  ")
+    return [f"{stats['total']} jobs would run:", listed, "Nothing was run. `snakemake -n -p` lists every job with its files."]
 
 
 def _reason(rule: str, logs: Sequence[str]) -> str:

@@ -13,7 +13,6 @@ from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot_file import robot_from_document
 
 UR10 = ROBOTS / "ur10.yaml"
-POINT = "6DoF"
 WRENCH = ["fx", "fy", "fz", "mx", "my", "mz"]
 
 
@@ -88,6 +87,18 @@ def test_a_reflector_of_unknown_offset_sits_at_one_place_within_a_decimetre(robo
     apart = turn.inv().apply((unknown[["x", "y", "z"]] - known[["x", "y", "z"]]).to_numpy())
     np.testing.assert_allclose(apart, np.broadcast_to(apart[0], apart.shape), atol=5e-4)
     assert 0.01 < np.abs(apart[0]).max() < 0.1
+
+
+def test_a_mount_is_turned_as_stated_and_anywhere_where_it_is_unknown(robot, angles, declared):
+    point = declared.chain.end_effector.name
+    stated = {"point": point, "offset_m": [0, 0, 0]}
+    targets = {"A": stated, "B": stated | {"rotation": [0, 0, 1.2]}, "C": stated | {"rotation": "unknown"}}
+    described = {"targets": targets, "frame": "base", "measured": "pose"}
+    filled = filled_sheet(sheet_of(angles, tuple(targets)), described, robot, 1)
+    turns = [Rotation.from_rotvec(filled.loc[filled["target"] == name, ["rx", "ry", "rz"]]) for name in "ABC"]
+    mounts = [(turns[0].inv() * turn).as_rotvec() for turn in turns[1:]]
+    np.testing.assert_allclose(mounts[0], np.broadcast_to([0, 0, 1.2], mounts[0].shape), atol=1e-3)
+    assert np.ptp(mounts[1], axis=0).max() < 1e-3 and np.linalg.norm(mounts[1][0]) > 0.1
 
 
 def test_readings_in_the_frame_of_the_tracker_keep_distances(robot, angles, declared):

@@ -131,3 +131,10 @@ def test_poses_along_a_path_are_configurations_no_wider_than_twice_what_one_pose
     assert (np.diff(found) >= 0).all()
     assert {np.ptp(path[found == each], axis=0).max() <= 2 * SAME_POSE_RAD for each in np.unique(found)} == {True}
     assert found.max() + 1 == pytest.approx(1.0 / SAME_POSE_RAD, rel=0.2)
+
+
+def test_a_million_poses_of_a_slow_path_are_sorted_without_all_their_pairs():
+    """Of neighbours alone there are 2e10 pairs, more than any memory has."""
+    path = np.linspace(0.0, 1.0, 1_000_000)[:, None] * [1.0, -0.5]
+    found = configurations(path, np.arange(len(path)))
+    assert found.max() + 1 == pytest.approx(1.0 / SAME_POSE_RAD, abs=2)

@@ -42,6 +42,24 @@ def test_campaign_is_read_as_written(cell):
     np.testing.assert_array_equal(measurements.row, np.arange(1, len(measurements) + 1))
 
 
+def test_a_mount_is_turned_as_stated_or_unknown_and_left_out_as_the_offset_is(cell):
+    stated = {
+        "A": {"point": "elbow", "offset_m": [0, 0, 0.1], "rotation": [0, 0, 1.5]},
+        "B": {"point": "hand", "offset_m": [0, 0, 0], "rotation": "unknown"},
+    }
+    cell.document["targets"] = stated
+    assert [target.rotation for target in cell.read().targets] == [(0.0, 0.0, 1.5), None]
+    stated["A"].pop("rotation")
+    stated["B"] = {"point": "hand", "offset_m": "unknown"}
+    assert [target.rotation for target in cell.read().targets] == [(0.0, 0.0, 0.0), None]
+    stated["B"]["rotation"] = [0, 1, 0]
+    assert cell.read().targets[1].rotation == (0.0, 1.0, 0.0)
+    for wrong, words in (([0, 0, 92], "not degrees"), ([0, 0], "3 entries"), ("known", "unknown"), (1.5, "rad")):
+        stated["B"]["rotation"] = wrong
+        with refused(cell.source, "targets.B.rotation", words):
+            cell.read()
+
+
 def test_what_a_campaign_leaves_out_has_a_default(cell):
     cell.without("approach1", "approach2", "approach3", "time_s", "temperature_c")
     campaign = cell.read()

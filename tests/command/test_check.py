@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from analysed_robots import analysed
+from analysed_robots import ROBOTS, analysed
 from made_folders import made_folder, made_table
 from typer.testing import CliRunner
 
@@ -25,8 +25,21 @@ def run(*words):
 def test_headings_say_what_was_read_identified_and_testable(folder):
     result = run(folder)
     assert result.exit_code == 0, result.output
-    for words in ("read", "validation poses", "noise", "compliance", "testable", "suspicious", "diagnosable"):
-        assert words in result.output
+    answer, *rest = result.output.splitlines()
+    assert answer.startswith("✓ made can be diagnosed: ")
+    for words in ("read", "validation poses", "noise", "compliance", "testable"):
+        assert any(line.startswith(f"  {words}") or words in line for line in rest), words
+    assert any(line.startswith("! ") for line in rest)
+    assert rest[-1] == f"next: elastocal diagnose {folder}"
+
+
+def test_labels_of_loads_are_counted_and_not_printed_as_newtons(folder):
+    from elastocal.command.check import lines
+    from elastocal.loop.overview import overview
+
+    facts = overview(folder, ROBOTS) | {"loads": [0, 1, 7], "largest_force_N": 1234.0}
+    words = " ".join(text for _, text in lines(facts))
+    assert "3 loads, forces up to 1,234 N" in words and "0, 1, 7" not in words
 
 
 def test_json_is_all_of_it(folder):
@@ -34,18 +47,11 @@ def test_json_is_all_of_it(folder):
     assert json.loads(result.stdout)["campaign"] == "made"
 
 
-@pytest.mark.parametrize(
-    ("loads", "force", "words"),
-    [
-        ([0, 1, 2], 1000.0, "unloaded and 2 loads of up to 1000 N; "),
-        ([7], 150.4, "1 load of up to 150 N; "),
-        ([0], 0.0, "unloaded; "),
-    ],
-)
-def test_loads_are_counted_for_their_numbers_are_labels(folder, loads, force, words):
-    facts = json.loads(run(folder, "--json").stdout) | {"loads": loads, "largest_force_N": force}
-    read = [each for _, each in lines(facts)][:3]
-    assert read[2].startswith(words)
+def test_a_fitted_mount_is_shown_with_its_rotation(folder):
+    facts = json.loads(run(folder, "--json").stdout)
+    assert facts["mounts"] == [] and not any(name == "mount" for name, _ in lines(facts))
+    shown = lines(facts | {"mounts": [{"target": "TMAC", "rotation_rad": [0.0, 0.1, 1.5707963]}]})
+    assert ("mount", "TMAC: rotation [0.0000, 0.1000, 1.5708] rad in the frame of its point, fitted") in shown
 
 
 def test_faults_of_the_data_end_in_exit_code_one(tmp_path):
@@ -53,7 +59,8 @@ def test_faults_of_the_data_end_in_exit_code_one(tmp_path):
     table["q3"] = -table["q3"]
     result = run(made_folder(tmp_path / "made", analysed("kuka"), table=table))
     assert result.exit_code == 1
-    assert "the data are at fault" in result.output
+    assert result.output.startswith("! made cannot be diagnosed: the data are at fault")
+    assert "next: mend the data" in result.output
 
 
 def test_a_sheet_that_is_not_filled_in_is_refused_with_its_row(tmp_path):

@@ -22,19 +22,19 @@ def test_a_table_becomes_a_robot_file_in_the_units_and_the_notation_asked_for(tm
 
 def test_a_file_that_is_there_stays_unless_forced(tmp_path):
     (tmp_path / "robot.yaml").write_text("mine")
-    result = run(tmp_path, "d,a,alpha\n0,1,0\n")
+    result = run(tmp_path, "d_m,a_m,alpha_deg\n0,1,0\n")
     assert isinstance(result.exception, InputError) and "--force" in str(result.exception)
     assert (tmp_path / "robot.yaml").read_text() == "mine"
-    assert run(tmp_path, "d,a,alpha\n0,1,0\n", "--force").exit_code == 0
+    assert run(tmp_path, "d_m,a_m,alpha_deg\n0,1,0\n", "--force").exit_code == 0
 
 
 @pytest.mark.parametrize("option", [("--angles", "gon"), ("--lengths", "inch")])
 def test_other_units_are_no_options(tmp_path, option):
-    assert run(tmp_path, "d,a,alpha\n0,1,0\n", *option).exit_code == 2
+    assert run(tmp_path, "d_m,a_m,alpha_deg\n0,1,0\n", *option).exit_code == 2
 
 
 def test_decimal_commas_are_stated(tmp_path):
-    text = "d;a;alpha\n0;1,5;0\n"
+    text = "d_m;a_m;alpha_deg\n0;1,5;0\n"
     assert "--decimal comma" in str(run(tmp_path, text).exception)
     assert run(tmp_path, text, "--decimal", "comma").exit_code == 0
     assert "Tx(1.5)" in (tmp_path / "robot.yaml").read_text()

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 from support import refused
 
-from elastocal.command.printed import iso_date, print_lines, printed
+from elastocal.command.printed import iso_date, print_answer, print_lines, printed
 
 
 @pytest.mark.parametrize(("text", "line"), [("4711", "4711"), (" KR 270-7 ", "KR 270-7"), ("é" * 60, "é" * 60)])
@@ -30,6 +30,13 @@ def test_a_date_is_taken_as_it_is():
 def test_anything_else_than_a_date_of_the_calendar_is_refused(text):
     with refused("--date", "", "such as 2026-11-20"):
         iso_date("--date", text)
+
+
+def test_an_answer_comes_first_and_what_to_do_next_comes_last():
+    console = Console(file=io.StringIO())
+    print_answer(True, "done", ["a detail", "! a warning"], "elastocal check cell", console)
+    print_answer(False, "refused", [], "", console)
+    assert console.file.getvalue() == "✓ done\n  a detail\n! a warning\nnext: elastocal check cell\n! refused\n"
 
 
 def test_lines_are_printed_as_they_are_but_for_what_would_steer_a_terminal():

@@ -251,3 +251,50 @@ def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_on
         position=rng.normal(0.0, 1.0, (20, 3))[campaign.measurements.pose],
     )
     assert find(campaign, measurements) == []
+
+
+@pytest.mark.parametrize("degrees", [8, 92, 180])
+@pytest.mark.parametrize("moved_m", [0.0, 0.05])
+def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_only_where_that_is_stated(
+    fanuc, degrees, moved_m
+):
+    campaign = made(fanuc, 1, Plan(poses=20))
+    assert find(campaign, campaign.measurements) == []
+    turn = Rotation.from_rotvec([0.0, 0.6 * np.radians(degrees), 0.8 * np.radians(degrees)])
+    measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
+    mine = campaign.measurements.target == 3
+    vectors = np.where(mine[:, None], (measured * turn).as_rotvec(), measured.as_rotvec())
+    place = np.where(mine[:, None], measured.apply([0.0, 0.0, moved_m]), 0.0)
+    written = with_measured(campaign, campaign.measurements.position + place, vectors)
+    (fault,) = find(campaign, written)
+    assert (fault.name, fault.decisive) == ("wrong_target", True)
+    assert f"T6DoF would be turned by {degrees}" in fault.detail and "rotation: unknown" in fault.detail
+    assert ("offset_m: unknown" in fault.detail) == bool(moved_m)
+    fitted = {value.name: value.value for value in fault.parameters}
+    got = [fitted[f"T6DoF rotation vector {axis}"] for axis in "xyz"]
+    assert (Rotation.from_rotvec(got).inv() * turn).magnitude() < 1e-3
+
+    def with_mount(rotation):
+        targets = (*campaign.targets[:3], replace(campaign.targets[3], rotation=rotation))
+        return replace(campaign, targets=targets)
+
+    if not moved_m:
+        for right in (None, tuple(turn.as_rotvec())):
+            assert find(with_mount(right), written) == []
+        # A known turn of another amount is no better.
+        wrong = (turn * Rotation.from_rotvec([0.5, 0, 0])).as_rotvec()
+        (fault,) = find(with_mount(tuple(wrong)), written)
+        assert "turned by 28.6" in fault.detail
+
+
+@pytest.mark.parametrize(("degrees", "named"), [(4, True), (2, False)])
+def test_a_slightly_turned_mount_is_a_warning_as_the_zero_of_a_joint_may_be_it(fanuc, degrees, named):
+    campaign = made(fanuc, 1, Plan(poses=20))
+    turn = Rotation.from_rotvec([0.0, 0.0, np.radians(degrees)])
+    mine = campaign.measurements.target == 3
+    measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
+    found = find(
+        campaign, with_measured(campaign, vectors=np.where(mine[:, None], (measured * turn).as_rotvec(), measured.as_rotvec()))
+    )
+    assert [(fault.name, fault.decisive) for fault in found] == [("wrong_target", False)] * named
+    assert all("T6DoF would be turned by 4°" in fault.detail and "rotation: unknown" in fault.detail for fault in found)

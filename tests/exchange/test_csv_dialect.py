@@ -84,7 +84,7 @@ def test_ten_times_as_many_columns_take_about_ten_times_as_long(tmp_path):
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with refused((tmp_path / "none.csv").as_posix(), "", "No such file", "a table"):
+    with refused((tmp_path / "none.csv").as_posix(), "", "no such file", "a table"):
         read_text_table(tmp_path / "none.csv", is_header)
 
 

@@ -13,12 +13,14 @@ from synthetic import made_states
 
 from elastocal.effects.conditions import conditions_of
 from elastocal.exchange.dh import robot_from_dh
+from elastocal.exchange.dh_table import DhOptions
 from elastocal.exchange.robot_text import robot_text
 from elastocal.io.documents import read_document
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import sites_of
 
+PLAIN = DhOptions("deg", "m")
 UR5E = """joint, theta_offset_deg, d_m,    a_m,     alpha_deg, type
 1,     0,                0.1625, 0,       90,        R
 2,     0,                0,      -0.425,  0,         R
@@ -64,7 +66,7 @@ def test_any_table_is_where_its_notation_puts_it_and_weighs_there(tmp_path_facto
     header = "theta_offset,d,a,alpha,type,lower,upper,mass_kg,cx,cy,cz"
     weighed = [(*row, -1, 1, 1.5 + number, 0.1, -0.02 * number, 0.05) for number, row in enumerate(rows)]
     path = written(tmp_path_factory.mktemp("dh"), weighed, header)
-    robot = robot_from_document(yaml.safe_load(robot_text(robot_from_dh(path, modified, angles="rad"))))
+    robot = robot_from_document(yaml.safe_load(robot_text(robot_from_dh(path, modified, DhOptions("rad", "m")))))
     states = made_states(robot.joints, 4, seed=1)
     position, rotation = poses(robot.chain, states.joint_angles, robot.chain.end_effector)
     own = conditions_of(sites_of(robot), robot.compliance, states).gravity[:, : robot.joints]
@@ -88,7 +90,7 @@ def test_the_ur_of_this_project_is_its_table(tmp_path, config_folder):
     lengths = read_document(config_folder / "robots" / "ur10.yaml")["lengths_m"]
     names = (("d1", None, 90), (None, "a2", 0), (None, "a3", 0), ("d4", None, 90), ("d5", None, -90), ("d6", None, 0))
     rows = [(0, lengths.get(d, 0), lengths.get(a, 0), alpha, "R", "", "") for d, a, alpha in names]
-    robot = robot_from_dh(written(tmp_path, rows)).robot
+    robot = robot_from_dh(written(tmp_path, rows), options=PLAIN).robot
     known = robot_from_document(read_document(config_folder / "robots" / "ur10.yaml"))
     q = np.random.default_rng(0).uniform(-3, 3, (5, 6))
     for one, other in zip(
@@ -113,7 +115,7 @@ def test_the_example_of_the_docstring_is_a_ur5e(tmp_path):
 def test_limits_compliances_names_and_points_come_along(tmp_path):
     header = "joint,d,a,alpha,type,lower,upper,compliance_urad_per_Nm,point"
     path = written(tmp_path, [("rail", 0, 0, 90, "P", 0, 2, 0.02, ""), ("arm", 1, 1, 0, "R", "", "", 5, "elbow at")], header)
-    result = robot_from_dh(path, name="two")
+    result = robot_from_dh(path, options=PLAIN, name="two")
     assert result.document["joint_names"] == ["rail", "arm"] and result.document["name"] == "two"
     assert result.document["joint_limits_deg"] == [[0.0, 2.0], [-360.0, 360.0]]
     assert result.document["compliance_urad_per_Nm"] == [0.02, 5.0] and result.robot.compliance_known
@@ -133,7 +135,7 @@ def test_limits_compliances_names_and_points_come_along(tmp_path):
 def test_what_makes_no_robot_is_refused(tmp_path, header, rows, key, words):
     path = written(tmp_path, rows, header)
     with refused(path, key, *words):
-        robot_from_dh(path)
+        robot_from_dh(path, options=PLAIN)
 
 
 # A UR5 as its controller has calibrated it; d of the second to the fourth joint cancel.
@@ -161,7 +163,7 @@ def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(tmp_pa
         for number, (row, centre) in enumerate(zip(rows, centres, strict=True))
     ]
     path = written(tmp_path, weighed, DH_HEADER)
-    result = robot_from_dh(path, modified, angles="rad")
+    result = robot_from_dh(path, modified, DhOptions("rad", "m"))
     robot = robot_from_document(yaml.safe_load(robot_text(result)))
     assert sum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T") < 2.5
     assert any("cancel" in note for note in result.notes)
@@ -187,4 +189,4 @@ def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(tmp_pa
 def test_lengths_that_do_not_cancel_are_still_refused(tmp_path):
     rows = [(0, 300, 0, 90, "R", "", ""), (0, -300, 0, 0, "R", "", "")]
     with refused(written(tmp_path, rows), "chain", "metres"):
-        robot_from_dh(tmp_path / "arm.csv")
+        robot_from_dh(tmp_path / "arm.csv", options=PLAIN)

@@ -5,8 +5,9 @@ import math
 import pytest
 from support import refused
 
-from elastocal.exchange.dh_table import read_dh_table
+from elastocal.exchange.dh_table import DhOptions, read_dh_table
 
+PLAIN = DhOptions("deg", "m")
 HEADER = "joint,theta_offset_deg,d_m,a_m,alpha_deg,type\n"
 
 
@@ -19,7 +20,7 @@ def table(folder, text, name="arm.csv"):
 def test_a_row_is_in_si_units(tmp_path):
     text = "# maker's manual\njoint; theta_offset_deg; d_mm; a_m; alpha; lower; upper; mass_kg; cx; cy; cz_m; point; type\n"
     path = table(tmp_path, text + "\nbase;90;250;-0.1;-pi/2;-1;pi;3;10;0;0.2;elbow;R\n; ;0;0;2*pi; ; ;;;;;;f\n")
-    row, fixed = read_dh_table(path, "rad", "mm")
+    (row, fixed), _ = read_dh_table(path, DhOptions("rad", "mm"))
     assert (row.joint, row.kind, row.point, row.where) == ("base", "R", "elbow", "line 4")
     assert (row.theta, row.d, row.a, row.alpha) == pytest.approx((math.pi / 2, 0.25, -0.1, -math.pi / 2))
     assert row.limits == pytest.approx((-1.0, math.pi)) and row.mass_kg == 3.0
@@ -29,7 +30,7 @@ def test_a_row_is_in_si_units(tmp_path):
 
 def test_limits_of_a_shift_are_lengths(tmp_path):
     path = table(tmp_path, "d,a,alpha,type,lower,upper\n0,0,90,P,100,400\n0,0,90,R,-90,180\n")
-    shift, turn = read_dh_table(path, lengths="mm")
+    (shift, turn), _ = read_dh_table(path, DhOptions("deg", "mm"))
     assert shift.limits == pytest.approx((0.1, 0.4)) and turn.limits == pytest.approx((-math.pi / 2, math.pi))
 
 
@@ -41,9 +42,9 @@ def test_yaml_says_the_same(tmp_path):
         "- {joint: 2, theta_offset_deg: -90, d_m: 0, a_m: -0.425, alpha_deg: 0, type: R}\n",
         "arm.yaml",
     )
-    for one, other in zip(read_dh_table(csv), read_dh_table(yaml), strict=True):
+    for one, other in zip(read_dh_table(csv)[0], read_dh_table(yaml)[0], strict=True):
         assert vars(one) | {"where": ""} == vars(other) | {"where": ""}
-    assert [row.where for row in read_dh_table(yaml)] == ["row 1", "row 2"]
+    assert [row.where for row in read_dh_table(yaml)[0]] == ["row 1", "row 2"]
 
 
 FAULTS = {
@@ -76,18 +77,18 @@ def test_a_fault_names_its_line_and_column(tmp_path, fault):
     text, key, words = FAULTS[fault]
     path = table(tmp_path, text)
     with refused(path, key, *words):
-        read_dh_table(path)
+        read_dh_table(path, PLAIN)
 
 
 def test_commas_are_decimal_marks_only_where_an_option_says_so(tmp_path):
     path = table(tmp_path, "theta_offset_deg;d_mm;a_mm;alpha_deg\n0;162,5;0;90\n-1,5;0;-1425,25;0\n")
     with refused(path, "", "commas", "--decimal comma"):
-        read_dh_table(path)
-    first, second = read_dh_table(path, decimal="comma")
+        read_dh_table(path, PLAIN)
+    (first, second), _ = read_dh_table(path, DhOptions(decimal="comma"))
     assert (first.d, second.a, second.theta) == pytest.approx((0.1625, -1.42525, math.radians(-1.5)))
     for cell in ("1,425", "1.425,5", "1 425"):
         with refused(table(tmp_path, f"d;a;alpha\n{cell};0;90\n"), "line 2", repr(cell), "--"):
-            read_dh_table(path)
+            read_dh_table(path, PLAIN)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +101,7 @@ def test_commas_are_decimal_marks_only_where_an_option_says_so(tmp_path):
 )
 def test_a_table_may_be_in_any_dialect(tmp_path, text, encoding):
     (tmp_path / "arm.csv").write_bytes(text.encode(encoding))
-    (row,) = read_dh_table(tmp_path / "arm.csv")
+    (row,), _ = read_dh_table(tmp_path / "arm.csv")
     assert (row.d, row.a, row.alpha) == (0.5, 0.0, pytest.approx(math.pi / 2))
 
 
@@ -108,18 +109,81 @@ def test_a_table_may_be_in_any_dialect(tmp_path, text, encoding):
 def test_a_multiple_of_pi_is_a_number(tmp_path, cell):
     path = table(tmp_path, f"d,a,alpha\n0.1,0,{cell}\n")
     with refused(path, "line 2, alpha", repr(cell)[:100]):
-        read_dh_table(path, "rad")
+        read_dh_table(path, DhOptions("rad", "m"))
 
 
 @pytest.mark.parametrize(("name", "text"), [("arm.yaml", "rows: 3"), ("arm.txt", "x"), ("arm.yaml", "[]"), ("arm.yaml", "- 3")])
 def test_what_is_no_table_is_refused(tmp_path, name, text):
     with refused(tmp_path / name, ""):
-        read_dh_table(table(tmp_path, text, name))
+        read_dh_table(table(tmp_path, text, name), PLAIN)
 
 
 def test_a_file_that_is_not_there_or_no_text_is_refused(tmp_path):
-    with refused(tmp_path / "none.csv", "", "No such file"):
-        read_dh_table(tmp_path / "none.csv")
+    with refused(tmp_path / "none.csv", "", "no such file"):
+        read_dh_table(tmp_path / "none.csv", PLAIN)
     (tmp_path / "latin.csv").write_bytes(b"d,a,alpha\n\xff")
     with refused(tmp_path / "latin.csv", "line 2", "byte 10", "UTF-8"):
-        read_dh_table(tmp_path / "latin.csv")
+        read_dh_table(tmp_path / "latin.csv", PLAIN)
+
+
+ROW = "0,0.1,0.2,90"
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "option"),
+    [
+        ("theta_offset,d_m,a_m,alpha_deg\n", "theta_offset", "--angles"),
+        ("theta_offset_deg,d_m,a,alpha_deg\n", "a", "--lengths"),
+        ("theta_offset [deg],d [m],a [m],alpha\n", "alpha", "--angles"),
+        ("theta_offset,d,a,alpha\ndeg,m,,deg\n", "a", "--lengths"),
+    ],
+)
+def test_a_unit_that_nothing_states_is_asked_for(tmp_path, text, name, option):
+    with refused(tmp_path / "arm.csv", "header", f"no unit of {name!r}", option):
+        read_dh_table(table(tmp_path, f"{text}{ROW}\n"))
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "theta_offset_rad,d_mm,a_mm,alpha_rad",
+        "theta_offset [rad],d [mm],a (mm),alpha(rad)",
+        "theta_offset,d,a,alpha\nrad,mm,mm,rad",
+        "theta_offset,d,a,alpha\n[rad],[mm],[mm],(rad)",
+        "theta_offset_rad,d,a_mm,alpha\nrad,mm,mm,rad",
+    ],
+)
+def test_units_stand_behind_names_in_brackets_or_in_a_row_of_their_own(tmp_path, head):
+    (row,), notes = read_dh_table(table(tmp_path, f"{head}\n{ROW}\n"))
+    assert (row.d, row.a, row.alpha) == pytest.approx((1e-4, 2e-4, 90.0))
+    assert "d in mm" in notes[0] and "alpha in rad" in notes[0]
+
+
+def test_units_that_contradict_each_other_or_are_of_something_else_are_refused(tmp_path):
+    for head, words in (
+        ("theta_offset_deg,d_mm,a_m,alpha_deg\ndeg,m,m,deg", "'d_mm' and 'm'"),
+        ("theta_offset_deg,d_deg,a_m,alpha_deg", "'d_deg' in deg"),
+    ):
+        with refused(tmp_path / "arm.csv", "header", words):
+            read_dh_table(table(tmp_path, f"{head}\n{ROW}\n"))
+
+
+@pytest.mark.parametrize("name", ["arm.csv", "arm.yaml"])
+def test_columns_that_nobody_needs_are_left_out_where_that_is_stated(tmp_path, name):
+    text = {
+        "arm.csv": "maker;d_m;a_m;alpha_deg;dynamics\nx;0.1;0;90;a,b\n",
+        "arm.yaml": "- {maker: x, d_m: 0.1, a_m: 0, alpha_deg: 90, dynamics: 3}\n",
+    }[name]
+    path = table(tmp_path, text, name)
+    with refused(path, "header", "'maker'", "--ignore 'maker'"):
+        read_dh_table(path)
+    (row,), notes = read_dh_table(path, DhOptions(ignore=("maker", "dynamics")))
+    assert row.d == 0.1 and "not used: maker, dynamics" in notes
+    with refused(path, "", "'serial'"):
+        read_dh_table(path, DhOptions(ignore=("serial",)))
+
+
+def test_a_limit_in_another_kind_of_unit_is_asked_for(tmp_path):
+    path = table(tmp_path, "d_m,a_m,alpha_deg,type,lower_deg,upper_deg\n0,0,0,P,0,2\n")
+    with refused(path, "line 2, lower_deg", "lengths", "--lengths"):
+        read_dh_table(path)

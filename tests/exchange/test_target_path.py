@@ -58,5 +58,5 @@ def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path):
-    with refused((tmp_path / "none.csv").as_posix(), "", "No such file"):
+    with refused((tmp_path / "none.csv").as_posix(), "", "no such file"):
         read_target_path(tmp_path / "none.csv", 6)

@@ -100,5 +100,5 @@ def test_more_links_than_can_be_followed_are_refused_at_once(tmp_path):
 
 
 def test_a_file_that_is_not_there_is_one_line(tmp_path):
-    with refused(tmp_path / "none.urdf", "", "No such file"):
+    with refused(tmp_path / "none.urdf", "", "no such file"):
         read_urdf(tmp_path / "none.urdf")

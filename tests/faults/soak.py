@@ -186,7 +186,7 @@ def clock_set_back(study, expected):
     before = source.read_text(encoding="utf-8")
     study.append("src/elastocal/study/metrics.py", "# an edit\n")
     os.utime(source, (1e9, 1e9))
-    assert ("evaluate", "kuka", "200", "6DoF") in study.planned()
+    assert ("identify", "kuka", "200", "6DoF") in study.planned()
     source.write_text(before, encoding="utf-8")
     os.utime(source, (1e9, 1e9))
     ended_by_itself(study)

@@ -5,7 +5,7 @@ from made_surveys import OPEN, made_candidates, made_survey
 
 from elastocal.application.planning.cell import Cell
 from elastocal.application.planning.plan import planned
-from elastocal.figures.plan import plan_picture
+from elastocal.figures.plan import plan_picture, pose_pictures
 
 
 def test_views_show_boxes_tracker_and_both_kinds_of_poses():
@@ -20,3 +20,12 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
     assert [text.get_text() for text in bare.legends[0].get_texts()] == ["to fit", "held out", "base"]
     last = figure.axes[2].lines[-1].get_ydata()[-1]
     np.testing.assert_allclose(last, 1e3 * plan.accuracy_m[-1])
+
+
+def test_every_pose_has_a_picture_with_its_number_and_pages_are_full():
+    survey = made_survey()
+    plan = planned(survey, made_candidates(survey, 300), 47, 4, "D", 1)
+    pages = pose_pictures(survey.robot, plan)
+    titles = [axis.get_title(loc="left") for page in pages for axis in page.axes if axis.get_title(loc="left")]
+    assert titles == [*(str(pose) for pose in range(1, 48)), *(f"{pose} held out" for pose in range(48, 52))]
+    assert len(pages) == 2

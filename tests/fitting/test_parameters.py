@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from fitted_models import model_of
-from synthetic import made_estimate
+from synthetic import made_estimate, made_model
 
+from elastocal.campaigns.campaign import Target
 from elastocal.fitting.parameters import limits, nonlinear_parameters, parameter_values, parameters, stepped
 
 
@@ -17,6 +18,27 @@ def test_parameters_are_named_in_the_order_of_the_sensitivities(full_case):
     names = [parameter.name for _, parameter in parameters(model, estimate)]
     assert names[:6] == ["dx", "dy", "dz", "rx", "ry", "rz"]
     assert names[-8:-6] == ["half_play", "torque"]
+
+
+def test_of_a_target_only_what_is_unknown_is_a_parameter(fanuc):
+    targets = [
+        Target("turn", "6DoF", (0.0, 0.0, 0.1), None),
+        Target("place", "6DoF", None, (0.0, 0.0, 1.5)),
+        Target("known", "6DoF", (0.0, 0.0, 0.1), (1.0, 0.0, 0.0)),
+        Target("both", "6DoF", None),
+    ]
+    names = {6: ["turn rx", "turn ry", "turn rz", "place dx", "place dy", "place dz"], 3: ["place dx", "place dy", "place dz"]}
+    both = {6: ["dx", "dy", "dz", "rx", "ry", "rz"], 3: ["dx", "dy", "dz"]}
+    for rows in (6, 3):
+        model = made_model(fanuc.chain, targets, rows=rows, fitted_frames=False)
+        estimate = made_estimate(model, seed=3)
+        expected = [*names[rows], *(f"both {name}" for name in both[rows])]
+        owned = parameters(model, estimate)
+        assert [f"{owner.removeprefix('target ')} {parameter.name}" for owner, parameter in owned] == expected
+        there = stepped(model, estimate, np.full(len(expected), 1e-3))
+        moved = np.abs(there.target_offset - estimate.target_offset).max(axis=1) > 0
+        turned = np.abs(there.target_rotation - estimate.target_rotation).max(axis=(1, 2)) > 1e-4
+        assert moved.tolist() == [False, True, False, True] and turned.tolist() == [rows == 6, False, False, rows == 6]
 
 
 def test_step_of_every_parameter_can_be_taken_back_to_second_order(full_case):

@@ -84,6 +84,17 @@ def test_known_frame_and_known_target_are_kept(fanuc):
     assert_known(found, true)
 
 
+def test_a_known_mount_keeps_its_turn_and_an_unknown_one_is_found(fanuc):
+    targets = (Target("A", "6DoF", None, (0.1, -1.5, 0.2)), Target("B", "4DoF", (0.1, 0.0, 0.2), None))
+    for fitted_frames in (False, True):
+        model = made_model(fanuc.chain, targets, rows=6, fitted_frames=fitted_frames)
+        states, true = unloaded(made_states(6, 15, seed=7)), made_estimate(model, seed=8)
+        found = registered(model, seen_exactly(model, true, states))
+        assert_known(found, true)
+        np.testing.assert_allclose(found.target_rotation, true.target_rotation, atol=1e-7)
+        np.testing.assert_array_equal(found.target_offset[1], (0.1, 0.0, 0.2))
+
+
 def test_frame_is_no_reflection_where_all_points_lie_in_a_plane():
     chain = chain_of("Tz(0.3) Rz(q1) Tx(0.5) Rz(q2) Tx(0.5) [end]")
     model = made_model(chain, (Target("A", "end", (0.0, 0.0, 0.0)),))

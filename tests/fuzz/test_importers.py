@@ -13,6 +13,7 @@ from elastocal.campaigns.measurements import write_measurements
 from elastocal.campaigns.reading import read_robot
 from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS, THOUSANDS
 from elastocal.exchange.dh import robot_from_dh
+from elastocal.exchange.dh_table import DhOptions
 from elastocal.exchange.import_options import import_options_text, read_import_options
 from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
 from elastocal.exchange.robot_text import write_robot
@@ -131,7 +132,9 @@ ANGLE_CELLS = ("pi/0", "1e9*pi", "-pi/2", "0*pi/0", "9" * 200 + "pi", "1e308", "
 def robot_of_table(folder, content, modified=False, angles="rad"):
     path = folder / "arm.csv"
     path.touch()
-    over(path, content, lambda: quietly(lambda: imported(folder, lambda: robot_from_dh(path, modified, angles))))
+    over(
+        path, content, lambda: quietly(lambda: imported(folder, lambda: robot_from_dh(path, modified, DhOptions(angles, "m"))))
+    )
 
 
 @given(BYTES | tables(DH.encode()) | damaged(DH.encode()), st.booleans(), st.sampled_from(["deg", "rad"]))
@@ -148,7 +151,7 @@ KINEMATICS = {
 def test_kinematics_of_ros_drivers(folder, content):
     path = folder / "calib.yaml"
     path.touch()
-    over(path, content, lambda: quietly(lambda: imported(folder, lambda: robot_from_dh(path))))
+    over(path, content, lambda: quietly(lambda: imported(folder, lambda: robot_from_dh(path, options=DhOptions("deg", "m")))))
 
 
 @given(st.lists(st.sampled_from(ANGLE_CELLS) | CELLS, min_size=4, max_size=4))
@@ -164,7 +167,7 @@ def test_numbers_of_denavit_hartenberg_tables(folder, cells):
 def test_denavit_hartenberg_tables_as_yaml(folder, content):
     path = folder / "arm_dh.yaml"
     path.touch()
-    over(path, content, lambda: quietly(lambda: imported(folder, lambda: robot_from_dh(path))))
+    over(path, content, lambda: quietly(lambda: imported(folder, lambda: robot_from_dh(path, options=DhOptions("deg", "m")))))
 
 
 TRACKER = "Tracker 7;;\nPose;J1;J2 [deg];q3;X [mm];Y;Z;Target;qw;qx;qy;qz;fz [kN];time\n" + "".join(

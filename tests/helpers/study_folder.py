@@ -94,7 +94,7 @@ class Study:
 
     def planned(self, *arguments):
         """Jobs that Snakemake would run, as (rule, wildcard, wildcard, ...)."""
-        done = self.snakemake("-n", *arguments)
+        done = self.snakemake("-n", "-p", *arguments)
         assert done.returncode == 0, done.stderr[-3000:]
         jobs = []
         for rule, body in _JOB.findall(done.stdout):

@@ -68,7 +68,8 @@ def made_estimate(model, sessions=(0,), seed=0, size=0.3):
     for target in model.targets:
         unknown = target.offset_m is None
         offsets.append(rng.uniform(-0.1, 0.1, 3) if unknown else target.offset_m)
-        turns.append(Rotation.random(rng=rng).as_matrix() if unknown and model.rows == 6 else np.eye(3))
+        known = target.rotation is not None or model.rows == 3
+        turns.append((Rotation.from_rotvec(target.rotation or np.zeros(3)) if known else Rotation.random(rng=rng)).as_matrix())
     sizes = [np.array([parameter.plausible for parameter in effect.parameters]) for effect in model.effects]
     return Estimate(
         tuple(sessions),

@@ -38,7 +38,7 @@ def test_documents_are_read(tmp_path):
 
 
 def test_missing_file_is_refused_in_one_line(tmp_path):
-    with refused(tmp_path / "nothing.yaml", "", "No such file", "readable"):
+    with refused(tmp_path / "nothing.yaml", "", "no such file", "readable"):
         read_document(tmp_path / "nothing.yaml")
 
 

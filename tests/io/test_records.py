@@ -155,7 +155,7 @@ def test_a_module_that_is_new_beside_a_catalogue_is_found(jobs):
 
 def test_modules_that_look_up_those_beside_them_are_called_catalogue():
     package = Path(sys.modules["elastocal"].__file__).parent
-    assert {file.name for file in package.rglob("*.py") if "import pkgutil" in file.read_text("utf-8")} == {"catalogue.py"}
+    assert {file.name for file in package.rglob("*.py") if "io.modules import" in file.read_text("utf-8")} == {"catalogue.py"}
 
 
 def test_any_altered_character_of_a_record_is_found():

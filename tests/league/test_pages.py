@@ -48,6 +48,16 @@ def test_improbable_mechanisms_and_figures_of_other_data_are_left_out(page):
     assert "somebody" in page and "three" not in page
 
 
+def test_each_wall_of_numbers_is_a_sentence_and_a_folded_table(page):
+    table = league_table(made_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1)
+    random = table[table["split"] == "random"]
+    best = [METHODS[part.loc[part["rms_mm"].idxmin(), "method"]].words for _, part in random.groupby("data")]
+    section = page.split("## Random poses held out\n\n")[1]
+    assert section.startswith(f"Smallest RMS error of {len(best)} data sets: ")
+    assert all(f"{name} {best.count(name)}" in section.splitlines()[0] for name in best)
+    assert page.count("<details><summary>") == page.count("\n\n</details>") == 6
+
+
 def test_only_methods_with_intervals_have_a_coverage(page):
     section = page.split("## Intervals")[1].split("## ")[0]
     assert "GP" in section and "ours" not in section

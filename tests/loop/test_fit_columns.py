@@ -27,7 +27,13 @@ MODELS = {
     "nothing": (dict(fitted_frames=False, rows=3), ()),
 }
 TARGET_ON_HAND = (Target("known", "hand", (0.1, 0.0, -0.2)),)
-TARGETS = (Target("A", "hand", None), Target("known", "elbow", (0.1, 0.0, -0.2)), Target("b c", "elbow", None))
+TARGETS = (
+    Target("A", "hand", None),
+    Target("known", "elbow", (0.1, 0.0, -0.2), (0.5, 0.0, -1.0)),
+    Target("b c", "elbow", None),
+    Target("mount", "elbow", (0.1, 0.0, 0.2), None),
+    Target("placed", "elbow", None, (0.1, 1.0, 0.0)),
+)
 
 
 def there_and_back(path, schema, columns):

@@ -103,7 +103,6 @@ def test_blanks_and_line_breaks_separate_tokens_alike():
         ("Tz(l1) Rz(q1) Tx(l2) Ry(q3) [A]", ["'Ry(q3)'", "q2, a joint before it or degrees"]),
         ("Tz(l1) Rz(q1) Tx(q1) Tx(l2) [A]", ["'Tx(q1)'", "R.() or in T.() alone"]),
         ("Tz(l1) Tx(q1) Rz(q1) Tx(l2) [A]", ["'Rz(q1)'", "R.() or in T.() alone"]),
-        ("Tz(l1) Rz(q2) Tx(l2) [A]", ["'Rz(q2)'", "q1 or degrees"]),
         ("Tz(l1) Rz(q1) Tx(l2) Ry(90) [A]", ["'Ry(90)'", "90deg"]),
         ("Tz(l1) Rz(q1) Tx(l2) Ry(l2) [A]", ["'Ry(l2)'"]),
         ("Tz(l1) Rz(q1) Tx(l9) [A]", ["'Tx(l9)'", "l1, l2 or metres"]),

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from support import OTHER_CHAINS, chain_of, random_angles, random_loads
 
 from elastocal.mechanics.elastostatics import (
@@ -17,9 +15,6 @@ from elastocal.mechanics.elastostatics import (
 )
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.pose_differences import pose_differences
-
-vectors = arrays(float, 3, elements=st.floats(-1e3, 1e3))
-wrenches = arrays(float, 6, elements=st.floats(-1e3, 1e3))
 
 
 @pytest.mark.parametrize("name", ["kuka", *OTHER_CHAINS])

@@ -114,7 +114,7 @@ def test_the_installed_pipeline_reads_a_campaign_in_the_working_directory(instal
     """A robot of config/robots; the first step runs, and what the others read is looked for: a diagnosis takes too long."""
     made_folder(tmp_path / "cell", kuka)
     snakefile = installed / "share" / "elastocal" / "Snakefile"
-    for target in (["results/loop/made/campaign.json"], ["diagnose", "-n"]):
+    for target in (["results/loop/made/campaign.json"], ["diagnose", "-n", "-p"]):
         words = ["-m", "snakemake", *target, "--snakefile", snakefile, "-j1", "--config", f"campaign={tmp_path / 'cell'}"]
         done = run("python", *words)
         assert done.returncode == 0, done.stderr[-2000:]

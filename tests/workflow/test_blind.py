@@ -33,7 +33,7 @@ def rules(planned):
 
 
 def inputs_by_rule(study):
-    plan = study.snakemake("-n", "--forceall", *BLIND)
+    plan = study.snakemake("-n", "-p", "--forceall", *BLIND)
     assert plan.returncode == 0, plan.stderr[-2000:]
     found = re.findall(r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE)
     return {rule: set(files.split(", ")) for rule, files in found}

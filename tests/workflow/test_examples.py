@@ -23,7 +23,7 @@ def ended(script, folder):
 @pytest.mark.parametrize("script", EXAMPLES)
 def test_a_folder_without_a_campaign_is_one_line(script, tmp_path):
     done = ended(script, tmp_path)
-    line = f"{tmp_path}/campaign.yaml: found No such file or directory; allowed: a readable file\n"
+    line = f"{tmp_path}/campaign.yaml: found no such file; allowed: the path of a readable file\n"
     assert (done.returncode, done.stderr) == (1, line)
 
 

@@ -42,7 +42,7 @@ FAULTS = {
     ),
     "no configuration": (
         lambda study: study.path("config.yaml").unlink(),
-        ["config.yaml: found No such file", "allowed: a readable file"],
+        ["config.yaml: found no such file", "allowed: the path of a readable file"],
     ),
     "chain that does not parse": (
         lambda study: study.replace(KUKA, "Rz(q1)", "Rz q1"),

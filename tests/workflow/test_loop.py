@@ -175,7 +175,7 @@ def test_a_finished_diagnosis_has_nothing_to_do(diagnosed):
 
 def inputs_by_rule(study, *arguments):
     """Files that the jobs of each rule read, from Snakemake's own plan."""
-    plan = study.snakemake("-n", "--forceall", *arguments)
+    plan = study.snakemake("-n", "-p", "--forceall", *arguments)
     assert plan.returncode == 0, plan.stderr[-2000:]
     found = re.findall(r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE)
     return {rule: set(files.split(", ")) for rule, files in found}

@@ -1,6 +1,8 @@
 """While it works Snakemake says one line a job; at the end, reports and verdicts, or last of all why a job failed."""
 
 import json
+import re
+from collections import Counter
 
 import pytest
 
@@ -17,6 +19,19 @@ def test_a_job_is_one_line_without_lists_of_files(finished):
     assert max(map(len, said)) < 200
 
 
+def test_a_dry_run_is_a_summary_and_every_job_is_listed_on_request(unstarted):
+    done = unstarted.snakemake("-n")
+    assert done.returncode == 0, done.stderr
+    first, *listed, last = done.stdout.splitlines()
+    jobs = unstarted.planned()
+    assert (
+        first == f"{len(jobs)} jobs would run:" and last == "Nothing was run. `snakemake -n -p` lists every job with its files."
+    )
+    counts = re.findall(r"(\d+) (\w+)", " ".join(listed))
+    assert {rule: int(count) for count, rule in counts} == Counter(rule for rule, *_ in jobs)
+    assert len(listed) < 25 and max(map(len, listed)) <= 80
+
+
 def test_the_outcome_names_reports_and_verdicts(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "reports/loop/cell7"
@@ -27,9 +42,12 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path, monkeypatch):
     monkeypatch.setattr("elastocal.report.first_page.sentences", lambda document: [document["verdict"], "more"])
     made = ["reports/study.pdf", "reports/loop/cell7/report.pdf", "reports/tables/table1.csv"]
     first, errors, *rest = outcome(made)
-    assert first == "cell7: not_testable"
-    assert errors == "    4.00 → 1.00 mm (noise 0.900), RMS position error on 9 validation poses"
-    assert rest == ["    reports/loop/cell7/report.pdf", "the study: reports/study.pdf"]
+    assert first == "! cell7: not_testable"
+    assert errors == "  4.00 → 1.00 mm (noise 0.900), RMS position error on 9 validation poses"
+    following = 'next: "What to do now" on the first page of the report'
+    assert rest == ["  report: reports/loop/cell7/report.pdf", "the study: reports/study.pdf", following]
+    (folder / "verdict.json").write_text(json.dumps(verdict | {"verdict": "named"}), encoding="utf-8")
+    assert outcome(made)[0] == "✓ cell7: named" and outcome(made)[-1] == "next: elastocal correct, elastocal certificate"
 
 
 @pytest.mark.parametrize(

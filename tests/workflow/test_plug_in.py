@@ -57,7 +57,7 @@ def test_an_added_robot_runs_no_job_of_the_others(finished):
     add(finished, "config/robots/ur10.yaml", UR10)
     finished.configure({"robots": ["kuka", "kuka_extended", "ur10"]})
     data = {"draw_experiments", "simulate", "measure"}
-    grid = data | {"judge_design", "identify", "evaluate", "bound", "summarize_initial", "compare_solvers"}
+    grid = data | {"judge_design", "identify", "bound", "summarize_initial", "compare_solvers"}
     planned = {job for job in finished.planned() if job[0] in grid}
     assert {job[0] for job in planned} == grid
     assert {job[1] for job in planned} == {"ur10"}
@@ -67,7 +67,7 @@ def test_an_added_strategy_runs_no_job_of_the_others(finished):
     add(finished, "config/strategies/2+6DoF-comb.yaml", TWO_AND_SIX)
     finished.configure({"strategies": ["6DoF", "4-6DoF-after-3DoF", "3+6DoF-comb", "2+6DoF-comb"]})
     planned = finished.planned()
-    assert {job[-1] for job in planned if job[0] in ("judge_design", "identify", "evaluate")} == {"2+6DoF-comb"}
+    assert {job[-1] for job in planned if job[0] in ("judge_design", "identify")} == {"2+6DoF-comb"}
     assert {job[0] for job in planned}.isdisjoint({"draw_experiments", "simulate", "measure", "summarize_initial"})
 
 
@@ -81,12 +81,12 @@ SWITCHES = {
         {"interpretations": {"measured": "position", "tool_offset_m": [0.1, 0.05, 0.02]}},
         "simulate",
     ),
-    "average compliance": ({"interpretations": {"average": "compliance"}}, "evaluate"),
-    "average median": ({"interpretations": {"average": "median"}}, "evaluate"),
-    "deviation_of each_data_set": ({"interpretations": {"deviation_of": "each_data_set"}}, "evaluate"),
+    "average compliance": ({"interpretations": {"average": "compliance"}}, "identify"),
+    "average median": ({"interpretations": {"average": "median"}}, "identify"),
+    "deviation_of each_data_set": ({"interpretations": {"deviation_of": "each_data_set"}}, "identify"),
     "solver gauss_newton": ({"identification": {"solver": "gauss_newton"}}, "identify"),
 }
-STEPS = ["draw_experiments", "simulate", "measure", "identify", "evaluate", "tabulate_strategies"]
+STEPS = ["draw_experiments", "simulate", "measure", "identify", "tabulate_strategies"]
 
 
 @pytest.fixture(scope="module")

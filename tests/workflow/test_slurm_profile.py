@@ -20,7 +20,7 @@ def folder(tmp_path):
 
 
 def test_jobs_of_every_target_can_be_grouped(folder):
-    called = [sys.executable, "-m", "snakemake", "--profile", "profiles/slurm", "-n", *TARGETS]
+    called = [sys.executable, "-m", "snakemake", "--profile", "profiles/slurm", "-n", "-p", *TARGETS]
     done = subprocess.run(called, cwd=folder, capture_output=True, text=True, timeout=HUNG_S)
     assert done.returncode == 0, done.stderr[-3000:]
     laid_out = set(re.findall(r"^(\w+) +\d+$", done.stdout, re.MULTILINE))

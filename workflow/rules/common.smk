@@ -18,6 +18,7 @@ from elastocal.errors import InputError
 from elastocal.io.origin import Origin, configuration_sha256, environment
 from elastocal.io.provenance import SOURCES_DIGEST
 from elastocal.io.records import checksum
+from elastocal.io.sources import keep_source_digests, source_digest
 from elastocal.study.configuration import check_study, rows_read, with_overrides
 
 ROOT = Path(workflow.basedir)
@@ -117,36 +118,47 @@ wildcard_constraints:
 
 
 def sources(script):
-    """A script and the package modules that it runs: an edit of one reruns the jobs that depend on it, and no others."""
+    """A script and the package modules that it runs, whose dates count for nothing: `watch_sources` has their digests."""
     path = ROOT / "workflow" / "scripts" / script
     try:
         files = [path, *closure(path, PACKAGES)]
     except InputError as error:
         sys.exit(str(error))
-    return [placed(file) for file in files]
+    return [ancient(placed(file)) for file in files]
 
 
 def digest_of(files):
-    """One digest of all that some files hold."""
-    return hashlib.sha256(" ".join(map(checksum_of, files)).encode()).hexdigest()[:16]
+    """One digest of all that some files hold, of modules but for comments and, where none of them reads these, docstrings."""
+    files = list(files)
+    documented = any(map(reads_docstrings, files))
+    return hashlib.sha256(" ".join(digest_of_file(file, documented) for file in files).encode()).hexdigest()[:16]
 
 
 @cache
-def checksum_of(file):
-    return checksum(file)
+def digest_of_file(file, documented):
+    return checksum(file) if documented else source_digest(file)
+
+
+@cache
+def reads_docstrings(file):
+    return file.endswith(".py") and b".__doc__" in Path(file).read_bytes()
 
 
 def watch_sources():
-    """Edited sources rerun their jobs whatever the date of the file: Snakemake looks at contents only where a date is new.
+    """An edit of a source reruns the jobs that depend on it, and no others, whatever the date of the file.
 
     Another environment, be it one of the libraries or the list of pins, reruns every job with a script.
     """
     environment_sha256 = configuration_sha256(environment(ROOT))
-    for each in workflow.rules:
-        if "sources" in each.input.keys():
-            named = [file for file in each.input if isinstance(file, str) and not MADE.match(file)]
-            digest = digest_of(file for file in named if Path(file).is_file())
-            each.set_params(**{SOURCES_DIGEST: f"{digest} {environment_sha256}"})
+    watched = {
+        each: [file for file in each.input if isinstance(file, str) and not MADE.match(file) and Path(file).is_file()]
+        for each in workflow.rules
+        if "sources" in each.input.keys()
+    }
+    if workflow.is_main_process and not workflow.dryrun:
+        keep_source_digests({file for files in watched.values() for file in files if file.endswith(".py")})
+    for each, files in watched.items():
+        each.set_params(**{SOURCES_DIGEST: f"{digest_of(files)} {environment_sha256}"})
 
 
 def outputs_behind(targets):

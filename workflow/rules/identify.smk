@@ -1,7 +1,8 @@
-"""Estimates: each strategy on each robot at each noise level, its own job.
+"""Estimates and their scores: each strategy on each robot at each noise level, its own job; and what is possible.
 
-Needs data/simulated/. Writes results/design/{robot}/{strategy}.parquet, which holds for all noise levels, and
-results/identified/{robot}/{noise}um/{strategy}.parquet.
+Needs data/simulated/. Writes results/design/{robot}/{strategy}.parquet, which holds for all noise levels,
+results/weights/{robot}.parquet, results/identified/, results/metrics/, results/replicates/ and results/accuracy/, each
+{robot}/{noise}um/{strategy}.parquet, and results/bounds/{robot}.parquet.
 """
 
 
@@ -27,26 +28,52 @@ rule judge_design:
         "../scripts/judge_design.py"
 
 
+rule draw_weights:
+    input:
+        sources=sources("draw_weights.py"),
+    output:
+        weights="results/weights/{robot}.parquet",
+    log:
+        "results/logs/draw_weights/{robot}.log",
+    benchmark:
+        "results/timings/draw_weights/{robot}.tsv"
+    params:
+        seed=config["seed"],
+        data_sets=config["data_sets"],
+        tests=config["test_configurations"],
+        replicates=config["evaluation"]["bootstrap_replicates"],
+    script:
+        "../scripts/draw_weights.py"
+
+
 rule identify:
     input:
         experiments="data/simulated/{robot}/experiments.parquet",
         measured=rules.measure.output.measured,
         design=rules.judge_design.output.design,
+        weights=rules.draw_weights.output.weights,
+        test_experiments="data/simulated/{robot}/test/experiments.parquet",
+        test_ideal="data/simulated/{robot}/test/ideal.parquet",
         sources=sources("identify.py"),
     output:
         identified="results/identified/{robot}/{noise}um/{strategy}.parquet",
+        metrics="results/metrics/{robot}/{noise}um/{strategy}.parquet",
+        replicates="results/replicates/{robot}/{noise}um/{strategy}.parquet",
+        accuracy="results/accuracy/{robot}/{noise}um/{strategy}.parquet",
     log:
         "results/logs/identify/{robot}/{noise}um/{strategy}.log",
     benchmark:
         "results/timings/identify/{robot}/{noise}um/{strategy}.tsv"
     params:
-        chain=lambda wildcards: robot_document(wildcards)["chain"],
-        lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
+        robot=robot_document,
         strategy=strategy_document,
         seed=config["seed"],
         rows=rows_read(INTERPRETATIONS["measured"]),
         tool_offset_m=INTERPRETATIONS["tool_offset_m"],
         wrench_at=INTERPRETATIONS["wrench_at"],
+        average=INTERPRETATIONS["average"],
+        deviation_of=INTERPRETATIONS["deviation_of"],
+        lengths=config["evaluation"]["lengths"],
         start=(
             1e-6 * config["identification"]["start_urad_per_Nm"]
             if config["identification"]["solver"] == "gauss_newton"
@@ -54,3 +81,26 @@ rule identify:
         ),
     script:
         "../scripts/identify.py"
+
+
+rule bound:
+    input:
+        experiments="data/simulated/{robot}/experiments.parquet",
+        test_experiments="data/simulated/{robot}/test/experiments.parquet",
+        test_ideal="data/simulated/{robot}/test/ideal.parquet",
+        sources=sources("bound.py"),
+    output:
+        bounds="results/bounds/{robot}.parquet",
+    log:
+        "results/logs/bound/{robot}.log",
+    benchmark:
+        "results/timings/bound/{robot}.tsv"
+    params:
+        robot=robot_document,
+        point_sets=list(STUDY.points.values()),
+        seed=config["seed"],
+        rows=rows_read(INTERPRETATIONS["measured"]),
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        wrench_at=INTERPRETATIONS["wrench_at"],
+    script:
+        "../scripts/bound.py"

@@ -39,7 +39,7 @@ def _graph() -> grimp.ImportGraph:
     except SourceSyntaxError as error:
         raise _no_python(error.filename, error) from None
     # A catalogue looks up the modules beside it by itself.
-    for catalogue in graph.find_modules_that_directly_import("pkgutil"):
+    for catalogue in graph.find_modules_that_directly_import(f"{PACKAGE}.io.modules"):
         for module in graph.find_children(catalogue.rpartition(".")[0]):
             if module != catalogue:
                 graph.add_import(importer=catalogue, imported=module)

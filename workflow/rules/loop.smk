@@ -161,6 +161,37 @@ rule summarize_campaigns:
         "../scripts/summarize_campaigns.py"
 
 
+rule draw_campaign_errors:
+    input:
+        table=rules.summarize_campaigns.output.table,
+        sources=sources("draw_campaign_errors.py"),
+    output:
+        pdf="reports/loop/{kind}.pdf",
+        png="reports/loop/{kind}.png",
+    log:
+        "results/logs/draw_campaign_errors/{kind}.log",
+    benchmark:
+        "results/timings/draw_campaign_errors/{kind}.tsv"
+    wildcard_constraints:
+        kind="campaigns|measured",
+    script:
+        "../scripts/draw_campaign_errors.py"
+
+
+rule measured_pictures:
+    """The picture of docs/measured_data.md, from finished campaigns of measured data."""
+    input:
+        picture="reports/loop/measured.png",
+    output:
+        picture="docs/measured_data.png",
+    log:
+        "results/logs/measured_pictures.log",
+    benchmark:
+        "results/timings/measured_pictures.tsv"
+    shell:
+        "cp {input.picture} {output.picture} 2> {log}"
+
+
 rule diagnose:
     input:
         reports_of_own,
@@ -170,4 +201,5 @@ rule measured:
     input:
         loop_reports(config["loop"]["measured"]),
         "reports/loop/measured.csv",
+        "reports/loop/measured.png",
         lambda wildcards: files_behind(rules.measured.input),

@@ -152,13 +152,30 @@ rule compile_loop_report:
         "../scripts/compile_loop_report.py"
 
 
+rule draw_hero:
+    input:
+        descriptions=rules.read_campaign.output.descriptions,
+        verdict=rules.judge_campaign.output.verdict,
+        residuals=rules.judge_campaign.output.residuals,
+        sources=sources("draw_hero.py"),
+    output:
+        pdf="reports/loop/{campaign}/figures/hero.pdf",
+        png="reports/loop/{campaign}/figures/hero.png",
+    log:
+        "results/logs/draw_hero/{campaign}.log",
+    benchmark:
+        "results/timings/draw_hero/{campaign}.tsv"
+    script:
+        "../scripts/draw_hero.py"
+
+
 rule pictures:
     input:
         figures=expand("reports/figures/{figure}.png", figure=FIGURES),
-        loop=expand("reports/loop/kuka_extended_end_effector/figures/{figure}.png", figure=["arrows", "candidates"]),
+        loop=expand("reports/loop/kuka_extended_end_effector/figures/{figure}.png", figure=["arrows", "candidates", "hero"]),
     output:
         figures=expand("docs/{figure}.png", figure=FIGURES),
-        loop=expand("docs/loop_{figure}.png", figure=["arrows", "candidates"]),
+        loop=expand("docs/loop_{figure}.png", figure=["arrows", "candidates", "hero"]),
     log:
         "results/logs/pictures.log",
     benchmark:

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 _CAMPAIGN = re.compile(r"reports/loop/([^/]+)/report\.pdf")
+# Verdicts after which the robot is corrected; after the others its report says what to do.
+_OF_USE = ("adequate", "named", "class", "several")
 _REPORTS = {"reports/study.pdf": "the study", "reports/blind/blind.pdf": "the blind proof"}
 
 
@@ -14,13 +16,17 @@ def outcome(made: Iterable[str]) -> list[str]:
     # Only a run that has made a report needs what makes its sentences.
     from elastocal.report.first_page import headline, headline_sentence, sentences
 
-    lines = []
+    lines, following = [], []
     for path in sorted(map(str, made)):
         if path in _REPORTS:
             lines.append(f"{_REPORTS[path]}: {path}")
         if match := _CAMPAIGN.fullmatch(path):
             verdict = json.loads(Path(path).with_name("verdict.json").read_text(encoding="utf-8"))
+            of_use = verdict["verdict"] in _OF_USE and all(effect["family"] != "data" for effect in verdict["effects"])
             stated = headline(verdict)
-            errors = [f"    {headline_sentence(stated)}"] if stated else []
-            lines += [f"{match[1]}: {sentences(verdict)[0]}", *errors, f"    {path}"]
-    return lines
+            errors = [f"  {headline_sentence(stated)}"] if stated else []
+            lines += [f"{'✓' if of_use else '!'} {match[1]}: {sentences(verdict)[0]}", *errors, f"  report: {path}"]
+            then = "elastocal correct, elastocal certificate" if of_use else '"What to do now" on the first page of the report'
+            following.append(f"next: {then}")
+    # Of several campaigns each report says it.
+    return [*lines, *(following if len(following) == 1 else [])]

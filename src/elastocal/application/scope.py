@@ -63,8 +63,9 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
     """The scope of a fit with all of its effects to some states: in the base's frame where that was declared."""
     robot, end = calibrated.robot, model.sites.chain.end_effector.name
     there = [target for target in model.targets if target.point == end]
-    offset = bool(there) and all(target.offset_m is None for target in there)
-    free = np.repeat([model.fitted_frames, model.fitted_frames, offset, offset and model.rows == 6], 3)
+    offset, turn = (bool(there) and all(value is None for value in each) for each in
+                    ([target.offset_m for target in there], [target.rotation for target in there]))  # fmt: skip
+    free = np.repeat([model.fitted_frames, model.fitted_frames, offset, turn and model.rows == 6], 3)
     reported, operating = robot.reported_angles(states.joint_angles), conditions_in(calibrated, states)
     position, rotation = forward(calibrated, reported, operating)
     none = np.zeros((12, len(calibrated.covariance)))

@@ -124,13 +124,14 @@ class Springs:
 class Robot:
     """The robot that a campaign declares, its links able to bend.
 
-    `document`: a robot file. `targets`: with ``point`` and ``offset_m``.
+    `document`: a robot file. `targets`: with ``point``, ``offset_m`` and, where it is mounted turned, ``rotation``.
     """
 
     def __init__(self, document: Mapping[str, Any], targets: Sequence[Mapping[str, Any]]) -> None:
         bare = {**document, "links": {}}
         self.arms = [Arm(bare, target["offset_m"]) for target in targets]
         self.points = [str(target["point"]) for target in targets]
+        self.mounts = [pin.exp3(np.array(target.get("rotation", (0.0, 0.0, 0.0)), float)) for target in targets]
         self.joints = self.arms[0].joints
 
     def compliance(self, springs: Springs) -> np.ndarray:
@@ -167,7 +168,7 @@ class Robot:
             position, rotation = self.arms[target].pose(loaded[state][0], self.points[target])
             off = [seen.position[number] - position]
             if seen.rotation:
-                off.append(pin.log3(seen.rotation[number] @ rotation.T))
+                off.append(pin.log3(seen.rotation[number] @ (rotation @ self.mounts[target]).T))
             found.append(np.concatenate(off))
         return np.array(found)
 

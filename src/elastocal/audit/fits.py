@@ -77,7 +77,8 @@ def campaign_of(run: Audited, name: str) -> Campaign | None:
     described = run.document(f"results/loop/{name}/campaign.json")
     asked, robot = described["campaign"], described["robot"]
     targets = list(asked["targets"].values())
-    placed = asked["frame"] == "base" and all(target["offset_m"] != "unknown" for target in targets)
+    known = all(target[key] != "unknown" for target in targets for key in ("offset_m", "rotation") if key in target)
+    placed = asked["frame"] == "base" and known
     weightless = "masses" not in robot and "compliance_urad_per_Nm" in robot
     if not placed or not weightless or asked["declared"] or described.get("held_out") is not None:
         return None

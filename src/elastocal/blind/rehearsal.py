@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
 from elastocal.mechanics.components import WRENCH
@@ -19,7 +20,7 @@ from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, with_d
 from elastocal.plant.drives import Repeatability
 from elastocal.plant.physical_robot import PhysicalRobot, Schedule, seen_poses, specimen
 from elastocal.plant.random_numbers import stream
-from elastocal.plant.tracker import rotation_vector
+from elastocal.plant.tracker import misplaced_base, rotation_vector
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from elastocal.plant.arm import Arm
 
 # What every arm has that was never calibrated, at each of its joints, beside other gears and weights than its file says.
+_NOT_TURNED = (0.0, 0.0, 0.0)
 ERRORS_OF_GEOMETRY = ("joint_offset", "link_geometry")
 _COMPENSATORS = ("compensator_stiffness", "compensator_torque")
 # 10 µm at the end of an arm of 2 m.
@@ -69,18 +71,29 @@ def filled_sheet(
     """A measurement sheet with what a tracker reads.
 
     `sheet`: columns of measurements.csv but for those of the tracker, which may be there and empty. `document`: of
-    campaign.yaml. `seed`: of the noise, and of where reflectors sit whose offset is unknown. `source`: named in errors. Returns
-    the same rows. Raises `InputError`: a moment that is not that of the row's force at a lever.
+    campaign.yaml. `seed`: of the noise, and of where reflectors sit whose offset or rotation is unknown. `source`: named in
+    errors. Returns the same rows. Raises `InputError`: a column that is missing or no number, a target that the campaign does
+    not have, or a moment that is not that of the row's force at a lever.
     """
+    require_numbers(sheet, [*_STATE, *(f"q{j + 1}" for j in range(robot.arm.joints)), *_WRENCH], source)
+    if "target" not in sheet:
+        raise InputError(source, "columns", "no 'target'", "the target of each row")
+    strangers = sheet[~sheet["target"].isin(list(document["targets"]))]
+    if len(strangers):
+        found = repr(strangers["target"].iloc[0])
+        raise InputError(source, f"target, line {strangers.index[0] + 2}", found, ", ".join(document["targets"]))
     states = sheet.drop_duplicates(_STATE)
     number = pd.MultiIndex.from_frame(states[_STATE]).get_indexer(pd.MultiIndex.from_frame(sheet[_STATE]))
     schedule = _schedule(robot.arm, states, seed, source)
     position, rotation = seen_poses(robot, schedule)
     names = list(document["targets"])
     at = [robot.arm.points.index(document["targets"][name]["point"]) for name in names]
-    offsets = np.array([_offset(name, document["targets"][name]["offset_m"], seed) for name in names])
+    targets = document["targets"].items()
+    offsets = np.array([_stated(target["offset_m"], seed, f"reflector {name}", 0.1) for name, target in targets])
+    mounts = [_stated(target.get("rotation", _NOT_TURNED), seed, f"mount {name}", np.pi / 2) for name, target in targets]
+    turns = Rotation.from_rotvec(mounts).as_matrix()
     position = position[:, at] + (rotation[:, at] @ offsets[..., None])[..., 0]
-    position, rotation, _ = robot.tracker.read(position, rotation[:, at], stream(seed, "readings"))
+    position, rotation, _ = robot.tracker.read(position, rotation[:, at] @ turns, stream(seed, "readings"))
     if document["frame"] == "tracker":
         position, rotation = robot.tracker.in_own_frame(position, rotation)
     seen = number, pd.Index(names).get_indexer(sheet["target"])
@@ -88,6 +101,46 @@ def filled_sheet(
     if document["measured"] == "pose":
         measured |= dict(zip(("rx", "ry", "rz"), rotation_vector(rotation[seen]).T, strict=True))
     return sheet.assign(**measured)
+
+
+def require_numbers(table: pd.DataFrame, names: Sequence[str], source: str) -> None:
+    """Refuse a table that lacks one of these columns or has in it what is no number: `InputError` names ``source`` and line."""
+    for name in names:
+        if name not in table:
+            raise InputError(source, "columns", f"no {name!r}", ", ".join(names))
+        wrong = ~np.isfinite(pd.to_numeric(table[name], errors="coerce"))
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise InputError(source, f"{name}, line {row + 2}", repr(table[name].iloc[row]), "a number")
+
+
+def with_misplaced_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
+    """The robot beside a tracker whose frame of the base is off by some 0.3 mrad and 0.2 mm."""
+    return replace(robot, tracker=replace(robot.tracker, misplaced=misplaced_base(stream(seed, "tilted base"))))
+
+
+def with_lost_beam(sheet: pd.DataFrame, seed: int) -> tuple[pd.DataFrame, int]:
+    """A filled sheet in which one row, which is drawn, reads zeros as after a lost beam; and its place."""
+    row = int(stream(seed, "lost beam").integers(len(sheet)))
+    damaged = sheet.copy()
+    damaged.loc[damaged.index[row], [name for name in ("x", "y", "z", "rx", "ry", "rz") if name in sheet]] = 0.0
+    return damaged, row
+
+
+def errors_of_readings(
+    robot: PhysicalRobot, shown: np.ndarray, wrench: np.ndarray, wanted: np.ndarray, seed: int, source: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distances of where the tracker sees the robot from where it is wanted (N, 3), m, in the tracker's frame of the base.
+
+    Other arguments as in `reached`. Returns those (N,), and what the tracker's noise and the robot's repeatability leave where
+    the robot is commanded by an exact model (N,): half the square of the difference of two visits is the repeatability's.
+    """
+    visits = [reached(robot, shown, wrench, number, source) for number in (seed, seed + 1)]
+    position, rotation = (part[:, None] for part in visits[0])
+    noise = robot.tracker.read(position, rotation, stream(seed, "readings of a path"))[0][:, 0] - visits[0][0]
+    repeatability = (visits[0][0] - visits[1][0]) / np.sqrt(2.0)
+    errors = visits[0][0] + noise - wanted, noise + repeatability
+    return np.linalg.norm(errors[0], axis=1), np.linalg.norm(errors[1], axis=1)
 
 
 def reached(
@@ -144,8 +197,6 @@ def _schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedul
     )
 
 
-def _offset(name: str, stated: str | Sequence[float], seed: int) -> np.ndarray:
-    """Where a reflector sits on its point, m; within 0.1 m where the campaign does not know."""
-    if isinstance(stated, str):
-        return stream(seed, f"reflector {name}").uniform(-0.1, 0.1, 3)
-    return np.array(stated, float)
+def _stated(value: str | Sequence[float], seed: int, name: str, within: float) -> np.ndarray:
+    """What a campaign states of a target's place or mount (3,), or a draw within bounds where it does not know."""
+    return stream(seed, name).uniform(-within, within, 3) if isinstance(value, str) else np.array(value, float)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
 NO_REMAINDER = "none"
+UNKNOWN = "unknown"
+NOT_TURNED = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -27,12 +29,18 @@ class Target:
     """What is tracked.
 
     `point`: measuring point of the chain on which it sits. `offset_m`: in the frame of the point; None where unknown and
-    fitted.
+    fitted. `rotation`: rotation vector (rad) of the target's axes in the frame of the point, which orientations have beside
+    those of the point; None where unknown and fitted. Left out, it is unknown where the offset is, else none.
     """
 
     name: str
     point: str
     offset_m: tuple[float, ...] | None
+    rotation: tuple[float, ...] | None = ()
+
+    def __post_init__(self) -> None:
+        if self.rotation == ():
+            object.__setattr__(self, "rotation", None if self.offset_m is None else NOT_TURNED)
 
 
 @dataclass(frozen=True)
@@ -152,6 +160,8 @@ def targets_from(described: Mapping[str, Any], chain: Chain, source: str) -> tup
         if target["point"] not in points:
             allowed = f"a measuring point of the chain: {closest_first(target['point'], points)}"
             raise InputError(source, f"targets.{name}.point", repr(target["point"]), allowed)
-        offset = target["offset_m"]
-        targets.append(Target(name, target["point"], None if offset == "unknown" else tuple(map(float, offset))))
+        stated = (target["offset_m"], target.get("rotation", ()))
+        targets.append(
+            Target(name, target["point"], *(None if value == UNKNOWN else tuple(map(float, value)) for value in stated))
+        )
     return tuple(targets)

@@ -60,13 +60,16 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """
     mean = _means(joint_angles, pose)
     tree = cKDTree(mean)
-    if not tree.query_pairs(SAME_POSE_RAD, p=np.inf):
-        return np.arange(len(mean))
+    # What is farther from all others is not asked for its neighbours, and the neighbours of all are never held at once.
+    beyond = np.nextafter(SAME_POSE_RAD, 1.0)
+    alone = np.isinf(tree.query(mean, k=2, p=np.inf, distance_upper_bound=beyond)[0][:, 1])
     found, count = np.full(len(mean), -1), 0
     for leader in range(len(mean)):
         if found[leader] < 0:
-            near = np.array(tree.query_ball_point(mean[leader], SAME_POSE_RAD, p=np.inf))
-            found[near[found[near] < 0]] = count
+            found[leader] = count
+            if not alone[leader]:
+                near = np.array(tree.query_ball_point(mean[leader], SAME_POSE_RAD, p=np.inf))
+                found[near[found[near] < 0]] = count
             count += 1
     return found
 

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.pipeline import pipeline, workplace
-from elastocal.command.printed import iso_date, print_lines, printed
+from elastocal.command.printed import iso_date, print_answer, printed
 from elastocal.command.quantities import LARGEST_SEED, length_m
 from elastocal.errors import InputError
 
@@ -43,9 +43,10 @@ def certificate(
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of everything that is drawn.")] = 1,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
-    """Accuracy against a tolerance, with the risk of being wrong; repeatability, error budget and map; what changed.
+    """Certify a robot against a tolerance: pass, fail or undecided.
 
-    Exit code 0 if the robot passes, 1 if it fails or if that cannot be decided. A robot that nobody measured after correction
+    The certificate has the risk of being wrong, repeatability, error budget and a map of the workspace. The exit code is 0 if
+    the robot passes, and 1 if it fails or is undecided. A robot that nobody measured after correction
     is predicted to pass or fail; --measured states what was measured.
     """
     from datetime import date as calendar
@@ -96,6 +97,6 @@ def certificate(
                 save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")
             write_certificate(partial / PAGES, facts, [f"{scratch}/{name}.pdf" for name in drawn])
             write_json(partial / DOCUMENT, document)
-    lines = [f"{facts['decision']}: {facts['decision_sentences']}", facts["now"], f"    {place / PAGES}, {place / DOCUMENT}"]
-    print_lines(lines, console)
-    raise typer.Exit(0 if facts["decision"] == "pass" else 1)
+    passed, answer = facts["decision"] == "pass", f"{facts['decision']}: {facts['decision_sentences']}"
+    print_answer(passed, answer, [str(place / PAGES), str(place / DOCUMENT)], facts["now"], console)
+    raise typer.Exit(0 if passed else 1)

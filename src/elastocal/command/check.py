@@ -12,12 +12,13 @@ from rich.console import Console
 from rich.table import Table
 
 from elastocal.command.pipeline import pipeline
+from elastocal.command.printed import print_answer, print_lines
 from elastocal.errors import escaped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# Held parameters that are named; of more there are too many to read.
+# Parameters that are not identifiable and are named; more would be too many to read.
 _NAMED = 8
 
 
@@ -25,7 +26,10 @@ def check(
     folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
     as_json: Annotated[bool, typer.Option("--json", help="All that was found, as JSON on standard output.")] = False,
 ) -> None:
-    """Say what was read, what these measurements identify and test, and what is suspicious; exit code 1 if not diagnosable."""
+    """Show what a campaign identifies and what looks suspicious.
+
+    The exit code is 1 where the data are at fault and cannot be diagnosed.
+    """
     from elastocal.loop.overview import overview
 
     facts = overview(folder, pipeline() / "config" / "robots")
@@ -33,22 +37,41 @@ def check(
         json.dump(facts, sys.stdout, indent=1)
         print()
     else:
-        show(facts, Console())
+        show(facts, folder, Console())
     raise typer.Exit(0 if facts["diagnosable"] else 1)
 
 
-def show(facts: Mapping[str, Any], console: Console) -> None:
-    """Print what `overview` found."""
+def show(facts: Mapping[str, Any], folder: Path, console: Console) -> None:
+    """Print what `overview` found: the answer, its table, what asks for attention and what comes next."""
+    print_answer(facts["diagnosable"], answer(facts), [], "", console)
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for name, words in lines(facts):
-        table.add_row(name, escaped(words))
+        table.add_row(f"  {name}", escaped(words))
     console.print(table)
+    print_lines((f"! {sentence}" for sentence in attention(facts)), console)
+    print_lines(
+        [f"next: elastocal diagnose {folder}" if facts["diagnosable"] else "next: mend the data, then check again"], console
+    )
+
+
+def answer(facts: Mapping[str, Any]) -> str:
+    """Whether the campaign can be diagnosed, in one sentence."""
+    name, count = facts["campaign"], len(attention(facts))
+    if not facts["diagnosable"]:
+        return f"{name} cannot be diagnosed: the data are at fault"
+    more = f"; {count} remark{'s' if count > 1 else ''} below" if count else ""
+    return f"{name} can be diagnosed: {facts['testable']} candidate effects can be tested{more}"
+
+
+def attention(facts: Mapping[str, Any]) -> list[str]:
+    """Faults of the data, then what is suspicious."""
+    return [*(fault["sentence"] for fault in facts["faults"]), *facts["suspicious"]]
 
 
 def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What is shown, as pairs of a heading and words."""
+    """The table, as pairs of a heading and words."""
     from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 
     noise = facts["noise"]
@@ -59,16 +82,19 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     # Numbers of loads are labels; 0 is none.
     loaded = len(facts["loads"]) - (0 in facts["loads"])
     parts = [*(["unloaded"] if 0 in facts["loads"] else []), *([f"{loaded} load{'s' * (loaded > 1)}"] if loaded else [])]
-    loads = " and ".join(parts) + (f" of up to {facts['largest_force_N']:.0f} N" if loaded else "")
+    loads = " and ".join(parts) + (f" of up to {facts['largest_force_N']:,.0f} N" if loaded else "")
     repeats = "each state measured once" if facts["repeats"] == 1 else f"a state measured up to {facts['repeats']} times"
     found = [
         ("read", f"{robot}, {facts['measured']} in the {facts['frame']} frame"),
         ("", f"{poses}; {facts['measurements']} measurements of {', '.join(facts['targets'])}{sessions}"),
         ("", f"{loads}; {repeats}"),
-        ("noise", f"{1e6 * noise['position_m']:.0f} µm a coordinate, by {_SOURCES[noise['source']]}"),
-        ("declared model", f"leaves {1e3 * facts['residual_rms_m']:.3f} mm RMS on the poses that it was fitted to"),
+        ("noise", f"{1e6 * noise['position_m']:.0f} µm a coordinate, from {_SOURCES[noise['source']]}"),
+        ("declared model", f"residual of {1e3 * facts['residual_rms_m']:.3f} mm RMS on the fitted poses"),
         ("identified", f"{facts['parameters']} parameters, effectively {facts['effective_parameters']:.0f}{left}"),
     ]
+    for mount in facts.get("mounts", []):
+        rotation = ", ".join(f"{value:.4f}" for value in mount["rotation_rad"])
+        found.append(("mount", f"{mount['target']}: rotation [{rotation}] rad in the frame of its point, fitted"))
     for joint, spring in enumerate(facts.get("compliance", []), 1):
         error = spring["relative_std_error"]
         words = "not identifiable" if error is None else f"± {100 * error:.1f} %"
@@ -77,16 +103,13 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         )
     if facts["accuracy"]:
         sentence = accuracy_sentence(accuracy_from(facts["accuracy"]))
-        found.append(("accuracy", f"if nothing is missing in the declared model: {sentence}"))
+        found.append(("accuracy", f"if the declared model is complete: {sentence}"))
     found.append(("testable", f"{facts['testable']} candidate effects"))
-    found += [("", f"{count} not: {reason}") for reason, count in facts["untestable"].items()]
-    found += [("data fault", fault["sentence"]) for fault in facts["faults"]]
-    found += [("suspicious", sentence) for sentence in facts["suspicious"]]
-    found.append(("diagnosable", "yes" if facts["diagnosable"] else "no: the data are at fault"))
+    found += [("", f"{count} not testable: {reason}") for reason, count in facts["untestable"].items()]
     return found
 
 
-_SOURCES = {"repeats": "repeats", "declared": "the campaign's declaration", "residual": "what the declared model leaves"}
+_SOURCES = {"repeats": "repeats", "declared": "the campaign's declaration", "residual": "the residual of the declared model"}
 
 
 def _listed(names: list[str]) -> str:

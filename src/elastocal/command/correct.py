@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
-from elastocal.command.printed import print_lines
+from elastocal.command.printed import print_answer, print_lines
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,8 +46,9 @@ def correct(
     partial: Annotated[bool, typer.Option("--partial", help="Write the file though some targets cannot be reached.")] = False,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
-    """Joint targets that bring the loaded, sagging, imperfect robot to the wanted poses, and by how much it will miss them.
+    """Compute the joint targets that reach the wanted poses.
 
+    Loads, weight and every effect found are compensated, and each target states by how much the robot will miss it.
     Predicted errors are stated as `elastocal certificate` states them: in the frame of the declared base, or, where the base is
     unknown, in the robot's own frame after its best placement over the campaign's poses.
     """
@@ -107,20 +108,22 @@ def correct(
         if controller:
             targets = targets_of(found.joint_angles[good], prismatic, named)
             write_text(folder_of_all / program.name, controller.program(name, targets))
-    if beyond.any():
-        share = f"{beyond.sum():,} of {len(beyond):,} targets"
-        print_lines([f"{share} lie beyond the poses or loads of the campaign: errors there are extrapolated"], console)
-    lines = [f"{good.sum():,} of {len(good):,} targets corrected"]
+    lines, answer = [], f"{good.sum():,} of {len(good):,} targets corrected"
     if good.any():
         rms = np.sqrt((before[good] ** 2).mean())
         reachable = predicted(calibrated, found.joint_angles[good], operating.part(good)) if len(bad) else errors
-        lines[0] += f"; uncorrected they would be missed by {millimetres(rms)} RMS (predicted, in the same frame)"
+        lines.append(f"Predicted position error without correction, in the same frame: {millimetres(rms)} RMS.")
         lines.append(accuracy_sentence(reachable.accuracy("the targets")))
         lines.append(accuracy_sentence(campaign_accuracy(calibrated, campaign.case.observations.states)))
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
         lines.append(f"{program.name} goes to {good.sum():,} of {len(good):,} targets: {controller.WORDS}, {called}")
-    print_lines([*lines, *(f"    {file}" for file in files)], console)
+    if beyond.any():
+        share = f"{beyond.sum():,} of {len(beyond):,} targets"
+        lines.append(f"! {share} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
+    certify = f"elastocal certificate {folder} --tolerance 0.2mm"
+    following = f"{certify}; or command 12 targets or more, measure them, and add --measured AFTER"
+    print_answer(not len(bad), answer, [*lines, *map(str, files)], following, console)
 
 
 def places_of(output: Path, language: str) -> tuple[Controller | None, Path, Path]:

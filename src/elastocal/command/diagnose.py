@@ -23,13 +23,18 @@ if TYPE_CHECKING:
 # What `snakemake_logger_plugin_elastocal` writes when a job starts.
 _JOB = re.compile(r"(\d+) of (\d+): (.+)")
 _JOBS = re.compile(r"\d+ jobs")
+# Snakemake prints it before its logger begins.
+_NO_NEWS = "Using workflow specific profile"
 
 
 def diagnose(
     folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
     cores: Annotated[int, typer.Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs at a time.")] = 2,
 ) -> None:
-    """Find what the model of a robot lacks, and report the error before and after on held-out poses."""
+    """Find which effects the robot's model lacks; write the report.
+
+    The report compares the error before and after on held-out poses. It is the Snakemake target `diagnose` of this campaign.
+    """
     campaign = str(folder.resolve())
     # Braces are wildcards to Snakemake, the others mapping and comment of YAML.
     if mark := next((mark for mark in ("{", "}", ": ", " #") if mark in campaign), steering(campaign)):
@@ -54,5 +59,5 @@ def follow(lines: Iterable[str], console: Console) -> None:
             job = _JOB.fullmatch(line)
             if job and console.is_terminal:
                 progress.update(bar, completed=int(job[1]) - 1, total=int(job[2]), description=job[3])
-            elif not (_JOBS.fullmatch(line) and console.is_terminal):
+            elif not line.startswith(_NO_NEWS) and not (_JOBS.fullmatch(line) and console.is_terminal):
                 print_lines([line], console)

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
-from elastocal.command.printed import print_lines
+from elastocal.command.printed import print_answer
 from elastocal.command.quantities import MOST_ROWS
 from elastocal.errors import InputError
 
@@ -48,7 +48,10 @@ def export(
     date: Annotated[str, typer.Option(help="Date that the sidecar states; today without.")] = "",
     accept_environment: AcceptEnvironment = False,
 ) -> None:
-    """Write the calibrated robot: robot file, URDF and DH parameters (geometry), and a sidecar with springs and effects."""
+    """Write the calibrated robot: robot file, URDF, DH, effects.
+
+    URDF and DH parameters hold the geometry; effects.json holds springs and effects as well.
+    """
     from datetime import date as calendar
 
     import numpy as np
@@ -77,7 +80,7 @@ def export(
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
     accuracy = campaign_accuracy(calibrated, found.case.observations.states)
     document = sidecar(calibrated, found.name, date or calendar.today().isoformat(), accuracy)
-    lines = [accuracy_sentence(accuracy), *(f"    {output / name}" for name in (ROBOT, URDF, SIDECAR))]
+    lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, URDF, SIDECAR))]
     with write_together(output, _NAMES) as partial:
         write_text(partial / ROBOT, f"# {stated}\n{text}")
         if drop_in is None:
@@ -98,8 +101,8 @@ def export(
         off = left_out_m(calibrated, angles, OperatingConditions(states.wrench, None, states.time_s, states.temperature_c))
         names = ", ".join(entry["key"] for entry in document["effects"])
         largest, rms = 1e3 * off.max(), 1e3 * np.sqrt((off**2).mean())
-        lines.insert(0, f"only in {SIDECAR}: {names}; up to {largest:.3f} mm at the measured poses ({rms:.3f} mm RMS)")
-    print_lines(lines, console)
+        lines.insert(0, f"! only {SIDECAR} holds {names}: up to {largest:.3f} mm at the measured poses ({rms:.3f} mm RMS)")
+    print_answer(True, f"{found.name}: calibrated robot in {output}", lines, "", console)
 
 
 def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, angles: np.ndarray) -> list[str]:
@@ -133,7 +136,7 @@ def _table(calibrated: CalibratedRobot, rows: int, force: float, partial: Path, 
     found = forward_table(calibrated, rows, hanging, _SEED)
     left, whole = interpolation_error_m(calibrated, found, hanging, _SEED + 1)
     write_csv(partial / TABLE, found)
-    line = f"    {output / TABLE}: {len(found)} rows; interpolated, {1e3 * left:.3f} mm of {1e3 * whole:.3f} mm RMS remain"
+    line = f"{output / TABLE}: {len(found)} rows; interpolation leaves {1e3 * left:.3f} of {1e3 * whole:.3f} mm RMS"
     return [line]
 
 
@@ -152,4 +155,4 @@ def _denavit_hartenberg(nominal: Robot, robot: Robot, partial: Path, output: Pat
     write_csv(partial / DELTAS, dh_deltas(nominal, robot))
     names = [str(number) for number in range(len(frames) - 1)] + [nominal.chain.end_effector.name]
     save(dh_frames_picture(frames, nominal.name, names), str(partial / FRAMES[0]), str(partial / FRAMES[1]))
-    return [f"    {output / name}" for name in (DH, DELTAS, FRAMES[1])]
+    return [str(output / name) for name in (DH, DELTAS, FRAMES[1])]

@@ -55,7 +55,10 @@ def csv(
     column: Annotated[list[str] | None, typer.Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed.")] = None,
     ignore: Annotated[list[str] | None, typer.Option(help="Header of a column to leave out; as often as needed.")] = None,
     unit: Annotated[list[str] | None, typer.Option(help="NAME=UNIT of one column, such as fx=kN.")] = None,
-    target: Annotated[str | None, typer.Option(help="Name of the target where no column has it.")] = None,
+    target: Annotated[
+        list[str] | None,
+        typer.Option(help="Name of the target where no column has it; of each of several markers in a row, or NAME=MARKER."),
+    ] = None,
     wrench: Annotated[Wrench | None, typer.Option(help="Forces on the robot, or those that it exerts.")] = None,
     skip_empty: Annotated[bool, typer.Option("--skip-empty", help="Leave out rows without a position.")] = False,
     separator: Annotated[Separator | None, typer.Option(help="Found out where not given.")] = None,
@@ -92,6 +95,12 @@ def csv(
     units = _pairs("--unit", unit) | {
         key: value for key, value in (("angles", angles), ("lengths", lengths)) if value is not None
     }
+    several = target if target and (len(target) > 1 or "=" in target[0]) else []
+    markers = {
+        name.strip(): (marker if equals else name).strip() for name, equals, marker in (t.partition("=") for t in several)
+    }
+    if len(markers) < len(several) or "" in markers:
+        raise InputError("--target", "", ", ".join(several), "a name for each marker, such as A, or A=MARKER")
     chosen = ImportOptions(
         separator=separator.value if separator else earlier.separator,
         decimal=decimal.value if decimal else earlier.decimal,
@@ -102,7 +111,8 @@ def csv(
         columns=dict(earlier.columns or {}) | _pairs("--column", column),
         units=dict(earlier.units or {}) | units,
         rotation=rotation or earlier.rotation,
-        target=target or earlier.target,
+        target=(target[0] if target else earlier.target) if not markers else None,
+        targets=markers or (earlier.targets if not target else None),
         wrench=wrench.value if wrench else earlier.wrench,
         skip_empty=skip_empty or earlier.skip_empty,
     )

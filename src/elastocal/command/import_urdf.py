@@ -40,7 +40,10 @@ def urdf(
     ] = RELATIVE_STD,
     force: Annotated[bool, typer.Option("--force", help="Replace the file that is there.")] = False,
 ) -> None:
-    """Make a robot file of the chain between two links of a URDF: its lengths, limits and masses."""
+    """Make a robot file of the chain between two links of a URDF.
+
+    It has the lengths, the joint limits and the masses of that chain.
+    """
     refuse_existing(output, force)
     result = robot_from_urdf(file, base, tip, point or (), mass_std, limits.value if limits else None)
     write_robot(result, output)

@@ -6,15 +6,20 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
-from elastocal.errors import InputError, escaped
+from elastocal.command.printed import print_answer
+from elastocal.errors import InputError
 
 
 def init(
     folder: Annotated[Path, typer.Argument(help="New folder, or one that has measurements or a robot file already.")],
     robot: Annotated[Path | None, typer.Option(help="Robot file to copy there; a template where there is none.")] = None,
 ) -> None:
-    """Write a campaign.yaml with every key explained, robot.yaml and the header of measurements.csv; nothing is replaced."""
+    """Begin a campaign: a folder with files to fill in.
+
+    campaign.yaml explains every key; measurements.csv has its header alone. No file that exists is replaced.
+    """
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV, PARQUET
     from elastocal.campaigns.reading import read_robot
@@ -41,6 +46,7 @@ def init(
         if CSV in written:
             write_text(partial / CSV, sheet_template(arm.joints))
         write_text(partial / DOCUMENT, campaign_template(folder.resolve().name, arm))
-    typer.echo(escaped(f"{folder.as_posix()}: {', '.join(written)}"))
-    if source is None:
-        typer.echo("robot.yaml is a template: put your robot's chain and lengths there, or elastocal import urdf|dh")
+    template = ["! robot.yaml is a template: enter your robot's chain and lengths, or use `elastocal import urdf` or `dh`"]
+    answer = f"{folder.as_posix()}: {', '.join(written)}"
+    following = f"fill in measurements.csv, then elastocal check {folder.as_posix()}"
+    print_answer(True, answer, template if source is None else [], following, Console())

@@ -1,38 +1,82 @@
-"""The application of all subcommands; bad input ends in one line."""
+"""The application of all subcommands, in the order of the work; bad input ends in one line."""
 
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
+import elastocal
 from elastocal.command.certificate import certificate
 from elastocal.command.check import check
 from elastocal.command.correct import correct
+from elastocal.command.demo import demo
 from elastocal.command.diagnose import diagnose
 from elastocal.command.export import export
 from elastocal.command.importing import importing
 from elastocal.command.init import init
 from elastocal.command.plan import plan
+from elastocal.command.printed import example
 from elastocal.errors import InputError, fault_of_machine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+# Each subcommand with an example, in the order in which a calibration needs them; `import` is a group of its own.
+COMMANDS: dict[Callable[..., None], str] = {
+    demo: "elastocal demo",
+    init: "elastocal init campaigns/cell --robot robot.yaml",
+    plan: "elastocal plan robot.yaml --folder campaigns/cell --force 200 --pull",
+    check: "elastocal check campaigns/cell",
+    diagnose: "elastocal diagnose campaigns/cell",
+    correct: "elastocal correct campaigns/cell path.csv --output targets.csv",
+    certificate: "elastocal certificate campaigns/cell --tolerance 0.2mm",
+    export: "elastocal export campaigns/cell --output calibrated",
+}
+_ORDER = ("demo", "import", *(command.__name__ for command in COMMANDS))
+
+
+class InOrder(TyperGroup):
+    """Lists subcommands in the order of the work; typer would list groups last."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names of all subcommands."""
+        return sorted(super().list_commands(ctx), key=_ORDER.index)
+
 
 # Without the boxes of rich the last line says what is wrong with an option.
 app = typer.Typer(
-    name="elastocal", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+    name="elastocal",
+    cls=InOrder,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    epilog=example("elastocal demo"),
 )
-app.command()(init)
-app.command()(diagnose)
-app.command()(correct)
-app.command()(plan)
-app.command()(check)
-app.command()(export)
-app.command()(certificate)
+for _command, _typed in COMMANDS.items():
+    app.command(epilog=example(_typed))(_command)
 app.add_typer(importing)
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"elastocal {elastocal.__version__}")
+        raise typer.Exit
+
+
 @app.callback()
-def elastocal() -> None:
-    """From a robot and a tracker to a corrected robot."""
+def with_version(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """From a robot and a laser tracker to a corrected robot.
+
+    The order of the work: plan, measure, check, diagnose, correct, certificate.
+    """
 
 
 def main() -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
-from elastocal.command.printed import print_lines
+from elastocal.command.printed import print_answer
 from elastocal.command.quantities import FARTHEST_TARGET_M, LARGEST_SEED, MOST_POSES, MOST_ROWS, angle_rad, length_m, numbers
 from elastocal.errors import InputError, text_fault
 
@@ -29,7 +31,7 @@ _LONGEST_NAME = 80
 
 def plan(
     robot: Annotated[Path, typer.Argument(help="Robot file.")],
-    output: Annotated[Path | None, typer.Option(help="CSV of the plan; a picture goes beside it.")] = None,
+    output: Annotated[Path | None, typer.Option(help="CSV of the plan; the sheet and a picture go beside it.")] = None,
     folder: Annotated[Path | None, typer.Option(help="New campaign folder, whose measurement columns are empty.")] = None,
     poses: Annotated[int, typer.Option(min=1, max=MOST_POSES, help="Poses to fit.")] = 20,
     held_out: Annotated[
@@ -64,7 +66,11 @@ def plan(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of everything that is drawn.")] = 1,
 ) -> None:
-    """Choose configurations and loads that say most about a robot, among those that arm, cell and tracker allow."""
+    """Choose where to measure; write a sheet to print.
+
+    The chosen poses and loads determine the robot's parameters best, among those that the arm, the cell and the tracker allow.
+    plan.pdf is the sheet to take to the cell.
+    """
     import numpy as np
 
     from elastocal.application.accuracy import BASE, FRAMES, ROBOT, millimetres
@@ -77,11 +83,12 @@ def plan(
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
-    from elastocal.figures.plan import plan_picture
+    from elastocal.figures.plan import plan_picture, pose_pictures
     from elastocal.figures.style import save
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.data_frames import write_csv
     from elastocal.io.texts import kind_of
+    from elastocal.report.plan_pages import plan_facts, write_plan_sheet
 
     console = Console(stderr=True)
     arm = read_robot(robot)
@@ -120,11 +127,30 @@ def plan(
             found = planned(survey, some, max(enough, fewest_poses(survey)), held_out, criterion, seed)
     table = sheet(survey, found)
     stated = table.assign(expected_accuracy_m=float(found.accuracy_m[-1]))
-    picture = plan_picture(arm, cell, found)
+    random = 1e3 * np.quantile(found.random_m[:, -1], [0.05, 0.5, 0.95])
+    frame = FRAMES[ROBOT if survey.unknown_base else BASE]
+    worth = [
+        f"Predicted position error of a robot that is corrected by the fit, {frame}: {millimetres(found.accuracy_m[-1])} RMS "
+        f"over configurations that the cell allows; with as many random poses {random[1]:.3f} mm "
+        f"({random[0]:.3f} to {random[2]:.3f}).",
+        "It is a standard error by the uncertainty of the parameters alone, without the tracker's noise.",
+        f"Assumed noise: {1e6 * position_m:.3g} µm"
+        + (f", {1e6 * orientation_rad:.3g} µrad" if measured == "pose" else "")
+        + ("." if noise and (orientation_noise or measured == "position") else f"; {instrument.words}."),
+        f"{criterion}-efficiency: at least {100 * found.efficiency:.0f} % of the best design with as many poses.",
+    ]
 
     def write_plan(place: Path) -> None:
         write_csv(place / names[0], stated)
-        save(picture, str(place / names[1]), str(place / names[2]))
+        with tempfile.TemporaryDirectory() as scratch:
+            pages = {f"poses{page}": figure for page, figure in enumerate(pose_pictures(arm, found))}
+            drawn = {"overview": plan_picture(arm, cell, found), **pages}
+            for name, figure in drawn.items():
+                save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")
+            write_plan_sheet(
+                place / names[1], plan_facts(survey, found, table, worth), {name: f"{scratch}/{name}.pdf" for name in drawn}
+            )
+            shutil.copyfile(f"{scratch}/overview.png", place / names[2])
 
     if folder is not None:
         with write_together(folder, (ROBOT, CSV, *names, DOCUMENT)) as partial:
@@ -135,21 +161,15 @@ def plan(
         with write_together(output.parent, names) as partial:
             write_plan(partial)
     output = output or Path(str(folder), names[0])
-    random = 1e3 * np.quantile(found.random_m[:, -1], [0.05, 0.5, 0.95])
-    frame = FRAMES[ROBOT if survey.unknown_base else BASE]
-    lines = [
-        f"{len(found.fitted.joint_angles)} poses to fit and {held_out} held out of {len(some.joint_angles):,} allowed ones: "
-        f"{len(table)} measurements",
-        f"predicted position error of a robot that is corrected by the fit, {frame}: {millimetres(found.accuracy_m[-1])} RMS "
-        f"over configurations that the cell allows (standard error, by the uncertainty of the parameters alone; the tracker's "
-        f"noise is not in it); with random poses {random[1]:.3f} mm ({random[0]:.3f} to {random[2]:.3f})",
-        f"assumed noise: {1e6 * position_m:.3g} µm"
-        + (f", {1e6 * orientation_rad:.3g} µrad" if measured == "pose" else "")
-        + ("" if noise and (orientation_noise or measured == "position") else f"; {instrument.words}"),
-        f"{criterion}-efficiency: at least {found.efficiency:.2f} of the best design with as many poses",
-        f"    {output}, {output.with_suffix('.pdf')}" + (f", {folder}" if folder else ""),
-    ]
-    print_lines(lines, console)
+    answer = (
+        f"{len(found.fitted.joint_angles)} poses to fit and {held_out} held out, of {len(some.joint_angles):,} that the cell "
+        f"allows: {len(table)} measurements"
+    )
+    sheets = [f"sheet to print: {output.with_suffix('.pdf')}", f"table: {output}"]
+    following = "measure" + (
+        f", fill in {folder / CSV}, then elastocal check {folder}" if folder else " the poses of the sheet"
+    )
+    print_answer(True, answer, [*worth, *sheets], following, console)
 
 
 def _targets(described: list[str], chain: Chain) -> tuple[Target, ...]:

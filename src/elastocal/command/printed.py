@@ -1,4 +1,4 @@
-"""What is printed: options of documents as they are, names and numbers on one line, and dates; and lines on a terminal."""
+"""What is printed: options of documents as they are, names and numbers on one line, and dates; and answers on a terminal."""
 
 from __future__ import annotations
 
@@ -42,6 +42,21 @@ def iso_date(option: str, text: str) -> str:
     if day != text or not text:
         raise InputError(option, "", repr(text), "a date of the calendar as ISO 8601 has it, such as 2026-11-20")
     return day
+
+
+def example(*commands: str) -> str:
+    """The end of a help text: commands to type, on lines that are not wrapped."""
+    # \b keeps click from joining the lines of a paragraph.
+    return "\n".join(["\b", "Example:" if len(commands) == 1 else "Examples:", *(f"  {command}" for command in commands)])
+
+
+def print_answer(passed: bool, answer: str, details: Iterable[str], following: str, console: Console) -> None:
+    """Print an answer with its mark, ✓ or !, then its details and the command that comes next, if any.
+
+    A detail that asks for attention begins with "! " already.
+    """
+    lines = [f"{'✓' if passed else '!'} {answer}", *(line if line.startswith("! ") else f"  {line}" for line in details)]
+    print_lines([*lines, *([f"next: {following}"] if following else [])], console)
 
 
 def print_lines(lines: Iterable[str], console: Console) -> None:

@@ -29,7 +29,7 @@ from elastocal.data_checks.placement import (
 from elastocal.data_checks.protocol import Fault, Value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements, Target
     from elastocal.data_checks.placement import Placement
@@ -118,6 +118,8 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     found = _one_after_the_other(campaign, some)
     if found or campaign.measured == "position":
         return found
+    if slight := _slightly_turned(campaign, some):
+        return slight
     # Where orientations do not go with positions in any way, positions alone may still tell.
     found = _one_after_the_other(replace(campaign, measured="position"), replace(some, rotation_vector=None))
     return [replace(fault, detail=f"{fault.detail} (positions alone: orientations do not go with them)") for fault in found]
@@ -134,6 +136,16 @@ def _one_after_the_other(campaign: Campaign, some: Measurements) -> list[Fault]:
         if not any(fault.decisive for fault in new):
             break
     return found
+
+
+def _slightly_turned(campaign: Campaign, some: Measurements) -> list[Fault]:
+    """A mount turned by as much as the zero of a joint may be off, but seldom is: for physics to tell, and a warning."""
+    (freed, _) = _with_unknown({"rotation": None})(campaign, some)
+    written, fitted = robustly_placed(campaign, some), robustly_placed(freed, some)
+    detail, parameters = _target_fault(campaign.targets, written.estimate, fitted.estimate, np.inf, _NEAR_RAD)
+    if not detail or written.turn is None or fitted.turn is None:
+        return []
+    return [Fault("wrong_target", (), detail, parameters, (rms(written.turn), rms(fitted.turn)), (), False, ())]
 
 
 def single_changes(campaign: Campaign) -> list[Change]:
@@ -153,24 +165,22 @@ def placements(campaign: Campaign) -> list[Change]:
     found = []
     if campaign.frame == "base":
         found.append(Change("wrong_frame", "", lambda c, r: (replace(c, frame="tracker"), r), placement="frame"))
+    unknown: list[dict[str, None]] = []
+    if campaign.measured == "pose" and any(target.rotation is not None for target in campaign.targets):
+        unknown.append({"rotation": None})
     if any(target.offset_m is not None for target in campaign.targets):
-
-        def unknown(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
-            seen = set(measurements.target.tolist())
-            targets = [replace(t, offset_m=None) if number in seen else t for number, t in enumerate(campaign.targets)]
-            return replace(campaign, targets=tuple(targets)), measurements
-
-        found.append(Change("wrong_target", "", unknown, placement="targets"))
-    return found
+        unknown.append({"offset_m": None, "rotation": None})
+    return [*found, *(Change("wrong_target", "", _with_unknown(parts), placement="targets") for parts in unknown)]
 
 
 def pairs(campaign: Campaign) -> list[tuple[Change, ...]]:
     """Two changes at once, where neither alone lets the measurements fit."""
     placed_elsewhere = placements(campaign)
-    found = [tuple(placed_elsewhere)] if len(placed_elsewhere) == 2 else []
+    found: list[tuple[Change, ...]] = []
     for change in placed_elsewhere:
         if change.placement == "frame":
             oriented = campaign.measured == "pose"
+            found += [(change, other) for other in placed_elsewhere if other is not change]
             found += [(change, other) for other in single_changes(replace(campaign, frame="tracker"))]
             if oriented:
                 found += [(change, other) for other in _axes(True, False)]
@@ -181,14 +191,14 @@ def _mended(campaign: Campaign, measurements: Measurements) -> tuple[list[Fault]
     """Faults of the simplest alternative that mends the measurements, and campaign and measurements as they are then read."""
     written = robustly_placed(campaign, measurements)
     # All measurements but a few, or all: a joint may move in a few poses only.
-    measures = [measure for measure in (trimmed_rms, rms) if _misfit(written, measure).implausible]
+    measures = [measure for measure in (trimmed_rms, rms) if _misfit(written, measurements, measure).implausible]
     if not measures:
         return [], campaign, measurements
     one, fitted = [(change,) for change in single_changes(campaign)], [(change,) for change in placements(campaign)]
     for stages in ((one, fitted), (pairs(campaign),)):
         tried = [[_tried(campaign, measurements, changes) for changes in stage] for stage in stages]
         for measure in measures:
-            before = _misfit(written, measure)
+            before = _misfit(written, measurements, measure)
             winners = [winner for stage in tried if (winner := _winner(stage, before, measure))]
             if not winners:
                 continue
@@ -231,7 +241,8 @@ class _Winner:
             if change.placement == "frame":
                 detail, parameters, decisive = _frame_fault(self.placement.estimate, before, self.after)
             if change.placement == "targets":
-                detail, parameters = _target_fault(self.tried.campaign.targets, written.estimate, self.placement.estimate)
+                estimates = written.estimate, self.placement.estimate
+                detail, parameters = _target_fault(self.tried.campaign.targets, *estimates, IMPLAUSIBLE_M, IMPLAUSIBLE_RAD)
             parameters = (*parameters, Value("poses compared", float(len(np.unique(measurements.pose))), "–"))
             alike = self.alike if len(self.tried.changes) == 1 else ()
             found.append(Fault(change.name, change.joints, detail, parameters, self.evidence, (), decisive, alike))
@@ -242,7 +253,7 @@ def _winner(tried: Sequence[_Tried], before: Misfit, measure: Callable[[np.ndarr
     """The first of the alternatives that fit best, if it convinces."""
     if not tried:
         return None
-    misfits = [_misfit(one.placement, measure) for one in tried]
+    misfits = [_misfit(one.placement, one.measurements, measure) for one in tried]
     together = np.array([misfit.together for misfit in misfits])
     # One of two faults may concern positions alone, or orientations alone.
     keys = (
@@ -256,7 +267,7 @@ def _winner(tried: Sequence[_Tried], before: Misfit, measure: Callable[[np.ndarr
         alike = np.flatnonzero(key <= max(_ALIKE * key.min(), key.min() + _ALIKE_M))
         best = tried[alike[0]]
         placement = robustly_placed(best.campaign, best.measurements)
-        after = _misfit(placement, measure)
+        after = _misfit(placement, best.measurements, measure)
         evidence = _evidence(before, after, _extent(placement, best.measurements))
         if evidence:
             others = [
@@ -266,8 +277,11 @@ def _winner(tried: Sequence[_Tried], before: Misfit, measure: Callable[[np.ndarr
     return None
 
 
-def _misfit(placement: Placement, measure: Callable[[np.ndarray], float]) -> Misfit:
-    return Misfit(measure(placement.distance), 0.0 if placement.turn is None else measure(placement.turn))
+def _misfit(placement: Placement, measurements: Measurements, measure: Callable[[np.ndarray], float]) -> Misfit:
+    """Of the target that fits worst: the others say nothing of its mount."""
+    turn = np.zeros(len(measurements)) if placement.turn is None else placement.turn
+    each = [measurements.target == target for target in np.unique(measurements.target)]
+    return Misfit(max(measure(placement.distance[mine]) for mine in each), max(measure(turn[mine]) for mine in each))
 
 
 def _extent(placement: Placement, measurements: Measurements) -> float:
@@ -432,6 +446,15 @@ def _with_rotations(
     return correct
 
 
+def _with_unknown(parts: Mapping[str, None]) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
+    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
+        seen = set(measurements.target.tolist())
+        targets = [replace(t, **parts) if number in seen else t for number, t in enumerate(campaign.targets)]
+        return replace(campaign, targets=tuple(targets)), measurements
+
+    return correct
+
+
 def _with_offsets(names: Iterable[str], factor: float) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
     def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
         targets = [
@@ -464,23 +487,33 @@ def _frame_fault(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str
     return f"measurements would fit {better:.0f} times better if the base stood {where}", tuple(parameters), False
 
 
-def _target_fault(targets: Sequence[Target], written: Estimate, fitted: Estimate) -> tuple[str, tuple[Value, ...]]:
-    parameters, farthest, turned = [], ("", 0.0), 0.0
-    for number, target in enumerate(targets):
-        offset = fitted.target_offset[number]
-        vector = Rotation.from_matrix(fitted.target_rotation[number]).as_rotvec()
-        away = float(np.linalg.norm(offset - written.target_offset[number]))
-        turned = max(turned, float(np.linalg.norm(vector)))
-        farthest = max(farthest, (target.name, away), key=lambda pair: pair[1])
-        parameters += [
-            Value(f"{target.name} offset {axis}", float(value), "m") for axis, value in zip("xyz", offset, strict=True)
-        ]
-        if vector.any():
+def _target_fault(
+    targets: Sequence[Target], written: Estimate, fitted: Estimate, far_m: float, far_rad: float
+) -> tuple[str, tuple[Value, ...]]:
+    """Sentence and numbers of targets that sit elsewhere or are turned, and which keys of campaign.yaml are to be unknown.
+
+    `far_m`, `far_rad`: from where on. The sentence is empty where no target is so far off.
+    """
+    parameters: list[Value] = []
+    turns = Rotation.from_matrix(written.target_rotation.transpose(0, 2, 1) @ fitted.target_rotation).magnitude()
+    away = np.linalg.norm(fitted.target_offset - written.target_offset, axis=1)
+    vectors = Rotation.from_matrix(fitted.target_rotation).as_rotvec()
+    for target, offset, vector in zip(targets, fitted.target_offset, vectors, strict=True):
+        for name, unit, part in (("offset", "m", offset), ("rotation vector", "rad", vector)):
             parameters += [
-                Value(f"{target.name} rotation vector {axis}", float(value), "rad")
-                for axis, value in zip("xyz", vector, strict=True)
+                Value(f"{target.name} {name} {axis}", float(value), unit)
+                for axis, value in zip("xyz", part, strict=True)
+                if part is offset or part.any()
             ]
-    name, away = farthest
-    words = f"{name} would sit {1e3 * away:.3g} mm from there" if away > IMPLAUSIBLE_M else ""
-    words += f"{' and ' if words else 'it would be '}turned by {np.degrees(turned):.3g}°" if turned > IMPLAUSIBLE_RAD else ""
-    return f"targets do not sit where the campaign says: {words}", tuple(parameters)
+    words, keys = [], []
+    if away.max() > far_m:
+        words.append(f"{targets[np.argmax(away)].name} would sit {1e3 * away.max():.3g} mm from there")
+        keys.append("offset_m")
+    if turns.max() > far_rad:
+        words.append(f"{targets[np.argmax(turns)].name} would be turned by {np.degrees(turns.max()):.3g}°")
+        keys.append("rotation")
+    remedy = " and ".join(f"{key}: unknown" for key in keys)
+    if not words:
+        return "", ()
+    fits = f"where its mount is not as stated, {remedy} in campaign.yaml fits it, and known values may stand there"
+    return f"targets do not sit where the campaign says: {' and '.join(words)}; {fits}", tuple(parameters)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import pkgutil
 from functools import cache
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import elastocal.data_checks
+from elastocal.io.modules import modules_with
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -19,9 +18,7 @@ if TYPE_CHECKING:
 @cache
 def fault_modules() -> dict[str, ModuleType]:
     """Modules that look for faults by their own names, each behind those that it comes after."""
-    names = sorted(module.name for module in pkgutil.iter_modules(elastocal.data_checks.__path__))
-    modules = {name: import_module(f"elastocal.data_checks.{name}") for name in names}
-    waiting = {name: module for name, module in modules.items() if hasattr(module, "NAMES")}
+    waiting = modules_with("NAMES", elastocal.data_checks)
     ordered: dict[str, ModuleType] = {}
     while waiting:
         ready = [name for name, module in waiting.items() if not set(module.AFTER) & set(waiting)]

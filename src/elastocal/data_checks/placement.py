@@ -79,7 +79,7 @@ def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement
     """
     nominal = _Nominal.of(campaign, measurements)
     found = nominal.placed()
-    if campaign.frame == "base" and all(target.offset_m is not None for target in campaign.targets):
+    if campaign.frame == "base" and not nominal.model.fitted_parts:
         return found
     for step in range(_CORE_STEPS + 1):
         distance, kept = found.distance, np.zeros(len(measurements), bool)

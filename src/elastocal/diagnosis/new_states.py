@@ -16,7 +16,7 @@ import numpy as np
 from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import Target
+from elastocal.campaigns.campaign import NOT_TURNED, Target
 from elastocal.diagnosis import other
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import effect_columns, linearize
@@ -336,11 +336,12 @@ def instrument_of(
 
 
 def _with_targets_everywhere(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
-    """One more target on each measuring point without, at an unknown place where all of the campaign's own are unknown."""
+    """One more target on each measuring point without; what all of the campaign's own leave unknown is unknown of it too."""
     taken = {target.point for target in model.targets}
     bare = [point.name for point in model.sites.chain.points if point.name not in taken]
     place = None if all(target.offset_m is None for target in model.targets) else (0.0, 0.0, 0.0)
-    added = tuple(Target(f"further target on {name}", name, place) for name in bare)
+    turn = None if all(target.rotation is None for target in model.targets) else NOT_TURNED
+    added = tuple(Target(f"further target on {name}", name, place, turn) for name in bare)
     offsets = np.concatenate([estimate.target_offset, np.zeros((len(added), 3))])
     turns = np.concatenate([estimate.target_rotation, np.tile(np.eye(3), (len(added), 1, 1))])
     estimate = replace(estimate, target_offset=offsets, target_rotation=turns)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import pkgutil
 from functools import cache
-from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 import elastocal.effects
 from elastocal.effects.protocol import require_unique
 from elastocal.errors import InputError
+from elastocal.io.modules import modules_with
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,9 +20,7 @@ if TYPE_CHECKING:
 @cache
 def effects() -> dict[str, Effect]:
     """Modules of the catalogue by the name of their effect."""
-    names = sorted(module.name for module in pkgutil.iter_modules(elastocal.effects.__path__))
-    modules = [import_module(f"elastocal.effects.{name}") for name in names]
-    return {module.NAME: cast("Effect", module) for module in modules if hasattr(module, "NAME")}
+    return {module.NAME: cast("Effect", module) for module in modules_with("NAME", elastocal.effects).values()}
 
 
 def candidates_on(sites: Sites) -> dict[str, Candidate]:

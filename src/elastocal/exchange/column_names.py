@@ -15,7 +15,7 @@ from scipy import constants
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 LENGTH, ANGLE, FORCE, MOMENT, TIME, TEMPERATURE, NONE = "length", "angle", "force", "moment", "time", "temperature", "none"
 # SI value of one of each unit, by kind.
@@ -42,7 +42,7 @@ COVARIATES = ("time_s", "temperature_c", "u95_m")
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _INDEX = re.compile(r"([^\[(]*?)\s*[\[(]\s*([0-9]+)\s*[\])](.*)", re.ASCII)
 # What has no unit, as people write it.
-_NO_UNIT = ("", "-", "1", "#")
+_NO_UNIT = ("", "-", "1", "#", "–", "none")
 _BEHIND = re.compile(r"(.+?)[_/ ]([A-Za-zµ°]+)")
 # No arm has a hundred joints, and a table is looked through for each up to the last that it names.
 _JOINT = re.compile(
@@ -123,7 +123,7 @@ def recognized(header: str) -> tuple[str | None, str | None]:
     Returns `name`: as this module calls columns, None where the header is not known; `unit`: as it stands in the header, None
     where none does.
     """
-    text, unit = _without_unit(header)
+    text, unit = without_unit(header)
     name = _named(text)
     if name is not None and unit is None:
         return name, {"time_s": "s", "temperature_c": "C", "u95_m": "m"}.get(header.lower())
@@ -132,7 +132,7 @@ def recognized(header: str) -> tuple[str | None, str | None]:
 
 def ordinal_of_joint(header: str) -> tuple[str, int] | None:
     """What a header calls joints and the number of this one, which may be counted from 0; None where it is no joint angle."""
-    matches = (_JOINT.fullmatch(name) for name in _names_in(_without_unit(header)[0]))
+    matches = (_JOINT.fullmatch(name) for name in _names_in(without_unit(header)[0]))
     return next(((match[1], int(match[2])) for match in matches if match), None)
 
 
@@ -140,7 +140,7 @@ def unit_of_joint(header: str, joint: str) -> tuple[bool, str | None]:
     """Whether a column has the name of a joint (alone, with a unit, or as a topic has it), and the unit."""
     if _plain(joint) in _names_in(header):
         return True, None
-    text, unit = _without_unit(header)
+    text, unit = without_unit(header)
     return _plain(joint) in _names_in(text), unit
 
 
@@ -149,13 +149,26 @@ def is_unit_of_none(name: str, unit: str | None) -> bool:
     return unit not in (None, *_NO_UNIT) and kind_of(name) == (NONE,)
 
 
+def units_in(cells: Sequence[str]) -> list[str] | None:
+    """Units of a row that has nothing else, such as ``deg; [mm]; -``, "" for none; None where it has anything else."""
+    bare = [re.sub(r"^[\[(](.*)[\])]$", r"\1", cell).strip() for cell in cells]
+    units = ["" if unit in _NO_UNIT else _plain_unit(unit) for unit in bare]
+    known = {unit for of_kind in UNITS.values() for unit in of_kind}
+    return units if any(units) and known.issuperset(units) else None
+
+
 def joints_in(names: Iterable[str]) -> list[str]:
     """Names of joint angles among names, from q1 on."""
     numbers = sorted(int(name[1:]) for name in names if re.fullmatch(r"q[0-9]+", name))
     return [f"q{number}" for number in numbers]
 
 
-def _without_unit(header: str) -> tuple[str, str | None]:
+def recognized_plainly(text: str) -> str | None:
+    """What a header without a unit is by all of it; None where it is not known, or the end of a topic."""
+    return _named_plainly(_plain(text))
+
+
+def without_unit(header: str) -> tuple[str, str | None]:
     """A header without its unit, and the unit; an index in brackets is a part of the name."""
     index = _INDEX.fullmatch(header)
     if index and index[1]:

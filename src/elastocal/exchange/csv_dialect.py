@@ -66,14 +66,16 @@ _WANTED = "columns x, y, z or such; --header LINE and --column x=NAME say which 
 class TextTable:
     """Cells of a table: decimal points throughout, no marks between thousands; `lines` has the line of the file of each row.
 
-    `left_out` says in words what of the file is no cell of `columns`.
+    `units`: of the columns that have one in a row of units under the header. `left_out` says in words what of the file is no
+    cell of `columns`.
     """
 
     path: str
     dialect: Dialect
     columns: dict[str, tuple[str, ...]]
     lines: tuple[int, ...]
-    left_out: tuple[str, ...] = field(default=())
+    left_out: tuple[str, ...] = ()
+    units: dict[str, str] = field(default_factory=dict)
 
 
 def read_text_table(
@@ -82,15 +84,17 @@ def read_text_table(
     stated: Dialect = _UNSTATED,
     ignored: Collection[str] = (),
     wanted: str = _WANTED,
+    units_in: Callable[[Sequence[str]], Sequence[str] | None] = lambda cells: None,
 ) -> TextTable:
     """Read a table, finding out what is not stated of its dialect.
 
     Columns without a name are called ``column 3`` by their place; those of empty cells are left out, and so are such rows.
+    Names that several columns have are taken with what stands above them, as of the marker of three columns X, Y, Z.
 
     `is_header`: of the cells of a line, whether they name the columns; the first such line does where no line is stated, else
     one behind a comment mark. `wanted`: what a header has, for messages. `ignored`: names of columns that are left out whatever
-    they hold. Raises `InputError`: a file that cannot be read or has no header, a row of another length, or numbers that may be
-    read in two ways.
+    they hold. `units_in`: the units of a row of cells that is nothing but units, such as one under the header. Raises
+    `InputError`: a file that cannot be read or has no header, a row of another length, or numbers that may be read in two ways.
     """
     source = Path(path).as_posix()
     lines, encoding = _lines(path, stated.encoding)
@@ -101,7 +105,7 @@ def read_text_table(
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
     separator, header, line = _header(kept, comments, is_header, stated, wanted, source)
     table = [(number, cells_of(line, separator, source, number)) for number, line in kept if number > header]
-    names = [name or f"column {place}" for place, name in enumerate(cells_of(line, separator, source, header), 1)]
+    names, named_above = _names(cells_of(line, separator, source, header), kept, separator, header)
     rows = [row for row in table if any(row[1])]
     for number, cells in rows:
         # Separators at the end of the rows and not of the header are common.
@@ -111,6 +115,8 @@ def read_text_table(
             raise InputError(
                 source, f"line {number}", f"{len(cells)} cells", f"{len(names)}, one for each column of line {header}"
             )
+    units = dict(zip(names, (rows and units_in(rows[0][1])) or (), strict=False))
+    rows = rows[1:] if units else rows
     if not rows:
         raise InputError(source, "", "a header alone", "one row for each measurement")
     for name in ignored:
@@ -139,18 +145,35 @@ def read_text_table(
         columns = {name: tuple(map(_with_point, cells)) for name, cells in columns.items()}
     left_out = _left_out(
         {
-            "rows of empty cells": len(table) - len(rows),
-            "lines above the header": sum(number < header for number, _ in kept),
+            "rows of empty cells": len(table) - len(rows) - bool(units),
+            "lines above the header": sum(number < header for number, _ in filled) - named_above,
             "lines of comments below the header": sum(number > header for number, _ in comments),
             "columns without name and values": len(names) - len(places) - sum(name in ignored for name in names),
         }
     )
     dialect = Dialect(separator, decimal, header, encoding, thousands)
-    return TextTable(source, dialect, columns, tuple(numbers), left_out)
+    stated_units = {name: unit for name, unit in units.items() if unit and name in columns}
+    return TextTable(source, dialect, columns, tuple(numbers), left_out, stated_units)
 
 
 def _left_out(counted: dict[str, int]) -> tuple[str, ...]:
     return tuple(f"{number} {what}" for what, number in counted.items() if number)
+
+
+def _names(cells: Sequence[str], kept: Sequence[tuple[int, str]], separator: str, header: int) -> tuple[list[str], bool]:
+    """Names of columns, and whether some are of two lines: those that stand there twice, by what the line above has there."""
+    names = [name or f"column {place}" for place, name in enumerate(cells, 1)]
+    above = next((line for number, line in reversed(kept) if number < header), "")
+    twice = {name for name, times in Counter(names).items() if times > 1}
+    if not twice or separator == "space":
+        return names, False
+    of, groups = "", _tried_cells(above, separator)
+    both = []
+    for name, group in zip(names, [*groups, *[""] * (len(names) - len(groups))], strict=False):
+        # Of cells that a spreadsheet joined the first one has the text.
+        of = group or of
+        both.append(f"{of} {name}" if name in twice and of else name)
+    return (both, True) if len(set(both)) == len(both) else (names, False)
 
 
 def _nameless(name: str, place: int) -> bool:
@@ -262,7 +285,9 @@ def cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
     """
     mark = SEPARATORS.get(separator, separator)
     if mark == " ":
-        return line.split()
+        if '"' not in line:
+            return line.split()
+        line = " ".join(line.split("\t")).strip()
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True, strict=True))
     except csv.Error as error:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.exchange.dh_table import FIXED, PRISMATIC, REVOLUTE, read_dh_table
+from elastocal.exchange.dh_table import AS_STATED, FIXED, PRISMATIC, REVOLUTE, read_dh_table
 from elastocal.exchange.fixed_transforms import rotation_about, shift_word, turn_word
 from elastocal.exchange.robot_text import imported
 from elastocal.exchange.ros_kinematics import KINEMATICS, robot_from_kinematics
@@ -30,7 +30,7 @@ from elastocal.mechanics.usual_values import UNLIMITED_DEG
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from elastocal.exchange.dh_table import DhRow
+    from elastocal.exchange.dh_table import DhOptions, DhRow
     from elastocal.exchange.robot_text import Imported
     from elastocal.exchange.slid_frames import Piece
 
@@ -45,16 +45,14 @@ _MUCH_SHORTER = 0.5
 def robot_from_dh(
     path: str | Path,
     modified: bool = False,
-    angles: str = "deg",
-    lengths: str = "m",
+    options: DhOptions = AS_STATED,
     name: str | None = None,
     relative_std: float = RELATIVE_STD,
-    decimal: str | None = None,
 ) -> Imported:
     """The robot of a Denavit-Hartenberg table, or of a YAML file of `ros_kinematics`.
 
-    `modified`: craig's notation; else the standard one. `angles`, `lengths`, `decimal`: as in `read_dh_table`. `name`: of the
-    robot; that of the file without. `relative_std`: how well masses are known. Raises `InputError`: as in `read_dh_table`;
+    `modified`: Craig's notation; else the standard one. `options`: as in `read_dh_table`. `name`: of the robot; that of the
+    file without. `relative_std`: how well masses are known. Raises `InputError`: as in `read_dh_table`;
     compliances of some joints only, a prismatic joint without limits, two points of one name.
     """
     source = Path(path).as_posix()
@@ -63,8 +61,12 @@ def robot_from_dh(
         if isinstance(described, dict) and KINEMATICS in described:
             if modified:
                 raise InputError("--modified", "", f"a file of {KINEMATICS}, which is no table", "the file without --modified")
+            if options.ignore:
+                raise InputError(
+                    "--ignore", "", f"a file of {KINEMATICS}, of which nothing is left out", "the file without --ignore"
+                )
             return robot_from_kinematics(described, path, name)
-    rows = read_dh_table(path, angles, lengths, decimal)
+    rows, understood = read_dh_table(path, options)
     joints = [row for row in rows if row.kind != FIXED]
     points = [point_name(row.point) if row.point else "" for row in rows]
     points[-1] = points[-1] or END
@@ -98,7 +100,7 @@ def robot_from_dh(
     if free := [str(number) for number, row in enumerate(joints, 1) if row.limits is None]:
         notes.append(f"no limits of q{', q'.join(free)}: a turn either way")
     notation = f"{'modified' if modified else 'standard'} Denavit-Hartenberg parameters"
-    return imported(document, path, f"{notation}, in {angles} and {lengths} where a column does not say", notes)
+    return imported(document, path, notation, [*understood, *notes])
 
 
 def _words(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[str]:

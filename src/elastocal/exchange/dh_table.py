@@ -11,10 +11,11 @@ One row for each joint, or for what is fixed before, between or behind joints::
     6,     0,                0.0996, 0,       0,         R
 
 is a UR5e in the standard notation. ``type`` is R (revolute, also where the column is left out), P (prismatic) or F (fixed). A
-column of angles or lengths may end in ``_deg``, ``_rad``, ``_m`` or ``_mm``; without, an option says which. In radians ``pi/2``
-may stand for a number. Optional columns: ``lower`` and ``upper`` (joint limits; of prismatic joints lengths),
-``compliance_urad_per_Nm``, ``mass_kg`` with ``cx``, ``cy``, ``cz`` (centre of mass in the frame of the row), and ``point``
-(name of a measuring point at the frame of the row). In YAML the table is a list of rows with the same keys.
+column of angles or lengths ends in ``_deg``, ``_rad``, ``_m`` or ``_mm``, has ``[mm]`` behind its name or a row of units under
+the header; without, an option says which. In radians ``pi/2`` may stand for a number. Optional columns: ``lower`` and ``upper``
+(joint limits; of prismatic joints lengths), ``compliance_urad_per_Nm``, ``mass_kg`` with ``cx``, ``cy``, ``cz`` (centre of mass
+in the frame of the row), and ``point`` (name of a measuring point at the frame of the row). In YAML the table is a list of rows
+with the same keys.
 """
 
 from __future__ import annotations
@@ -27,12 +28,13 @@ from typing import TYPE_CHECKING, Any
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
+from elastocal.exchange.column_names import units_in, without_unit
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.io.documents import read_document
 from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
 ANGLE_UNITS = {"deg": math.radians(1.0), "rad": 1.0}
 LENGTH_UNITS = {"m": 1.0, "mm": 1e-3}
@@ -73,74 +75,126 @@ class DhRow:
     point: str
 
 
-def read_dh_table(path: str | Path, angles: str = "deg", lengths: str = "m", decimal: str | None = None) -> list[DhRow]:
-    """Rows of a Denavit-Hartenberg table.
+@dataclass(frozen=True)
+class DhOptions:
+    """How a table is read.
 
-    `path`: ends in ``.csv``, ``.yaml`` or ``.yml``. `angles`: of columns that do not say. `lengths`: of columns that do not
-    say. `decimal`: of CSV; commas are asked for where it is not stated. Raises `InputError`: file, line and column of what
-    cannot be read.
+    `angles`, `lengths`: units of columns that do not say; asked for where they are None. `decimal`: of CSV; commas are asked
+    for where it is not stated. `ignore`: columns that are left out.
+    """
+
+    angles: str | None = None
+    lengths: str | None = None
+    decimal: str | None = None
+    ignore: Collection[str] = ()
+
+
+AS_STATED = DhOptions()
+
+
+def read_dh_table(path: str | Path, options: DhOptions = AS_STATED) -> tuple[list[DhRow], list[str]]:
+    """Rows of a Denavit-Hartenberg table, and notes how they were understood and what was left out.
+
+    `path`: ends in ``.csv``, ``.yaml`` or ``.yml``. Raises `InputError`: file, line and column of what cannot be read, or a
+    column whose unit nothing states.
     """
     source = Path(path).as_posix()
     suffix = Path(path).suffix.lower()
     if suffix not in (".csv", ".yaml", ".yml"):
         raise InputError(source, "", f"a file that ends in {suffix or 'nothing'!r}", ".csv, .yaml or .yml")
-    columns, table = _csv_rows(path, source, decimal) if suffix == ".csv" else _yaml_rows(path, source)
-    meanings = _meanings(columns, angles, lengths, source)
+    columns, table, left_out = (_csv_rows if suffix == ".csv" else _yaml_rows)(path, source, options)
+    meanings = _meanings(columns, options, source)
     if len(table) > MOST_ROWS:
         raise InputError(source, "", f"{len(table)} rows", f"at most {MOST_ROWS}, one for each joint")
     rows = [_row(where, cells, meanings, source) for where, cells in table]
     if not any(row.kind != FIXED for row in rows):
         raise InputError(source, "", "no joint", "a row of type R or P for each joint")
-    return rows
+    return rows, [f"read: {'; '.join(f'{name!r} as {meaning}' for name, meaning in meanings.items())}", *left_out]
 
 
 @dataclass(frozen=True)
 class _Meaning:
-    """What a column holds: its name without the unit, and what one of it is in SI units; of angles in degrees or radians."""
+    """What a column holds: its name without the unit, and the units that its angles and its lengths have, if any."""
 
     name: str
-    angle: str
-    length: str
+    angle: str = ""
+    length: str = ""
+
+    def __str__(self) -> str:
+        units = " or ".join(unit for unit in (self.angle, self.length) if unit)
+        return f"{self.name} in {units}" if units else self.name
 
 
-def _csv_rows(path: str | Path, source: str, decimal: str | None) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
+_Rows = tuple[dict[str, str], list[tuple[str, dict[str, Any]]], list[str]]
+
+
+def _csv_rows(path: str | Path, source: str, options: DhOptions) -> _Rows:
+    """Columns with the units that a row under them has, rows by where they stand, and what was left out."""
     text = read_text_table(
-        path, _has_known_column, Dialect(decimal=decimal), wanted="columns d, a and alpha, such as d_m or d_mm"
+        path,
+        _has_known_column,
+        Dialect(decimal=options.decimal),
+        options.ignore,
+        wanted="columns d, a and alpha, such as d_m or d_mm",
+        units_in=units_in,
     )
-    if text.dialect.decimal == "comma" and decimal is None:
+    if text.dialect.decimal == "comma" and options.decimal is None:
         raise InputError(source, "", "numbers with commas", "--decimal comma where the comma is the decimal mark, else points")
     rows = zip(*text.columns.values(), strict=True)
     table = [(f"line {line}", dict(zip(text.columns, row, strict=True))) for line, row in zip(text.lines, rows, strict=True)]
-    return list(text.columns), table
+    file = f"names of columns in line {text.dialect.header}, separator {text.dialect.separator}, decimal {text.dialect.decimal}"
+    unused = [f"not used: {', '.join(options.ignore)}"] if options.ignore else []
+    columns = {name: text.units.get(name, "") for name in text.columns}
+    return columns, table, [f"file: {file}, encoding {text.dialect.encoding}", *unused, *text.left_out]
 
 
 def _has_known_column(cells: Sequence[str]) -> bool:
-    return any(cell in _NEEDED or cell.rpartition("_")[0] in _NEEDED for cell in cells)
+    return any(without_unit(cell)[0] in _NEEDED for cell in cells)
 
 
-def _yaml_rows(path: str | Path, source: str) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
+def _yaml_rows(path: str | Path, source: str, options: DhOptions) -> _Rows:
     rows = read_document(path)
     if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) for row in rows):
         raise InputError(source, "", type(rows).__name__, "a list of rows, such as `- {d_m: 0.1, a_m: 0, alpha_deg: 90}`")
-    columns = list(dict.fromkeys(str(name) for row in rows for name in row))
+    names = list(dict.fromkeys(str(name) for row in rows for name in row))
+    for name in options.ignore:
+        if name not in names:
+            raise InputError(source, "", f"no key {name!r} to ignore", closest_first(name, names))
+    columns = dict.fromkeys((name for name in names if name not in options.ignore), "")
     table = [(f"row {number}", {str(name): cell for name, cell in row.items()}) for number, row in enumerate(rows, 1)]
-    return columns, table
+    return columns, table, [f"not used: {', '.join(options.ignore)}"] if options.ignore else []
 
 
-def _meanings(columns: Sequence[str], angles: str, lengths: str, source: str) -> dict[str, _Meaning]:
-    """What each column is, by its name."""
+def _meanings(columns: Mapping[str, str], options: DhOptions, source: str) -> dict[str, _Meaning]:
+    """What each column is, by its name and the unit of the row under it."""
     found: dict[str, _Meaning] = {}
-    for column in columns:
-        name, _, unit = column.rpartition("_")
-        if unit in ANGLE_UNITS and name in (*_ANGLES, *_LIMITS):
-            meaning = _Meaning(name, unit, lengths)
-        elif unit in LENGTH_UNITS and name in (*_LENGTHS, *_LIMITS):
-            meaning = _Meaning(name, angles, unit)
-        elif column in (*_ANGLES, *_LENGTHS, *_LIMITS, *_PLAIN, *_WORDS):
-            meaning = _Meaning(column, angles, lengths)
+    for column, below in columns.items():
+        known = column in (*_PLAIN, *_WORDS)
+        name, stated = (column, None) if known else without_unit(column)
+        stated = {"°": "deg"}.get(stated or "", stated)
+        unit = stated or {"°": "deg"}.get(below, below)
+        if stated and below and unit != {"°": "deg"}.get(below, below):
+            raise InputError(source, "header", f"{column!r} and {below!r} in the row under it", "one unit")
+        if known:
+            meaning = _Meaning(name)
+        elif name not in (*_ANGLES, *_LENGTHS, *_LIMITS):
+            names = ["joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type", "lower_deg", "upper_deg", *_PLAIN]
+            allowed = closest_first(column, [*names, "cx_m", "cy_m", "cz_m", "point"])
+            raise InputError(source, "header", repr(column), f"{allowed}; import dh --ignore {column!r} leaves it out")
         else:
-            known = ["joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type", "lower_deg", "upper_deg", *_PLAIN]
-            raise InputError(source, "header", repr(column), closest_first(column, [*known, "cx_m", "cy_m", "cz_m", "point"]))
+            turns, shifts = name in (*_ANGLES, *_LIMITS), name in (*_LENGTHS, *_LIMITS)
+            if unit and not (turns and unit in ANGLE_UNITS) and not (shifts and unit in LENGTH_UNITS):
+                units = [*(ANGLE_UNITS if turns else ()), *(LENGTH_UNITS if shifts else ())]
+                raise InputError(source, "header", f"{column!r} in {unit}", ", ".join(units))
+            meaning = _Meaning(
+                name,
+                (unit if unit in ANGLE_UNITS else options.angles or "") if turns else "",
+                (unit if unit in LENGTH_UNITS else options.lengths or "") if shifts else "",
+            )
+            if not (meaning.angle or meaning.length):
+                option = "--angles deg or rad" if turns else "--lengths m or mm"
+                allowed = f"{option}, or {name}_{'deg' if turns else 'mm'} and such"
+                raise InputError(source, "header", f"no unit of {column!r}", allowed)
         if any(meaning.name == other.name for other in found.values()):
             raise InputError(source, "header", f"{meaning.name} twice", "each column once")
         found[column] = meaning
@@ -167,6 +221,11 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
             return None
         column, meaning = column_of[name], meanings[column_of[name]]
         turns = name in _ANGLES or (name in _LIMITS and kind != PRISMATIC)
+        if name not in _PLAIN and not (meaning.angle if turns else meaning.length):
+            option = "--angles deg or rad" if turns else "--lengths m or mm"
+            raise InputError(
+                source, f"{where}, {column}", f"a limit without a unit of {'angles' if turns else 'lengths'}", option
+            )
         value = _number(text(name), turns and meaning.angle == "rad")
         largest = MOST_TURNS * (2.0 * math.pi if meaning.angle == "rad" else 360.0) if turns else LARGEST_NUMBER
         if value is None or abs(value) > largest:

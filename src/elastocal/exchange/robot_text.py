@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, reason_of
 from elastocal.io.atomic_writes import check_places, write_text
 from elastocal.io.documents import check_document, one_line
 from elastocal.mechanics.robot_file import robot_from_document
@@ -84,7 +84,7 @@ def write_robot(result: Imported, path: str | Path) -> None:
     try:
         write_text(path, robot_text(result))
     except OSError as error:
-        raise InputError(path, "", error.strerror or str(error), "a place for a file") from None
+        raise InputError(path, "", reason_of(error), "a place for a file") from None
 
 
 def summary(result: Imported) -> list[str]:

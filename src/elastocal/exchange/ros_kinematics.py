@@ -58,12 +58,15 @@ def robot_from_kinematics(document: Mapping[str, Any], path: str | Path, name: s
     for number, (link, origin) in enumerate(links.items(), 1):
         words += [*displacement_words(_transform(origin, f"{KINEMATICS}.{link}", source)), f"Rz(q{number})"]
     words.append(f"[{point_name([*links][-1])}]")
+    names = [_JOINTS.get(link, link) for link in links]
     contents = {
         "name": name or Path(path).stem,
-        "joint_names": [_JOINTS.get(link, link) for link in links],
+        "joint_names": names,
         "chain": " ".join(words),
     }
     notes = [
+        f"read: {', '.join(f'q{n} is {name} of {link!r}' for n, (name, link) in enumerate(zip(names, links, strict=True), 1))}",
+        *(["not used: hash"] if "hash" in described else []),
         "no masses: the weight of the links is not known",
         "no limits of any joint: a turn either way",
         "base axes are the controller's (base, not base_link, which is turned half round)",

@@ -50,7 +50,10 @@ def robot_from_urdf(
     chain = chain_between(urdf, base, tip, points, source)
     weights = weights_of(urdf, chain, relative_std)
     gravity = gravity_in_base(urdf, base)
-    notes = list(weights.notes)
+    notes = [
+        f"read: {', '.join(f'q{number} from {joint.name!r}' for number, joint in enumerate(chain.joints, 1))}",
+        *weights.notes,
+    ]
     limits = [_limits(joint, limits_in, notes, source) for joint in chain.joints]
     if limits_in == DEG:
         notes.append("limits read in degrees, as the option says")
@@ -70,6 +73,8 @@ def robot_from_urdf(
         notes.append(f"nearly right angles stay as they are written, with few digits: those of {few}")
     if beside := [joint.name for joint in urdf.joints if joint.kind != "fixed" and joint.child not in chain.links]:
         notes.append(f"joints that are no part of the chain, left out: {', '.join(beside)}")
+    if urdf.left_out:
+        notes.append(f"not used: {', '.join(urdf.left_out)}, nor limits of effort and velocity")
     return imported(document, path, f"the links from {base!r} to {tip!r}", notes)
 
 

@@ -84,11 +84,15 @@ class Joint:
 
 @dataclass(frozen=True)
 class Urdf:
-    """A tree of links: every name once, every joint between two links that are there."""
+    """A tree of links: every name once, every joint between two links that are there.
+
+    `left_out`: what else the file has, by the names of its elements.
+    """
 
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
+    left_out: tuple[str, ...] = ()
 
 
 def read_urdf(path: str | Path) -> Urdf:
@@ -104,7 +108,10 @@ def read_urdf(path: str | Path) -> Urdf:
             raise InputError(source, f"<{part.tag}>", "no name", "a name")
         _check_part(part, f"{part.tag} {part.get('name')!r}", source)
     _check_tree(links, joints, source)
-    return Urdf(root.get("name") or Path(path).stem, tuple(map(_link, links)), tuple(map(_joint, joints)))
+    parts = [root, *links, *joints, *root.iterfind("link/inertial")]
+    left_out = {child.tag for part in parts for child in part if child.tag not in ("link", "joint", *_READ.get(part.tag, ()))}
+    name = root.get("name") or Path(path).stem
+    return Urdf(name, tuple(map(_link, links)), tuple(map(_joint, joints)), tuple(sorted(left_out)))
 
 
 def _link(part: Element) -> Link:

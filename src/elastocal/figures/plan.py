@@ -1,4 +1,4 @@
-"""A plan as a picture: where the targets will be, from above and from the side, and what each further pose is worth."""
+"""A plan as pictures: where the targets will be, what each further pose is worth, and the robot in every pose."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from elastocal.application.planning.cell import link_points
+from elastocal.figures.arm_view import as_seen, draw_arm
 from elastocal.figures.style import PALETTE, panels, styled
 from elastocal.mechanics.kinematics import poses
 
@@ -22,6 +24,10 @@ if TYPE_CHECKING:
 # Of the curve, above its end.
 _SHOWN_TIMES = 30.0
 _VIEWS = (("from above", 0, 1), ("from the side", 0, 2))
+# Of the pictures of single poses: how many stand in a row and on a page.
+_ACROSS, _MOST_ON_PAGE = 6, 48
+# A force is drawn as long as this share of the reach.
+_PULL = 0.35
 
 
 @styled
@@ -76,7 +82,42 @@ def _curves(axis: Axes, plan: Plan) -> None:
     # With too few poses hardly anything is known: nobody measures so few.
     axis.set_ylim(0.5e3 * plan.accuracy_m[-1], _SHOWN_TIMES * 1e3 * plan.accuracy_m[-1])
     axis.set_yscale("log")
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.yaxis.set_minor_formatter(NullFormatter())
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.set_xlabel("poses")
     axis.set_ylabel("position error left, RMS (mm)")
     axis.set_title("what each pose is worth")
-    axis.legend(loc="upper right")
+    # Below the axis: the curves fill the panel.
+    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2))
+
+
+@styled
+def pose_pictures(robot: Robot, plan: Plan) -> list[Figure]:
+    """The robot in every pose of a plan, by its number on the sheet, with the direction of the load; one figure a page."""
+    angles = robot.model_angles(np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles]))
+    force = np.concatenate([plan.fitted.force, plan.held_out.force])
+    links = link_points(robot, angles).transpose(1, 0, 2)
+    arms = as_seen(links)
+    pull = as_seen(force / max(np.linalg.norm(force, axis=1).max(), 1e-9))
+    middle, half = (arms.max((0, 1)) + arms.min((0, 1))) / 2, 0.53 * np.ptp(arms, axis=(0, 1)).max()
+    figures = []
+    for first in range(0, len(arms), _MOST_ON_PAGE):
+        page = range(first, min(first + _MOST_ON_PAGE, len(arms)))
+        rows = -(-len(page) // _ACROSS)
+        figure, axes = panels(rows, _ACROSS, 29 * rows)
+        for axis in axes.flat:
+            axis.set_axis_off()
+        for axis, pose in zip(axes.flat, page, strict=False):
+            judged = pose >= len(plan.fitted.joint_angles)
+            draw_arm(axis, links[pose], 3.0)
+            axis.plot(*arms[pose][-1], "os"[judged], color=PALETTE[judged], ms=5)
+            if force[pose].any():
+                axis.annotate(
+                    "", arms[pose][-1] + _PULL * half * pull[pose], arms[pose][-1], arrowprops={"arrowstyle": "->", "lw": 1.0}
+                )
+            axis.set_title(f"{pose + 1}{' held out' if judged else ''}", fontsize=8, loc="left", pad=1)
+            axis.set(xlim=middle[0] + np.array([-half, half]), ylim=middle[1] + np.array([-half, half]), aspect="equal")
+        figures.append(figure)
+    return figures

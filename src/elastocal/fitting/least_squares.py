@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.campaigns.campaign import NOT_TURNED
 from elastocal.fitting.memory import kept_conditions
 from elastocal.fitting.observations import sample_of
 from elastocal.fitting.parameters import parameters
@@ -67,11 +68,15 @@ def fit_frames(fitted: Fit, model: Model, observations: Observations, noise: Noi
     """
     found = fitted.estimate
     if not own_targets:
-        known = [replace(t, offset_m=tuple(at)) for t, at in zip(model.targets, found.target_offset, strict=True)]
+        known = [
+            replace(target, offset_m=tuple(at), rotation=NOT_TURNED)
+            for target, at in zip(model.targets, found.target_offset, strict=True)
+        ]
         model = replace(model, targets=tuple(known))
     start = registered(model, observations)
     start = replace(start, coefficients=found.coefficients, shapes=found.shapes)
     if not own_targets:
+        # To the last bit, which a rotation vector does not keep.
         start = replace(start, target_rotation=found.target_rotation)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
     around = kept_conditions(model, start, observations)

@@ -87,12 +87,9 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
         for session in estimate.sessions:
             in_session = (observations.states.session == session).astype(float)
             laws += [{coordinate: in_session} for coordinate in model.sites.base]
-    unknown = [index for index, target in enumerate(model.targets) if target.offset_m is None]
-    of_targets = len(laws) + np.arange(rows * len(unknown))
-    target_columns = np.zeros((count, rows, len(of_targets)))
-    for number, index in enumerate(unknown):
-        mask = observations.target == index
-        target_columns[mask, :, number * rows : (number + 1) * rows] = _target_columns(rotation[mask], rows)
+    columns = [_target_columns(rotation, rows, observations.target == index)[..., parts] for index, parts in model.fitted_parts]
+    target_columns = np.concatenate([np.zeros((count, rows, 0)), *columns], axis=2)
+    of_targets = len(laws) + np.arange(target_columns.shape[2])
     laws += [{} for _ in of_targets]
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
         laws += (
@@ -121,11 +118,11 @@ def effect_columns(
     return Factored(displacements, coordinate_jacobian, state).dense()
 
 
-def _target_columns(rotation: np.ndarray, rows: int) -> np.ndarray:
-    """Shift of a target along the axes of its measuring point and, for poses, its turn about them."""
+def _target_columns(rotation: np.ndarray, rows: int, seen: np.ndarray) -> np.ndarray:
+    """Shift of a target along the axes of its measuring point and, for poses, its turn about them, where it is seen."""
     columns = np.zeros((len(rotation), rows, rows))
     for first in range(0, rows, 3):
-        columns[:, first : first + 3, first : first + 3] = rotation
+        columns[seen, first : first + 3, first : first + 3] = rotation[seen]
     return columns
 
 

@@ -24,12 +24,13 @@ if TYPE_CHECKING:
 class Model:
     """What is taken to make the measurements.
 
-    `targets`: as in the campaign; those without an offset are fitted. `fitted_frames`: whether the placement of the base is
-    unknown, one for each session. `rows`: 3 where positions are measured, 6 where poses are. `nominal_compliance` (n,): rad/(N
-    m). `effects`: joint compliances, where they are identified, and errors of declared masses, where there are any, among them.
-    `time_zero_s`: from which effects count the time: the first measurement to be fitted. `row_span` (int, int): first and last
-    row of the measurements to be fitted, between which the campaign made its progress. `compliance_known`: whether the nominal
-    compliances are those of the robot file; else they are usual ones, or 0 of joints taken as rigid.
+    `targets`: as in the campaign; offsets and rotations that they do not have are fitted. `fitted_frames`: whether the
+    placement of the base is unknown, one for each session. `rows`: 3 where positions are measured, 6 where poses are.
+    `nominal_compliance` (n,): rad/(N m). `effects`: joint compliances, where they are identified, and errors of declared
+    masses, where there are any, among them. `time_zero_s`: from which effects count the time: the first measurement to be
+    fitted. `row_span` (int, int): first and last row of the measurements to be fitted, between which the campaign made its
+    progress. `compliance_known`: whether the nominal compliances are those of the robot file; else they are usual ones, or 0 of
+    joints taken as rigid.
     """
 
     sites: Sites
@@ -46,6 +47,16 @@ class Model:
     def identifies_compliance(self) -> bool:
         """Whether the joint compliances are parameters."""
         return any(effect.effect == "joint_compliance" for effect in self.effects)
+
+    @property
+    def fitted_parts(self) -> list[tuple[int, slice]]:
+        """Targets that are fitted, and which of shift and turn (x, y, z, rx, ry, rz) are."""
+        found = []
+        for number, target in enumerate(self.targets):
+            first, last = (0 if target.offset_m is None else 3), (self.rows if target.rotation is None else 3)
+            if first < last:
+                found.append((number, slice(first, last)))
+        return found
 
     def offered(self, states: States) -> frozenset[str]:
         """What effects may need that some states and the campaign have: see `Candidate.needs`."""
@@ -88,6 +99,7 @@ def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Mod
     `effects`: declared effects.
     """
     sites = sites_of(campaign.robot)
+    sites = replace(sites, usual_weight=not sites.masses and not campaign.measurements.wrench.any())
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
     weight = (declared_weight.candidate(sites),) if sites.masses else ()
     return Model(

@@ -29,9 +29,8 @@ def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
     turn = [Parameter(name, "rad", _ANYWHERE_RAD) for name in _TURN]
     if model.fitted_frames:
         found += [(f"frame {session}", parameter) for session in estimate.sessions for parameter in (*shift, *turn)]
-    for target in model.targets:
-        if target.offset_m is None:
-            found += [(f"target {target.name}", parameter) for parameter in (*shift, *(turn if model.rows == 6 else ()))]
+    for number, parts in model.fitted_parts:
+        found += [(f"target {model.targets[number].name}", parameter) for parameter in (*shift, *turn)[parts]]
     for effect in model.effects:
         found += [(effect.key, parameter) for parameter in effect.parameters]
         found += [(effect.key, Parameter(s.name, s.unit, s.highest - s.lowest)) for s in effect.shapes]
@@ -81,11 +80,11 @@ def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
             frame_position[number] += frame_rotation[number] @ shift
             frame_rotation[number] = frame_rotation[number] @ Rotation.from_rotvec(turn).as_matrix()
     target_offset, target_rotation = estimate.target_offset.copy(), estimate.target_rotation.copy()
-    for number, target in enumerate(model.targets):
-        if target.offset_m is None:
-            target_offset[number] += take(3)
-            if model.rows == 6:
-                target_rotation[number] = Rotation.from_rotvec(take(3)).as_matrix() @ target_rotation[number]
+    for number, parts in model.fitted_parts:
+        moved = np.zeros(6)
+        moved[parts] = take(parts.stop - parts.start)
+        target_offset[number] += moved[:3]
+        target_rotation[number] = Rotation.from_rotvec(moved[3:]).as_matrix() @ target_rotation[number]
     coefficients, shapes = [], []
     for effect, values, shape in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
         coefficients.append(values + take(len(values)))

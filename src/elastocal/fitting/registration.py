@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.campaign import NOT_TURNED
 from elastocal.fitting.model import Estimate
 from elastocal.fitting.observations import sample_of
 from elastocal.mechanics.kinematics import poses_of_points
@@ -81,10 +82,10 @@ def registered_to(
             offsets[index] = sum(sums.local(*frame) for sums, *frame in mine) / sum(sums.count for sums, *_ in mine)
         if np.abs(offsets - before).max() < _SETTLED_M:
             break
-    turns = np.tile(np.eye(3), (len(model.targets), 1, 1))
+    turns = Rotation.from_rotvec([target.rotation or NOT_TURNED for target in model.targets]).as_matrix()
     if observations.rotation is not None:
         turned = frames[0][session].transpose(0, 2, 1) @ observations.rotation
-        for index in unknown:
+        for index in (index for index in seen if model.targets[index].rotation is None):
             mask = observations.target == index
             turns[index] = Rotation.from_matrix(nominal_rotation[mask].transpose(0, 2, 1) @ turned[mask]).mean().as_matrix()
     nothing = Estimate(tuple(sessions.tolist()), *frames, offsets, turns).with_effects(model.effects)

@@ -1,13 +1,12 @@
-"""Tables on disk: Parquet files that carry their units, their provenance and a digest of their contents.
+"""Tables on disk: Parquet files that carry their units and their provenance.
 
 A file is one tidy table. Each column's unit and meaning stand in its field metadata; the file's own metadata hold the name of
-the schema, the provenance and, for each row group and column, a SHA-256 of the values. Row groups are blocks of data sets, so
-that any number of them is worked off in the same memory.
+the schema and the provenance. Row groups are blocks of data sets, so that any number of them is worked off in the same memory.
+That a file is as it was written says its record, see `io.records`.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     # Of each column one value or an array.
     Block = Mapping[str, np.ndarray | Sequence[str] | Sequence[float]]
 
-_TABLE, _PROVENANCE, _DIGESTS = "elastocal.table", "elastocal.provenance", "elastocal.sha256"
+_TABLE, _PROVENANCE = "elastocal.table", "elastocal.provenance"
 _AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again)"
 
 
@@ -68,7 +67,6 @@ def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], 
     """
     fields = [pa.field(c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}) for c in schema.columns]
     floats = [c.name for c in schema.columns if c.type.startswith("float")]
-    digests = []
     with (
         atomic_write(path) as partial,
         pq.ParquetWriter(
@@ -82,22 +80,20 @@ def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], 
     ):
         for block in blocks:
             values = _checked(path, schema, block)
-            if not len(next(iter(values.values()))):
-                continue
-            digests.append({c.name: _digest(c, values[c.name]) for c in schema.columns})
-            arrays = [_to_arrow(c, values[c.name], len(next(iter(values.values())))) for c in schema.columns]
-            writer.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), row_group_size=2**30)
-        metadata = {_TABLE: schema.name, _PROVENANCE: provenance, _DIGESTS: digests}
+            if len(next(iter(values.values()))):
+                arrays = [pa.array(values[c.name], _arrow_type(c)) for c in schema.columns]
+                writer.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), row_group_size=2**30)
+        metadata = {_TABLE: schema.name, _PROVENANCE: provenance}
         writer.add_key_value_metadata({key: json.dumps(value, sort_keys=True) for key, value in metadata.items()})
 
 
 def read_blocks(
     path: str | Path, schema: TableSchema, columns: Sequence[str] | None = None, **where: str | float
 ) -> Iterator[dict[str, np.ndarray]]:
-    """Read a table block by block, checked against its schema and its digests.
+    """Read a table block by block, checked against its schema.
 
     `columns`: only these; all without. `**where`: column = value: only row groups with this value throughout. Raises
-    `InputError`: a file that cannot be read, is another table, or whose contents are not those written.
+    `InputError`: a file that cannot be read or is another table.
     """
     wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
     with _parquet_file(path) as file:
@@ -110,9 +106,6 @@ def read_blocks(
             if index < 0 or fields.field(index).type != _arrow_type(column):
                 found = "nothing" if index < 0 else f"type {fields.field(index).type}"
                 raise InputError(path, f"column {column.name}", found, f"type {_arrow_type(column)}")
-        digests = _metadata(path, file, _DIGESTS)
-        if len(digests) != file.num_row_groups:
-            raise InputError(path, "row groups", str(file.num_row_groups), f"{len(digests)}: {_AS_WRITTEN}")
         positions = {file.metadata.schema.column(i).path: i for i in range(file.metadata.num_columns)}
         for group in range(file.num_row_groups):
             if any(_constant(file, group, positions[name]) != value for name, value in where.items()):
@@ -121,12 +114,7 @@ def read_blocks(
                 table = file.read_row_group(group, [c.name for c in wanted], use_threads=False)
             except (OSError, pa.ArrowException) as error:
                 raise InputError(path, f"row group {group}", f"unreadable data ({error})", _AS_WRITTEN) from None
-            block = {c.name: _to_numpy(c, table.column(c.name)) for c in wanted}
-            for column in wanted:
-                if _digest(column, block[column.name]) != digests[group][column.name]:
-                    place = f"column {column.name}, row group {group}"
-                    raise InputError(path, place, "values that were edited", _AS_WRITTEN)
-            yield block
+            yield {c.name: table.column(c.name).to_numpy() for c in wanted}
 
 
 def read_table(
@@ -199,47 +187,3 @@ def _checked(path: str | Path, schema: TableSchema, block: Block) -> dict[str, n
         raise InputError(path, "rows", f"columns of {sorted(lengths)} rows", "columns of one length")
     rows = lengths.pop()
     return {n: np.full(rows, v, dtype=object) if isinstance(v, str) else v for n, v in values.items()}
-
-
-def _digest(column: Column, array: np.ndarray) -> str:
-    if column.type in ("string", "text"):
-        data: bytes | memoryview = "\n".join(dict.fromkeys(array) if column.type == "string" else array).encode()
-    else:
-        data = np.ascontiguousarray(array).data
-    return hashlib.sha256(data).hexdigest()[:32]
-
-
-# Arrays go to and from Arrow through their buffers: every other way makes pyarrow import pandas, which takes longer than a job.
-def _to_arrow(column: Column, array: np.ndarray, rows: int) -> pa.Array:
-    if column.type == "string":
-        text = array[0].encode()
-        name = pa.Array.from_buffers(pa.string(), 1, [None, _buffer(np.array([0, len(text)], np.int32)), pa.py_buffer(text)])
-        return pa.DictionaryArray.from_arrays(_plain(pa.int32(), np.zeros(rows, np.int32)), name)
-    if column.type == "text":
-        return pa.array(array.tolist(), pa.string())
-    return _plain(_arrow_type(column), np.packbits(array, bitorder="little") if column.type == "bool" else array, rows)
-
-
-def _plain(arrow_type: pa.DataType, array: np.ndarray, rows: int | None = None) -> pa.Array:
-    return pa.Array.from_buffers(arrow_type, len(array) if rows is None else rows, [None, _buffer(array)])
-
-
-def _buffer(array: np.ndarray) -> pa.Buffer:
-    return pa.py_buffer(np.ascontiguousarray(array))
-
-
-def _to_numpy(column: Column, chunked: pa.ChunkedArray) -> np.ndarray:
-    array = chunked.combine_chunks() if chunked.num_chunks != 1 else chunked.chunk(0)
-    if column.type == "string":
-        names = np.array(array.dictionary.to_pylist(), dtype=object)
-        return names[_values(array.indices, np.int32)]
-    if column.type == "text":
-        return np.array(array.to_pylist(), dtype=object)
-    if column.type == "bool":
-        bits = np.unpackbits(np.frombuffer(array.buffers()[1], np.uint8), bitorder="little")
-        return bits[array.offset : array.offset + len(array)].astype(bool)
-    return _values(array, column.type)
-
-
-def _values(array: pa.Array, dtype: str | type[np.generic]) -> np.ndarray:
-    return np.frombuffer(array.buffers()[1], dtype)[array.offset : array.offset + len(array)]

@@ -8,7 +8,7 @@ import re
 import stat
 from pathlib import Path
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, reason_of
 
 # Python also takes 1_0 for 10, other scripts' digits, and words for what is no number.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -24,7 +24,7 @@ def kind_of(mode: int) -> str:
     return f"a {kinds.get(stat.S_IFMT(mode), 'device')}"
 
 
-def check_file(path: str | Path, kind: str = "a readable file") -> int:
+def check_file(path: str | Path, kind: str = "the path of a readable file") -> int:
     """Size of a file in bytes; a pipe or a device is refused before it is opened, as it might never end."""
     status = os.stat(path)
     if not stat.S_ISREG(status.st_mode):
@@ -32,7 +32,7 @@ def check_file(path: str | Path, kind: str = "a readable file") -> int:
     return status.st_size
 
 
-def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") -> bytes:
+def read_bytes(path: str | Path, largest: int, kind: str = "the path of a readable file") -> bytes:
     """Contents of a file.
 
     `largest`: bytes that it may have. `kind`: what the file should be, for messages. Raises `InputError`: no file, none that
@@ -46,7 +46,7 @@ def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") ->
                 return content
         raise InputError(path, "", f"more than {largest} bytes", f"{kind} of at most {largest} bytes")
     except OSError as error:
-        raise InputError(path, "", error.strerror or str(error), kind) from None
+        raise InputError(path, "", reason_of(error), kind) from None
     except ValueError as error:
         # A null character in the path; but an InputError is one too.
         if isinstance(error, InputError):
@@ -54,7 +54,7 @@ def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") ->
         raise InputError(path, "", str(error), kind) from None
 
 
-def read_text(path: str | Path, largest: int, kind: str = "a readable file") -> str:
+def read_text(path: str | Path, largest: int, kind: str = "the path of a readable file") -> str:
     """Contents of a file in UTF-8, without the byte order mark that spreadsheets write.
 
     `path`, `largest`, `kind`: as in `read_bytes`. Raises `InputError`: as `read_bytes`, and a text in another encoding, with

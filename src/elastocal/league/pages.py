@@ -46,12 +46,34 @@ def league_page(
     for split, title in _TITLES.items():
         mine = table[table["split"] == split]
         if len(mine):
-            parts += [f"## {title}", _ERRORS, error_table(mine, words)]
-    parts += ["## Intervals", _COVERED, _coverage(table, words)]
+            parts += [f"## {title}", _winners(mine, words), folded(_ERRORS, error_table(mine, words))]
+    parts += ["## Intervals", _coverage_sentence(table, words), folded(_COVERED, _coverage(table, words))]
     parts += ["## Published figures", _published(published, table)]
-    parts += ["## Mechanisms", _FOUND, _mechanisms(mechanisms)]
-    parts += ["## Cost", _SPENT, _costs(costs, words)]
+    parts += ["## Mechanisms", folded(_FOUND, _mechanisms(mechanisms))]
+    parts += ["## Cost", folded(_SPENT, _costs(costs, words))]
     return "\n\n".join(parts) + "\n"
+
+
+def folded(title: str, table: str) -> str:
+    """A table that a reader opens, under a title, as the Markdown of GitHub and of MyST."""
+    return f"<details><summary>{title}</summary>\n\n{table}\n\n</details>"
+
+
+def _winners(table: pd.DataFrame, words: Mapping[str, str]) -> str:
+    """How often each method has the smallest RMS error on one split."""
+    best = table.loc[table.groupby("data")["rms_mm"].idxmin(), "method"].map(words)
+    counts = best.value_counts()
+    return f"Smallest RMS error of {len(best)} data sets: {', '.join(f'{name} {count}' for name, count in counts.items())}."
+
+
+def _coverage_sentence(table: pd.DataFrame, words: Mapping[str, str]) -> str:
+    """The middle of the coverages of each method, and their range."""
+    covered = table.dropna(subset="covered").groupby("method", sort=False)["covered"]
+    each = [
+        f"{words[str(name)]} {100 * part.median():.0f} % (from {100 * part.min():.0f} to {100 * part.max():.0f})"
+        for name, part in covered
+    ]
+    return f"Median over data sets and splits: {'; '.join(each)}."
 
 
 def error_table(table: pd.DataFrame, words: Mapping[str, str]) -> str:

@@ -66,12 +66,15 @@ def estimate_from(columns: Mapping[str, np.ndarray], model: Model, sessions: Col
     """
     values = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
 
-    def placed(owner: str, default: Sequence[float]) -> tuple[list[float], np.ndarray]:
-        shift = [values.get((owner, name), missing) for name, missing in zip(("dx", "dy", "dz"), default, strict=True)]
-        return shift, Rotation.from_rotvec([values.get((owner, name), 0.0) for name in ("rx", "ry", "rz")]).as_matrix()
+    def placed(owner: str, *stated: Sequence[float] | None) -> tuple[list[float], np.ndarray]:
+        shift, turn = (
+            [values.get((owner, name), missing) for name, missing in zip(names, each or (0.0, 0.0, 0.0), strict=True)]
+            for names, each in zip((("dx", "dy", "dz"), ("rx", "ry", "rz")), stated, strict=True)
+        )
+        return shift, Rotation.from_rotvec(turn).as_matrix()
 
-    frames = [placed(f"frame {session}", (0.0, 0.0, 0.0)) for session in sessions]
-    targets = [placed(f"target {target.name}", target.offset_m or (0.0, 0.0, 0.0)) for target in model.targets]
+    frames = [placed(f"frame {session}", None, None) for session in sessions]
+    targets = [placed(f"target {target.name}", target.offset_m, target.rotation) for target in model.targets]
     return Estimate(
         tuple(int(session) for session in sessions),
         np.array([turn for _, turn in frames]),
@@ -88,10 +91,8 @@ def _absolute_values(model: Model, estimate: Estimate) -> np.ndarray:
     if model.fitted_frames:
         for shift, turn in zip(estimate.frame_position, estimate.frame_rotation, strict=True):
             parts += [shift, Rotation.from_matrix(turn).as_rotvec()]
-    for number, target in enumerate(model.targets):
-        if target.offset_m is None:
-            parts.append(estimate.target_offset[number])
-            if model.rows == 6:
-                parts.append(Rotation.from_matrix(estimate.target_rotation[number]).as_rotvec())
+    for number, fitted in model.fitted_parts:
+        turn = Rotation.from_matrix(estimate.target_rotation[number]).as_rotvec()
+        parts.append(np.concatenate([estimate.target_offset[number], turn])[fitted])
     effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
     return np.concatenate([*parts, *effects]) if parts or effects else np.zeros(0)

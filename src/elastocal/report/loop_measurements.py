@@ -111,8 +111,7 @@ def _part(part: Mapping[str, np.ndarray], campaign: Mapping[str, Any]) -> dict[s
         "targets": listed(
             (
                 ("" if name == target["point"] else f"{name} ")
-                + f"at the measuring point {target['point']}"
-                + (", place fitted" if target["offset_m"] == "unknown" else "")
+                + f"at the measuring point {target['point']}{_mount(target, campaign['measured'] == 'pose')}"
                 for name, target in used
             ),
             12,
@@ -123,6 +122,15 @@ def _part(part: Mapping[str, np.ndarray], campaign: Mapping[str, Any]) -> dict[s
         "coordinate frame": frame,
         "time": "recorded" if np.isfinite(part["time_s"]).any() else "not recorded",
     }
+
+
+def _mount(target: Mapping[str, Any], oriented: bool) -> str:
+    """What is fitted of how a target sits, and a known turn of its mount."""
+    rotation = target.get("rotation", target["offset_m"]) if oriented else ""
+    fitted = [word for word, value in (("place", target["offset_m"]), ("rotation", rotation)) if value == "unknown"]
+    known = "rotation" in target and oriented and rotation != "unknown" and any(rotation)
+    turned = f", turned by {np.degrees(np.linalg.norm(rotation)):.4g}°" if known else ""
+    return turned + (f", {' and '.join(fitted)} fitted" if fitted else "")
 
 
 def _distinct(part: Mapping[str, np.ndarray], *names: str) -> int:

@@ -51,7 +51,8 @@ def other_parameters(verdict: Mapping[str, Any], parameters: Mapping[str, np.nda
             continue
         kind = owner.split(" ")[0] if owner.startswith(("frame ", "target ")) else "declared"
         counts[kind] += 1
-        if kind == "declared":
+        if kind == "declared" or (kind == "target" and unit == "rad"):
+            # Where a target sits matters to nobody; how it is mounted is what the campaign may have wrongly.
             rows.append([capital(candidate_words(owner)), parameter_words(effect_of(owner), name), *scaled(value, error, unit)])
     placed = counts["frame"] + counts["target"]
     return {

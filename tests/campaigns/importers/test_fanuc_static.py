@@ -50,7 +50,7 @@ def test_file_that_is_no_mat_file_is_refused(tmp_path, contents):
 
 
 def test_missing_source_is_refused(tmp_path):
-    with refused(tmp_path / "nowhere", "", "No such file", "a MAT file"):
+    with refused(tmp_path / "nowhere", "", "no such file", "a MAT file"):
         fanuc_static.read(tmp_path / "nowhere")
 
 

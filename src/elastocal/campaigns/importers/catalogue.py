@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import pkgutil
 from importlib import import_module
 from typing import TYPE_CHECKING, Protocol, cast
 
-import elastocal.campaigns.importers
+import elastocal.campaigns.importers as package
 from elastocal.errors import InputError
+from elastocal.io.modules import module_names, modules_with
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -34,7 +34,9 @@ def importer(name: str, source: str | Path) -> Importer:
 
     `name`: of its module. `source`: file that names it, for the message. Raises `InputError`: there is none of this name.
     """
-    if name not in _modules() or not hasattr(module := _module(name), "FILES"):
+    check_importer(name, source)
+    module = import_module(f"{package.__name__}.{name}")
+    if not hasattr(module, "FILES"):
         raise _unknown(name, source)
     return cast("Importer", module)
 
@@ -44,22 +46,13 @@ def check_importer(name: str, source: str | Path) -> None:
 
     Raises `InputError`.
     """
-    if name not in _modules():
+    if name not in module_names(package):
         raise _unknown(name, source)
 
 
 def importers() -> dict[str, Importer]:
     """All of them by their names."""
-    modules = {name: _module(name) for name in _modules()}
-    return {name: cast("Importer", module) for name, module in modules.items() if hasattr(module, "FILES")}
-
-
-def _modules() -> list[str]:
-    return sorted(module.name for module in pkgutil.iter_modules(elastocal.campaigns.importers.__path__))
-
-
-def _module(name: str) -> object:
-    return import_module(f"elastocal.campaigns.importers.{name}")
+    return {name: cast("Importer", module) for name, module in modules_with("FILES", package).items()}
 
 
 def _unknown(name: str, source: str | Path) -> InputError:

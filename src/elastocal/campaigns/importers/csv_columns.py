@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -28,7 +28,7 @@ def read_columns(path: str | Path, separator: str, needed: Iterable[str], kind: 
         with open(path, encoding="utf-8-sig", newline="") as file:
             lines = [line for line in csv.reader(file, delimiter=separator, strict=True) if line]
     except OSError as error:
-        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
+        raise InputError(path, "", reason_of(error), "the path of a readable file") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(path, "", str(error), f"text with columns separated by {separator}") from None
     if len(lines) < 2:

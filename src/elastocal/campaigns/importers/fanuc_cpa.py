@@ -8,7 +8,7 @@ import numpy as np
 
 from elastocal.campaigns.importers.reflectors import write_reflectors
 from elastocal.campaigns.public_data import PublicFile
-from elastocal.errors import InputError
+from elastocal.errors import InputError, reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,7 +43,7 @@ def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         with open(path, encoding="utf-8") as file:
             lines = [line.split() for line in file]
     except OSError as error:
-        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
+        raise InputError(path, "", reason_of(error), "the path of a readable file") from None
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
     rows = []

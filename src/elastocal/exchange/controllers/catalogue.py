@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import pkgutil
-from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 import elastocal.exchange.controllers
 from elastocal.errors import InputError
+from elastocal.io.modules import modules_with
 
 if TYPE_CHECKING:
     from elastocal.exchange.controllers.protocol import Controller
@@ -15,10 +14,8 @@ if TYPE_CHECKING:
 
 def controllers() -> dict[str, Controller]:
     """Modules by the names of their languages."""
-    package = elastocal.exchange.controllers
-    names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
-    modules = [import_module(f"{package.__name__}.{name}") for name in names]
-    return {module.NAME: cast("Controller", module) for module in modules if hasattr(module, "NAME")}
+    modules = modules_with("NAME", elastocal.exchange.controllers)
+    return {module.NAME: cast("Controller", module) for module in modules.values()}
 
 
 def controller_of(name: str, suffix: str) -> Controller | None:

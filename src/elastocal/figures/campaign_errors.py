@@ -1,0 +1,42 @@
+"""Held-out errors of several campaigns, before and after, on one axis."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from elastocal.figures.style import PALETTE, panels, styled
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+_STAGES = (("before", "declared model", PALETTE[1]), ("after", "with the effects found", PALETTE[0]))
+
+
+@styled
+def campaign_errors(table: pd.DataFrame) -> Figure:
+    """Root mean square errors with their intervals, a line for each campaign.
+
+    `table`: ``campaign`` and ``before_rms_mm``, ``before_rms_low_mm``, ``before_rms_high_mm``, the same for after; mm.
+    """
+    rows = np.arange(len(table))[::-1]
+    figure, axes = panels(1, 1, 24 + 6 * len(table))
+    axis = axes[0, 0]
+    axis.hlines(rows, table["after_rms_mm"], table["before_rms_mm"], color="#c8c8c8", lw=2.5, zorder=1)
+    for stage, words, color in _STAGES:
+        rms, low, high = (table[f"{stage}_rms{end}_mm"].to_numpy(float) for end in ("", "_low", "_high"))
+        # An interval that is open above is drawn to the value alone.
+        span = [rms - low, np.where(np.isfinite(high), high - rms, 0.0)]
+        axis.errorbar(rms, rows, xerr=span, fmt="o", color=color, ms=4, lw=1.2, capsize=2, label=words, zorder=2)
+    axis.set_yticks(rows, [name.replace("_", " ") for name in table["campaign"]])
+    axis.set_xscale("log")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlabel("RMS position error of held-out poses (mm), with 95 % intervals")
+    axis.grid(visible=False, axis="y")
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure

@@ -1,0 +1,73 @@
+"""The demonstration runs the commands that it prints, in their order; .ci/run goes the whole way with them."""
+
+import shlex
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from elastocal.command import demo, main
+
+DONE = {"plan": 0, "check": 0, "diagnose": 0, "correct": 0, "certificate": 1}
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run it with subcommands that only note what they were called with; what was called, and what was printed."""
+    called = []
+
+    def main_of_the_rest(self, args=None, **options):
+        if options.get("standalone_mode", True):
+            return whole(self, args, **options)
+        called.append(list(args))
+        return codes[args[0]]
+
+    codes = dict(DONE)
+    whole = main.InOrder.main
+    monkeypatch.setattr(main.InOrder, "main", main_of_the_rest)
+    monkeypatch.setattr(demo, "workplace", lambda: tmp_path)
+    stand_ins = {
+        "fill_sheet": lambda *_: 12,
+        "write_milling_path": lambda *_: 50,
+        "measured_errors": lambda *_: {
+            "uncorrected": np.full(3, 2e-3),
+            "corrected": np.full(3, 1e-4),
+            "noise alone": np.full(3, 9e-5),
+        },
+    }
+    for name, stand_in in stand_ins.items():
+        monkeypatch.setattr(f"elastocal.blind.rehearsal_files.{name}", stand_in)
+    monkeypatch.setattr("elastocal.campaigns.reading.read_descriptions", lambda *_: ({}, ""))
+
+    def ended(*words, **other):
+        codes.update(other)
+        return CliRunner().invoke(main.app, ["demo", str(tmp_path / "cell"), *words]), called
+
+    return ended
+
+
+def test_what_is_printed_is_what_is_run_from_plan_to_certificate(run):
+    result, called = run()
+    assert result.exit_code == 0, result.output
+    assert [words[0] for words in called] == list(DONE)
+    typed = [shlex.split(line[2:])[1:] for line in result.stderr.splitlines() if line.startswith("$ elastocal")]
+    assert typed == called
+    assert "✓" in result.stderr and "2.00 mm RMS before, 0.100 mm after" in result.stderr
+    assert "hidden in it: transmission_harmonic of joint" in result.stderr
+
+
+def test_a_step_that_fails_ends_it_with_its_exit_code(run):
+    result, called = run(diagnose=3)
+    assert result.exit_code == 3
+    assert [words[0] for words in called] == ["plan", "check", "diagnose"]
+
+
+@pytest.mark.parametrize(("desktop", "opened"), [(True, 1), (False, 0)])
+def test_the_report_is_opened_where_somebody_sits_at_a_desktop(run, monkeypatch, tmp_path, desktop, opened):
+    pages = []
+    monkeypatch.setattr(demo, "_has_browser", lambda: desktop)
+    monkeypatch.setattr(demo.webbrowser, "open", pages.append)
+    run()
+    assert pages == [(tmp_path / "reports/loop/cell/report.html").as_uri()] * opened
+    run("--no-open")
+    assert len(pages) == opened

@@ -1,0 +1,215 @@
+"""What columns are: found by their names, asked for where they could be two things."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from imported_tables import PLAIN, ROW, table
+from scipy.spatial.transform import Rotation
+from support import refused, robot_of
+
+from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+
+
+@pytest.mark.parametrize("header", ["Load [kg]", "load (kg)", "Cycle [s]", "Target [mm]", "Marker (mm)"])
+def test_a_number_or_name_with_a_unit_is_a_question(tmp_path, header):
+    text = f"q1,x,y,z,{header}\n0,1,2,3,4\n"
+    with refused(tmp_path / "t.csv", repr(header), f"--ignore {header!r}", f"={header!r}"):
+        table(tmp_path, text)
+    assert table(tmp_path, text, replace(PLAIN, ignore=[header])).ignored == (header,)
+    assert table(tmp_path, text, replace(PLAIN, columns={"load": header})).table["load"].tolist() == [4]
+    assert table(tmp_path, "q1,x,y,z,load [-]\n0,1,2,3,4\n").table["load"].tolist() == [4]
+
+
+SIX = "1,2,3,4,5,6"
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"q[{joint}]" for joint in range(1, 7)],
+        [f"q[{joint}]" for joint in range(6)],
+        [f"J({joint})" for joint in range(1, 7)],
+        [f"J ( {joint} )" for joint in range(1, 7)],
+        [f"q[{joint}] [deg]" for joint in range(6)],
+        [f"actual_q_{joint}" for joint in range(6)],
+        [f"rax_{joint}" for joint in range(1, 7)],
+        [f"/joint_states/A{joint}/position" for joint in range(1, 7)],
+        [f"/joint_states/position.J{joint}" for joint in range(1, 7)],
+    ],
+)
+def test_joints_may_be_counted_by_an_index_or_from_0_and_have_the_names_of_topics(tmp_path, names):
+    found = table(tmp_path, f"{','.join(names)},x,y,z\n{SIX},{ROW}\n")
+    np.testing.assert_allclose([found.table[f"q{joint}"][0] for joint in range(1, 7)], np.radians(range(1, 7)))
+    assert bool(found.notes) == ("0" in names[0])
+
+
+def test_an_index_is_no_unit(tmp_path):
+    names = {f"q{joint + 1}": f"q_d[{joint}]" for joint in range(6)}
+    found = table(tmp_path, f"{','.join(names.values())},x,y,z\n{SIX},{ROW}\n", replace(PLAIN, columns=names))
+    assert found.options.units["q1"] == "deg"
+
+
+@pytest.mark.parametrize(
+    ("names", "columns", "words"),
+    [
+        # A part of what is counted from 0, four of it, and two counts.
+        ("q[0],q[2],q[3]", {}, ["counted from 0", "--column q1="]),
+        ("q0,q1,q2,q3", {}, ["counted from 0", "--column q1="]),
+        ("q[0],q[1],q[2]", {"q1": "q[0]"}, ["counted from 0"]),
+        ("J1,J2,A3", {}, ["'J1' and 'A3'", "--ignore"]),
+        ("J1,J2,A1,A2", {}, ["both 'J1' and 'A1'", "--ignore"]),
+        ("position0,position1", {}, ["no joint angles", "not yet used: position0, position1"]),
+    ],
+)
+def test_joints_that_may_be_counted_in_two_ways_are_a_question(tmp_path, names, columns, words):
+    text = f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n"
+    with refused(tmp_path / "t.csv", "header", *words):
+        table(tmp_path, text, replace(PLAIN, columns=columns))
+
+
+@pytest.mark.parametrize(
+    "joints", [[f"rax_{j}" for j in range(1, 7)], [f"A{j}" for j in range(1, 7)], [f"axis_{j}_real" for j in "abcdef"], []]
+)
+@pytest.mark.parametrize("parts", [["q1", "q2", "q3", "q4"], ["q0", "q1", "q2", "q3"]])
+def test_a_quaternion_beside_joints_is_a_question(tmp_path, joints, parts):
+    rng = np.random.default_rng(1)
+    turns = Rotation.random(5, random_state=rng)
+    rows = "".join(
+        f"{','.join(['5'] * len(joints) + [f'{each:.6f}' for each in quat])},{ROW}\n"
+        for quat in turns.as_quat()[:, [3, 0, 1, 2]]
+    )
+    text = f"{','.join([*joints, *parts])},x,y,z\n{rows}"
+    with refused(tmp_path / "t.csv", "header", ", ".join(parts), "length 1", f"--column qw={parts[0]!r}"):
+        table(tmp_path, text)
+    if joints:
+        columns = {f"q{number}": name for number, name in enumerate(joints, 1)} | dict(
+            zip(("qw", "qx", "qy", "qz"), parts, strict=True)
+        )
+        found = table(tmp_path, text, replace(PLAIN, columns=columns))
+        got = np.column_stack([found.table[name] for name in ("rx", "ry", "rz")])
+        np.testing.assert_allclose(got, turns.as_rotvec(), atol=1e-5)
+
+
+def test_four_joints_that_are_no_quaternion_are_joints(tmp_path):
+    assert table(tmp_path, f"q1,q2,q3,q4,x,y,z\n0.5,0.5,0.5,0.5,{ROW}\n10,20,30,40,{ROW}\n").joints == 4
+
+
+@pytest.mark.parametrize("others", ["A,B,C", "W,P,R", "A [deg],B [deg],C [deg]", "E4,E5,E6"])
+@pytest.mark.parametrize("external", ["E1,E2,E3", "E1"])
+def test_external_axes_beside_an_orientation_are_a_question(tmp_path, others, external):
+    count = len(external.split(","))
+    text = f"q1,x,y,z,{others},{external}\n1,{ROW},10,20,30{',0' * count}\n"
+    options = replace(PLAIN, rotation="euler:ZYX")
+    with refused(tmp_path / "t.csv", "header", external.replace(",", ", "), "external axes?", "--column e1="):
+        table(tmp_path, text, options)
+    # Said in part it is still one.
+    names = others.split(",")
+    if count == 1:
+        with refused(tmp_path / "t.csv", "header", "external axes?"):
+            table(tmp_path, text, replace(options, columns={"e2": names[1], "e3": names[2]}))
+    found = table(tmp_path, text, replace(options, columns=dict(zip(("e1", "e2", "e3"), names, strict=True))))
+    expected = Rotation.from_euler("ZYX", [10, 20, 30], degrees=True).as_rotvec()
+    np.testing.assert_allclose([found.table[name][0] for name in ("rx", "ry", "rz")], expected)
+
+
+def test_euler_angles_with_nothing_beside_them_are_what_the_option_says(tmp_path):
+    assert "rx" in table(tmp_path, f"q1,x,y,z,E1,E2,E3\n1,{ROW},1,2,3\n", replace(PLAIN, rotation="euler:ZYX")).table
+
+
+def test_a_label_that_is_no_pose_is_a_question(tmp_path):
+    """Controllers call the posture of the arm its configuration."""
+    text = f"Config,q1,x,y,z\nFUT,1,{ROW}\nFUT,40,{ROW}\n"
+    with refused(tmp_path / "t.csv", "line 2, column Config", "'FUT'", "--ignore 'Config'"):
+        table(tmp_path, text)
+    assert table(tmp_path, text, replace(PLAIN, ignore=["Config"])).table["pose"].tolist() == [1, 2]
+
+
+NAMED = ("rail", "shoulder_pan_joint", "J1")
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        "rail,shoulder_pan_joint,J1",
+        "rail [mm],Shoulder Pan Joint (deg),J1 [deg]",
+        "rail_mm,shoulder_pan_joint_deg,J1_deg",
+        "/joint_states/rail/position,/joint_states/shoulder_pan_joint/position,/joint_states/J1/position",
+    ],
+)
+def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
+    robot = replace(robot_of("Tx(q1) Rz(q2) Tx(1) Rz(q3) [A]"), joint_names=NAMED)
+    velocity = "/joint_states/rail/velocity"
+    (tmp_path / "t.csv").write_text(f"{headers},{velocity},x,y,z\n1,2,3,9,{ROW}\n")
+    found = read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
+    np.testing.assert_allclose([found.table[name][0] for name in ("q1", "q2", "q3")], [0.001, *np.radians([2, 3])])
+    assert found.ignored == (velocity,)
+    # What was found out needs no robot a second time.
+    assert read_measurement_table(tmp_path / "t.csv", found.options).options == found.options
+
+
+def test_a_rail_is_measured_in_lengths_and_a_joint_in_angles(tmp_path):
+    robot = robot_of("Tx(q1) Rz(q2) [A]")
+    for names, unit in (("J1 [deg],J2", "J1 [deg]"), ("J1,J2 [mm]", "J2 [mm]")):
+        (tmp_path / "t.csv").write_text(f"{names},x,y,z\n1,2,{ROW}\n")
+        with refused(tmp_path / "t.csv", f"unit of {unit!r}", "--unit"):
+            read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
+
+
+@pytest.mark.parametrize(
+    ("names", "words"), [("J1,J2,J3", ["3 joints", "--ignore"]), ("J1", ["no column q2"]), ("a,b", ["no joint angles"])]
+)
+def test_as_many_joints_as_the_robot_has_are_needed(tmp_path, names, words):
+    (tmp_path / "t.csv").write_text(f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n")
+    with refused(tmp_path / "t.csv", "header", *words):
+        read_measurement_table(tmp_path / "t.csv", PLAIN, robot_of("Rz(q1) Tx(1) Rz(q2) [A]"))
+
+
+def test_topics_have_positions_orientations_and_forces(tmp_path):
+    names = [f"/tcp/pose/position/{axis}" for axis in "xyz"] + [f"field.pose.orientation.{axis}" for axis in "wxyz"]
+    text = f"J1,/ft/wrench/force/x,/tcp/twist/linear/x,{','.join(names)}\n5,6,9,{ROW},1,0,0,0\n"
+    found = table(tmp_path, text)
+    assert [found.table[name][0] for name in ("x", "y", "z", "fx", "rx")] == [0.001, 0.002, 0.003, 6.0, 0.0]
+    assert found.ignored == ("/tcp/twist/linear/x",)
+
+
+@pytest.mark.parametrize("names", ["qx,qy,qz", "qw,qx", "Q_x,Q_y,Q_z"])
+def test_a_part_of_a_quaternion_is_a_question(tmp_path, names):
+    text = f"q1,x,y,z,{names}\n1,{ROW}{',0' * len(names.split(','))}\n"
+    with refused(tmp_path / "t.csv", "header", "a part of a quaternion", "--column qw=NAME", "--rotation none"):
+        table(tmp_path, text)
+    assert table(tmp_path, text, replace(PLAIN, rotation="none")).ignored == tuple(names.split(","))
+
+
+@pytest.mark.parametrize(
+    "head", ["q1,x,y,z,fz\ndeg,mm,mm,mm,kN", "q1,x,y,z,fz\n[deg],[mm],(mm),mm,[ kN ]", "q1 [deg],x,y_mm,z,fz\n,mm,mm,mm,kN"]
+)
+def test_units_may_stand_in_a_row_under_the_header(tmp_path, head):
+    found = table(tmp_path, f"{head}\n90,{ROW},4\n", ImportOptions(target="a"))
+    assert (found.table["q1"][0], found.table["x"][0], found.table["fz"][0]) == (np.pi / 2, 0.001, 4000.0)
+    assert any(note.startswith("units in the row under the header") for note in found.notes)
+    again = table(tmp_path, f"{head}\n90,{ROW},4\n", found.options)
+    assert again.options == found.options and again.table["fz"].tolist() == [4000.0]
+
+
+def test_a_unit_of_the_row_that_the_header_contradicts_is_a_question_and_options_go_before_both(tmp_path):
+    text = f"q1,x [mm],y,z\ndeg,m,mm,mm\n90,{ROW}\n"
+    with refused(tmp_path / "t.csv", "header", "'x [mm]' and 'm'", "one unit"):
+        table(tmp_path, text)
+    text = f"q1,x,y,z\nmm,mm,mm,mm\n90,{ROW}\n"
+    with refused(tmp_path / "t.csv", "unit of 'q1'", "'mm'", "--unit q1="):
+        table(tmp_path, text, ImportOptions(target="a"), robot_of("Rz(q1) Tx(1) [A]"))
+    assert table(tmp_path, text, replace(PLAIN, units={"q1": "deg"})).table["q1"][0] == np.pi / 2
+
+
+def test_a_first_row_of_words_that_are_no_units_is_no_row_of_units(tmp_path):
+    with refused(tmp_path / "t.csv", "line 2, column q1", "'degrees?'"):
+        table(tmp_path, f"q1,x,y,z\ndegrees?,mm,mm,mm\n90,{ROW}\n")
+
+
+def test_what_may_surprise_is_noted(tmp_path):
+    found = table(tmp_path, f"q1,x,y,z,fz,time\n90,{ROW},4,5\n", replace(PLAIN, units={"angles": "rad", "lengths": "mm"}))
+    assert "'time' in s, as nothing states a unit" in found.notes
+    assert "units as usual, as nothing states them: 'fz' in N" in found.notes
+    assert any("'q1' goes to 90 rad, 14.3 turns" in note and "--angles deg" in note for note in found.notes)
+    assert table(tmp_path, f"q1,x,y,z,fz [N],time [s]\n90,{ROW},4,5\n").notes == ()

@@ -1,0 +1,34 @@
+"""The sheet of a plan has a row for each pose, in degrees, with a box for each measurement."""
+
+import numpy as np
+from drawn_figures import empty_pictures
+from made_surveys import made_candidates, made_survey
+
+from elastocal.application.planning.plan import planned
+from elastocal.application.planning.sheet import sheet
+from elastocal.report.plan_pages import plan_facts, write_plan_sheet
+
+
+def made():
+    survey = made_survey()
+    plan = planned(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    return survey, plan, sheet(survey, plan)
+
+
+def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
+    survey, plan, rows = made()
+    facts = plan_facts(survey, plan, rows, ["worth"])
+    angles = np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles])
+    assert len(facts["rows"]) == len(angles) == 18 and facts["fitted"] == 14
+    for row, expected in zip(facts["rows"], angles, strict=True):
+        shown = np.array(row["cells"][1 : 1 + survey.robot.joints], float)
+        np.testing.assert_allclose(shown, np.degrees(expected), atol=0.006)
+        assert len(row["cells"]) + 1 == len(facts["heads"])
+    boxes = sum(visit["count"] for row in facts["rows"] for visit in row["visits"])
+    assert boxes * len(survey.targets) == len(rows)
+
+
+def test_the_sheet_is_typeset(tmp_path):
+    pictures = dict(zip(("overview", "poses0"), map(str, empty_pictures(tmp_path, ["overview", "poses0"])), strict=True))
+    write_plan_sheet(tmp_path / "plan.pdf", plan_facts(*made(), ["It is worth the effort."]), pictures)
+    assert (tmp_path / "plan.pdf").read_bytes().startswith(b"%PDF")

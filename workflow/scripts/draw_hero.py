@@ -1,0 +1,18 @@
+"""The arm of a campaign with its errors at held-out poses, before and after."""
+
+from job import Job, origin_of, run
+
+from elastocal.figures.hero import arm_with_errors
+from elastocal.figures.style import save
+from elastocal.io.json_files import read_json
+from elastocal.loop.residual_tables import read_residuals
+from elastocal.mechanics.robot_file import robot_from_document
+
+
+def draw_hero(job: Job) -> None:
+    robot = robot_from_document(read_json(job.input.descriptions)["robot"])
+    figure = arm_with_errors(robot, read_residuals(job.input.residuals, robot.joints), read_json(job.input.verdict)["heldout"])
+    save(figure, job.output.pdf, job.output.png, origin_of(job))
+
+
+run(draw_hero, snakemake)
