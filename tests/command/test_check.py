@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from analysed_robots import ROBOTS, analysed
+from analysed_robots import analysed
 from made_folders import made_folder, made_table
 from typer.testing import CliRunner
 
