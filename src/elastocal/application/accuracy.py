@@ -322,7 +322,7 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
         names = ", ".join(accuracy.left_out)
         text += f" {millimetres(accuracy.left_out_m)} of it stand for {names}, which no command contains."
     if accuracy.form_m:
-        why = "held-out poses were missed by more than the fit says" if accuracy.contradicted else "other models fit as well"
+        why = "validation poses were missed by more than the fit says" if accuracy.contradicted else "other models fit as well"
         text += f" {millimetres(accuracy.form_m)} of it stand for the form of the model: {why}."
     return text
 

@@ -78,7 +78,7 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     left = f"; not identifiable: {_listed(facts['held'])}" if facts["held"] else ""
     sessions = f", {facts['sessions']} sessions" if facts["sessions"] > 1 else ""
     robot = f"{facts['campaign']}: {facts['robot']}, {facts['joints']} joints"
-    poses = f"{facts['training']['poses']} poses to fit and {facts['held_out']['poses']} held out"
+    poses = f"{facts['training']['poses']} poses to fit and {facts['held_out']['poses']} validation poses"
     # Numbers of loads are labels; 0 is none.
     loaded = len(facts["loads"]) - (0 in facts["loads"])
     parts = [*(["unloaded"] if 0 in facts["loads"] else []), *([f"{loaded} load{'s' * (loaded > 1)}"] if loaded else [])]
