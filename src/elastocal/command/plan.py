@@ -46,7 +46,7 @@ def plan(
     criterion: Annotated[
         str,
         typer.Option(
-            help="D, A or I: minimize the determinant, the variance of the parameters, or the error over the workspace."
+            help="D, A or I: minimize the determinant or the trace of the covariance, or the error over the workspace."
         ),
     ] = "D",
     force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0,
