@@ -5,7 +5,7 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper audit test test-slurm fuzz soak mutants lint bench pictures site crate supply lock clean
+.PHONY: paper audit test test-slurm fuzz soak mutants lint bench pictures site crate supply dist installed lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
@@ -54,6 +54,23 @@ site: .venv/ready-for-tests
 	$(BIN)/snakemake -j1 signatures
 	$(BIN)/python docs/site/assemble.py site/source
 	$(BIN)/sphinx-build -q -W --keep-going -j $(CORES) -b html -c docs/site -d site/cache site/source site/html
+
+# Wheel and source archive of the version in src/elastocal/__init__.py.
+dist: .venv/ready
+	rm -rf dist
+	$(BIN)/uv build -q --no-build-isolation --python $(BIN)/python --out-dir dist
+
+# The whole way in a fresh environment without the checkout: the wheel with the lowest or the highest versions that pyproject.toml
+# allows, by an interpreter: make installed RESOLUTION=highest INTERPRETER=3.13
+RESOLUTION ?= lowest-direct
+INTERPRETER ?= $(PYTHON)
+installed: dist
+	rm -rf .installed
+	$(BIN)/uv venv -q --python $(INTERPRETER) .installed/env
+	$(BIN)/uv pip compile -q --system-certs --resolution $(RESOLUTION) --python .installed/env/bin/python pyproject.toml -o .installed/versions.txt
+	$(BIN)/uv pip install -q --system-certs --python .installed/env/bin/python -r .installed/versions.txt
+	$(BIN)/uv pip install -q --no-deps --python .installed/env/bin/python dist/*.whl
+	work="$$(mktemp -d)" && cd "$$work" && OMP_NUM_THREADS=1 "$(CURDIR)/.installed/env/bin/elastocal" demo --no-open && rm -r "$$work"
 
 # A finished run as a Workflow Run RO-Crate, held against its files and its profile.
 crate: .venv/ready .venv-crate/ready

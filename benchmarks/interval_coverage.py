@@ -13,7 +13,7 @@ import numpy as np
 from common import ROOT
 from scipy.stats import bootstrap
 
-from elastocal.figures.style import PALETTE, panels, save_png, styled
+from elastocal.figures.style import PALETTE, panels, styled
 from elastocal.validation.held_out import Errors, intervals
 
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
@@ -58,7 +58,7 @@ def draw(page: Path) -> None:
         axis.set(title=kind, xlabel="held-out poses", xticks=POSES)
     axes[0, 0].set_ylabel("intervals with the true value (%)")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    save_png(figure, str(page.with_suffix(".png")))
+    figure.savefig(page.with_suffix(".png"), metadata={"Software": None}, dpi=150)
 
 
 def covered(kind: str, poses: int, campaigns: int, truth: Mapping[str, float]) -> tuple[dict[tuple[str, str], float], float]:

@@ -4,10 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from analysed_robots import ROBOTS, analysed
+from analysed_robots import analysed
 from made_folders import made_folder, made_table
 from typer.testing import CliRunner
 
+from elastocal.command.check import lines
 from elastocal.command.main import app
 from elastocal.errors import InputError
 
@@ -26,24 +27,35 @@ def test_headings_say_what_was_read_identified_and_testable(folder):
     assert result.exit_code == 0, result.output
     answer, *rest = result.output.splitlines()
     assert answer.startswith("✓ made can be diagnosed: ")
-    for words in ("read", "held out", "noise", "compliance", "testable"):
+    for words in ("read", "validation poses", "noise", "compliance", "testable"):
         assert any(line.startswith(f"  {words}") or words in line for line in rest), words
     assert any(line.startswith("! ") for line in rest)
     assert rest[-1] == f"next: elastocal diagnose {folder}"
 
 
-def test_labels_of_loads_are_counted_and_not_printed_as_newtons(folder):
-    from elastocal.command.check import lines
-    from elastocal.loop.overview import overview
-
-    facts = overview(folder, ROBOTS) | {"loads": [0, 1, 7], "largest_force_N": 1234.0}
-    words = " ".join(text for _, text in lines(facts))
-    assert "3 loads, forces up to 1,234 N" in words and "0, 1, 7" not in words
+@pytest.mark.parametrize(
+    ("loads", "force", "words"),
+    [
+        ([0, 1, 7], 1234.0, "unloaded and 2 loads of up to 1,234 N; "),
+        ([7], 150.4, "1 load of up to 150 N; "),
+        ([0], 0.0, "unloaded; "),
+    ],
+)
+def test_labels_of_loads_are_counted_and_not_printed_as_newtons(folder, loads, force, words):
+    facts = json.loads(run(folder, "--json").stdout) | {"loads": loads, "largest_force_N": force}
+    assert any(text.startswith(words) for _, text in lines(facts))
 
 
 def test_json_is_all_of_it(folder):
     result = run(folder, "--json")
     assert json.loads(result.stdout)["campaign"] == "made"
+
+
+def test_a_fitted_mount_is_shown_with_its_rotation(folder):
+    facts = json.loads(run(folder, "--json").stdout)
+    assert facts["mounts"] == [] and not any(name == "mount" for name, _ in lines(facts))
+    shown = lines(facts | {"mounts": [{"target": "TMAC", "rotation_rad": [0.0, 0.1, 1.5707963]}]})
+    assert ("mount", "TMAC: rotation [0.0000, 0.1000, 1.5708] rad in the frame of its point, fitted") in shown
 
 
 def test_faults_of_the_data_end_in_exit_code_one(tmp_path):

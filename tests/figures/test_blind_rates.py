@@ -37,6 +37,17 @@ def test_coverage_has_a_row_for_each_kind_and_numbers_of_intervals():
     assert texts_in_axes(figure) == ["1", "2", "2", "intervals"]
 
 
+def test_a_quantity_without_a_case_is_stated_and_has_neither_dot_nor_interval():
+    rows = [
+        summary_row("detected at 50", np.nan, 0.0, 1.0, (0.97, 1.0)),
+        summary_row("held-out RMS after, over the oracle's, mean", 1.02, 1.01, 1.03, (0.0, 1.05)),
+    ]
+    figure = rates_and_targets(pd.DataFrame(rows))
+    assert row_labels(figure.axes[0]) == ["detected at 50"] and len(figure.axes[0].patches) == 1
+    assert not figure.axes[0].lines and len(figure.axes[1].lines) == 2
+    assert texts_in_axes(figure) == ["no cases"]
+
+
 def of_summary(*rows):
     return rates_and_targets(pd.DataFrame(rows))
 
@@ -64,12 +75,6 @@ def test_excesses_over_the_oracle_lie_on_an_axis_that_is_symmetric_and_holds_eve
     assert low == -high and high > 30
     assert ratios.get_xlabel() == "held-out RMS above the oracle's (%)"
     assert [list(line.get_xdata()) for line in ratios.lines] == [pytest.approx([0.0, 30.0]), pytest.approx([10.0])]
-
-
-def test_a_rate_without_a_case_has_its_target_but_no_dot():
-    rates, _ = of_summary(summary_row("detected at 50", *[float("nan")] * 3, (0.97, 1.0))).axes
-    assert row_labels(rates) == ["detected at 50"] and len(rates.patches) == 1
-    assert not np.isfinite(np.concatenate([line.get_xdata() for line in rates.lines])).any()
 
 
 def coverage_row(kind, effect, rate, low, high, comparable="exact", **changes):

@@ -22,6 +22,18 @@ def test_sensitivities_are_central_differences_of_the_residuals(full_case):
     np.testing.assert_allclose(found / largest, expected / largest, rtol=0, atol=1e-5)
 
 
+def test_a_mount_of_unknown_turn_and_a_known_one_at_an_unknown_place_have_their_sensitivities(fanuc):
+    targets = Target("turned", "6DoF", (0.1, 0.0, 0.2), None), Target("placed", "3DoF", None, (0.3, -1.0, 0.2))
+    model = made_model(fanuc.chain, targets, rows=6)
+    estimate, states = made_estimate(model, seed=1), made_states(6, 8, seed=2)
+    seen = seen_exactly(model, estimate, states)
+    around, steps = conditions(model, estimate, states), np.diag(small_steps(model, estimate))
+    found = linearize(model, estimate, seen, around).sensitivities @ steps
+    expected = slopes(model, estimate, seen, around, steps)
+    assert found.shape == expected.shape == (16, 6, 12) and (np.abs(expected).max(axis=(0, 1)) > 0).all()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
 def test_frame_of_one_session_moves_only_its_own_measurements(full_case):
     model, estimate, seen = full_case
     columns = linearize(model, estimate, seen, conditions(model, estimate, seen.states)).sensitivities

@@ -42,6 +42,10 @@ def assert_meant(found, made):
             np.testing.assert_allclose(table[name], values, rtol=1e-9, atol=1e-9, err_msg=name)
     assert ("rx" in table) == ("rotation" in made.rows)
     assert set(table) <= {*made.rows, "rx", "ry", "rz", "pose", "load", "repeat"}
+    # Nothing of the file is left unmentioned.
+    words = " ".join(found.notes)
+    mentioned = {*(found.options.columns or {}).values(), *found.ignored}
+    assert [header for header in made.headers if header not in mentioned and repr(header) not in words] == []
     poses = np.unique(np.column_stack([table[name] for name in table if name[0] == "q"]), axis=0)
     assert len(np.unique(table["pose"])) == len(poses)
 

@@ -28,6 +28,8 @@ def made_document(decision="pass", comparison=None, repeats=True, measured=False
         "robot": "arm",
         "serial": "",
         "date": "2026-11-23",
+        "stated": {"instrument": "Leica AT960, 751234"},
+        "worst_pose": {"joints": [{"value": -0.5, "unit": "rad"}, {"value": 0.25, "unit": "m"}], "error_m": 3e-4},
         "versions": {"elastocal": "0.1.0"},
         "origin": {"commit": "c0ffee", "code_sha256": "cd" * 32, "data_sha256": "da" * 32, "environment": {"numpy": "2"}},
         "files": {"campaign.yaml": "ab" * 32},
@@ -76,6 +78,7 @@ def made_document(decision="pass", comparison=None, repeats=True, measured=False
             line("repeatability", 0.0, False),
         ],
         "budget_states": 100,
+        "tracker_rms_m": 1.5e-4,
         "workspace": [
             {"force_N": force, "uncorrected": quantiles, "bound": quantiles, "bound_inside": inside, "share_outside": 0.3}
             for force, inside in ((0.0, quantiles), (100.0, None))

@@ -47,7 +47,7 @@ class Written:
     """A file's bytes, what it means, and the options that it leaves open.
 
     `rows`: expected columns of measurements.csv. `options`: fields of `ImportOptions`. `joint_names`: of the robot, empty where
-    it has none. `prismatic`: of each joint.
+    it has none. `prismatic`: of each joint. `headers`: names of all columns, as messages have them.
     """
 
     content: bytes
@@ -55,6 +55,7 @@ class Written:
     options: dict
     joint_names: tuple
     prismatic: tuple
+    headers: list
     dialect: dict = field(default_factory=dict)
 
 
@@ -240,6 +241,10 @@ def written_campaigns(draw):
     if shape == "two lines":
         writer.writerow([above.get(header, "") for header, _, _ in columns])
         headers = [header.partition("|")[0] for header in headers]
+        called_so = [
+            f"{above[header]} {name}" if header in above else name
+            for (header, _, _), name in zip(columns, headers, strict=True)
+        ]
         if units in ("bracket", "parenthesis", "ending"):
             options["units"] |= {"angles": angle, "lengths": length}
     comment = pick("", "", "#", "%", "//") if not quotes and units != "row" and shape != "two lines" else ""
@@ -275,4 +280,5 @@ def written_campaigns(draw):
         "separator": separator, "decimal": decimal, "thousands": grouped, "quotes": quotes, "encoding": encoding,
         "comment": comment, "poses": numbered, "beside": beside,
     }  # fmt: skip
-    return Written(content.encode(encoding), expected, options, joint_names, prismatic, dialect)
+    named = called_so if shape == "two lines" else headers
+    return Written(content.encode(encoding), expected, options, joint_names, prismatic, named, dialect)

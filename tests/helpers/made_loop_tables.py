@@ -142,6 +142,7 @@ def effect_entry(
     alternatives=(),
     locations=None,
     adopted=True,
+    cost_m=8.5e-5,
 ):
     """An entry of the effects of verdict.json."""
     named = [
@@ -167,6 +168,7 @@ def effect_entry(
         "p_value": 0.002,
         "heldout_gain": 0.24 if adopted else None,
         "adopted": adopted,
+        "cost_m": cost_m if adopted else None,
         "alternatives": list(alternatives),
         "angle_to_nearest_deg": None,
     }
@@ -189,6 +191,7 @@ def fault_entry():
         "p_value": None,
         "heldout_gain": None,
         "adopted": False,
+        "cost_m": None,
         "alternatives": ["a load that is 1000 times larger"],
         "angle_to_nearest_deg": None,
         "evidence": [0.5, 1e-4],

@@ -62,6 +62,12 @@ def test_it_states_what_it_is_of(found, top, diagnosed):
     json.dumps(document, allow_nan=False)
 
 
+def test_the_worst_pose_is_the_one_of_the_largest_predicted_error(found):
+    document = found[0]
+    assert document["worst_pose"]["error_m"] == pytest.approx(document["accuracy"]["worst_m"])
+    assert {joint["unit"] for joint in document["worst_pose"]["joints"]} == {"rad"}
+
+
 def test_the_map_is_drawn_without_load_and_under_the_largest(found, diagnosed):
     document, maps = found
     largest = np.linalg.norm(diagnosed.case.observations.states.wrench[:, :3], axis=1).max()

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from made_folders import made_folder, made_table
+from scipy.spatial.transform import Rotation
 from small_data import service_arm_folder
 
 from elastocal.loop.overview import overview
@@ -84,3 +85,23 @@ def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_t
     assert found["numbers"] == 72 and least > 48
     assert 9 < found["effective_parameters"] < found["parameters"]
     assert not any("poses are few" in sentence for sentence in facts["suspicious"])
+
+
+def test_a_fitted_mount_is_listed_and_a_known_one_is_not(kuka, config_folder, tmp_path):
+    turn = Rotation.from_rotvec([0.0, 0.3, 1.5])
+    table = made_table(kuka, "made")
+    mine = np.array(table["target"]) == "6DoF"
+    vectors = np.column_stack([table[name] for name in ("rx", "ry", "rz")])
+    turned = (Rotation.from_rotvec(vectors) * turn).as_rotvec()
+    table |= {name: np.where(mine, turned[:, k], vectors[:, k]) for k, name in enumerate(("rx", "ry", "rz"))}
+    for rotation, mounts in (("unknown", ["6DoF"]), (turn.as_rotvec().tolist(), []), (None, [])):
+        targets = {"3DoF": {"point": "3DoF", "offset_m": [0, 0, 0]}, "6DoF": {"point": "6DoF", "offset_m": [0, 0, 0]}}
+        targets["6DoF"] |= {} if rotation is None else {"rotation": rotation}
+        folder = tmp_path / f"made{len(list(tmp_path.iterdir()))}"
+        found = overview(made_folder(folder, kuka, table=table, measured="pose", targets=targets), config_folder / "robots")
+        assert [mount["target"] for mount in found["mounts"]] == mounts
+        assert found["diagnosable"] == (rotation is not None)
+        if mounts:
+            np.testing.assert_allclose(found["mounts"][0]["rotation_rad"], turn.as_rotvec(), atol=5e-3)
+        if rotation is None:
+            assert any("rotation: unknown" in fault["sentence"] for fault in found["faults"])

@@ -22,6 +22,7 @@ from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import (
     corners,
     jacobians,
+    joint_axes,
     poses,
     poses_and_jacobians,
     poses_of_points,
@@ -323,3 +324,10 @@ def test_corners_go_from_the_base_to_the_last_point():
     chain = parse_chain("Tz(h) Rz(q1) Tx(a) Rz(q2) Tx(b) [end]", {"h": 0.5, "a": 1.0, "b": 0.5}, "test")
     found = corners(chain, np.array([[0.0, np.pi / 2]]))
     np.testing.assert_allclose(found[:, 0], [[0, 0, 0], [0, 0, 0.5], [1, 0, 0.5], [1, 0.5, 0.5]], atol=1e-12)
+
+
+def test_joints_stand_at_their_places_along_their_axes():
+    chain = parse_chain("Tz(h) Rz(q1) Tx(a) Ry(q2) Tx(b) [end]", {"h": 0.5, "a": 1.0, "b": 0.5}, "test")
+    place, axis = joint_axes(chain, np.array([[np.pi / 2, 0.3]])).swapaxes(0, 1)
+    np.testing.assert_allclose(place[:, 0], [[0, 0, 0.5], [0, 1, 0.5]], atol=1e-12)
+    np.testing.assert_allclose(axis[:, 0], [[0, 0, 1], [-1, 0, 0]], atol=1e-12)

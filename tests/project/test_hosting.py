@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # Schemas that come with check-jsonschema, so that nothing is downloaded.
 CHECKED = {
     "citation-file-format": ["CITATION.cff"],
-    "github-workflows": [".github/workflows/ci.yml"],
+    "github-workflows": [".github/workflows/ci.yml", ".github/workflows/release.yml"],
     "github-issue-forms": [f".github/ISSUE_TEMPLATE/{name}.yml" for name in ("fault", "verdict", "proposal")],
     "dependabot": [".github/dependabot.yml"],
     "github-issue-config": [".github/ISSUE_TEMPLATE/config.yml"],

@@ -10,7 +10,9 @@ from elastocal.report.certificate_words import (
     certificate_facts,
     comparison_facts,
     decision_sentences,
+    headline,
     iso_rows,
+    iso_warning,
     share_name,
     what_to_do,
 )
@@ -38,7 +40,8 @@ def test_only_what_was_measured_is_called_so():
     predicted, measured = (decision_sentences(made_document(measured=each)) for each in (False, True))
     assert "Measured position error" in measured and "Nobody has measured" not in measured
     assert "In 8 of 9 poses" in measured and "Measured" not in predicted and "poses every measurement" not in predicted
-    assert certificate_facts(made_document())["kind"] == " (predicted)"
+    headlines = [certificate_facts(made_document(measured=each))["headline"] for each in (False, True)]
+    assert [each["title"] for each in headlines] == ["Pass, as predicted", "Pass, as measured"]
     assert "is predicted to keep" in what_to_do(made_document()) and "it keeps" in what_to_do(made_document(measured=True))
 
 
@@ -69,10 +72,37 @@ def test_advice_follows_a_change_and_a_correction_that_does_not_help():
 def test_the_tracker_is_named_where_it_hides_the_repeatability():
     document = made_document(measured=True)
     rows = iso_rows(document["iso_9283"], document["measured"])
-    assert rows[-1][-1] == "hides the robot's own" and rows[2][1].startswith("100\u00a0µm (80.0")
+    assert rows[-1][-1] == "so large that it hides the robot's own" and rows[2][1].startswith("100\u00a0µm (80.0")
     assert iso_rows(made_document(repeats=False)["iso_9283"], None) == [
         ["pose repeatability RP", "unknown", "no pose was approached again"]
     ]
+
+
+def test_the_headline_has_the_criterion_and_the_worst_pose():
+    stated = headline(made_document())
+    assert (stated["rms"], stated["limit"], stated["tolerance"]) == ("0.120 mm", "0.160 mm", "0.200 mm")
+    assert (stated["worst"], stated["worst_pose"]) == ("0.300 mm", "−28.6°, 250.0 mm")
+
+
+def test_what_the_campaign_does_not_state_is_blank():
+    identity = dict(certificate_facts(made_document())["identity"])
+    assert identity["instrument"] == "Leica AT960, 751234"
+    assert [name for name, value in identity.items() if not value] == [
+        "certificate number",
+        "serial number",
+        "measured on",
+        "calibration of the instrument",
+        "temperature",
+        "operator",
+        "signature",
+    ]
+
+
+@pytest.mark.parametrize(("approaches", "poses", "enough"), [(150, 5, True), (149, 5, False), (120, 4, False), (40, 10, False)])
+def test_fewer_approaches_than_the_standard_asks_for_are_no_test_after_it(approaches, poses, enough):
+    warning = iso_warning({"approaches": approaches, "poses": poses})
+    assert (warning == "") is enough
+    assert enough or f"{approaches} approaches to {poses} poses are fewer" in warning
 
 
 def test_changes_are_named_by_their_joint_and_counted():

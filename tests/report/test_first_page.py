@@ -5,7 +5,18 @@ from made_loop_facts import CAMPAIGNS, plainly
 from made_loop_tables import effect_entry, experiment_rows, probabilities, step_rows, verdict_document
 
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
-from elastocal.report.first_page import TITLES, held_out_sentence, probability_sentence, sentences, what_to_do, worth_sentence
+from elastocal.report.first_page import (
+    TITLES,
+    cause_rows,
+    cost_words,
+    headline,
+    headline_sentence,
+    held_out_sentence,
+    probability_sentence,
+    sentences,
+    what_to_do,
+    worth_sentence,
+)
 
 WORDS = {
     "adequate": "none of 30 candidate causes is needed",
@@ -14,8 +25,8 @@ WORDS = {
     "class": "most probably lost motion (backlash) of joint 3. Instead of lost motion (backlash) it may be bearing tilt or "
     "elastic bending and torsion: these measurements do not distinguish them.",
     "class with a related mechanism": "Instead of lost motion (backlash) it may be a related mechanism",
-    "several": "lacks 2 mechanisms, each with its probability: lost motion (backlash) of joint 3 (94 %) and weight of an "
-    "undeclared payload (94 %)",
+    "several": "lacks 2 mechanisms: lost motion (backlash) of joint 3 (94 %; 0.085 mm) and weight of an undeclared payload "
+    "(94 %; 0.085 mm)",
     "unexplained": "a smooth error of unknown cause explains it better than any of 30 candidate causes",
     "not_testable": "show neither that something is missing nor that nothing is",
     "fault of the data": "The loads fit as if they were written in kilonewtons.",
@@ -48,7 +59,7 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
         for ends in ((0.15, 0.32), (-0.3, -0.1), (-0.1, 0.3))
     )
     assert gained.startswith("Use the corrected model") and lost.startswith("Do not use") and "not certain" in unsure
-    assert "the 10 poses of the section on the next experiment" in what_to_do(CAMPAIGNS["class"], experiment_rows())[1]
+    assert "the 10 poses of the next experiment, which the report lists" in what_to_do(CAMPAIGNS["class"], experiment_rows())[1]
     assert "trust the correction at poses and loads like these only" in what_to_do(CAMPAIGNS["class"], [])[1]
     assert any("extrapolated" in advice for advice in what_to_do(CAMPAIGNS["poses outside the range"], []))
     assert not any("extrapolated" in advice for advice in what_to_do(CAMPAIGNS["named"], []))
@@ -65,6 +76,42 @@ def test_the_first_page_says_what_calibration_is_worth_against_doing_nothing():
     assert "as good uncalibrated" in worth_sentence(heldout | {"after": {"rms_m": 3.87e-3}})
     verdict = CAMPAIGNS["named"]
     assert worth_sentence(verdict["heldout"]) in held_out_sentence(verdict, step_rows())
+
+
+def test_the_headline_is_the_robot_as_it_was_and_as_it_is_in_mm_beside_the_noise():
+    verdict = CAMPAIGNS["named"]
+    stated = headline(verdict)
+    assert plainly(headline_sentence(stated)) == ("0.171 → 0.084 mm (noise 0.050), RMS position error on 10 validation poses")
+    assert headline(CAMPAIGNS["noise not known"])["noise"] == "" and headline(CAMPAIGNS["fault of the data"]) is None
+    large = verdict["heldout"] | {"uncalibrated": {"rms_m": 1.184e-3}}
+    assert headline(verdict | {"heldout": large})["before"] == "1.18"
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"cost_m": 8.5e-5}, "0.085 mm"),
+        # A third of 84 µm are 28: the error would be 88 µm without.
+        ({"cost_m": 2.9e-5}, "0.029 mm"),
+        ({"cost_m": 1.5e-5, "probability": 0.996}, "0.015 mm: real, negligible"),
+        ({"cost_m": 1.5e-5, "probability": 0.7}, "0.015 mm: negligible"),
+        ({"cost_m": None}, "not in the final model"),
+        ({"cost_m": None, "name": "setup_step"}, "an error of the measurement, not of the robot"),
+    ],
+)
+def test_each_cause_states_its_cost_and_small_ones_are_negligible(changed, words):
+    assert cost_words(effect_entry() | changed, CAMPAIGNS["named"]["heldout"]) == words
+
+
+def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities_of_the_verdict():
+    sets = [({"lost_motion": ["joint 3"]}, 0.6), ({"joint_tilt": ["joint 2"], "other": [""]}, 0.36), ({}, 0.04)]
+    rows = cause_rows(verdict_document(NAMED, [effect_entry() | {"probability": 0.6}], sets=sets))
+    assert [(row["name"], plainly(row["words"]), row["cost"]) for row in rows] == [
+        ("Lost motion (backlash) of joint 3", "60 %", "0.085 mm"),
+        ("Bearing tilt", "36 %", ""),
+        ("Something that the catalogue does not have", "36 %", ""),
+        ("Nothing is missing", "4 %", ""),
+    ]
 
 
 def test_a_robot_whose_calibration_predicts_worse_is_left_as_it_is():

@@ -4,7 +4,12 @@ from made_loop_facts import CAMPAIGNS
 from made_loop_tables import effect_entry
 
 from elastocal.effects.catalogue import effects
-from elastocal.report.loop_effects import description, effect_facts
+from elastocal.report.loop_effects import description
+from elastocal.report.loop_effects import effect_facts as facts_about
+
+
+def effect_facts(effect):
+    return facts_about(effect, CAMPAIGNS["named"]["heldout"])
 
 
 def test_every_effect_of_the_catalogue_is_described_without_formulas():

@@ -21,7 +21,7 @@ def test_before_and_after_have_intervals_and_multiples():
 def test_errors_of_blocks_stand_beside_those_of_held_out_poses():
     facts = facts_of(CAMPAIGNS["named"])["splits"]
     assert [row["name"] for row in facts["rows"]] == [
-        "validation poses (held out)",
+        "validation poses",
         "every block of joint space in turn",
         *(f"block of joint space {k}" for k in range(1, 5)),
     ]

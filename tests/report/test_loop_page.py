@@ -8,49 +8,53 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from durations import HUNG_S
-from made_loop_facts import CAMPAIGNS, facts_of
+from made_loop_facts import CAMPAIGNS, facts_of, plainly
 from made_loop_tables import candidate_table, residual_table
 
 from elastocal.io.origin import Origin
+from elastocal.loop.residual_tables import worst_measurement
 from elastocal.mechanics.kinematics import corners
 from elastocal.report import loop_page as module
 from elastocal.report.loop_page import loop_page, write_loop_page
 
 CHROMIUM = shutil.which("chromium")
-# Three-dimensional drawing without a graphics card.
-IN_SOFTWARE = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-
-# Red, green and blue of what the page and a plot are drawn on.
-PAPER_OF_PAGE = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
-PAPER_OF_PLOT = "getComputedStyle(document.querySelector('#scatter .main-svg')).backgroundColor.match(/\\d+/g).map(Number)"
-
-
-# How far the farthest of all that is drawn in space lies from the middle of the plot; its edge is at 1.
-FARTHEST = """() => {
-  const { _scene } = document.getElementById('robot')._fullLayout.scene;
-  const { view, projection, model } = _scene.glplot.cameraParams;
-  const times = (m, v) => [0, 1, 2, 3].map((i) => [0, 1, 2, 3].reduce((sum, k) => sum + m[4 * k + i] * v[k], 0));
-  let farthest = 0;
-  for (const { x, y, z } of document.getElementById('robot').data) {
-    x.forEach((_, n) => {
-      if (x[n] === null) return;
-      const at = [x[n], y[n], z[n]].map((value, k) => value * _scene.dataScale[k]);
-      const [right, up, , depth] = times(projection, times(view, times(model, [...at, 1])));
-      farthest = Math.max(farthest, Math.abs(right / depth), Math.abs(up / depth));
-    });
-  }
-  return farthest;
+# Colour of what the page and a plot are drawn on.
+PAPER_OF_PAGE = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).slice(0, 3).map(Number)"
+PAPER_OF_PLOT = "[...document.getElementById('scatter').getContext('2d').getImageData(1, 1, 1, 1).data].slice(0, 3)"
+# Whether all that is drawn in space lies on its canvas.
+ALL_IN_SIGHT = """() => {
+  const canvas = document.getElementById('robot');
+  const { shown, ends } = projection(canvas.clientWidth, canvas.clientHeight);
+  return ends.every((at) => {
+    const [x, y] = shown(at);
+    return x >= 0 && x <= canvas.clientWidth && y >= 0 && y <= canvas.clientHeight;
+  });
 }"""
-ALL_IN_SIGHT = f"() => {{ const farthest = ({FARTHEST})(); return 0.2 < farthest && farthest < 1; }}"
-EYE = "JSON.stringify(document.getElementById('robot').layout.scene.camera.eye)"
-# By how many pixels the narrowest first cell of a table is narrower than its table.
-NARROWER = """() => Math.max(...[...document.querySelectorAll('tbody td:first-child')].map(
+# By how many pixels the narrowest first cell of a table is narrower than its table; what is folded has no width.
+NARROWER = """() => Math.max(...[...document.querySelectorAll('tbody td:first-child')].filter((cell) => cell.clientWidth).map(
   (cell) => cell.closest('table').clientWidth - cell.clientWidth))"""
+# Of all letters that are seen, the least contrast with what they stand on; WCAG 2.2 asks for 4.5.
+LEAST_CONTRAST = """() => {
+  const parts = (color) => color.match(/[\\d.]+/g).map(Number);
+  const light = (color) => parts(color).slice(0, 3).map((value) => value / 255).map(
+    (value) => (value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4)).reduce(
+    (sum, value, k) => sum + value * [0.2126, 0.7152, 0.0722][k], 0);
+  const behind = (element) => {
+    const color = getComputedStyle(element).backgroundColor;
+    return parts(color)[3] === 0 ? behind(element.parentElement) : color;
+  };
+  const seen = [...document.querySelectorAll('body *')].filter((element) => element.getClientRects().length
+    && [...element.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim()));
+  return Math.min(...seen.map((element) => {
+    const two = [light(getComputedStyle(element).color), light(behind(element))].sort((a, b) => b - a);
+    return (two[0] + 0.05) / (two[1] + 0.05);
+  }));
+}"""
 
 
 def page_of(kuka, name="named", **changed):
     verdict = CAMPAIGNS[name] | changed
-    return loop_page(facts_of(verdict), verdict, residual_table(), candidate_table(), kuka)
+    return loop_page(facts_of(verdict), residual_table(), candidate_table(), kuka)
 
 
 def data_in(path):
@@ -72,7 +76,7 @@ def test_measurements_are_in_metres_and_micrometres_with_what_they_may_be_drawn_
     np.testing.assert_allclose(data["after"], 1e6 * np.column_stack([table[f"after_d{axis}"] for axis in "xyz"]), atol=0.01)
     assert data["held_out"] == table["held_out"].astype(bool).tolist()
     against = {entry["name"]: entry for entry in data["against"]}
-    np.testing.assert_allclose(against["angle of joint 2"]["values"], np.degrees(table["q2"]), atol=1e-4)
+    np.testing.assert_allclose(against["angle of joint 2"]["values"], np.degrees(table["q2"]), rtol=1e-4)
     # What does not vary explains nothing.
     assert all(np.ptp(entry["values"]) > 0 for entry in data["against"])
 
@@ -88,7 +92,7 @@ def test_the_robot_stands_where_its_chain_says(kuka):
 def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_reports(kuka):
     table, verdict = residual_table(), CAMPAIGNS["named"]
     other = replace(kuka, reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]), reported_offset=np.full(6, 0.3))
-    _, data = loop_page(facts_of(verdict), verdict, table, candidate_table(), other)
+    _, data = loop_page(facts_of(verdict), table, candidate_table(), other)
     angles = np.column_stack([table[f"q{joint}"] for joint in range(1, 7)])[:1]
     np.testing.assert_allclose(data["outlines"][0], corners(kuka.chain, angles)[:, 0], atol=1e-4)
 
@@ -97,7 +101,7 @@ def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at
     """Both campaigns count their poses from nought."""
     table, verdict = residual_table(poses=6), CAMPAIGNS["named"]
     table |= {"held_out": table["pose"] >= 3, "pose": table["pose"] % 3}
-    _, data = loop_page(facts_of(verdict), verdict, table, candidate_table(), kuka)
+    _, data = loop_page(facts_of(verdict), table, candidate_table(), kuka)
     assert data["poses"] == ["0", "1", "2", "0, validation", "1, validation", "2, validation"]
     joints = np.column_stack([table[f"q{joint}"] for joint in range(1, 7)])
     for outline, rows in zip(data["outlines"], data["targets"], strict=True):
@@ -109,7 +113,7 @@ def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at
 def test_where_nothing_was_added_the_page_says_so(kuka):
     verdict = CAMPAIGNS["adequate"]
     for found, said in ((True, ""), (False, "Nothing was added to the declared model: after is the same as before.")):
-        page, data = loop_page(facts_of(verdict), verdict, residual_table(found=found), candidate_table(), kuka)
+        page, data = loop_page(facts_of(verdict), residual_table(found=found), candidate_table(), kuka)
         assert page["same_sentence"] == said and data["changed"] is found
 
 
@@ -117,7 +121,8 @@ def test_of_many_measurements_some_are_shown_evenly_spread_and_the_page_says_so(
     monkeypatch.setattr(module, "_MOST_SHOWN", 11)
     page, data = page_of(kuka)
     count = len(residual_table()["x"])
-    assert len(data["position"]) == 11 and page["shown_sentence"] == f"11 of {count} measurements are shown, evenly spread."
+    shown = len(data["position"])
+    assert 10 <= shown <= 11 and page["shown_sentence"] == f"{shown} of {count} measurements are shown, evenly spread."
 
 
 def test_the_leading_candidates_stand_by_falling_bayes_factor(kuka):
@@ -130,15 +135,24 @@ def test_the_leading_candidates_stand_by_falling_bayes_factor(kuka):
     assert [row["chosen"] for row in page["candidates"]].count("yes") == table["chosen"].sum()
 
 
-def test_a_candidate_of_several_shapes_stands_once_at_the_best(kuka):
+def test_a_candidate_of_several_shapes_has_the_factor_of_the_best_and_the_probability_of_all(kuka):
+    """A model has one of them at most. The page once stated 62 % of a step of which verdict.json has over 99 %."""
     table = candidate_table()
     key = table["candidate"][np.nanargmax(table["log_bayes_factor"])]
-    lesser = {name: values[table["candidate"] == key][:1].copy() for name, values in table.items()}
-    lesser["log_bayes_factor"] = lesser["log_bayes_factor"] - 1
-    verdict = CAMPAIGNS["named"]
+    best = table["candidate"] == key
+    table["probability"] = np.where(best, 0.62, table["probability"])
+    lesser = {name: values[best][:1].copy() for name, values in table.items()}
+    lesser |= {
+        "log_bayes_factor": lesser["log_bayes_factor"] - 1,
+        "probability": np.array([0.379]),
+        "chosen": np.zeros(1, bool),
+    }
     twice = {name: np.concatenate([lesser[name], values]) for name, values in table.items()}
-    pages = [loop_page(facts_of(verdict), verdict, residual_table(), some, kuka)[0] for some in (table, twice)]
-    assert pages[0]["candidates"] == pages[1]["candidates"]
+    once, both = (
+        loop_page(facts_of(CAMPAIGNS["named"]), residual_table(), some, kuka)[0]["candidates"] for some in (table, twice)
+    )
+    assert plainly(once[0]["words"]) == "62 %" and plainly(both[0]["words"]) == "> 99 %"
+    assert [row | {"words": ""} for row in once] == [row | {"words": ""} for row in both]
 
 
 def test_the_page_names_its_origin_at_the_foot(kuka, tmp_path):
@@ -146,15 +160,35 @@ def test_the_page_names_its_origin_at_the_foot(kuka, tmp_path):
     assert "Made from commit c0ffee, configuration SHA-256 d16e57, seed 7." in (tmp_path / "report.html").read_text("utf-8")
 
 
-def test_where_nothing_could_be_tested_no_probabilities_are_stated(kuka):
-    page, data = page_of(kuka, "not_testable")
-    assert page["probabilities"] == "" and page["hypotheses"] == data["hypotheses"] == []
-
-
-def test_data_at_fault_have_no_hypotheses(kuka, tmp_path):
-    page, data = page_of(kuka, "fault of the data", probabilities=None)
+@pytest.mark.parametrize("campaign", ["not_testable", "fault of the data"])
+def test_where_nothing_could_be_tested_no_probabilities_are_stated(kuka, tmp_path, campaign):
+    page, data = page_of(kuka, campaign)
     write_loop_page(tmp_path / "report.html", page, data)
-    assert data["hypotheses"] == [] and 'id="causes"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page["causes"] == [] and 'class="bar"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_joints_are_drawn_on_the_arm_and_the_page_opens_at_the_worst_pose(kuka):
+    table = residual_table()
+    _, data = page_of(kuka)
+    assert np.shape(data["joints"]) == (len(data["poses"]), 6, 2, 3)
+    np.testing.assert_allclose(np.linalg.norm(np.array(data["joints"])[:, :, 1], axis=2), 1, atol=1e-3)
+    worst = worst_measurement(table)
+    assert data["poses"][data["worst"]].split(",")[0] == str(table["pose"][worst])
+    size = np.linalg.norm(data["before"], axis=1)
+    assert size.max() == size[data["targets"][data["worst"]]].max() or table["load"][worst]
+
+
+def test_the_worst_pose_is_there_however_few_are_drawn(kuka, monkeypatch):
+    monkeypatch.setattr(module, "_POSES", 2)
+    monkeypatch.setattr(module, "_MOST_SHOWN", 3)
+    table = residual_table()
+    _, data = page_of(kuka)
+    assert data["poses"][data["worst"]].split(",")[0] == str(table["pose"][worst_measurement(table)])
+
+
+def test_the_page_is_light_enough_for_a_phone(written):
+    """Of 4,000 measurements, which are the most shown, it is some 0.8 MB."""
+    assert written.stat().st_size < 300_000
 
 
 def test_texts_of_other_people_stay_texts(kuka, tmp_path):
@@ -171,7 +205,9 @@ def test_texts_of_other_people_stay_texts(kuka, tmp_path):
 
 def test_the_page_names_nothing_that_a_browser_would_fetch(written):
     text = re.sub(r"<script>.*?</script>", "", written.read_text(encoding="utf-8"), flags=re.DOTALL)
-    assert re.findall(r'(?:src|href)="(?!data:)', text) == [] and "@import" not in text and "url(" not in text
+    assert (
+        re.findall(r'(?:src|href)="(?!data:)([^"]*)', text) == ["report.pdf"] and "@import" not in text and "url(" not in text
+    )
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Debian's chromium is not installed")
@@ -181,7 +217,7 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
 
     faults, requests = [], []
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=IN_SOFTWARE)
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": width, "height": 844}, color_scheme=scheme)
         page.set_default_timeout(1000 * HUNG_S)
         page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
@@ -192,16 +228,19 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         papers = [page.evaluate(script) for script in (PAPER_OF_PAGE, PAPER_OF_PLOT)]
         assert papers[0] == papers[1] and (min(papers[0]) > 200) == (scheme == "light")
-
-        # Nothing of the robot and the arrows is cut off, names in tables have the width of a phone, legends hide no plot.
-        page.wait_for_function(ALL_IN_SIGHT)
+        assert page.evaluate(ALL_IN_SIGHT)
+        # Names in tables have the width of a phone.
         assert width > 600 or page.evaluate(NARROWER) < 1
-        legend, plot = (page.query_selector(f"#scatter {part}").bounding_box() for part in (".legend", ".nsewdrag"))
-        assert legend["y"] + legend["height"] <= plot["y"]
 
-        # One bar among few is no wall.
-        bars = page.query_selector_all("#causes .bars .point path")
-        assert bars and all(bar.bounding_box()["height"] < 80 for bar in bars)
+        # What a reader of the screen needs: letters that are seen, names, headings without a gap.
+        assert page.evaluate(LEAST_CONTRAST) >= 4.5
+        unlabelled = "[...document.querySelectorAll('select, input')].filter(e => !e.labels.length).length"
+        unnamed = "[...document.querySelectorAll('[role=img]')].filter(e => !e.getAttribute('aria-label')).length"
+        assert page.evaluate(unlabelled) == page.evaluate(unnamed) == 0
+        levels = page.evaluate("[...document.querySelectorAll('h1, h2, h3')].map(e => Number(e.tagName[1]))")
+        assert levels[0] == 1 and levels.count(1) == 1 and max(np.diff(levels)) <= 1
+        assert page.evaluate("document.documentElement.lang") == "en"
+
         # What is fitted and what validates are not thrown together.
         table = residual_table()
         for part, held_out in (("fitted", False), ("validation", True)):
@@ -211,28 +250,30 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
             assert float(stated[1]) == pytest.approx(root, rel=6e-3), part
 
         def drawn(plot):
-            return f"JSON.stringify(document.getElementById('{plot}').data)"
+            return page.evaluate(f"document.getElementById('{plot}').toDataURL()")
 
         for control, key, plot in (
             ("which", "ArrowDown", "robot"),
             ("factor", "ArrowRight", "robot"),
-            ("pose", "ArrowRight", "robot"),
+            ("pose", "ArrowLeft", "robot"),
+            ("robot", "ArrowUp", "robot"),
+            ("robot", "+", "robot"),
             ("component", "ArrowDown", "scatter"),
             ("against", "ArrowDown", "scatter"),
             ("step", "ArrowDown", "scatter"),
         ):
-            before = page.evaluate(drawn(plot))
+            before = drawn(plot)
             page.focus(f"#{control}")
             page.keyboard.press(key)
-            page.wait_for_function(f"before => {drawn(plot)} !== before", arg=before)
+            assert drawn(plot) != before, control
         for button in page.query_selector_all("button"):
-            before = page.evaluate(EYE)
+            before = drawn("robot")
             button.focus()
             page.keyboard.press("Enter")
-            page.wait_for_function(f"before => {EYE} !== before", arg=before)
+            assert drawn("robot") != before, button.inner_text()
             if button.get_attribute("data-view"):
-                page.wait_for_function(ALL_IN_SIGHT)
-        unlabelled = page.evaluate("[...document.querySelectorAll('select, input')].filter(e => !e.labels.length).length")
+                assert page.evaluate(ALL_IN_SIGHT)
+        assert page.input_value("#pose") == page.evaluate("String(data.worst)")
         browser.close()
-    assert faults == [] and unlabelled == 0
+    assert faults == []
     assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []

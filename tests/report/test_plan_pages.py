@@ -1,7 +1,8 @@
 """The sheet of a plan has a row for each pose, in degrees, with a box for each measurement."""
 
 import numpy as np
-from made_surveys import OPEN, made_candidates, made_survey
+from drawn_figures import empty_pictures
+from made_surveys import made_candidates, made_survey
 
 from elastocal.application.planning.plan import planned
 from elastocal.application.planning.sheet import sheet
@@ -28,7 +29,6 @@ def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
 
 
 def test_the_sheet_is_typeset(tmp_path):
-    survey, plan, rows = made()
-    write_plan_sheet(tmp_path / "plan.pdf", survey, OPEN, plan, rows, ["It is worth the effort."])
+    pictures = dict(zip(("overview", "poses0"), map(str, empty_pictures(tmp_path, ["overview", "poses0"])), strict=True))
+    write_plan_sheet(tmp_path / "plan.pdf", plan_facts(*made(), ["It is worth the effort."]), pictures)
     assert (tmp_path / "plan.pdf").read_bytes().startswith(b"%PDF")
-    assert [path.name for path in tmp_path.iterdir()] == ["plan.pdf"]

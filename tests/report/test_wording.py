@@ -7,6 +7,7 @@ from elastocal.report.wording import (
     counted,
     length,
     members_words,
+    millimetres,
     plain,
     probability_words,
     scaled,
@@ -58,6 +59,7 @@ def test_lengths_and_counts():
         "21.3 mm",
     ]
     assert length(None) == "unknown"
+    assert [millimetres(value) for value in (1.5e-5, 0.9999e-3, 1.184e-3, 0.0213)] == ["0.015", "1.00", "1.18", "21.3"]
     assert counted(1, "pose") == "1 pose" and counted(12000, "pose") == "12\u2009000 poses"
     assert plain(0.000123) == "0.000123" and plain(1234.5) == "1234"
 

@@ -132,7 +132,7 @@ rule compile_loop_report:
         steps=rules.diagnose_campaign.output.steps,
         descriptions=rules.read_campaign.output.descriptions,
         figures=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=LOOP_FIGURES),
-        pages=[placed(PACKAGES / f"elastocal/report/loop.{ending}") for ending in ("typ", "html", "js")],
+        pages=[placed(PACKAGES / "elastocal/report" / name) for name in ("loop.typ", "sheet.typ", "loop.html", "loop.js")],
         sources=sources("compile_loop_report.py"),
     output:
         report="reports/loop/{campaign}/report.pdf",

@@ -14,7 +14,7 @@ _REPORTS = {"reports/study.pdf": "the study", "reports/blind/blind.pdf": "the bl
 def outcome(made: Iterable[str]) -> list[str]:
     """Lines about the reports among the files that a run has made."""
     # Only a run that has made a report needs what makes its sentences.
-    from elastocal.report.first_page import sentences, worth_sentence
+    from elastocal.report.first_page import headline, headline_sentence, sentences
 
     lines, following = [], []
     for path in sorted(map(str, made)):
@@ -23,8 +23,9 @@ def outcome(made: Iterable[str]) -> list[str]:
         if match := _CAMPAIGN.fullmatch(path):
             verdict = json.loads(Path(path).with_name("verdict.json").read_text(encoding="utf-8"))
             of_use = verdict["verdict"] in _OF_USE and all(effect["family"] != "data" for effect in verdict["effects"])
-            lines += [f"{'✓' if of_use else '!'} {match[1]}: {sentences(verdict)[0]}"]
-            lines += [f"  {worth_sentence(verdict['heldout'])}", f"  report: {path}"]
+            stated = headline(verdict)
+            errors = [f"  {headline_sentence(stated)}"] if stated else []
+            lines += [f"{'✓' if of_use else '!'} {match[1]}: {sentences(verdict)[0]}", *errors, f"  report: {path}"]
             then = "elastocal correct, elastocal certificate" if of_use else '"What to do now" on the first page of the report'
             following.append(f"next: {then}")
     # Of several campaigns each report says it.

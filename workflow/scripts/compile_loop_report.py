@@ -24,7 +24,7 @@ def compile_loop_report(job: Job) -> None:
     parameters = final_parameters(read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
     facts = loop_facts(verdict, *rows, table, descriptions, parameters)
     write_loop_report(job.output.report, facts, job.input.figures, origin_of(job))
-    write_loop_page(job.output.page, *loop_page(facts, verdict, table, candidates, robot), origin_of(job))
+    write_loop_page(job.output.page, *loop_page(facts, table, candidates, robot), origin_of(job))
 
 
 run(compile_loop_report, snakemake)

@@ -265,6 +265,13 @@ def absorbed(columns: np.ndarray, field: np.ndarray, free: np.ndarray) -> np.nda
     return found
 
 
+def less_placement(scope: Scope, position: np.ndarray, rotation: np.ndarray, fields: np.ndarray) -> np.ndarray:
+    """Displacements (N, 6, K) of poses less what the placement that a scope leaves free takes up of each over these poses."""
+    columns = placement(scope, position, rotation)
+    free = np.repeat([scope.frame == ROBOT, scope.frame == ROBOT, scope.offset_removed, False], 3)
+    return np.asarray(fields - columns @ absorbed(columns, fields, free))
+
+
 def without_rigid_motion(displacement: np.ndarray, position: np.ndarray, rotation: np.ndarray | None = None) -> np.ndarray:
     """Displacements (..., N, 3) less the small rigid motion that explains most of their squares.
 
@@ -315,7 +322,7 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
         names = ", ".join(accuracy.left_out)
         text += f" {millimetres(accuracy.left_out_m)} of it stand for {names}, which no command contains."
     if accuracy.form_m:
-        why = "held-out poses were missed by more than the fit says" if accuracy.contradicted else "other models fit as well"
+        why = "validation poses were missed by more than the fit says" if accuracy.contradicted else "other models fit as well"
         text += f" {millimetres(accuracy.form_m)} of it stand for the form of the model: {why}."
     return text
 

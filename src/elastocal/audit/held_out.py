@@ -88,9 +88,8 @@ def verdict(run: Audited, file: str, campaign: str) -> list[Finding]:
     kept = stated["warnings"][: len(diagnosed["warnings"])] == diagnosed["warnings"]
     off += [] if kept else ["warnings"]
     pairs = zip(stated["effects"], diagnosed["effects"], strict=True)
-    off += [
-        reported["name"] for reported, found in pairs if reported | {"heldout_gain": None} != found | {"heldout_gain": None}
-    ]
+    judged = dict.fromkeys(("heldout_gain", "cost_m"))
+    off += [reported["name"] for reported, found in pairs if reported | judged != found | judged]
     found = [held(file, "what the diagnosis reported", "diagnosis.json", not off, ", ".join(off), len(diagnosed))]
     springs = run.table(f"results/loop/{campaign}/steps.parquet").query("owner == 'joint_compliance'")
     declared = springs[springs["step"] == springs["step"].min()]["value"]

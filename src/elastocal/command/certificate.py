@@ -65,9 +65,10 @@ def certificate(
     from elastocal.report.certificate_words import certificate_facts
 
     console = Console(stderr=True)
-    stated = read_descriptions(folder, pipeline() / "config" / "robots")[0].get("serial_number", "")
+    campaign = read_descriptions(folder, pipeline() / "config" / "robots")[0]
     limit = length_m("--tolerance", tolerance)
-    number = stated if serial is None else printed("--serial", serial)
+    number = campaign.get("serial_number", "") if serial is None else printed("--serial", serial)
+    stated = {"measured_on": campaign.get("measured_on", "")} | campaign.get("certificate", {})
     day = calendar.today().isoformat() if date is None else iso_date("--date", date)
     found = diagnosed_campaign(folder, accept_environment)
     place = output or workplace() / "reports" / "loop" / found.name
@@ -80,15 +81,17 @@ def certificate(
         used = use_at(found.calibrated, found.case.observations.states, read_target_path(use, found.calibrated.robot.joints))
     if any(effect["family"] == "data" for effect in found.verdict["effects"]):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
-    wanted = Wanted(limit, risk, number, day, seed)
+    wanted = Wanted(limit, risk, number, day, seed, stated)
     with console.status("working"):
         document, maps = certified(folder, robots, found, wanted, other, after, used)
         facts = certificate_facts(document)
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             forces = [each["force_N"] for each in document["workspace"]]
             drawn = {
-                "workspace": workspace_map(maps, forces),
-                "budget": budget_bars(document["budget"], [row[0] for row in facts["budget"]], limit),
+                "workspace": workspace_map(maps, forces, limit),
+                "budget": budget_bars(
+                    document["budget"], [row[0] for row in facts["budget"]], limit, document["tracker_rms_m"]
+                ),
             }
             for name, figure in drawn.items():
                 save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")

@@ -78,17 +78,23 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     left = f"; not identifiable: {_listed(facts['held'])}" if facts["held"] else ""
     sessions = f", {facts['sessions']} sessions" if facts["sessions"] > 1 else ""
     robot = f"{facts['campaign']}: {facts['robot']}, {facts['joints']} joints"
-    poses = f"{facts['training']['poses']} poses to fit and {facts['held_out']['poses']} held out"
-    count = len(facts["loads"])
-    loads = f"{count} load{'s' if count > 1 else ''}, forces up to {facts['largest_force_N']:,.0f} N"
+    poses = f"{facts['training']['poses']} poses to fit and {facts['held_out']['poses']} validation poses"
+    # Numbers of loads are labels; 0 is none.
+    loaded = len(facts["loads"]) - (0 in facts["loads"])
+    parts = [*(["unloaded"] if 0 in facts["loads"] else []), *([f"{loaded} load{'s' * (loaded > 1)}"] if loaded else [])]
+    loads = " and ".join(parts) + (f" of up to {facts['largest_force_N']:,.0f} N" if loaded else "")
+    repeats = "each state measured once" if facts["repeats"] == 1 else f"a state measured up to {facts['repeats']} times"
     found = [
         ("read", f"{robot}, {facts['measured']} in the {facts['frame']} frame"),
         ("", f"{poses}; {facts['measurements']} measurements of {', '.join(facts['targets'])}{sessions}"),
-        ("", f"{loads}; up to {facts['repeats']} repeats"),
+        ("", f"{loads}; {repeats}"),
         ("noise", f"{1e6 * noise['position_m']:.0f} µm a coordinate, from {_SOURCES[noise['source']]}"),
         ("declared model", f"residual of {1e3 * facts['residual_rms_m']:.3f} mm RMS on the fitted poses"),
         ("identified", f"{facts['parameters']} parameters, effectively {facts['effective_parameters']:.0f}{left}"),
     ]
+    for mount in facts.get("mounts", []):
+        rotation = ", ".join(f"{value:.4f}" for value in mount["rotation_rad"])
+        found.append(("mount", f"{mount['target']}: rotation [{rotation}] rad in the frame of its point, fitted"))
     for joint, spring in enumerate(facts.get("compliance", []), 1):
         error = spring["relative_std_error"]
         words = "not identifiable" if error is None else f"± {100 * error:.1f} %"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -22,10 +22,10 @@ from elastocal.command.printed import example
 from elastocal.errors import InputError, fault_of_machine
 
 if TYPE_CHECKING:
-    from click import Context
+    from collections.abc import Callable
 
 # Each subcommand with an example, in the order in which a calibration needs them; `import` is a group of its own.
-COMMANDS = {
+COMMANDS: dict[Callable[..., None], str] = {
     demo: "elastocal demo",
     init: "elastocal init campaigns/cell --robot robot.yaml",
     plan: "elastocal plan robot.yaml --folder campaigns/cell --force 200 --pull",
@@ -41,7 +41,7 @@ _ORDER = ("demo", "import", *(command.__name__ for command in COMMANDS))
 class InOrder(TyperGroup):
     """Lists subcommands in the order of the work; typer would list groups last."""
 
-    def list_commands(self, ctx: Context) -> list[str]:
+    def list_commands(self, ctx: Any) -> list[str]:
         """Names of all subcommands."""
         return sorted(super().list_commands(ctx), key=_ORDER.index)
 

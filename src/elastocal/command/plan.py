@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -81,12 +83,12 @@ def plan(
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
-    from elastocal.figures.plan import plan_picture
-    from elastocal.figures.style import save_png
+    from elastocal.figures.plan import plan_picture, pose_pictures
+    from elastocal.figures.style import save
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.data_frames import write_csv
     from elastocal.io.texts import kind_of
-    from elastocal.report.plan_pages import write_plan_sheet
+    from elastocal.report.plan_pages import plan_facts, write_plan_sheet
 
     console = Console(stderr=True)
     arm = read_robot(robot)
@@ -140,8 +142,15 @@ def plan(
 
     def write_plan(place: Path) -> None:
         write_csv(place / names[0], stated)
-        write_plan_sheet(place / names[1], survey, cell, found, table, worth)
-        save_png(plan_picture(arm, cell, found), str(place / names[2]))
+        with tempfile.TemporaryDirectory() as scratch:
+            pages = {f"poses{page}": figure for page, figure in enumerate(pose_pictures(arm, found))}
+            drawn = {"overview": plan_picture(arm, cell, found), **pages}
+            for name, figure in drawn.items():
+                save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")
+            write_plan_sheet(
+                place / names[1], plan_facts(survey, found, table, worth), {name: f"{scratch}/{name}.pdf" for name in drawn}
+            )
+            shutil.copyfile(f"{scratch}/overview.png", place / names[2])
 
     if folder is not None:
         with write_together(folder, (ROBOT, CSV, *names, DOCUMENT)) as partial:

@@ -19,6 +19,7 @@ from elastocal.diagnosis.linearize import linearized, searched_part, shapes_look
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, SEVERAL, UNEXPLAINED, concluded
+from elastocal.diagnosis.words import hypothesis_words
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.tolerances import effective_parameters
@@ -223,7 +224,9 @@ def _explained(
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
-        tell(f"selection step {round_number + 1}, so far {_summary_of(conclusion, alarm)}")
+        # No verdict yet, and no probability: a later search, or the poses left out, may say otherwise.
+        leading = hypothesis_words(conclusion.best.mechanisms)
+        tell(f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}")
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
@@ -322,11 +325,6 @@ def _document(
         "warnings": list(dict.fromkeys(remarks)),
         "settings": settings.document(),
     }
-
-
-def _summary_of(conclusion: Conclusion, alarm: Alarm) -> str:
-    best = " + ".join(conclusion.best.mechanisms) or "nothing"
-    return f"{conclusion.verdict}: {best}, probability {conclusion.best.probability:.2f}, alarm p {alarm.p_value:.3f}"
 
 
 def _misfit(found: Evidence) -> dict[str, float]:

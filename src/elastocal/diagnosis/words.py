@@ -33,6 +33,16 @@ _PARAMETER_WORDS = (
     (r"\bmoment\b", "first moment"),
     (r"\b1 over ([EG])([IJ])\b", r"1/(\1\2)"),
 )
+# What the mechanisms of a family have in common.
+_IN_COMMON = {
+    "elastic": "yielding",
+    "geometry": "an error of geometry",
+    "gravity": "weight",
+    "transmission": "an error of a gear",
+    "gearbox": "an error of a gear",
+    "load": "an error of the load",
+    "drift": "drift of the set-up or by warmth",
+}
 # Locations that have no joint: what stands there in the place of one.
 _PARTS = ("column", "base")
 # Bands of orders, variants and the like are given for as many locations; of more only their joints.
@@ -87,7 +97,7 @@ def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
     Returns such as: gravity sag of joints 2 and 3.
     """
     parsed = []
-    for location in filter(None, locations):
+    for location in locations:
         found = _LOCATION.match(location)
         assert found is not None
         numbers = tuple(map(int, found["numbers"].split(" and "))) if found["numbers"] else ()
@@ -151,6 +161,13 @@ def alternative_words(name: str) -> str:
     return RELATED if name == OTHER else physical_name(name)
 
 
+def in_common(effect: str, alternatives: Iterable[str]) -> str:
+    """What an effect and all that may be meant instead have in common, as people call it: yielding; empty of no one kind."""
+    families = {getattr(effects().get(name), "FAMILY", "") for name in (effect, *alternatives) if name != OTHER}
+    kinds = {_IN_COMMON.get(family, "") for family in families}
+    return kinds.pop() if len(kinds) == 1 else ""
+
+
 def in_words(text: str) -> str:
     """A text with every name of the catalogue, every key of a candidate and the parameter stated after it in words."""
     names = "|".join(sorted(effects(), key=len, reverse=True))
@@ -177,13 +194,14 @@ def _where(effect: str, locations: Iterable[tuple[tuple[int, ...], str]]) -> str
     singles = len(details) > 1 and all(len(numbers) == 1 for numbers in details)
     if singles and (len(details) > _MOST_DETAILED or not any(map(any, details.values()))):
         return at_joints(effect, sorted(numbers[0] for numbers in details))
-    parts = [_located(effect, numbers, ", ".join(filter(None, which))) for numbers, which in details.items()]
-    return f" {listed(part.strip() for part in parts if part)}" if any(parts) else ""
+    parts = [_located(effect, numbers, ", ".join(filter(None, which)), len(details) > 1) for numbers, which in details.items()]
+    return f" {listed(part.strip() for part in parts)}" if any(parts) else ""
 
 
-def _located(effect: str, numbers: tuple[int, ...], detail: str) -> str:
+def _located(effect: str, numbers: tuple[int, ...], detail: str, beside_others: bool) -> str:
     detail = detail_words(effect, detail)
-    # Details without a joint stand alone, but for parts of the robot.
-    if not numbers:
-        return f" of the {detail}" if detail in _PARTS else f" ({detail})" if detail else ""
-    return at_joints(effect, numbers) + (f" ({detail})" if detail else "")
+    if not numbers and detail in _PARTS:
+        return f" of the {detail}"
+    # What is no joint's needs a place of its own only in a list with those that are.
+    where = at_joints(effect, numbers) or (" of the whole arm" if beside_others else "")
+    return where + (f" ({detail})" if detail else "")

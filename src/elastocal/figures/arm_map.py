@@ -42,9 +42,15 @@ def arm_map(table: pd.DataFrame, outlines: Mapping[str, np.ndarray], titles: Map
     return figure
 
 
+def draw_links(axis: Axes, plane: np.ndarray) -> None:
+    """The corners (K, 2) of an arm joined, behind all else."""
+    style = {"solid_capstyle": "round", "solid_joinstyle": "round", "gid": "arm"}
+    axis.plot(*plane.T, color="#c8c8c8", linewidth=6, zorder=1, **style)
+
+
 def _draw_arm(axis: Axes, cells: pd.DataFrame, corners: np.ndarray, scale: Normalize) -> None:
     plane = corners[:, [0, 2]]
-    axis.plot(*plane.T, color="#c8c8c8", linewidth=6, solid_capstyle="round", solid_joinstyle="round", zorder=1)
+    draw_links(axis, plane)
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     on_links = cells[~cells.side.str.startswith("bar")]
     for joints, link in on_links.groupby("joints"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def draw_arm(axis: Axes, links: np.ndarray, width: float) -> None:
     `links` (N, 3): points along the moving links, base axes, m. `width`: of the lines, in points.
     """
     links = np.concatenate([np.zeros((1, 3)), links[:1] * [0.0, 0.0, 1.0], links])
-    round_ends = {"solid_capstyle": "round", "solid_joinstyle": "round"}
+    round_ends: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round"}
     axis.plot(*as_seen(links * [1.0, 1.0, 0.0]).T, color=_SHADOW, lw=0.8 * width, zorder=0, **round_ends)
     for color, share in ((_EDGE, 1.0), (_ARM, 0.72)):
         axis.plot(*as_seen(links).T, color=color, lw=share * width, zorder=1, **round_ends)

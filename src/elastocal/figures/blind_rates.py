@@ -114,14 +114,12 @@ def coverage_by_effect(coverage: pd.DataFrame) -> Figure:
         marker = _COMPARABLE[row.comparable][0]
         axis.plot([_PER_CENT * row.low, _PER_CENT * row.high], [place, place], color=PALETTE[0], linewidth=1.2)
         axis.plot(_PER_CENT * row.rate, place, marker, color=PALETTE[0], markersize=4.5)
-        axis.annotate(f"{row.cases}", (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=6.5)
+        axis.annotate(f"{row.cases}", (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7)
     lowest = min([_PER_CENT * row.low for row in order])
     axis.set(yticks=range(len(order)), ylim=(len(order) - 0.5, -0.5), xlim=(min(80.0, lowest - 2), 100.5))
     axis.set_yticklabels([_coverage_name(row) for row in order], fontsize=7)
     axis.set_xlabel("95 % intervals that contain the true value (%)")
-    axis.annotate(
-        "intervals", (1.01, -0.9), xycoords=("axes fraction", "data"), va="center", fontsize=6.5, annotation_clip=False
-    )
+    axis.annotate("intervals", (1.01, -0.9), xycoords=("axes fraction", "data"), va="center", fontsize=7, annotation_clip=False)
     axis.grid(visible=False, axis="y")
     present = {row.comparable for row in order}
     handles: list[Artist] = [
@@ -156,6 +154,12 @@ def _dots(axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[fl
         color, marker, _ = LOOKS[key]
         for row in _rows(_Rate, rows[rows.robots == key]):
             place = names.index(row.quantity) + 0.32 * (number - (len(robots) - 1) / 2)
+            if not np.isfinite(row.rate):
+                # The interval of nothing is everything, which would look like a result.
+                axis.annotate(
+                    "no cases", (0.01, place), xycoords=("axes fraction", "data"), va="center", color=color, fontsize=7
+                )
+                continue
             axis.plot([scaled(row.low), scaled(row.high)], [place, place], color=color, linewidth=1.2)
             axis.plot(scaled(row.rate), place, marker, color=color, markersize=4.2)
     axis.set(yticks=range(len(names)), ylim=(len(names) - 0.4, -0.6))

@@ -47,7 +47,7 @@ def probabilities(stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarr
     named = order[:_NAMED]
     # Rows as high as their names are long.
     heights = np.array([0.75 + 0.65 * (label.count("\n") + 1) for label in labels])
-    height_mm = 34 + 3.6 * heights.sum(), 22 + 4.3 * len(named)
+    height_mm = 34 + 3.6 * heights.sum(), 22 + _row_mm(table["candidate"][named]) * len(named)
     figure, axes = panels(2, 1, sum(height_mm), height_ratios=height_mm)
     _bars(axes[0, 0], np.cumsum(heights) - heights / 2, heights.sum(), labels, values)
     _factors(axes[1, 0], table, named)
@@ -82,8 +82,7 @@ def _factors(axis: Axes, table: Mapping[str, np.ndarray], named: np.ndarray) -> 
     axis.set_xticks(_ticks(low, high))
     axis.set_xlabel("Bayes factor against the declared model\n(natural logarithm; above 0 it explains more)")
     axis.axvline(0, color="black", linewidth=0.8, zorder=4)
-    axis.set_yticklabels([short_name(table["candidate"][index]) for index in named], fontsize=7)
-    _two_lines(axis)
+    axis.set_yticklabels([short_name(table["candidate"][index]) for index in named], fontsize=7, linespacing=0.9)
     axis.set_title("Each candidate cause alone", loc="left")
     axis.grid(visible=False, axis="y")
 
@@ -103,7 +102,7 @@ def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]
     chosen = set(table["candidate"][table["chosen"].astype(bool)])
     angles = angle_matrix([name_in_pairs(table, index) for index in shown], pairs)
     count = len(names)
-    figure, axes = panels(1, 1, 18 + 4.2 * max(count, 6))
+    figure, axes = panels(1, 1, 18 + _row_mm(names) * max(count, 6))
     axis = axes[0, 0]
     # Never black, so that the numbers can be read everywhere.
     colours = LinearSegmentedColormap.from_list("angles", ["#08306b", "#4292c6", "#c6dbef", "#ffffff"])
@@ -112,12 +111,11 @@ def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]
         for column in range(count):
             if row != column and np.isfinite(angles[row, column]):
                 ink = ink_on(colours(angles[row, column] / 90))
-                axis.text(column, row, f"{angles[row, column]:.0f}", ha="center", va="center", fontsize=6, color=ink)
+                axis.text(column, row, f"{angles[row, column]:.0f}", ha="center", va="center", fontsize=7, color=ink)
     numbered = [f"{short_name(name)}  {number}" for number, name in enumerate(names, 1)]
     axis.set(xticks=range(count), yticks=range(count))
     axis.set_xticklabels(range(1, count + 1), fontsize=7)
-    axis.set_yticklabels(numbered, fontsize=7)
-    _two_lines(axis)
+    axis.set_yticklabels(numbered, fontsize=7, linespacing=0.9)
     axis.tick_params(length=0)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)
@@ -175,11 +173,9 @@ def short_name(key: str, longest: int = 80) -> str:
     return textwrap.fill(words, 48)
 
 
-def _two_lines(axis: Axes) -> None:
-    """Names of two lines in smaller letters, so that they do not touch their neighbours."""
-    for label in axis.get_yticklabels():
-        if "\n" in label.get_text():
-            label.set(fontsize=5.6, linespacing=0.95)
+def _row_mm(names: Sequence[str]) -> float:
+    """Height of a row in which every name fits."""
+    return 5.6 if any("\n" in short_name(name) for name in names) else 4.3
 
 
 def _capital(text: str) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from scipy.stats import binned_statistic_2d
 
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -22,79 +25,110 @@ if TYPE_CHECKING:
 _BINS = 24
 _FEWEST = 3
 _MILLI = 1e3
+# Light to dark: the larger error is the darker one, in grey too.
+_COLOURS = "viridis_r"
 # What is left however well the robot is corrected.
 _REST = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded")
+TRACKER = "tracker"
+_KINDS = {
+    "uncorrected": ("#b9b9b9", "without any correction"),
+    "effect": (PALETTE[0], "if this alone were left out"),
+    "rest": (PALETTE[2], "left after correction"),
+    TRACKER: ("#ffffff", "in no robot: noise of a single measurement"),
+}
 
 
 @styled
-def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float]) -> Figure:
-    """Errors over distance from the base axis and height: uncorrected, and the bound of the corrected robot.
+def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], tolerance_m: float) -> Figure:
+    """RMS error over distance from the base axis and height, uncorrected and corrected, on one logarithmic scale.
 
-    `maps`: one row of panels each. `forces_N`: hanging load of each.
+    `maps`: one row of panels each. `forces_N`: hanging load of each. `tolerance_m`: drawn as a contour.
     """
-    figure, axes = panels(len(maps), 2, 70 * len(maps), sharex=True, sharey=True)
-    for row, (errors, force) in zip(axes, zip(maps, forces_N, strict=True), strict=True):
+    figure, axes = panels(len(maps), 2, 62 * len(maps) + 16, sharex=True, sharey=True)
+    grids = [[_binned(errors, values) for values in (errors.uncorrected_m, errors.corrected_m)] for errors in maps]
+    known = np.concatenate([found[np.isfinite(found)] for pair in grids for found in pair] + [[tolerance_m]])
+    scale = LogNorm(_MILLI * known[known > 0].min(), _MILLI * known.max())
+    for row, errors, pair, force in zip(axes, maps, grids, forces_N, strict=True):
         load = f"{force:.0f} N hanging" if force else "no load"
-        _panel(row[0], errors, errors.uncorrected_m, 0.5, f"uncorrected, {load}", "median error (mm)")
-        _panel(row[1], errors, errors.bound_m, 0.95, f"corrected, {load}", "95 % bound of the error (mm)")
+        for axis, found, title in zip(row, pair, ("uncorrected", "corrected"), strict=True):
+            image = _panel(axis, errors, found, scale, tolerance_m)
+            axis.set_title(f"{title}, {load}")
         row[0].set_ylabel("height above the base (m)")
     for axis in axes[-1]:
         axis.set_xlabel("distance from the base's vertical axis (m)")
-    outside = Patch(
-        facecolor="none", edgecolor="#555555", hatch="////", lw=0.0, label="mostly beyond the range of the fitted poses"
-    )
-    figure.legend(handles=[outside], loc="outside lower center")
+    bar = figure.colorbar(image, ax=axes.ravel().tolist(), label="predicted RMS position error (mm)")
+    bar.ax.yaxis.set_major_formatter("{x:g}")
+    bar.ax.axhline(_MILLI * tolerance_m, color="black", lw=1.6)
+    handles = [
+        Line2D([], [], color="black", lw=1.6, label=f"tolerance {_MILLI * tolerance_m:g} mm"),
+        Patch(facecolor="none", edgecolor="#555555", hatch="////", lw=0.0, label="mostly beyond the range of the fitted poses"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 
 
-def _panel(axis: Axes, errors: WorkspaceErrors, values: np.ndarray, share: float, title: str, unit: str) -> None:
+def _edges(errors: WorkspaceErrors) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     radius, height = np.hypot(errors.position[:, 0], errors.position[:, 1]), errors.position[:, 2]
-    edges = [np.linspace(values.min(), values.max(), _BINS + 1) for values in (radius, height)]
+    return radius, height, [np.linspace(values.min(), values.max(), _BINS + 1) for values in (radius, height)]
 
-    def binned(what: np.ndarray, how: Any) -> np.ndarray:
-        return np.asarray(binned_statistic_2d(radius, height, what, how, bins=edges).statistic)
 
-    enough = binned(values, "count") >= _FEWEST
-    found = np.where(enough, binned(values, lambda some: np.quantile(some, share)), np.nan)
-    image = axis.pcolormesh(edges[0], edges[1], _MILLI * found.T, cmap="cividis", vmin=0.0, rasterized=True)
-    beyond = enough & (binned(errors.outside.astype(float), "mean") > 0.5)
+def _statistic(errors: WorkspaceErrors, values: np.ndarray, how: str) -> np.ndarray:
+    radius, height, edges = _edges(errors)
+    return np.asarray(binned_statistic_2d(radius, height, values, how, bins=edges).statistic)
+
+
+def _binned(errors: WorkspaceErrors, values: np.ndarray) -> np.ndarray:
+    """RMS of values (N,) in each cell with enough poses, (bins, bins); elsewhere not a number."""
+    enough = _statistic(errors, values, "count") >= _FEWEST
+    return np.where(enough, np.sqrt(_statistic(errors, values**2, "mean")), np.nan)
+
+
+def _panel(axis: Axes, errors: WorkspaceErrors, found: np.ndarray, scale: LogNorm, tolerance_m: float) -> Any:
+    _, _, edges = _edges(errors)
+    image = axis.pcolormesh(edges[0], edges[1], _MILLI * found.T, cmap=_COLOURS, norm=scale, rasterized=True)
+    middles = [(ends[1:] + ends[:-1]) / 2 for ends in edges]
+    if np.nanmin(found) < tolerance_m < np.nanmax(found):
+        axis.contour(*middles, found.T, levels=[tolerance_m], colors="black", linewidths=1.6)
+    beyond = np.isfinite(found) & (_statistic(errors, errors.outside.astype(float), "mean") > 0.5)
+    size = edges[0][1] - edges[0][0], edges[1][1] - edges[1][0]
     for across, up in np.argwhere(beyond):
         corner = edges[0][across], edges[1][up]
-        size = edges[0][1] - edges[0][0], edges[1][1] - edges[1][0]
         axis.add_patch(Rectangle(corner, *size, fill=False, hatch="////", lw=0.0, edgecolor="#ffffffaa"))
-    axis.figure.colorbar(image, ax=axis, label=unit)
-    axis.set_title(title)
     axis.set_aspect("equal")
     axis.grid(visible=False)
+    return image
 
 
 @styled
-def budget_bars(budget: Sequence[Mapping[str, Any]], names: Sequence[str], tolerance_m: float) -> Figure:
-    """Lines of an error budget as bars with their intervals, against the tolerance.
+def budget_bars(budget: Sequence[Mapping[str, Any]], names: Sequence[str], tolerance_m: float, tracker_m: float) -> Figure:
+    """Lines of an error budget as bars with their intervals, the largest first, against the tolerance.
 
-    `budget`: ``name, rms_m, low_m, high_m``. `names`: of the lines, in words.
+    `budget`: ``name, rms_m, low_m, high_m``. `names`: of the lines, in words. `tracker_m`: RMS position error that the
+    tracker's noise alone shows.
     """
-    shown = [line for line in budget if line["rms_m"] > 0.0]
-    labels = [name for name, line in zip(names, budget, strict=True) if line["rms_m"] > 0.0]
-    figure, axes = panels(1, 1, 22 + 6.5 * len(shown))
-    axis = axes[0, 0]
-    smallest = min(tolerance_m, *(line["low_m"] or line["rms_m"] for line in shown))
-    for row, line in enumerate(shown):
-        left = line["name"] in _REST
-        axis.barh(row, _MILLI * line["rms_m"], height=0.6, color=PALETTE[2] if left else PALETTE[0] if row else "#b9b9b9")
+    own = {"name": TRACKER, "rms_m": tracker_m, "low_m": None, "high_m": None}
+    lines = [*zip(names, budget, strict=True), ("noise of the tracker alone", own)]
+    shown = sorted((line for line in lines if line[1]["rms_m"] > 0.0), key=lambda line: -line[1]["rms_m"])
+    figure, axes = panels(1, 1, 26 + 6.5 * len(shown))
+    axis, kinds = axes[0, 0], []
+    for row, (_, line) in enumerate(shown):
+        kind = line["name"] if line["name"] in _KINDS else "rest" if line["name"] in _REST else "effect"
+        kinds.append(kind)
+        size, end = _MILLI * line["rms_m"], _MILLI * (line["high_m"] or line["rms_m"])
+        axis.barh(row, size, height=0.6, color=_KINDS[kind][0], edgecolor="black" if kind == TRACKER else None, linewidth=0.6)
         if line["low_m"] is not None:
-            axis.plot(_MILLI * np.array([line["low_m"], line["high_m"]]), [row, row], color="black", lw=1.2)
-    axis.axvline(_MILLI * tolerance_m, color=PALETTE[1], ls="--", label=f"tolerance {_MILLI * tolerance_m:g} mm")
-    axis.set(xscale="log", xlim=(0.4 * _MILLI * smallest, None), xlabel="position error, RMS over the measured states (mm)")
-    axis.xaxis.set_major_formatter("{x:g}")
-    axis.set_yticks(range(len(shown)), labels)
+            axis.plot([_MILLI * line["low_m"], end], [row, row], color="black", lw=1.2)
+        style: dict[str, Any] = {"fontsize": 7, "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.6}}
+        axis.annotate(f"{size:.3f}", (max(size, end), row), (4, 0), textcoords="offset points", va="center", **style)
+    axis.axvline(_MILLI * tolerance_m, color=PALETTE[1], ls="--", zorder=0, label=f"tolerance {_MILLI * tolerance_m:g} mm")
+    axis.set(xlim=(0, 1.1 * max(axis.get_xlim()[1], _MILLI * tolerance_m)), xlabel="predicted RMS position error (mm)")
+    axis.set_yticks(range(len(shown)), [name for name, _ in shown])
     axis.invert_yaxis()
     axis.grid(visible=False, axis="y")
-    handles = [
-        Patch(color="#b9b9b9", label="without any correction"),
-        Patch(color=PALETTE[0], label="if this alone were left out"),
-        Patch(color=PALETTE[2], label="left after correction"),
-        *axis.get_legend_handles_labels()[0],
+    handles: list[Artist] = [
+        Patch(facecolor=color, edgecolor="black" if kind == TRACKER else color, linewidth=0.6, label=label)
+        for kind, (color, label) in _KINDS.items()
+        if kind in kinds
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    figure.legend(handles=[*handles, *axis.get_legend_handles_labels()[0]], loc="outside lower center", ncols=3)
     return figure

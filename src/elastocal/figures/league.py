@@ -90,7 +90,7 @@ def mechanism_picture(table: pd.DataFrame) -> Figure:
             # Below its circle, where no neighbour hides it.
             place = (0.0, -0.5 * float(np.sqrt(size)) - 1.0)
             words = f"{100 * share:.0f} %"
-            axis.annotate(words, (x, y), place, textcoords="offset points", ha="center", va="top", fontsize=6.5)
+            axis.annotate(words, (x, y), place, textcoords="offset points", ha="center", va="top", fontsize=7)
     axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], rotation=30, ha="right")
     axis.set_yticks(range(len(order)), [_UNKNOWN if name == OTHER else physical_name(name) for name in order])
     axis.set_xlim(-0.5, len(names) - 0.2)

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
+from elastocal.figures.arm_map import draw_links
 from elastocal.figures.style import PALETTE, note, panels, styled
 
 if TYPE_CHECKING:
@@ -78,11 +79,11 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
 
 
 @styled
-def arrows(table: Mapping[str, np.ndarray]) -> Figure:
+def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Figure:
     """Residuals as arrows where the measurements were taken, from the side and from above.
 
-    `table`: columns of the residuals table. Returns repeats are averaged; where states are still many, one of each cell of a
-    grid is drawn.
+    `table`: columns of the residuals table. `arm` (K, 3): corners of the robot in one pose, m. Repeats are averaged; where
+    states are still many, one of each cell of a grid is drawn.
     """
     place, off, stages = *_states(table), _stages(table)
     size = np.linalg.norm(off["before"], axis=1)
@@ -90,7 +91,7 @@ def arrows(table: Mapping[str, np.ndarray]) -> Figure:
     extent = np.maximum(np.ptp(place, axis=0), 1e-3)
     cell_m = _cell_side(extent) if len(place) > _MOST_ARROWS else None
     views = {"from the side": (0, 2), "from above": (0, 1)}
-    figure, axes = panels(1, 2, 32 + float(np.clip(66 * extent[1:].max() / extent[0], 45, 72)))
+    figure, axes = panels(1, 2, 26 + float(np.clip(66 * extent[1:].max() / extent[0], 40, 56)))
     length = _ARROW * extent.max()
     for axis, (title, seen) in zip(axes[0], views.items(), strict=True):
         shown = np.arange(len(place)) if cell_m is None else middle_of_cells(place[:, seen], size, cell_m)
@@ -101,6 +102,8 @@ def arrows(table: Mapping[str, np.ndarray]) -> Figure:
             arrow = axis.quiver(*at.T, *(tips - at).T, angles="xy", scale_units="xy", scale=1, color=STAGES[stage][1], **head)
             arrow.set(zorder=3 + order, gid=stage)
             axis.update_datalim(tips)
+        if arm is not None:
+            draw_links(axis, arm[:, seen])
         axis.plot(0, 0, "+", color="black", markersize=8, gid="base")
         axis.annotate("base", (0, 0), (4, 4), textcoords="offset points", fontsize=7)
         axis.set_title(title, loc="left")
@@ -240,7 +243,7 @@ def _legend(stages: Iterable[str], with_held_out: bool) -> list[Line2D]:
     handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
     handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="fitted measurement"))
     if with_held_out:
-        handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="held-out measurement"))
+        handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="validation measurement"))
     return handles
 
 

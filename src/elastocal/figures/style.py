@@ -91,13 +91,6 @@ def save(figure: Figure, pdf: str, png: str, origin: Origin | None = None) -> No
 
 
 @styled
-def save_png(figure: Figure, path: str) -> None:
-    """Write a figure as PNG alone, without a date; the file appears whole or not at all."""
-    with atomic_write(path) as partial:
-        figure.savefig(partial, format="png", metadata={"Software": None}, dpi=150)
-
-
-@styled
 def save_svg(figure: Figure, path: str) -> None:
     """Write a figure for a page of the site, without a date and with names that are the same in every run.
 

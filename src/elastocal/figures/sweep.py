@@ -38,7 +38,7 @@ def sweep(table: pd.DataFrame) -> Figure:
             axis.bar(places, mine[name], 0.8, base, color=colour, label=label)
             base += mine[name].to_numpy(float)
         for place, count in zip(places, mine["cases"], strict=True):
-            axis.text(place, 1.01, f"{count}", ha="center", va="bottom", fontsize=6)
+            axis.text(place, 1.01, f"{count}", ha="center", va="bottom", fontsize=7)
         axis.set_xticks(range(len(bins)), [f"{angle:g}" for angle in bins])
         axis.set_title(pair.replace("_", " ").replace(" / ", " /\n"), pad=9)
         axis.set_xlabel("angle up to (°)")

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.campaign import NOT_TURNED
 from elastocal.fitting.memory import kept_conditions
 from elastocal.fitting.observations import sample_of
 from elastocal.fitting.parameters import parameters
@@ -68,14 +68,16 @@ def fit_frames(fitted: Fit, model: Model, observations: Observations, noise: Noi
     """
     found = fitted.estimate
     if not own_targets:
-        turns = Rotation.from_matrix(found.target_rotation).as_rotvec()
         known = [
-            replace(target, offset_m=tuple(at), rotation=tuple(turn))
-            for target, at, turn in zip(model.targets, found.target_offset, turns, strict=True)
+            replace(target, offset_m=tuple(at), rotation=NOT_TURNED)
+            for target, at in zip(model.targets, found.target_offset, strict=True)
         ]
         model = replace(model, targets=tuple(known))
     start = registered(model, observations)
     start = replace(start, coefficients=found.coefficients, shapes=found.shapes)
+    if not own_targets:
+        # To the last bit, which a rotation vector does not keep.
+        start = replace(start, target_rotation=found.target_rotation)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
     around = kept_conditions(model, start, observations)
     return robustly(model, observations, around, noise, start, frozen).estimate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,12 +23,15 @@ from elastocal.validation.conformity import PASS, UNDECIDED, conformity, predict
 from elastocal.validation.span import joint_ranges, shortfalls
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pandas as pd
 
     from elastocal.application.certificate.use import Use
     from elastocal.application.certificate.workspace import WorkspaceErrors
     from elastocal.loop.calibrated_files import Diagnosed
     from elastocal.loop.measured import MeasuredErrors
+    from elastocal.mechanics.robot import Robot
 
 # Poses of the map: a bin of 25 by 25 has some ten.
 _POSES = 6000
@@ -42,13 +45,17 @@ _MODELS = {"frames": "uncorrected", "declared": "declared", "effect": "corrected
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a certificate is to state."""
+    """What a certificate is to state.
+
+    `stated`: ``measured_on`` of the campaign and the entries of its ``certificate``.
+    """
 
     tolerance_m: float
     accepted_risk: float
     serial: str
     date: str
     seed: int
+    stated: Mapping[str, str] = field(default_factory=dict)
 
 
 def certificate(
@@ -97,6 +104,7 @@ def certificate(
         "robot": robot.name,
         "serial": wanted.serial,
         "date": wanted.date,
+        "stated": dict(wanted.stated),
         "versions": {name: metadata.version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
         "origin": found.origin,
         "files": {Path(file).name: checksum(file) for file in campaign_files(folder, robots_folder)},
@@ -107,6 +115,7 @@ def certificate(
         "noise_floor_rms_m": found.verdict["heldout"]["noise_floor_rms_m"],
         "accuracy": (accuracy if measured is None else measured.accuracy).document(),
         "predicted": accuracy.document(),
+        "worst_pose": _worst_pose(robot, poses[0], prediction.error_m),
         "conformity": asdict(decision) | {"configurations": judged, "shortfalls": missing},
         "joint_ranges": joint_ranges(states, robot),
         "measured": None if measured is None else measured.document(),
@@ -116,6 +125,7 @@ def certificate(
         },
         "budget": [asdict(share) for share in error_budget(calibrated, *poses, _DRAWS, draws("budget"))],
         "budget_states": accuracy.poses,
+        "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
         "workspace": [_summary(force, each) for force, each in zip(forces, maps, strict=True)],
         "comparison": None,
     }
@@ -136,6 +146,16 @@ def _step(row: pd.Series) -> dict[str, Any]:
     return {"model": _MODELS[row["kind"]], "step": row["step"]} | {
         name.removeprefix("heldout_"): number(name) for name in names
     }
+
+
+def _worst_pose(robot: Robot, reported_angles: np.ndarray, error_m: np.ndarray) -> dict[str, Any]:
+    """Where the corrected robot is predicted to be worst: command in rad and m, RMS error there."""
+    place = int(np.argmax(error_m))
+    joints = [
+        {"value": float(value), "unit": "m" if slides else "rad"}
+        for value, slides in zip(reported_angles[place], robot.chain.prismatic, strict=True)
+    ]
+    return {"joints": joints, "error_m": float(error_m[place])}
 
 
 def _summary(force_N: float, errors: WorkspaceErrors) -> dict[str, Any]:

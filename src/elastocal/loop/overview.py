@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from elastocal.application.scope import calibrated_on, campaign_accuracy
 from elastocal.campaigns.columns import columns_of
@@ -46,10 +47,10 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     ``training`` and ``held_out`` with their ``poses``; ``states, measurements, numbers, loads, repeats, sessions,
     largest_force_N``; ``noise`` (source, position_m, orientation_rad); ``faults`` (name, sentence, decisive);
     ``residual_rms_m`` of the declared model; ``parameters``, ``effective_parameters`` (without what priors decide) and ``held``
-    (those that are not identifiable); ``compliance`` (value, relative standard error of each joint) where identified;
-    ``testable`` and ``untestable`` (how many candidate effects, by reason); ``suspicious``, sentences; ``diagnosable``;
-    ``accuracy`` that a robot is predicted to have which is corrected by the declared model, if nothing is missing in it
-    (`Accuracy.document`), None where the data are at fault. Raises `InputError`.
+    (those that are not identifiable); ``mounts`` (target, rotation_rad) that are fitted; ``compliance`` (value, relative
+    standard error of each joint) where identified; ``testable`` and ``untestable`` (how many candidate effects, by reason);
+    ``suspicious``, sentences; ``diagnosable``; ``accuracy`` that a robot is predicted to have which is corrected by the
+    declared model, if nothing is missing in it (`Accuracy.document`), None where the data are at fault. Raises `InputError`.
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
     whole, settings = case_from(descriptions, columns_of(training)), Settings()
@@ -105,10 +106,16 @@ def _poses(session: np.ndarray, pose: np.ndarray) -> int:
 
 def _identified(declared: Fit) -> dict[str, Any]:
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
+    vectors = Rotation.from_matrix(declared.estimate.target_rotation).as_rotvec()
     found: dict[str, Any] = {
         "parameters": int((~declared.held).sum()),
         "effective_parameters": effective_parameters(declared),
         "held": [name for name, held in zip(named, declared.held, strict=True) if held],
+        "mounts": [
+            {"target": declared.model.targets[number].name, "rotation_rad": vectors[number].tolist()}
+            for number, parts in declared.model.fitted_parts
+            if parts.stop == 6
+        ],
     }
     if declared.model.identifies_compliance:
         mine = np.array([owner == "joint_compliance" for owner, _ in declared.parameters])

@@ -6,7 +6,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from elastocal.application.scope import calibrated_on, campaign_accuracy, judged_by_held_out, with_form
+from elastocal.application.certificate.error_budget import effect_costs
+from elastocal.application.scope import calibrated_on, campaign_accuracy, campaign_poses, judged_by_held_out, with_form
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
@@ -53,12 +54,17 @@ def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
 
 
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
-    """The verdict of a diagnosis on held-out poses, with the accuracy that a corrected robot is predicted to have.
+    """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected robot and the cost of each effect.
 
-    None where the data are at fault: nothing is known of the robot then.
+    ``accuracy`` is predicted, ``cost_m`` of an effect is the RMS error over the campaign's poses and loads if it alone were
+    left out of the correction. Both are None where the data are at fault, the cost also of an effect that is not in the final
+    model or moves no robot.
     """
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
-    accuracy = None
+    accuracy, costs = None, dict[str, float]()
     if not any(effect["family"] == "data" for effect in verdict.document["effects"]):
-        accuracy = campaign_accuracy(calibrated_by(diagnosis, verdict.held_out), case.observations.states).document()
-    return replace(verdict, document=verdict.document | {"accuracy": accuracy})
+        found = calibrated_by(diagnosis, verdict.held_out)
+        accuracy = campaign_accuracy(found, case.observations.states).document()
+        costs = effect_costs(found, *campaign_poses(found, case.observations.states))
+    effects = [effect | {"cost_m": costs.get(effect["name"])} for effect in verdict.document["effects"]]
+    return replace(verdict, document=verdict.document | {"accuracy": accuracy, "effects": effects})

@@ -55,6 +55,17 @@ def corners(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
     return poses_of_points(chain, coordinates, [MeasuringPoint(str(place), place) for place in places])[0]
 
 
+def joint_axes(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
+    """Where each joint turns or slides, and about or along which axis.
+
+    `chain`, `coordinates`: as in `poses`. Returns (J, 2, ..., 3): a place on the axis in m and its direction, base axes.
+    """
+    moved = [number for number, t in enumerate(chain.transforms) if t.coordinate is not None and not chain.is_passive(number)]
+    position, rotation = poses_of_points(chain, coordinates, [MeasuringPoint(str(number), number) for number in moved])
+    axes = np.stack([turned[..., chain.transforms[number].axis] for number, turned in zip(moved, rotation, strict=True)])
+    return np.stack([position, axes], axis=1)
+
+
 def poses_and_jacobians(
     chain: Chain, coordinates: np.ndarray, point: MeasuringPoint, out: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from elastocal.application.accuracy import MEASURED, PREDICTED, accuracy_from, accuracy_sentence, millimetres
+from elastocal.application.certificate.repeatability import ISO_CYCLES, ISO_POSES
 from elastocal.diagnosis.words import candidate_words, listed, parameter_words, physical_name
 from elastocal.effects.protocol import effect_of
 from elastocal.report.first_page import TITLES
-from elastocal.report.wording import MICRO, capital, counted, length, percent, plain, scaled, span_words
+from elastocal.report.wording import MICRO, capital, counted, length, minus, percent, plain, scaled, span_words
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from typing import Any
 
 _SHARES = {
@@ -45,21 +47,31 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
 
     `document`: of `loop.certificate.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
-    conformity, steps = document["conformity"], document["held_out"]
+    conformity, steps, stated = document["conformity"], document["held_out"], document["stated"]
     return {
         "campaign": document["campaign"],
         "robot": document["robot"],
+        # What is not stated is filled in by hand.
         "identity": [
+            ["certificate number", stated.get("number", "")],
             ["robot", document["robot"]],
-            ["serial number", document["serial"] or "not stated"],
+            ["serial number", document["serial"]],
             ["campaign", document["campaign"]],
+            ["measured on", stated.get("measured_on", "")],
+            ["instrument", stated.get("instrument", "")],
+            ["calibration of the instrument", stated.get("instrument_calibration", "")],
+            ["temperature", stated.get("temperature", "")],
+            ["operator", stated.get("operator", "")],
             ["date of this certificate", document["date"]],
+            ["signature", ""],
+        ],
+        "headline": headline(document),
+        "made": [
             ["fitted poses span", span_words(document["joint_ranges"])],
             ["software", ", ".join(f"{name} {version}" for name, version in document["versions"].items())],
             ["commit of the diagnosis", document["origin"]["commit"]],
         ],
         "decision": conformity["decision"],
-        "kind": f" ({document['accuracy']['kind']})",
         "decision_sentences": decision_sentences(document),
         "verdict": verdict_sentence(document),
         "accuracy": before_and_after(document),
@@ -75,6 +87,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         ],
         "floor": length(document["noise_floor_rms_m"]),
         "iso": iso_rows(document["iso_9283"], document["measured"]),
+        "iso_warning": iso_warning(document["iso_9283"]["repeatability"]),
         "budget": [[share_name(line["name"]), _share(line), _limits(line)] for line in document["budget"]],
         "budget_states": counted(document["budget_states"], "state"),
         "workspace": workspace_rows(document["workspace"]),
@@ -85,6 +98,32 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
             *([name, digest] for name, digest in (document["files"] | document["measured_files"]).items()),
         ],
     }
+
+
+def headline(document: Mapping[str, Any]) -> dict[str, str]:
+    """What is decided, by which criterion: ``title``, and the errors in mm: ``rms``, ``limit``, ``worst``, ``tolerance``."""
+    found, accuracy = document["conformity"], accuracy_from(document["accuracy"])
+    kind = accuracy.kind
+    return {
+        "title": f"{capital(found['decision'])}, as {kind}",
+        "rms": millimetres(accuracy.rms_m),
+        "limit": millimetres(found["limit_m"]),
+        "tolerance": millimetres(found["tolerance_m"]),
+        "sure": _percent(1.0 - found["accepted_risk"]),
+        "kind": kind,
+        "worst": millimetres(accuracy.worst_m),
+        "worst_pose": _pose_words(document["worst_pose"]["joints"]) if kind == PREDICTED else "",
+    }
+
+
+def _pose_words(joints: Sequence[Mapping[str, Any]]) -> str:
+    """A command joint by joint, in degrees and mm."""
+    return minus(
+        ", ".join(
+            f"{1e3 * joint['value']:.1f} mm" if joint["unit"] == "m" else f"{math.degrees(joint['value']):.1f}°"
+            for joint in joints
+        )
+    )
 
 
 def decision_sentences(document: Mapping[str, Any]) -> str:
@@ -177,10 +216,18 @@ def iso_rows(found: Mapping[str, Any], measured: Mapping[str, Any] | None) -> li
         rows.append(["pose repeatability RP, orientation", f"{plain(MICRO * repeats['orientation_rad'])} µrad", taken])
     sensor = found["repeatability_of_sensor_m"]
     hides = sensor > _HIDDEN * repeats["position_m"]
-    rows.append(
-        ["of RP, what the tracker's noise alone shows", length(sensor), "hides the robot's own" if hides else "by its noise"]
-    )
-    return rows
+    worth = "so large that it hides the robot's own" if hides else "part of the values above"
+    return [*rows, ["RP that the tracker's noise alone would give", length(sensor), worth]]
+
+
+def iso_warning(repeats: Mapping[str, Any] | None) -> str:
+    """What keeps repeats from being a test after ISO 9283; empty where they are enough."""
+    if repeats is None:
+        return "No pose was approached again, so that no repeatability can be stated."
+    if repeats["poses"] >= ISO_POSES and repeats["approaches"] >= ISO_CYCLES * repeats["poses"]:
+        return ""
+    taken = f"{counted(repeats['approaches'], 'approach', 'approaches')} to {counted(repeats['poses'], 'pose')}"
+    return f"{taken} are fewer than the standard asks for: the values are an indication and no test after ISO 9283."
 
 
 def workspace_rows(maps: list[Mapping[str, Any]]) -> list[list[str]]:

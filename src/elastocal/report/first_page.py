@@ -1,4 +1,4 @@
-"""The first page of a campaign's report: the verdict, its probabilities, what it is worth and what to do now, in words."""
+"""The first page of a campaign's report: how good the robot is, what to do now, what is missing and how sure that is."""
 
 from __future__ import annotations
 
@@ -6,14 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.words import (
+    NOTHING,
+    UNKNOWN,
     alternative_words,
     effect_words,
     found_words,
     hypotheses_words,
+    in_common,
     listed,
     physical_name,
 )
+from elastocal.effects.catalogue import effects
 from elastocal.report.wording import (
     MICRO,
     MILLI,
@@ -21,6 +26,7 @@ from elastocal.report.wording import (
     capital,
     counted,
     length,
+    millimetres,
     minus,
     percent,
     plain,
@@ -44,9 +50,72 @@ AT_FAULT = "the data are at fault"
 OF_DATA = "data"
 # Hypotheses below this stand together as "something else", and so do those beyond the first few.
 LEAST_SHOWN, _MOST_SHOWN = 0.01, 4
-# From this probability on a location is stated without its alternatives.
+# From this probability on a location is stated without its alternatives, and a cause is real.
 _SURE = 0.95
+# Causes of which page 1 has a bar, if they are not part of the verdict.
+_MOST_CAUSES = 6
+# A cause is negligible below this share of the corrected robot's error: squares add up, so that leaving it uncorrected raises
+# the error by 5 % at most. Ellison, S. L. R. and Williams, A. (eds.), EURACHEM/CITAC Guide CG 4, 2012, section 7.2.2:
+# components below a third of the largest need no closer look.
+NEGLIGIBLE = 1 / 3
 MOST_NAMES = 8
+_COST = "the RMS error at the poses and loads of the campaign if it alone is left uncorrected"
+
+
+def headline(verdict: Mapping[str, Any]) -> dict[str, str] | None:
+    """The errors on validation poses in mm: ``before`` any calibration, ``after``, and what ``noise`` alone leaves.
+
+    None where the data are at fault; ``noise`` is empty where it is not known.
+    """
+    if any(effect["family"] == OF_DATA for effect in verdict["effects"]):
+        return None
+    errors, floor = verdict["heldout"], verdict["heldout"]["noise_floor_rms_m"]
+    return {
+        "before": millimetres(errors["uncalibrated"]["rms_m"]),
+        "after": millimetres(errors["after"]["rms_m"]),
+        "noise": millimetres(floor) if floor else "",
+        "poses": counted(errors["poses"], "validation pose"),
+    }
+
+
+def headline_sentence(stated: Mapping[str, str]) -> str:
+    """A headline in one line: 1.18 → 0.110 mm (noise 0.105)."""
+    noise = f" (noise {stated['noise']})" if stated["noise"] else ""
+    return f"{stated['before']} → {stated['after']} mm{noise}, RMS position error on {stated['poses']}"
+
+
+def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
+    """What an effect costs at the campaign's poses and loads: the RMS error if it alone were left out of the correction."""
+    cost = effect["cost_m"]
+    if cost is None:
+        module = effects().get(effect["name"])
+        moves = module is None or module.MOVES_ROBOT
+        return "not in the final model" if moves else "an error of the measurement, not of the robot"
+    if cost > NEGLIGIBLE * heldout["after"]["rms_m"]:
+        return f"{millimetres(cost)} mm"
+    return f"{millimetres(cost)} mm: {'real, ' if effect['probability'] >= _SURE else ''}negligible"
+
+
+def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What may be missing, the most probable first: in words, with its probability and, of what was found, its cost.
+
+    Mechanisms may act together, so that probabilities need not add up to one.
+    """
+    stated, found = verdict["probabilities"], {effect["name"]: effect for effect in verdict["effects"]}
+    if stated is None:
+        return []
+    rows = [(_found(effect), effect["probability"], cost_words(effect, verdict["heldout"])) for effect in found.values()]
+    others = [
+        (UNKNOWN if name == OTHER else physical_name(name), value, "")
+        for name, value in stated["mechanisms"].items()
+        if name not in found
+    ]
+    others = [*others, (NOTHING, stated["nothing"], "")]
+    others = sorted((row for row in others if row[1] >= LEAST_SHOWN), key=lambda row: -row[1])[:_MOST_CAUSES]
+    return [
+        {"name": capital(name), "probability": probability, "words": probability_words(probability), "cost": cost}
+        for name, probability, cost in sorted([*rows, *others], key=lambda row: -row[1])
+    ]
 
 
 def sentences(verdict: Mapping[str, Any]) -> list[str]:
@@ -92,14 +161,24 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
     named = [_found(effect) for effect in found]
     if kind == "several":
         each = listed(
-            (f"{name} ({probability_words(effect['probability'])})" for name, effect in zip(named, found, strict=True))
+            f"{name} ({probability_words(effect['probability'])}; {cost_words(effect, verdict['heldout'])})"
+            for name, effect in zip(named, found, strict=True)
         )
-        first = f"The declared model lacks {counted(len(found), 'mechanism')}, each with its probability: {each}."
-        return [first, *(_ambiguity(effect) for effect in found if effect["alternatives"]), alarm]
+        first = f"The declared model lacks {counted(len(found), 'mechanism')}: {each}."
+        return [
+            first,
+            f"In brackets: how probable it is; its cost, {_COST}.",
+            *(_ambiguity(effect) for effect in found if effect["alternatives"]),
+            alarm,
+        ]
     (effect,) = found
     if kind == "class":
-        return [f"The declared model lacks one mechanism, most probably {named[0]}.", _ambiguity(effect), alarm]
-    return [f"The declared model lacks one mechanism: {named[0]}.", *_unsure_location(effect), alarm]
+        first = [f"The declared model lacks one mechanism, most probably {named[0]}.", _ambiguity(effect)]
+    else:
+        first = [f"The declared model lacks one mechanism: {named[0]}.", *_unsure_location(effect)]
+    if effect["cost_m"] is not None:
+        first.append(f"Its cost, {_COST}: {cost_words(effect, verdict['heldout'])}.")
+    return [*first, alarm]
 
 
 def probability_sentence(probabilities: Mapping[str, Any]) -> str:
@@ -128,7 +207,7 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
         ]
     if kind == "not_testable":
         return [
-            "Measure more: more poses all over the joint ranges, repeats, loads if the robot carries any. The section on what "
+            "Measure more: more poses all over the joint ranges, repeats, loads if the robot carries any. The table of what "
             "could not be tested says what each mechanism needs."
         ]
     if kind == "adequate":
@@ -148,8 +227,8 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
         low, high = heldout["reduction_ci95"]
         if low > 0:
             advice.append(
-                "Use the corrected model: on poses that it was not fitted to it is more accurate. Its parameters stand in the "
-                "section on what is missing."
+                "Use the corrected model: on poses that it was not fitted to it is more accurate. The command elastocal "
+                "correct corrects targets by it, elastocal export writes the calibrated robot."
             )
         elif high < 0:
             advice.append("Do not use the corrected model: on poses that it was not fitted to it is less accurate.")
@@ -166,14 +245,14 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
     elif experiment:
         poses = len({(row["effect"], row["pose"]) for row in experiment})
         advice.append(
-            f"To resolve what is ambiguous measure the {counted(poses, 'pose')} of the section on the next experiment."
+            f"To resolve what is ambiguous measure the {counted(poses, 'pose')} of the next experiment, which the report lists."
         )
     elif kind == "class" and adopted:
         advice.append(
             "Until an experiment resolves which mechanism acts, trust the correction at poses and loads like these only."
         )
     if found and heldout["outside_range"]["poses"]:
-        advice.append("Beyond the range of the fitted poses the errors are extrapolated; see the section on errors.")
+        advice.append("Beyond the range of the fitted poses the errors are extrapolated, and may be larger.")
     return advice
 
 
@@ -221,7 +300,9 @@ def _ambiguity(effect: Mapping[str, Any]) -> str:
     if not effect["alternatives"]:
         return f"Its probability is {probability_words(effect['probability'])}."
     others = listed((alternative_words(name) for name in effect["alternatives"]), MOST_NAMES, last="or")
-    return f"Instead of {physical_name(effect['name'])} it may be {others}: these measurements do not distinguish them."
+    common = in_common(effect["name"], effect["alternatives"])
+    either = f"; it is {common} either way" if common else ""
+    return f"Instead of {physical_name(effect['name'])} it may be {others}: these measurements do not distinguish them{either}."
 
 
 def _unsure_location(effect: Mapping[str, Any]) -> list[str]:

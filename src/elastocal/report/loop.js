@@ -1,172 +1,159 @@
 "use strict";
-// Draws the page of a campaign from the JSON that stands in it; colours and dashes tell before from after without colour, too.
+// Draws the page of a campaign from the JSON that stands in it; marks and dashes tell before from after without colour, too.
 const data = JSON.parse(document.getElementById("data").textContent);
-const BEFORE = { name: "before", dash: "solid", symbol: "circle-open", tip: "circle" };
-const AFTER = { name: "after", dash: "dash", symbol: "cross", tip: "diamond" };
-const SETTINGS = { responsive: true, displaylogo: false, displayModeBar: false };
 const find = (id) => document.getElementById(id);
-const chosen = (value) => [BEFORE, AFTER].filter((step) => value === "both" || value === step.name);
+const STEPS = [{ name: "before", dash: [], mark: "dot" }, { name: "after", dash: [5, 3], mark: "diamond" }];
+const chosen = (value) => STEPS.filter((step) => value === "both" || value === step.name);
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 // Colours are those of the page, which has a light and a dark set.
 const ink = {};
 function takeColours() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["paper", "ink", "grid", "robot", "before", "after"]) ink[name] = style.getPropertyValue(`--${name}`).trim();
-  BEFORE.color = ink.before;
-  AFTER.color = ink.after;
-}
-const sheet = () => ({ paper_bgcolor: ink.paper, plot_bgcolor: ink.paper, font: { color: ink.ink } });
-
-// The robot in space.
-const VIEWS = { corner: [1, -1, 0.5], front: [1, 0, 0.1], side: [0, -1, 0.1], above: [0.01, 0, 1] };
-const camera = { eye: { x: 1, y: -1, z: 0.5 }, center: { x: 0, y: 0, z: 0 } };
-// Plots in space lie above their legend; of the angle under which plotly looks this is the tangent of half.
-const [DOMAIN, HALF_ANGLE] = [{ x: [0, 1], y: [0.07, 1] }, Math.tan(Math.PI / 8)];
-// Numbers of axes stand beside what is drawn.
-const BESIDE = 1.05;
-
-function factor() {
-  // From one tenth to ten times the factor at which arrows of the middle length are well seen.
-  return data.usual_factor * 10 ** ((find("factor").value - 50) / 50);
+  for (const name of ["paper", "ink", "grid", "link", "joint", "before", "after"]) ink[name] = style.getPropertyValue(`--${name}`).trim();
+  for (const step of STEPS) step.color = ink[step.name];
 }
 
+// A canvas at the resolution of the screen, empty.
+function emptied(canvas) {
+  const [width, height, fine] = [canvas.clientWidth, canvas.clientHeight, window.devicePixelRatio || 1];
+  canvas.width = Math.round(width * fine);
+  canvas.height = Math.round(height * fine);
+  const pen = canvas.getContext("2d");
+  pen.scale(fine, fine);
+  pen.fillStyle = ink.paper;
+  pen.fillRect(0, 0, width, height);
+  pen.font = "12px system-ui, sans-serif";
+  return { pen, width, height };
+}
+
+function line(pen, from, to, color, width, { dash = [], cap = "butt" } = {}) {
+  Object.assign(pen, { strokeStyle: color, lineWidth: width, lineCap: cap });
+  pen.setLineDash(dash);
+  pen.beginPath();
+  pen.moveTo(from[0], from[1]);
+  pen.lineTo(to[0], to[1]);
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
+function mark(pen, [x, y], kind, color, size, filled = true) {
+  Object.assign(pen, { strokeStyle: color, fillStyle: color, lineWidth: 1.3 });
+  pen.beginPath();
+  if (kind === "dot") pen.arc(x, y, size, 0, 2 * Math.PI);
+  else if (kind === "cross") for (const s of [-1, 1]) { pen.moveTo(x - size, y - s * size); pen.lineTo(x + size, y + s * size); }
+  else { pen.moveTo(x, y - 1.3 * size); pen.lineTo(x + 1.3 * size, y); pen.lineTo(x, y + 1.3 * size); pen.lineTo(x - 1.3 * size, y); pen.closePath(); }
+  if (filled && kind !== "cross") pen.fill(); else pen.stroke();
+}
+
+// The robot in space, seen without perspective from a direction.
+const VIEWS = { corner: [-0.8, 0.35], front: [0, 0.05], side: [-Math.PI / 2, 0.05], above: [-Math.PI / 2, Math.PI / 2] };
+const view = { yaw: VIEWS.corner[0], pitch: VIEWS.corner[1], zoom: 1 };
+const MARGIN = 24;
+
+// From one tenth to ten times the factor at which arrows of the middle length are well seen.
+const factor = () => data.usual_factor * 10 ** ((find("factor").value - 50) / 50);
 const tip = (step, number) => data.position[number].map((at, k) => at + 1e-6 * factor() * data[step.name][number][k]);
 
-function arrows(step) {
-  const [x, y, z] = [[], [], []];
-  data.position.forEach((at, number) => {
-    const end = tip(step, number);
-    [x, y, z].forEach((axis, k) => axis.push(at[k], end[k], null));
-  });
-  // A mark at the end alone says which way an arrow points.
-  return {
-    type: "scatter3d", mode: "lines+markers", name: step.name, x, y, z, hoverinfo: "skip",
-    line: { color: step.color, width: 4, dash: step.dash },
-    marker: { color: step.color, symbol: step.tip, size: x.map((_, place) => (place % 3 === 1 ? 3.5 : 0)), line: { width: 0 } },
-  };
+function projection(width, height) {
+  const [cy, sy, cp, sp] = [Math.cos(view.yaw), Math.sin(view.yaw), Math.cos(view.pitch), Math.sin(view.pitch)];
+  const [right, up, towards] = [[-sy, cy, 0], [-sp * cy, -sp * sy, cp], [cp * cy, cp * sy, sp]];
+  // All that is drawn in any pose lies in sight, so that nothing jumps when the robot moves.
+  const ends = [...data.outlines.flat(), ...data.position];
+  for (const step of STEPS) data.position.forEach((_, number) => ends.push(tip(step, number)));
+  const spans = [right, up].map((axis) => ends.reduce(([low, high], at) => {
+    const value = dot(axis, at);
+    return [Math.min(low, value), Math.max(high, value)];
+  }, [Infinity, -Infinity]));
+  const [wide, tall] = spans.map(([low, high]) => Math.max(high - low, 1e-6));
+  const scale = view.zoom * Math.min((width - 2 * MARGIN) / wide, (height - 2 * MARGIN) / tall);
+  const [x0, y0] = spans.map(([low, high]) => (low + high) / 2);
+  const shown = (at) => [width / 2 + scale * (dot(right, at) - x0), height / 2 - scale * (dot(up, at) - y0), dot(towards, at)];
+  return { shown, scale, ends };
 }
 
-function robot() {
-  const [x, y, z] = [0, 1, 2].map((k) => data.outlines[find("pose").value].map((corner) => corner[k]));
-  return {
-    type: "scatter3d", mode: "lines+markers", name: "robot", x, y, z, hoverinfo: "name",
-    line: { color: ink.robot, width: 12 }, marker: { color: ink.robot, size: 4 },
-  };
-}
-
-function targets() {
-  const [x, y, z] = [0, 1, 2].map((k) => data.targets[find("pose").value].map((number) => data.position[number][k]));
-  return {
-    type: "scatter3d", mode: "markers", name: "targets in this pose", x, y, z, hoverinfo: "name",
-    marker: { color: ink.robot, symbol: "circle-open", size: 8 },
-  };
-}
-
-// All that is drawn in any pose, so that nothing jumps when the robot moves.
-function ends() {
-  const places = [...data.outlines.flat(), ...data.position];
-  for (const step of [BEFORE, AFTER]) data.position.forEach((_, number) => places.push(tip(step, number)));
-  return places;
-}
-
-function ranges(places) {
-  return [0, 1, 2].map((k) => {
-    const [low, high] = places.reduce(([a, b], at) => [Math.min(a, at[k]), Math.max(b, at[k])], [Infinity, -Infinity]);
-    const margin = Math.max(0.02 * (high - low), 0.01);
-    return [low - margin, high + margin];
-  });
-}
-
-// As far away as it takes to see everything from there, and at a height that leaves as much room above as below.
-function fit(direction) {
-  const [range, size] = [ranges(ends()), Math.hypot(...direction)];
-  const towards = direction.map((value) => value / size);
-  const longest = Math.max(...range.map(([low, high]) => high - low));
-  const level = Math.hypot(towards[0], towards[1]);
-  const right = [-towards[1] / level, towards[0] / level, 0];
-  const up = [-towards[2] * right[1], towards[2] * right[0], towards[0] * right[1] - towards[1] * right[0]];
-  const along = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const shape = find("robot").clientWidth / (find("robot").clientHeight * (DOMAIN.y[1] - DOMAIN.y[0]));
-  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((corner) =>
-    range.map(([low, high], k) => (((corner >> k) % 2 ? 1 : -1) * (high - low)) / 2 / longest));
-  let [far, height] = [0, 0];
-  // Some rounds: how high the corners are seen depends on how far away they are, and the other way round.
-  for (let round = 0; round < 8; round += 1) {
-    const seen = corners.map((at) => [at[0], at[1], at[2] - height]);
-    far = Math.max(...seen.map((at) => {
-      const across = Math.max(Math.abs(along(at, right)) / shape, Math.abs(along(at, up)));
-      return along(at, towards) + (BESIDE * across) / HALF_ANGLE;
-    }));
-    const ups = seen.map((at) => along(at, up) / (far - along(at, towards)));
-    height += (up[2] * far * (Math.max(...ups) + Math.min(...ups))) / 2;
+function floor(pen, shown, ends) {
+  const reach = Math.max(...ends.map((at) => Math.max(Math.abs(at[0]), Math.abs(at[1]))));
+  const step = reach > 1.5 ? 1 : 0.25;
+  const last = Math.ceil(reach / step);
+  for (let k = -last; k <= last; k += 1) {
+    for (const swap of [false, true]) {
+      const [from, to] = [-last, last].map((end) => (swap ? [k * step, end * step, 0] : [end * step, k * step, 0]));
+      line(pen, shown(from), shown(to), ink.grid, 1);
+    }
   }
-  const [x, y, z] = towards.map((value) => far * value);
-  return { eye: { x, y, z: z + height }, center: { x: 0, y: 0, z: height } };
+  pen.fillStyle = ink.ink;
+  for (const [k, name] of ["x", "y", "z"].entries()) {
+    const end = [0, 1, 2].map((axis) => (axis === k ? 0.35 * Math.min(reach, 2) : 0));
+    line(pen, shown([0, 0, 0]), shown(end), ink.ink, 1.5);
+    pen.fillText(name, shown(end)[0] + 4, shown(end)[1] - 4);
+  }
+  return step;
 }
 
 function drawRobot() {
+  const pose = find("pose").value;
   find("factor-out").textContent = Number(factor().toPrecision(2)).toLocaleString("en");
-  find("pose-out").textContent = data.poses[find("pose").value];
-  const range = ranges(ends());
-  const spans = range.map(([low, high]) => high - low);
-  const longest = Math.max(...spans);
-  const axis = { zeroline: false, gridcolor: ink.grid, title: { font: { size: 12 } } };
-  const layout = {
-    ...sheet(), margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "kept", legend: { orientation: "h", y: 0 },
-    scene: {
-      domain: DOMAIN, aspectmode: "manual", camera: structuredClone(camera),
-      aspectratio: { x: spans[0] / longest, y: spans[1] / longest, z: spans[2] / longest },
-      ...Object.fromEntries(["x", "y", "z"].map((name, k) => [
-        `${name}axis`, { ...axis, range: range[k], nticks: spans[k] < longest / 2 ? 4 : 8, title: { text: `${name} (m)` } },
-      ])),
-    },
-  };
-  Plotly.react("robot", [robot(), targets(), ...chosen(find("which").value).map(arrows)], layout, SETTINGS);
+  find("pose-out").textContent = data.poses[pose];
+  const { pen, width, height } = emptied(find("robot"));
+  const { shown, scale, ends } = projection(width, height);
+  const step = floor(pen, shown, ends);
+  const things = [];
+  const outline = data.outlines[pose].map(shown);
+  const thick = Math.min(Math.max(0.15 * scale, 7), 34);
+  for (let k = 1; k < outline.length; k += 1) {
+    const [from, to, size] = [outline[k - 1], outline[k], thick * (1 - (0.5 * k) / outline.length)];
+    things.push([(from[2] + to[2]) / 2, () => {
+      line(pen, from, to, ink.joint, size + 2, { cap: "round" });
+      line(pen, from, to, ink.link, size, { cap: "round" });
+    }]);
+  }
+  data.joints[pose].forEach(([at, axis], k) => {
+    const size = thick * (1.15 - (0.5 * k) / data.joints[pose].length);
+    const ends_of = [-1, 1].map((sign) => shown(at.map((value, i) => value + (sign * 0.75 * size * axis[i]) / scale)));
+    // In front of the links that meet there.
+    things.push([shown(at)[2] + thick / scale, () => {
+      mark(pen, shown(at), "dot", ink.joint, 0.55 * size);
+      line(pen, ...ends_of, ink.joint, 1.1 * size);
+    }]);
+  });
+  for (const each of chosen(find("which").value)) {
+    data.position.forEach((at, number) => {
+      const [from, to] = [shown(at), shown(tip(each, number))];
+      things.push([to[2], () => {
+        line(pen, from, to, each.color, 1.8, { dash: each.dash });
+        mark(pen, to, each.mark, each.color, 2.2);
+      }]);
+    });
+  }
+  for (const number of data.targets[pose]) things.push([Infinity, () => mark(pen, shown(data.position[number]), "dot", ink.ink, 8, false)]);
+  things.sort((a, b) => a[0] - b[0]).forEach(([, draw]) => draw());
+  find("grid-out").textContent = `Lines on the floor are ${step} m apart.`;
 }
 
-function look(at) {
-  Object.assign(camera, at);
-  Plotly.relayout("robot", { "scene.camera": structuredClone(camera) });
+function turn(yaw, pitch, zoom = 1) {
+  view.yaw += yaw;
+  view.pitch = Math.min(Math.max(view.pitch + pitch, -Math.PI / 2), Math.PI / 2);
+  view.zoom = Math.min(Math.max(view.zoom * zoom, 0.2), 20);
+  drawRobot();
 }
-
-function present() {
-  // Where the mouse has turned it to.
-  const scene = find("robot")._fullLayout && find("robot")._fullLayout.scene;
-  return scene && scene._scene ? scene._scene.getCamera() : camera;
-}
-
-document.querySelectorAll("[data-view]").forEach((button) =>
-  button.addEventListener("click", () => look(fit(VIEWS[button.dataset.view]))));
-document.querySelectorAll("[data-turn]").forEach((button) =>
-  button.addEventListener("click", () => {
-    const [{ eye, center }, angle] = [present(), Number(button.dataset.turn)];
-    const [c, s] = [Math.cos(angle), Math.sin(angle)];
-    const [x, y] = [eye.x - center.x, eye.y - center.y];
-    look({ eye: { x: center.x + c * x - s * y, y: center.y + s * x + c * y, z: eye.z }, center });
-  }));
-document.querySelectorAll("[data-zoom]").forEach((button) =>
-  button.addEventListener("click", () => {
-    const [{ eye, center }, by] = [present(), Number(button.dataset.zoom)];
-    const nearer = (name) => center[name] + by * (eye[name] - center[name]);
-    look({ eye: { x: nearer("x"), y: nearer("y"), z: nearer("z") }, center });
-  }));
-
-// Probabilities of hypotheses.
-function drawCauses() {
-  if (!data.hypotheses.length) return;
-  const rows = data.hypotheses.slice().reverse();
-  find("causes").style.height = `${70 + 75 * rows.length}px`;
-  // A number stays with its joint.
-  const wrapped = (text) => text.replace(/ (?=\d)/g, "\u00a0").replace(/(.{1,34})( |$)/g, "$1<br>").replace(/<br>$/, "");
-  Plotly.react("causes", [{
-    type: "bar", orientation: "h", x: rows.map((row) => 100 * row.probability), y: rows.map((row) => wrapped(row.name)),
-    text: rows.map((row) => row.words), textposition: "auto", textangle: 0, insidetextfont: { color: ink.paper }, marker: { color: AFTER.color }, hoverinfo: "skip",
-  }], {
-    ...sheet(), margin: { l: 10, r: 10, t: 10, b: 40 },
-    xaxis: { title: { text: "posterior probability (%)" }, range: [0, 105], gridcolor: ink.grid },
-    yaxis: { automargin: true, tickfont: { size: 12 }, ticks: "outside", ticklen: 6, tickcolor: "rgba(0, 0, 0, 0)" },
-  }, SETTINGS);
-}
+const on = (selector, act) => document.querySelectorAll(selector).forEach((button) => button.addEventListener("click", () => act(button.dataset)));
+on("[data-view]", ({ view: name }) => { [view.yaw, view.pitch] = VIEWS[name]; view.zoom = 1; drawRobot(); });
+on("[data-turn]", ({ turn: by }) => turn(Number(by), 0));
+on("[data-tilt]", ({ tilt: by }) => turn(0, Number(by)));
+on("[data-zoom]", ({ zoom: by }) => turn(0, 0, Number(by)));
+on("[data-worst]", () => { find("pose").value = data.worst; drawRobot(); });
+const KEYS = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1], "+": [0, 0, 1.25], "-": [0, 0, 0.8] };
+find("robot").addEventListener("keydown", (event) => {
+  if (KEYS[event.key]) { event.preventDefault(); turn(...KEYS[event.key]); }
+});
+find("robot").addEventListener("pointermove", (event) => {
+  if (event.buttons) turn(-0.008 * event.movementX, 0.008 * event.movementY);
+});
+// The wheel alone moves the page.
+find("robot").addEventListener("wheel", (event) => {
+  if (event.ctrlKey) { event.preventDefault(); turn(0, 0, Math.exp(-0.002 * event.deltaY)); }
+}, { passive: false });
 
 // Any component of the residual against any quantity.
 const COMPONENTS = {
@@ -174,51 +161,90 @@ const COMPONENTS = {
   x: ["along x", (off) => off[0]], y: ["along y", (off) => off[1]], z: ["along z", (off) => off[2]],
 };
 
+function ticks(low, high, most) {
+  const rough = (high - low) / most;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].find((each) => each * power >= rough) * power;
+  const first = Math.ceil(low / step - 1e-9);
+  return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, k) => Number(((first + k) * step).toPrecision(12)));
+}
+
 function drawScatter() {
   const [words, of] = COMPONENTS[find("component").value];
   const against = data.against[find("against").value];
-  const traces = [];
-  const sums = [];
+  const [series, sums] = [[], []];
   for (const step of chosen(find("step").value)) {
     const values = data[step.name].map(of);
     const parts = [];
-    for (const [held, suffix, symbol] of [[false, " (fitted)", step.symbol], [true, " (validation)", "diamond"]]) {
+    for (const [held, suffix, kind, filled] of [[false, "fitted", step.mark, step.name === "after"], [true, "validation", "cross", true]]) {
       const rows = values.map((_, number) => number).filter((number) => data.held_out[number] === held);
       if (!rows.length) continue;
       const root = Math.sqrt(rows.reduce((sum, number) => sum + values[number] ** 2, 0) / rows.length);
-      parts.push(`${root < 1000 ? root.toPrecision(3) : root.toFixed(0)} µm${suffix}`);
-      traces.push({
-        type: "scatter", mode: "markers", name: step.name + suffix, x: rows.map((n) => against.values[n]),
-        y: rows.map((n) => values[n]), marker: { color: step.color, symbol, size: 5, opacity: 0.7 },
-      });
+      parts.push(`${root < 1000 ? root.toPrecision(3) : root.toFixed(0)} µm (${suffix})`);
+      series.push({ name: `${step.name} (${suffix})`, kind, filled, color: step.color, points: rows.map((n) => [against.values[n], values[n]]) });
     }
     sums.push(`${step.name} ${parts.join(" and ")}`);
   }
-  const axis = { gridcolor: ink.grid, zerolinecolor: ink.ink };
-  Plotly.react("scatter", traces, {
-    ...sheet(), margin: { l: 60, r: 10, t: 10, b: 45 }, legend: { orientation: "h", y: 1.02, yanchor: "bottom", itemsizing: "constant" },
-    xaxis: { ...axis, title: { text: `${against.name} (${against.unit})` } },
-    yaxis: { ...axis, title: { text: `residual, ${words} (µm)` } },
-  }, SETTINGS);
   find("scatter-words").textContent = `Root mean square of the single measurements shown, ${words}: ${sums.join("; ")}.`;
+  const { pen, width, height } = emptied(find("scatter"));
+  const box = { left: 64, right: width - 12, top: 30, bottom: height - 44 };
+  const spans = [0, 1].map((k) => {
+    const all = series.flatMap(({ points }) => points.map((point) => point[k]));
+    const [low, high] = [Math.min(...(k ? [0] : []), ...all), Math.max(...(k ? [0] : []), ...all)];
+    const room = 0.04 * (high - low) || 1;
+    return [low - room, high + room];
+  });
+  const across = (value) => box.left + ((value - spans[0][0]) / (spans[0][1] - spans[0][0])) * (box.right - box.left);
+  const up = (value) => box.bottom - ((value - spans[1][0]) / (spans[1][1] - spans[1][0])) * (box.bottom - box.top);
+  pen.fillStyle = ink.ink;
+  pen.textAlign = "center";
+  for (const value of ticks(...spans[0], width / 90)) {
+    line(pen, [across(value), box.top], [across(value), box.bottom], ink.grid, 1);
+    pen.fillText(value.toLocaleString("en"), across(value), box.bottom + 16);
+  }
+  pen.fillText(`${against.name} (${against.unit})`, (box.left + box.right) / 2, box.bottom + 36);
+  pen.textAlign = "right";
+  for (const value of ticks(...spans[1], 6)) {
+    line(pen, [box.left, up(value)], [box.right, up(value)], value ? ink.grid : ink.ink, 1);
+    pen.fillText(value.toLocaleString("en"), box.left - 6, up(value) + 4);
+  }
+  pen.save();
+  pen.translate(12, (box.top + box.bottom) / 2);
+  pen.rotate(-Math.PI / 2);
+  pen.textAlign = "center";
+  pen.fillText(`residual, ${words} (µm)`, 0, 0);
+  pen.restore();
+  pen.globalAlpha = 0.75;
+  for (const { kind, filled, color, points } of series) for (const [x, y] of points) mark(pen, [across(x), up(y)], kind, color, 2.6, filled);
+  pen.globalAlpha = 1;
+  find("scatter-legend").replaceChildren(...series.map(({ name, kind, filled, color }) => {
+    const [item, sample] = [document.createElement("li"), document.createElement("canvas")];
+    Object.assign(sample, { width: 14, height: 14 });
+    mark(sample.getContext("2d"), [7, 7], kind, color, 4, filled);
+    item.append(sample, ` ${name}`);
+    return item;
+  }));
 }
 
 for (const [key, [words]] of Object.entries(COMPONENTS)) find("component").add(new Option(words, key));
 data.against.forEach((entry, number) => find("against").add(new Option(entry.name, number)));
 find("pose").max = data.outlines.length - 1;
-find("pose").value = 0;
+find("pose").value = data.worst;
 find("factor").value = 50;
 // Where nothing was added one of two equal pictures is enough.
 if (!data.changed) for (const id of ["which", "step"]) find(id).value = "before";
-if (data.outlines.length) Object.assign(camera, fit(VIEWS.corner));
 for (const id of ["which", "factor", "pose"]) find(id).addEventListener("input", drawRobot);
 for (const id of ["component", "against", "step"]) find(id).addEventListener("input", drawScatter);
 function drawAll() {
   takeColours();
-  if (data.outlines.length) drawRobot();
-  drawCauses();
-  drawScatter();
+  drawRobot();
+  if (data.against.length) drawScatter();
 }
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+window.addEventListener("resize", drawAll);
+// On paper the page is light.
+for (const [event, light] of [["beforeprint", true], ["afterprint", false]]) {
+  window.addEventListener(event, () => { document.documentElement.classList.toggle("light", light); drawAll(); });
+}
 drawAll();
 document.body.dataset.ready = "yes";

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from elastocal.diagnosis.words import alternative_words, listed, parameter_words, physical_name
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
-from elastocal.report.first_page import LEAST_SHOWN, MOST_NAMES, OF_DATA, location_words
+from elastocal.report.first_page import LEAST_SHOWN, MOST_NAMES, OF_DATA, cost_words, location_words
 from elastocal.report.loop_parameters import mostly_prior
 from elastocal.report.wording import (
     as_sentence,
@@ -35,8 +35,11 @@ NONE_FOUND = {
 _MOST_PARAMETERS, _SHOWN_PARAMETERS = 16, 10
 
 
-def effect_facts(effect: Mapping[str, Any]) -> dict[str, Any]:
-    """Facts of one effect or fault of the data."""
+def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str, Any]:
+    """Facts of one effect or fault of the data.
+
+    `heldout`: of verdict.json.
+    """
     known = [entry for entry in effect["parameters"] if not entry.get("held") or entry.get("shape")]
     rest = ""
     shown = known
@@ -73,6 +76,7 @@ def effect_facts(effect: Mapping[str, Any]) -> dict[str, Any]:
         if held
         else "",
         "probability": "" if effect["probability"] is None else probability_words(effect["probability"]),
+        "cost": "" if of_data or not effect["adopted"] else cost_words(effect, heldout),
         "gain": "" if gain is None else _gain(gain),
         "adopted": effect["adopted"],
         "alternatives": listed(

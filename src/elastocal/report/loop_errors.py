@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 METRICS = ("mean", "rms", "p95", "max")
-SPLITS = {"held out": "validation poses (held out)", "joint space": "block of joint space", "session": "session"}
+SPLITS = {"held out": "validation poses", "joint space": "block of joint space", "session": "session"}
 # More rows than these would fill pages that nobody reads; the table has them all.
 _MOST_BLOCKS = 12
 

@@ -33,7 +33,7 @@ def made(campaign: Mapping[str, Any]) -> str:
 
 
 def measured(table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]) -> list[list[str]]:
-    """Rows of what was measured: name, training, held out.
+    """Rows of what was measured: name, at fitted poses, at validation poses.
 
     `table` (N,): columns of the residuals table. `descriptions`: contents of campaign.json.
     """
@@ -109,7 +109,11 @@ def _part(part: Mapping[str, np.ndarray], campaign: Mapping[str, Any]) -> dict[s
         "states (pose and load)": grouped(states),
         "loads": loads,
         "targets": listed(
-            (f"{name} on {target['point']}{_mount(target, campaign['measured'] == 'pose')}" for name, target in used),
+            (
+                ("" if name == target["point"] else f"{name} ")
+                + f"at the measuring point {target['point']}{_mount(target, campaign['measured'] == 'pose')}"
+                for name, target in used
+            ),
             12,
         ),
         "repeats of a state": str(each.min())

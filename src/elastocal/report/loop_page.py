@@ -1,7 +1,4 @@
-"""A campaign's page to look into: one HTML file that asks nothing of the network.
-
-Drawn by plotly.js, whose source stands in the page: it turns, zooms and answers to touch, and is kept by many.
-"""
+"""A campaign's page to look into: one HTML file that asks nothing of the network and draws on canvases of its own."""
 
 from __future__ import annotations
 
@@ -12,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jinja2 import Environment
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
-from elastocal.diagnosis.words import candidate_words, hypotheses_words
+from elastocal.diagnosis.words import candidate_words
 from elastocal.io.atomic_writes import write_text
-from elastocal.mechanics.kinematics import corners
+from elastocal.loop.residual_tables import angles_of, worst_measurement
+from elastocal.mechanics.kinematics import corners, joint_axes
 from elastocal.report.wording import MICRO, capital, grouped, minus, probability_words
 
 if TYPE_CHECKING:
@@ -35,50 +32,41 @@ _LEADING = 15
 # Arrows of the middle length are this share of the width of what they are drawn in.
 _ARROW = 0.03
 _FACTS = (
-    "campaign",
-    "robot",
-    "made",
-    "verdict",
-    "sentences",
-    "accuracy",
-    "held_out_sentence",
-    "probabilities",
-    "now",
-    "warnings",
-    "remainder",
+    *("campaign", "robot", "made", "headline", "now", "verdict", "sentences", "causes", "accuracy", "warnings", "effects"),
+    *("held_out_sentence", "remainder"),
 )
 
 
 def loop_page(
     facts: Mapping[str, Any],
-    verdict: Mapping[str, Any],
     table: Mapping[str, np.ndarray],
     candidates: Mapping[str, np.ndarray],
     robot: Robot,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """What the page of a campaign says, and what it draws.
 
-    `facts`: from `loop_facts.loop_facts`. `verdict`: contents of verdict.json. `table` (N,): columns of the residuals; joint
+    `facts`: from `loop_facts.loop_facts`. `table` (N,): columns of the residuals; joint
     angles are the model's, as in a campaign, not the controller's. `candidates` (K,): columns of the candidates table. `robot`:
     as declared. Returns `page`: texts and tables, worded; `data`: JSON-serialisable: positions (m), residuals (µm), what they
-    may be drawn against, corners of the robot (m), hypotheses.
+    may be drawn against, corners, joints and axes of the robot (m).
     """
     count = len(table["x"])
     shown = _spread(count, _MOST_SHOWN)
+    if len(shown) < count:
+        # The worst is among them whatever the others are.
+        shown = np.unique([*_spread(count, _MOST_SHOWN - 1), worst_measurement(table)])
     some = {name: values[shown] for name, values in table.items()}
     position = np.column_stack([some[name] for name in "xyz"])
     off = {step: MICRO * np.column_stack([some[f"{step}_d{axis}"] for axis in "xyz"]) for step in ("before", "after")}
-    angles = np.column_stack([some[f"q{joint}"] for joint in range(1, robot.joints + 1)])
+    angles = angles_of(some, robot.joints)
     # Validation poses of another campaign have numbers of their own.
     pose = np.column_stack([some["held_out"], some["session"], some["pose"]])
     first, of_pose = np.unique(pose, axis=0, return_index=True, return_inverse=True)[1:]
-    places = np.argsort(first)[_spread(len(first), _POSES)]
-    drawn = first[places]
-    sets = (verdict["probabilities"] or {}).get("sets", []) if facts["probabilities"] else []
-    hypotheses = [
-        {"name": capital(name), "probability": entry["probability"], "words": probability_words(entry["probability"])}
-        for name, entry in zip(hypotheses_words(sets), sets, strict=True)
-    ]
+    worst_pose = of_pose.ravel()[worst_measurement(some)]
+    in_order = np.argsort(first)
+    places = np.unique([*_spread(len(first), _POSES), np.flatnonzero(in_order == worst_pose)[0]])
+    places = in_order[places]
+    drawn, worst = first[places], int(np.flatnonzero(places == worst_pose)[0])
     middle = np.median(np.linalg.norm(off["before"], axis=1)) / MICRO
     data = {
         "position": position.round(6).tolist(),
@@ -86,14 +74,15 @@ def loop_page(
         "held_out": some["held_out"].astype(bool).tolist(),
         "against": _against(some, angles, robot),
         "outlines": corners(robot.chain, angles[drawn]).swapaxes(0, 1).round(4).tolist(),
+        "joints": np.moveaxis(joint_axes(robot.chain, angles[drawn]), 2, 0).round(4).tolist(),
+        "worst": worst,
         "poses": [f"{some['pose'][row]}" + (", validation" if some["held_out"][row] else "") for row in drawn],
         "targets": [_targets(some, np.flatnonzero(of_pose.ravel() == place)) for place in places],
         "usual_factor": float(_ARROW * np.ptp(position, axis=0).max() / max(middle, 1e-9)),
-        "hypotheses": hypotheses,
         "changed": not np.allclose(off["before"], off["after"], rtol=0, atol=0.01),
     }
     page = {name: facts[name] for name in _FACTS}
-    page |= {"hypotheses": hypotheses, "candidates": _candidates(candidates), "effects": facts["effects"]}
+    page["candidates"] = _candidates(candidates)
     page["compliances"] = facts["compliances"] if facts["compliances_identified"] else []
     page["same_sentence"] = "" if data["changed"] else "Nothing was added to the declared model: after is the same as before."
     page["shown_sentence"] = (
@@ -112,24 +101,23 @@ def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str
     # Texts come from files of other people: they are escaped, and nothing in the data can end the script that holds it.
     numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
     text = Environment(autoescape=True).from_string(template)
-    write_text(
-        path, text.render(page=page, origin=origin, data=Markup(numbers), script=Markup(script), plotly=Markup(get_plotlyjs()))
-    )
+    write_text(path, text.render(page=page, origin=origin, data=Markup(numbers), script=Markup(script)))
 
 
 def _candidates(table: Mapping[str, np.ndarray]) -> list[dict[str, str]]:
-    """The leading candidates, worded; of one that was tried in several shapes the best."""
-    factors = np.nan_to_num(table["log_bayes_factor"], nan=-np.inf)
+    """The leading candidates, worded; of one that was tried in several shapes the best, and the probability of them all."""
     keys, of_key = np.unique(table["candidate"].astype(str), return_inverse=True)
-    best, probable, chosen = (np.full(len(keys), -np.inf) for _ in range(3))
-    for most, values in ((best, factors), (probable, table["probability"]), (chosen, table["chosen"])):
-        np.fmax.at(most, of_key, np.asarray(values, float))
+    best, probability, chosen = np.full(len(keys), -np.inf), np.zeros(len(keys)), np.zeros(len(keys), bool)
+    np.fmax.at(best, of_key, table["log_bayes_factor"])
+    # A model holds one shape of a candidate at most: their probabilities add up.
+    np.add.at(probability, of_key, np.nan_to_num(table["probability"]))
+    np.logical_or.at(chosen, of_key, np.asarray(table["chosen"], bool))
     return [
         {
             "name": capital(candidate_words(keys[key])),
             "factor": minus(f"{best[key]:.1f}"),
-            "words": probability_words(probable[key]),
-            "chosen": "yes" if chosen[key] == 1 else "",
+            "words": probability_words(probability[key]),
+            "chosen": "yes" if chosen[key] else "",
         }
         for key in np.argsort(-best, kind="stable")[:_LEADING]
         if np.isfinite(best[key])
@@ -157,7 +145,7 @@ def _against(some: Mapping[str, np.ndarray], angles: np.ndarray, robot: Robot) -
     found += [(f"position {axis}", "m", some[axis]) for axis in "xyz"]
     found += [("order of measurement", "row", some["row"]), ("time", "s", some.get("time_s", np.zeros(0)))]
     return [
-        {"name": name, "unit": unit, "values": np.asarray(values, float).round(5).tolist()}
+        {"name": name, "unit": unit, "values": [float(f"{value:.5g}") for value in values]}
         for name, unit, values in found
         if len(values) and np.isfinite(values).all() and np.ptp(values) > 0
     ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.diagnosis.words import candidate_words, listed, parameter_words
 from elastocal.effects.protocol import effect_of
-from elastocal.report.wording import capital, scaled
+from elastocal.report.wording import capital, pm, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -30,8 +30,9 @@ def compliance_rows(compliance: Mapping[str, Sequence[float]]) -> list[list[str]
         if not error:
             rows.append([str(joint), f"{before:.4g}", f"{after:.4g}"])
             continue
-        decimals = max(0, 1 - int(np.floor(np.log10(error))))
-        rows.append([str(joint), f"{before:.{decimals}f}", f"{after:.{decimals}f} ± {error:.{decimals}f}"])
+        stated = pm(after, error)
+        decimals = len(stated.rpartition(".")[2]) if "." in stated else 0
+        rows.append([str(joint), f"{before:.{decimals}f}", stated])
     return rows
 
 
@@ -50,7 +51,8 @@ def other_parameters(verdict: Mapping[str, Any], parameters: Mapping[str, np.nda
             continue
         kind = owner.split(" ")[0] if owner.startswith(("frame ", "target ")) else "declared"
         counts[kind] += 1
-        if kind == "declared":
+        if kind == "declared" or (kind == "target" and unit == "rad"):
+            # Where a target sits matters to nobody; how it is mounted is what the campaign may have wrongly.
             rows.append([capital(candidate_words(owner)), parameter_words(effect_of(owner), name), *scaled(value, error, unit)])
     placed = counts["frame"] + counts["target"]
     return {

@@ -2,52 +2,39 @@
 
 from __future__ import annotations
 
-import tempfile
 from typing import TYPE_CHECKING
 
 from elastocal.campaigns.measurements import SHOWN
-from elastocal.figures.plan import plan_picture, pose_pictures
-from elastocal.figures.style import save
 from elastocal.report.typesetting import compile_document
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
     from typing import Any
 
     import pandas as pd
 
-    from elastocal.application.planning.cell import Cell
     from elastocal.application.planning.plan import Plan
     from elastocal.application.planning.survey import Survey
 
 _UNITS = {"deg": "°", "mm": "mm"}
 
 
-def write_plan_sheet(
-    path: str | Path, survey: Survey, cell: Cell, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]
-) -> None:
+def write_plan_sheet(path: str | Path, facts: Mapping[str, Any], figures: Mapping[str, str]) -> None:
     """Typeset the sheet; the file appears whole or not at all.
 
-    `path`: the PDF. `rows`: from `planning.sheet.sheet`. `worth`: sentences about the accuracy that is expected.
+    `path`: the PDF. `facts`: from `plan_facts`. `figures`: PDF files by their names, "overview" and pages of poses.
     """
-    facts = plan_facts(survey, plan, rows, worth)
-    with tempfile.TemporaryDirectory() as scratch:
-        drawn = {"overview": plan_picture(survey.robot, cell, plan)}
-        drawn |= {f"poses{page}": figure for page, figure in enumerate(pose_pictures(survey.robot, plan))}
-        for name, figure in drawn.items():
-            save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")
-        facts["pictures"] = [name for name in drawn if name != "overview"]
-        compile_document(path, "plan.typ", {"facts": facts}, [f"{scratch}/{name}.pdf" for name in drawn])
+    pictures = [name for name in figures if name != "overview"]
+    compile_document(path, "plan.typ", {"facts": {**facts, "pictures": pictures}}, figures.values())
 
 
 def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]) -> dict[str, Any]:
     """What the sheet states: sentences, the heads of the table, and for each pose its cells and how often each load is read."""
-    angles = [name for name in rows if name.startswith("q") and name.rpartition("_")[2] in SHOWN]
+    angles = [name for name in map(str, rows) if name.startswith("q") and name.rpartition("_")[2] in SHOWN]
     heads = ["pose", *(f"{name.partition('_')[0]} ({_UNITS[name.partition('_')[2]]})" for name in angles)]
     forces = ["fx", "fy", "fz"] if survey.loaded else []
     heads += [f"F{name[1]} (N)" for name in forces] + ["measured"]
-    first = dict(enumerate(survey.shares))
     poses = []
     for pose, part in rows.groupby("pose"):
         pulled = part[part["load"] == 1] if survey.loaded else part
@@ -57,7 +44,9 @@ def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[s
             *(f"{round(pulled[name].iloc[0]) + 0:d}" for name in forces),
         ]
         visits = [
-            {"load": _load_name(first[load]), "count": int(group["repeat"].nunique())} for load, group in part.groupby("load")
+            {"load": _load_name(share), "count": int(part.loc[part["load"] == load, "repeat"].nunique())}
+            for load, share in enumerate(survey.shares)
+            if (part["load"] == load).any()
         ]
         poses.append({"cells": cells, "visits": visits})
     targets = ", ".join(target.name for target in survey.targets)

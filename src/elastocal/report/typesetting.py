@@ -31,7 +31,10 @@ def compile_document(
     """
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / document
-        source.write_text(resources.files("elastocal.report").joinpath(document).read_text(encoding="utf-8"), encoding="utf-8")
+        # A document imports what it shares with the others.
+        for each in resources.files("elastocal.report").iterdir():
+            if each.name.endswith(".typ"):
+                Path(folder, each.name).write_text(each.read_text(encoding="utf-8"), encoding="utf-8")
         for name, contents in {**data, "origin": "" if origin is None else origin.words}.items():
             (Path(folder) / f"{name}.json").write_text(json.dumps(contents, allow_nan=False), encoding="utf-8")
         for figure in figures:

@@ -95,6 +95,18 @@ def length(metres: float | None, digits: int = 3) -> str:
     return f"{plain(factor * metres, digits)}{_TIED}{unit}"
 
 
+def millimetres(metres: float) -> str:
+    """A length without its unit in mm: three digits, and none finer than a micrometre."""
+    return plain(MILLI * metres) if abs(metres) >= 0.9995e-3 else f"{MILLI * metres:.3f}"
+
+
+def pm(value: float, error: float) -> str:
+    """A number ± its standard error, of which two digits are given."""
+    decimals = max(0, 1 - int(np.floor(np.log10(error))))
+    # What is rounded to zero has no sign.
+    return minus(f"{round(value, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}")
+
+
 def plain(value: float, digits: int = 3) -> str:
     """A number with so many significant digits and without an exponent."""
     if value == 0:
@@ -131,16 +143,11 @@ def scaled(value: float, error: float | None, unit: str) -> tuple[str, str]:
     # What no prefix makes handy gets a power of ten.
     power = 0 if size == 0 or 1e-3 <= size < 1e5 else int(np.floor(np.log10(size)))
     number, error = number / 10.0**power, error / 10.0**power
-    if error:
-        decimals = max(0, 1 - int(np.floor(np.log10(error))))
-        # What is rounded to zero has no sign.
-        text = f"{round(number, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}"
-    else:
-        text = plain(number, 4)
+    text = pm(number, error) if error else minus(plain(number, 4))
     if power:
         text = f"({text})" if error else text
         text += " · 10" + str(power).translate(_SUPERSCRIPTS)
-    return text.replace("-", "−"), shown
+    return text, shown
 
 
 def _unit(value: float, unit: str) -> tuple[float, str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import before_m, predicted
+from elastocal.application.accuracy import before_m, less_placement, predicted, scope_in
 from elastocal.application.calibrated import forward, nominal_forward, observations_of, square_root, states_of
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
@@ -54,13 +54,11 @@ def error_budget(
     """
     model, estimate = calibrated.model, calibrated.estimate
     whole, turned = forward(calibrated, reported_angles, operating)
-    gram, owners = _gram(calibrated, reported_angles, operating)
+    gram, owners = _gram(calibrated, reported_angles, operating, (whole, turned))
     values = np.concatenate([np.zeros(0), *estimate.coefficients])
     shares = []
-    for name in dict.fromkeys([*(effect.effect for effect in model.effects), SPRINGS]):
+    for name, rms in effect_costs(calibrated, reported_angles, operating).items():
         mine = [number for number, effect in enumerate(model.effects) if effect.effect == name]
-        without = _without(calibrated, name, mine)
-        rms = _rms(whole - forward(without, reported_angles, operating)[0])
         limits: tuple[float | None, float | None] = (None, None)
         chosen = np.flatnonzero(np.isin(owners, mine))
         if mine and rms > 0.0:
@@ -83,6 +81,23 @@ def error_budget(
     return [total, *shares, *(end for end in ends if end.rms_m or end.name not in (FORM, NOT_COMMANDED))]
 
 
+def effect_costs(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> dict[str, float]:
+    """RMS error in m over some states if one effect alone were left out of the correction, by effect; compliances last.
+
+    In the frame of the robot's scope: what a new placement of its base takes up is no error there.
+
+    `reported_angles` (N, n): rad, as the controller reports them.
+    """
+    whole, turned = forward(calibrated, reported_angles, operating)
+    costs = {}
+    for name in dict.fromkeys([*(effect.effect for effect in calibrated.model.effects), SPRINGS]):
+        mine = [number for number, effect in enumerate(calibrated.model.effects) if effect.effect == name]
+        other = forward(_without(calibrated, name, mine), reported_angles, operating)
+        apart = pose_differences(whole, turned, *other)[..., None]
+        costs[name] = _rms(less_placement(scope_in(calibrated), whole, turned, apart)[:, :3, 0])
+    return costs
+
+
 def _without(calibrated: CalibratedRobot, name: str, mine: list[int]) -> CalibratedRobot:
     values = tuple(0.0 * v if number in mine else v for number, v in enumerate(calibrated.estimate.coefficients))
     model = calibrated.model
@@ -93,13 +108,16 @@ def _without(calibrated: CalibratedRobot, name: str, mine: list[int]) -> Calibra
 
 
 def _gram(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions
+    calibrated: CalibratedRobot,
+    reported_angles: np.ndarray,
+    operating: OperatingConditions,
+    poses: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean products of the linear parameters' sensitivities of positions (K, K), and the number of the effect of each (K,)."""
     model, estimate = calibrated.model, calibrated.estimate
     seen = observations_of(states_of(calibrated, reported_angles, operating))
     line = linearize(model, estimate, seen, conditions(model, estimate, seen.states))
-    columns = line.sensitivities[:, :3][..., _linear(calibrated)]
+    columns = less_placement(scope_in(calibrated), *poses, line.sensitivities[..., _linear(calibrated)])[:, :3]
     rows = columns.reshape(-1, columns.shape[-1])
     owners = np.repeat(np.arange(len(model.effects)), [len(values) for values in estimate.coefficients])
     return rows.T @ rows / len(reported_angles), owners

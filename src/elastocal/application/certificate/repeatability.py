@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # ISO 9283 takes three standard deviations beyond the mean.
 _DEVIATIONS = 3.0
+# What it asks for (section 7.2.1): so many poses, each approached so often.
+ISO_POSES, ISO_CYCLES = 5, 30
 # Mean and standard deviation of the length of a vector of three standard normal components.
 _MEAN, _STD = float(chi.mean(3)), float(chi.std(3))
 _CONFIDENCE = 0.975

@@ -21,13 +21,15 @@ class WorkspaceErrors:
     """Errors at poses drawn over the workspace.
 
     `joint_angles` (N, n): as the controller reports them, rad. `position` (N, 3): m, base axes. `uncorrected_m` (N,): distance
-    of the robot from where its file has it, less what the placement of its base takes up. `bound_m` (N,): below which the
-    corrected robot misses 95 % of the time, all told. `outside` (N,) of bool: beyond the range of the fitted poses.
+    of the robot from where its file has it, less what the placement of its base takes up. `corrected_m` (N,): RMS error that is
+    predicted of the corrected robot. `bound_m` (N,): below which that one misses 95 % of the time, all told. `outside` (N,) of
+    bool: beyond the range of the fitted poses.
     """
 
     joint_angles: np.ndarray
     position: np.ndarray
     uncorrected_m: np.ndarray
+    corrected_m: np.ndarray
     bound_m: np.ndarray
     outside: np.ndarray
 
@@ -51,10 +53,12 @@ def workspace_errors(
     operating = OperatingConditions(np.asarray(wrench, float)[None])
     position, rotation = forward(calibrated, reported_angles, operating)
     off = pose_differences(*nominal_forward(calibrated.robot, reported_angles), position, rotation)
+    after = predicted(calibrated, reported_angles, operating, draws=0)
     return WorkspaceErrors(
         reported_angles,
         position,
         before_m(calibrated, position, rotation, off),
-        predicted(calibrated, reported_angles, operating, draws=0).bound_m,
+        after.error_m,
+        after.bound_m,
         beyond_range(fitted_angles, calibrated.robot.model_angles(reported_angles)),
     )
