@@ -51,9 +51,9 @@ def test_designs_have_a_line_each_and_the_wanted_accuracy(robot):
 
 
 def test_metrics_have_a_row_each_and_strategies_stand_where_their_ratio_is():
-    figure = metrics(strategy_scores(), TITLES, {"rms_um": "RMS", "k_sigma_percent_first_stage": "first stage"})
+    figure = metrics(strategy_scores(), TITLES, {"rms_um": "RMS", "k_sigma_percent_fixed_joints": "fixed joints"})
     kuka = figure.axes[0]
-    assert row_labels(kuka) == ["RMS", "first stage"]
+    assert row_labels(kuka) == ["RMS", "fixed joints"]
     one, other = [line for line in kuka.lines if line.get_marker() == "o"]
     assert one.get_xdata().tolist() == [1.0, 1.0] and other.get_xdata().tolist() == [1.2, 0.5]
     assert legend_entries(figure) == ["6DoF", "staged"]

@@ -22,7 +22,7 @@ TITLES = {"kuka": "Kuka KR 270", "fanuc": "Fanuc R-2000"}
 
 def metrics_of(robot, strategy, size, noise_um=200.0, untrusted=0):
     frame = pd.DataFrame({"robot": robot, "strategy": strategy, "noise_um": noise_um, "length": LENGTHS})
-    for name, scale in (("k_sigma", 1.0), ("k_sigma_first_stage", 0.5), ("deviation", 1e-6)):
+    for name, scale in (("k_sigma", 1.0), ("k_sigma_fixed_joints", 0.5), ("deviation", 1e-6)):
         frame[name], frame[f"{name}_std_error"] = scale * size / LENGTHS, 0.1 * scale * size / LENGTHS
     return frame.assign(trustworthy=untrusted < LENGTHS)
 
@@ -85,10 +85,10 @@ def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
         np.testing.assert_allclose(other.get_ydata(), 20 * scale / LENGTHS)
         assert band(axis.collections[1])[2] == pytest.approx((9 * scale, 11 * scale))
         assert list(limit.get_ydata()) == [3.0, 3.0] and [text.get_text() for text in axis.texts] == ["3 %"]
-    assert "all joints" in whole.get_title() and "first stage" in first.get_title()
+    assert "all joints" in whole.get_title() and "fixed in the last stage" in first.get_title()
     assert whole.get_ylabel() == r"$k_\Sigma$ (%)"
     assert [text.get_text() for text in first.get_legend().get_texts()] == [*ORDER, PAPER]
-    # Both counts are the first stage's in the paper: its score at 4 configurations, and where it reaches 3 %.
+    # Both counts are those of the fixed joints in the paper: its score at 4 configurations, and where it reaches 3 %.
     marks = [line for line in first.lines if line.get_marker() == "D"]
     assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [[[4, 2.2]], [[5, 3]]]
     assert marks[0].get_color() == first.lines[1].get_color()

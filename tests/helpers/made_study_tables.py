@@ -77,7 +77,7 @@ def expectations():
     names = ["robot", "strategy", "quantity", "expected", "studies", "studies_mean", "studies_std", "paper", "p_value"]
     rows = [
         ("kuka", "6DoF", "k_sigma_20_percent", 1.8, 16, 1.75, 0.1, np.nan, np.nan),
-        ("kuka", "6DoF", "k_sigma_20_percent_first_stage", 1.8, 16, 1.75, 0.1, 1.5, 0.0004),
+        ("kuka", "6DoF", "k_sigma_20_percent_fixed_joints", 1.8, 16, 1.75, 0.1, 1.5, 0.0004),
         ("kuka", "6DoF", "dev_20_um", 1.22, 16, 1.2, 0.08, 1.0, 0.04),
     ]
     return pd.DataFrame(rows, columns=names)
@@ -144,11 +144,11 @@ def tubes():
 
 
 def strategy_scores():
-    """A staged strategy that is worse by every metric but the sum over the joints of its first stage."""
+    """A staged strategy that is worse by every metric but the sum over the joints that its last stage fixes."""
     rows = []
     for robot in TITLES:
         for metric in METRIC_NAMES:
-            staged = 0.5 if metric.endswith("first_stage") else 1.2
+            staged = 0.5 if metric.endswith("fixed_joints") else 1.2
             for strategy, ratio, half in (("6DoF", 1.0, 0.0), ("staged", staged, 0.05)):
                 rank = 1 + ((ratio > 1) if staged > 1 else (ratio == 1))
                 rows.append((robot, metric, strategy, 75.0 * ratio, 0.5, ratio, ratio - half, ratio + half, int(rank)))
@@ -160,7 +160,7 @@ def score_pairs():
     rows = []
     for robot in TITLES:
         for metric in METRIC_NAMES:
-            turned = metric.endswith("first_stage") and robot == "kuka"
+            turned = metric.endswith("fixed_joints") and robot == "kuka"
             ratio = (2.0, 1.5, 2.5) if turned else (0.83, 0.80, 0.86)
             rows.append((robot, metric, "6DoF", "staged", *ratio, 0.83, 0.80, 0.86, turned))
     names = ["robot", "metric", "strategy", "other", "ratio", "ratio_low", "ratio_high"]

@@ -24,11 +24,11 @@ SHIFTED = {"as_configured": studies_of(), "R4_other": studies_of(biases=(40.0, 4
 def test_expectations_stand_beside_studies_and_the_paper():
     expected = studies_of(biases=(21.0,)).drop(columns="study").assign(noise_um=200.0)
     table = expectations_table(studies_of(), expected, PRINTED, 20, ["A", "B"])
-    assert table.quantity.tolist() == ["k_sigma_20_percent", "k_sigma_20_percent_first_stage", "dev_20_um"]
+    assert table.quantity.tolist() == ["k_sigma_20_percent", "k_sigma_20_percent_fixed_joints", "dev_20_um"]
     assert table.expected.tolist() == pytest.approx([1.05, 0.525, 1.05])
     assert table.studies_mean.tolist() == pytest.approx([1.1, 0.55, 1.1]) and set(table.studies) == {3}
     assert table.studies_std.tolist() == pytest.approx([0.1, 0.05, 0.1])
-    # The paper's count is taken for that of the first stage.
+    # The paper's count is taken for that of the fixed joints.
     np.testing.assert_array_equal(table.paper, [np.nan, 0.6, 1.0])
     assert table.p_value[2] == pytest.approx(predicted(studies_of(), "arm", "A", "dev_20", 20).p_value(1.0))
 

@@ -29,7 +29,7 @@ def evaluate(job: Job) -> None:
         read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS),
         read_table(job.input.weights, WEIGHTS, counts, members=TESTS),
         judge,
-        strategy_from_document(settings.strategy).first_stage_joints,
+        strategy_from_document(settings.strategy).fixed_joints,
         settings.average,
         settings.deviation_of,
         settings.lengths,

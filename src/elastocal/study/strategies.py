@@ -43,8 +43,11 @@ class Strategy:
         return tuple(dict.fromkeys(name for stage in self.stages for name in stage.points))
 
     @property
-    def first_stage_joints(self) -> tuple[int, ...]:
-        """Joints that the last stage takes over (which the paper's k_sigma counts alone, interpretation R10); else all."""
+    def fixed_joints(self) -> tuple[int, ...]:
+        """Joints that the last stage takes over (which the paper's k_sigma counts alone, interpretation R10); else all.
+
+        Not those that the first stage identifies: "4-6DoF after 6+3DoF" identifies all joints there.
+        """
         last = self.stages[-1]
         return last.held or tuple(sorted({joint for stage in self.stages for joint in stage.identified}))
 

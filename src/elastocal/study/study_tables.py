@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # Quantities of the expectations table by the columns of scores, with the factor to their units.
 _QUANTITIES = {
     "k_sigma_{}_percent": ("k_sigma", 1.0),
-    "k_sigma_{}_percent_first_stage": ("k_sigma_first_stage", 1.0),
+    "k_sigma_{}_percent_fixed_joints": ("k_sigma_fixed_joints", 1.0),
     "dev_{}_um": ("deviation", MICRO),
 }
 # Groups of printed figures by the start of their quantity.
@@ -31,7 +31,7 @@ def expectations_table(
     `studies`: robot and the columns of `table_schemas.repeated`. `expected`: long, of `table_schemas.expected`, at the noise of
     the tables. `reference`: the printed figures. `length`: data set length of the scores. `strategies`: in the order of rows.
     Returns robot, strategy, quantity, expected, studies, studies_mean, studies_std, paper, p_value. Of the two counts of joints
-    in k_sigma, the paper's figure is taken for that of the first stage (interpretation R10).
+    in k_sigma, the paper's figure is taken for that of the fixed joints (interpretation R10).
     """
     printed = reference[reference.table == "4"].set_index(["robot", "strategy", "quantity"]).value
     rows = []
@@ -46,7 +46,7 @@ def expectations_table(
                 row: dict[str, Any] = {"robot": robot, "strategy": strategy, "quantity": name.format(length)}
                 row["expected"] = factor * float(expected[there][column].iloc[0])
                 row |= {"studies": len(values), "studies_mean": values.mean(), "studies_std": values.std(ddof=1)}
-                cell = {"k_sigma_first_stage": f"k_sigma_{length}", "deviation": f"dev_{length}"}.get(column, "")
+                cell = {"k_sigma_fixed_joints": f"k_sigma_{length}", "deviation": f"dev_{length}"}.get(column, "")
                 row["paper"] = float(printed.get((robot, strategy, cell), np.nan))
                 scatter = predicted(studies, robot, strategy, cell, length) if np.isfinite(row["paper"]) else None
                 row["p_value"] = scatter.p_value(row["paper"]) if scatter else np.nan
@@ -84,7 +84,7 @@ def interpretations_table(
 
 
 def _of_interpretation(
-    name: str, studies: pd.DataFrame, printed: pd.DataFrame, length: int, first_stage: bool, classical: str
+    name: str, studies: pd.DataFrame, printed: pd.DataFrame, length: int, fixed_joints: bool, classical: str
 ) -> tuple[dict[str, Any], np.ndarray]:
     """The row of an interpretation, and its log likelihood without each of the studies."""
     row: dict[str, Any] = {"interpretation": name}
@@ -96,7 +96,7 @@ def _of_interpretation(
     p_values, deleted = [], np.zeros(studies.study.nunique())
     cells = printed[["robot", "strategy", "quantity"]].itertuples(index=False, name=None)
     for (robot, strategy, quantity), value in zip(cells, printed.value, strict=True):
-        scatter = predicted(studies, robot, strategy, quantity, length, first_stage)
+        scatter = predicted(studies, robot, strategy, quantity, length, fixed_joints)
         if scatter is not None:
             group = next(group for start, group in _GROUPS.items() if quantity.startswith(start))
             totals[group] += scatter.log_density(value)

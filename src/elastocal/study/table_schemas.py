@@ -61,7 +61,7 @@ def metrics(joints: int) -> TableSchema:
         )
     columns += _with_error("k_sigma", "percent", "sum of delta_k over all joints (equation 14)")
     columns += _with_error(
-        "k_sigma_first_stage", "percent", "sum of delta_k over the joints of the first stage (interpretation R10)"
+        "k_sigma_fixed_joints", "percent", "sum of delta_k over the joints fixed in the last stage (interpretation R10)"
     )
     columns += _with_error(
         "deviation", "m", "mean end-effector error of the averaged model on test configurations (equation 15)"
@@ -86,7 +86,7 @@ def _scores(joints: int) -> list[Column]:
     return [
         *compliances,
         Column("k_sigma", "float64", "percent", "as in the metrics", missing=True),
-        Column("k_sigma_first_stage", "float64", "percent", "as in the metrics", missing=True),
+        Column("k_sigma_fixed_joints", "float64", "percent", "as in the metrics", missing=True),
         Column("deviation", "float64", "m", "as in the metrics", missing=True),
     ]
 
@@ -253,7 +253,7 @@ REPLICATES = TableSchema(
         _REPLICATE,
         _LENGTH,
         Column("k_sigma", "float64", "percent", "as in the metrics", missing=True),
-        Column("k_sigma_first_stage", "float64", "percent", "as in the metrics", missing=True),
+        Column("k_sigma_fixed_joints", "float64", "percent", "as in the metrics", missing=True),
         Column("deviation", "float64", "m", "as in the metrics", missing=True),
         Column("initial_deviation", "float64", "m", "as in the metrics"),
     ),

@@ -98,7 +98,7 @@ def table4(
             drawn = _cell(replicates, robot, noise_um, strategy)
             at = _row_of(cell, length)
             row: dict[str, str | float] = {"strategy": strategy, "robot": robot}
-            for suffix in ("", "_first_stage"):
+            for suffix in ("", "_fixed_joints"):
                 name = f"k_sigma{suffix}"
                 row |= {f"k_sigma_{length}_percent{suffix}": at[name]}
                 row |= {f"k_sigma_{length}_percent{suffix}_std_error": at[f"{name}_std_error"]}
@@ -261,9 +261,9 @@ def column_head(name: str) -> str:
 
     Returns names that are not of the paper's quantities with blanks.
     """
-    stage = ", first stage" if name.endswith("_first_stage") else ""
+    stage = ", fixed joints" if name.endswith("_fixed_joints") else ""
     for pattern, words in _HEADS:
-        if found := re.fullmatch(pattern, name.removesuffix("_first_stage")):
+        if found := re.fullmatch(pattern, name.removesuffix("_fixed_joints")):
             return words.format(*found.groups()) + stage
     return name.replace("_", " ")
 

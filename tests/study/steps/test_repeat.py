@@ -36,8 +36,8 @@ def test_scores_are_those_of_the_pipeline_for_the_same_data_sets(kuka, some, ave
     deflections, scores = deflections_of(kuka, experiments, 1e-5), judge(kuka)
     for strategy, block in zip(some, found, strict=True):
         table = identified(kuka, strategy, experiments, deflections)
-        metrics = evaluated_in_one_block(table, scores, strategy.first_stage_joints, average, 10, [5])[0]
-        for name in ("compliance_1", "compliance_6", "k_sigma", "k_sigma_first_stage", "deviation"):
+        metrics = evaluated_in_one_block(table, scores, strategy.fixed_joints, average, 10, [5])[0]
+        for name in ("compliance_1", "compliance_6", "k_sigma", "k_sigma_fixed_joints", "deviation"):
             np.testing.assert_allclose(block[name][1:], metrics[name][1:], rtol=1e-6, err_msg=name)
 
 

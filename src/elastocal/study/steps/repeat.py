@@ -37,12 +37,12 @@ def repeated_blocks(
             averages = average(
                 blocks, judge, interpretation.average, interpretation.deviation_of, np.ones((1, study.size.tests))
             )
-            scores = score_columns(averages.compliance[0], averages.deviation[0], robot, strategy.first_stage_joints)
+            scores = score_columns(averages.compliance[0], averages.deviation[0], robot, strategy.fixed_joints)
             yield {**scores, "study": np.full(len(scores["length"]), number), "strategy": strategy.name}
 
 
 def score_columns(
-    compliance: np.ndarray, deviation: np.ndarray, robot: Robot, first_stage_joints: Sequence[int]
+    compliance: np.ndarray, deviation: np.ndarray, robot: Robot, fixed_joints: Sequence[int]
 ) -> dict[str, np.ndarray]:
     """Columns of the scores of an averaged model, one row for each length.
 
@@ -52,6 +52,6 @@ def score_columns(
         "length": np.arange(1, len(compliance) + 1),
         **{f"compliance_{j + 1}": compliance[:, j] for j in range(compliance.shape[1])},
         "k_sigma": k_sigma(compliance, robot.compliance),
-        "k_sigma_first_stage": k_sigma(compliance, robot.compliance, list(first_stage_joints)),
+        "k_sigma_fixed_joints": k_sigma(compliance, robot.compliance, list(fixed_joints)),
         "deviation": deviation,
     }
