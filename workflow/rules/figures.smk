@@ -11,10 +11,9 @@ SCHEME_ROBOTS = {"fig2": REDUCED[0], **{f"fig2_{name}": name for name in REDUCED
 STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
 DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
 BEST_TWO = [name for name in (CLASSICAL, "3+6DoF-comb") if name in config["strategies"]]
+PAPER_FIGURES = [*SCHEME_ROBOTS, "fig4", *(f"fig5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS))]
 FIGURES = [
-    *SCHEME_ROBOTS,
-    "fig4",
-    *(f"fig5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS)),
+    *PAPER_FIGURES,
     "bias_and_accuracy",
     "accuracy_of_one_data_set",
     "scores_against_paper",

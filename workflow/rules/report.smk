@@ -13,6 +13,33 @@ STATED = {
 }
 
 
+rule judge_claims:
+    input:
+        studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
+        expected=cells("expected", REDUCED, NOISE, CLASSICAL),
+        comparison=rules.compare_with_paper.output.table,
+        solvers=rules.tabulate_solvers.output.table,
+        starts=rules.tabulate_decisions.output.starts,
+        stiffness=rules.tabulate_decisions.output.stiffness,
+        designs=rules.tabulate_designs.output.table,
+        pairs=rules.tabulate_budget.output.pairs,
+        score_pairs=rules.tabulate_uses.output.pairs,
+        sources=sources("judge_claims.py"),
+    output:
+        table=shown(
+            "reports/tables/claims.csv", "claims", "Tables and figures of the paper", shows="Claims of the paper", kind="table"
+        ),
+    log:
+        "results/logs/judge_claims.log",
+    benchmark:
+        "results/timings/judge_claims.tsv"
+    params:
+        length=config["tables"]["length"],
+        robots=REDUCED,
+    script:
+        "../scripts/judge_claims.py"
+
+
 rule state_answers:
     input:
         comparison=rules.compare_with_paper.output.table,

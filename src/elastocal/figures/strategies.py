@@ -58,8 +58,8 @@ def stiffness_errors(
 ) -> Figure:
     """Figures 5a and 5b: summed stiffness error of all strategies against the data set length, under both counts of joints.
 
-    `metrics`: long, of one noise level. `printed`: the printed figures; those of k_sigma are taken to count the joints fixed in the
-    last stage. `order`: strategies. `limit_percent`: marked by a line.
+    `metrics`: long, of one noise level. `printed`: the printed figures; those of k_sigma are taken to count the
+    joints fixed in the last stage. `order`: strategies. `limit_percent`: marked by a line.
     """
     figure, axes = panels(1, 2, 92, sharey=True)
     counts = {"k_sigma": "all joints (equation 14)", "k_sigma_fixed_joints": "joints fixed in the last stage"}

@@ -110,9 +110,7 @@ def metrics_table(averages: Averages, true_compliance: np.ndarray, fixed_joints:
     return table
 
 
-def replicates_table(
-    averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]
-) -> dict[str, np.ndarray]:
+def replicates_table(averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]) -> dict[str, np.ndarray]:
     """Columns of the replicates table: the scores of every bootstrap replicate at every length.
 
     `averages`, `true_compliance`, `fixed_joints`: as in `metrics_table`.
@@ -183,9 +181,7 @@ def _scores_of_one_data_set(compliance: np.ndarray, judge: Judge) -> np.ndarray:
     return np.stack([mean, square, errors[:, rank], errors[:, rank:].max(axis=1)], 1).reshape(sets, lengths, 4)
 
 
-def _replicated_scores(
-    averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]
-) -> dict[str, np.ndarray]:
+def _replicated_scores(averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]) -> dict[str, np.ndarray]:
     return {
         "k_sigma": k_sigma(averages.compliance, true_compliance),
         "k_sigma_fixed_joints": k_sigma(averages.compliance, true_compliance, list(fixed_joints)),

@@ -31,11 +31,13 @@ class Stage:
 class Strategy:
     """A named sequence of stages that together estimate every joint.
 
-    `name`: as printed in the paper.
+    `name`: as printed in the paper. `prior_std`: relative standard deviation of the nominal compliances, towards which the
+    estimates are shrunk; None where nothing is known beforehand.
     """
 
     name: str
     stages: tuple[Stage, ...]
+    prior_std: float | None = None
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -65,7 +67,7 @@ def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
         )
         for stage in document["stages"]
     ]
-    return Strategy(document["name"], tuple(stages))
+    return Strategy(document["name"], tuple(stages), document.get("prior_std"))
 
 
 def without_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from elastocal.study.metrics import length_to_reach
 from elastocal.study.printed import LEVEL, MICRO, holm, predicted
 
 if TYPE_CHECKING:
@@ -53,6 +54,39 @@ def expectations_table(
                 rows.append(row)
     names = ["robot", "strategy", "quantity", "expected", "studies", "studies_mean", "studies_std", "paper", "p_value"]
     return pd.DataFrame(rows, columns=names)
+
+
+def measured_table(studies: Mapping[str, pd.DataFrame], length: int, limits: Mapping[str, float]) -> pd.DataFrame:
+    """Table 4 as the mean over studies, by what is measured and by what is averaged.
+
+    `studies`: by what is measured; robot and the columns of `table_schemas.repeated`. `length`: of the scores. `limits`:
+    k_sigma in percent and deviation in µm whose lengths are given. Returns robot, strategy, measured, average (stiffness or
+    compliance), and each figure of Table 4 as its median over studies (of positions of one reflector the mean of 1/ĉ need not
+    exist) with the standard deviation between studies, robust (1.4826 times the median absolute deviation); k_sigma over all
+    joints and over those fixed in the last stage; rms_{length}_um of one data set.
+    """
+    rows = []
+    for measured, frame in studies.items():
+        for (robot, strategy), cell in frame.groupby(["robot", "strategy"], sort=False):
+            for average, end in (("stiffness", ""), ("compliance", "_mean_compliance")):
+                row: dict[str, Any] = {"robot": robot, "strategy": strategy, "measured": measured, "average": average}
+                for name, column, factor, unit in (
+                    ("k_sigma", "k_sigma", 1.0, "percent"),
+                    ("k_sigma_fixed_joints", "k_sigma_fixed_joints", 1.0, "percent"),
+                    ("dev", "deviation", MICRO, "um"),
+                ):
+                    curves = factor * cell.pivot(index="study", columns="length", values=f"{column}{end}").to_numpy()
+                    row |= _middle(f"{name}_{length}_{unit}", curves[:, length - 1])
+                    limit = limits[column.removesuffix("_fixed_joints")]
+                    row |= _middle(f"n_{name}_{limit:g}_{unit}", length_to_reach(curves, limit))
+                rows.append(row | _middle(f"rms_{length}_um", MICRO * np.sqrt(cell.mean_square[cell.length == length])))
+    return pd.DataFrame(rows)
+
+
+def _middle(name: str, values: np.ndarray | pd.Series) -> dict[str, float]:
+    """Median, and a standard deviation that outlying studies do not move."""
+    middle = float(np.median(values))
+    return {name: middle, f"{name}_std": float(1.4826 * np.median(np.abs(values - middle)))}
 
 
 def interpretations_table(

@@ -236,6 +236,16 @@ def solver_summary(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def with_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
+    """A table with the names of the strategies' files, which those of folders are, behind the names of strategies.
+
+    `slugs`: names of files by the names of strategies.
+    """
+    return frame.assign(strategy_file=frame.strategy.map(slugs))[
+        [name for column in frame.columns for name in (column, *(["strategy_file"] if column == "strategy" else []))]
+    ]
+
+
 def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
     """The same table for people: each value with its standard error behind a ± sign, an infinite length as "not reached".
 
@@ -252,7 +262,7 @@ def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
 
 def headed_rows(frame: pd.DataFrame) -> list[list[str]]:
     """The table for people as rows of words, its header first, with names of columns that break at blanks."""
-    shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set")])
+    shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set|strategy_file")])
     return [[column_head(name) for name in shown.columns], *shown.to_numpy().tolist()]
 
 

@@ -5,7 +5,7 @@ They are the same as those of the pipeline's steps: random streams have names, s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -91,13 +91,25 @@ class StudyInMemory:
         tests = self.tests(number)
         return make_judge(self.robot, tests, self.deflections(tests), self.interpretation.wrench_at)
 
-    def measured(self, sets: np.ndarray, points: Sequence[str], repeat: str = "") -> dict[str, Measurements]:
+    def measured(
+        self, sets: np.ndarray, points: Sequence[str], repeat: str = "", drawn: Experiments | None = None
+    ) -> dict[str, Measurements]:
         """What each measuring point contributes to some data sets.
 
-        `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`: tells measurements of the same
-        configurations apart: part of the name of the noise's stream.
+        `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`: part of the name of the noise's stream,
+        by which measurements of the same configurations differ. `drawn`: other configurations and loads than those of the
+        study, as many of them.
         """
-        drawn, rows = self.experiments(sets), self.interpretation.rows
+        drawn, rows = drawn or self.experiments(sets), self.interpretation.rows
+        if reflectors := self.interpretation.reflectors_m:
+            one = replace(self.interpretation, reflectors_m=())
+            parts = [
+                replace(self, robot=with_target_offset(self.robot, offset), interpretation=one).measured(
+                    sets, points, f"{repeat}/reflector {number}", drawn
+                )
+                for number, offset in enumerate(reflectors, 1)
+            ]
+            return {name: _stacked([part[name] for part in parts]) for name in points}
         regressors = Design(drawn, self.robot.chain, points, rows, self.interpretation.wrench_at).regressors
         found = {}
         for name in points:
@@ -107,6 +119,12 @@ class StudyInMemory:
 
     def _point(self, name: str | None) -> MeasuringPoint:
         return self.robot.chain.point(name) if name else self.robot.chain.end_effector
+
+
+def _stacked(parts: Sequence[Measurements]) -> Measurements:
+    """Measurements of several targets of one point as those of one."""
+    regressors, deflections = zip(*((part.regressor, part.deflection) for part in parts), strict=True)
+    return Measurements(np.concatenate(regressors), np.concatenate(deflections))
 
 
 def study_in_memory(

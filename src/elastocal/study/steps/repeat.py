@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.evaluation import average
-from elastocal.study.metrics import k_sigma
+from elastocal.study.metrics import k_sigma, mean_form, mean_square_errors, signed_deviation
 from elastocal.study.steps.estimates import estimates
 
 if TYPE_CHECKING:
@@ -28,17 +28,25 @@ def repeated_blocks(
 
     `studies`: their numbers. Yields columns of one block of the repeated table: one strategy in one study.
     """
-    robot, interpretation = study.robot, study.interpretation
+    robot, read, tests = study.robot, study.interpretation, np.ones((1, study.size.tests))
     for number in studies:
         judge = study.judge(number)
-        found = estimates(study, strategies, number)
+        form, found = mean_form(judge), estimates(study, strategies, number)
         for strategy in strategies:
-            blocks = ((compliance, np.ones((1, len(compliance)))) for compliance in found[strategy.name])
-            averages = average(
-                blocks, judge, interpretation.average, interpretation.deviation_of, np.ones((1, study.size.tests))
-            )
+            blocks = [(compliance, np.ones((1, len(compliance)))) for compliance in found[strategy.name]]
+            averages = average(blocks, judge, read.average, read.deviation_of, tests)
+            plain = average(blocks, judge, "compliance", "averaged_model", tests)
             scores = score_columns(averages.compliance[0], averages.deviation[0], robot, strategy.fixed_joints)
-            yield {**scores, "study": np.full(len(scores["length"]), number), "strategy": strategy.name}
+            others = score_columns(plain.compliance[0], plain.deviation[0], robot, strategy.fixed_joints)
+            squares = [mean_square_errors(form, np.moveaxis(each - robot.compliance, 0, -1)) for each, _ in blocks]
+            yield {
+                **scores,
+                **{f"{name}_mean_compliance": others[name] for name in ("k_sigma", "k_sigma_fixed_joints", "deviation")},
+                "deviation_signed": signed_deviation(judge, plain.compliance[0]),
+                "mean_square": np.concatenate(squares, axis=1).mean(axis=1),
+                "study": np.full(len(scores["length"]), number),
+                "strategy": strategy.name,
+            }
 
 
 def score_columns(
