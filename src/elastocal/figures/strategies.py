@@ -93,6 +93,39 @@ def deviations(
 
 
 @styled
+def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str]) -> Figure:
+    """k_sigma over the fixed joints and deviation against the data set length: mean over studies and how they scatter.
+
+    `studies`: robot and the columns of `table_schemas.repeated`. `printed`: the printed figures. `titles`: name of each robot
+    to draw, by its key. `order`: strategies; one estimator under several names is drawn once, under the first of them.
+    """
+    figure, axes = panels(2, len(titles), 128, sharex=True, sharey="row")
+    quantities = (("k_sigma_fixed_joints", 1.0, "k_sigma", (0, 12)), ("deviation", MICRO, "dev", (0, 25)))
+    for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
+        for axis, (quantity, scale, name, span) in zip(column, quantities, strict=True):
+            seen: set[float] = set()
+            for index, strategy in enumerate(order):
+                mine = studies[(studies.robot == robot) & (studies.strategy == strategy)]
+                curves = scale * mine.pivot(index="study", columns="length", values=quantity)
+                middle, spread, style = curves.mean(), curves.std(), line_style(index)
+                if (key := float(f"{middle.iloc[-1]:.6g}")) in seen:
+                    continue
+                seen.add(key)
+                axis.plot(middle.index, middle, label=strategy, **style)
+                axis.fill_between(middle.index, middle - spread, middle + spread, color=style["color"], alpha=0.12, linewidth=0)
+            _printed_marks(axis, printed, robot, name, order)
+            axis.set(xlim=(5, studies.length.max()), ylim=span)
+        column[0].set_title(title)
+        column[1].set_xlabel(_LENGTH)
+    axes[0, 0].set_ylabel(r"$k_\Sigma$ of the fixed joints (%)")
+    axes[1, 0].set_ylabel("dev, equation 15 (µm)")
+    handles = {label: handle for axis in axes.flat for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    title = "bands: ± one standard deviation between studies; one estimator under several names is drawn once"
+    figure.legend([*handles.values()], [*handles], title=title, loc="outside lower center", ncols=4, title_fontsize=7.5)
+    return figure
+
+
+@styled
 def bias_and_accuracy(
     metrics: pd.DataFrame, per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str], accuracy_um: float
 ) -> Figure:

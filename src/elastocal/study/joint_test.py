@@ -27,7 +27,7 @@ def joint_table(studies: pd.DataFrame, reference: pd.DataFrame, length: int) -> 
     """The joint test under both counts of joints in k_sigma (R10).
 
     `studies`: robot and the columns of `table_schemas.repeated`. `reference`: the printed figures, of which those of Tables 3
-    and 4 are judged. `length`: data set length of figures that name none. Returns count (fixed joints or all joints), cells,
+    and 4 are judged. `length`: data set length of figures that name none. Returns joints (fixed joints or all joints), cells,
     differ (after Holm's correction), below (p below the level), statistic (Fisher's); of the last two the median and the
     largest of the studies (`..._studies_median`, `..._studies_largest`) and the p value (`..._p`); studies.
     """
@@ -44,7 +44,7 @@ def _row(studies: pd.DataFrame, printed: pd.DataFrame, length: int, fixed_joints
     ]
     paper = np.array([scatter.p_value(value) for scatter, value in found])
     others = np.array([_left_out(scatter) for scatter, _ in found]).T
-    row: dict[str, Any] = {"count": "fixed joints" if fixed_joints else "all joints", "cells": len(paper)}
+    row: dict[str, Any] = {"joints": "fixed joints" if fixed_joints else "all joints", "cells": len(paper)}
     row |= {"differ": int((holm(paper) < LEVEL).sum()), "studies": len(others)}
     row |= _ranked("below", int((paper < LEVEL).sum()), (others < LEVEL).sum(axis=1))
     return row | _ranked("statistic", float(-2 * np.log(paper).sum()), -2 * np.log(others).sum(axis=1))
