@@ -11,6 +11,7 @@ from elastocal.figures.strategies import (
     bias_and_accuracy,
     deviations,
     noise_impact,
+    over_studies,
     stiffness_errors,
 )
 from elastocal.figures.style import PALETTE
@@ -150,4 +151,19 @@ def test_bars_of_one_data_set_stand_in_the_given_order_with_bound_error_and_effi
         assert axis.get_xlabel() == "RMS end-effector error (µm)"
     assert row_labels(figure.axes[0]) == ORDER[::-1]
     assert legend_entries(figure) == ["Cramér-Rao bound", "RMS error"] and "20 configurations" in figure.get_suptitle()
+    assert_nothing_cut_off(figure)
+
+
+def test_studies_are_drawn_as_their_mean_and_one_estimator_once():
+    parts = [
+        metrics_of(robot, name, size * (1 + 0.1 * study)).assign(study=study)
+        for robot in TITLES
+        for name, size in (("6DoF", 20.0), ("6DoF again", 20.0), ("2DoF+6DoF", 10.0))
+        for study in (0, 1, 2)
+    ]
+    figure = over_studies(pd.concat(parts), PRINTED, TITLES, ["6DoF", "6DoF again", "2DoF+6DoF"])
+    deviation = figure.axes[2]
+    lines = [line for line in deviation.lines if line.get_marker() != "D"]
+    assert len(lines) == 2 and "6DoF again" not in legend_entries(figure)
+    np.testing.assert_allclose(lines[0].get_ydata(), 22.0 / LENGTHS, rtol=1e-9)
     assert_nothing_cut_off(figure)

@@ -189,7 +189,7 @@ def _arrow_type(column: Column) -> pa.DataType:
 
 def _headed(heads: Mapping[str, Column], provenance: Mapping[str, Any], block: Block) -> dict[str, str | np.ndarray]:
     """One value a column of what a file is of, as long as a block."""
-    rows = next(len(values) for values in block.values() if not isinstance(values, str))
+    rows = max((len(values) for values in block.values() if not isinstance(values, str)), default=0)
     return {
         column.name: provenance[key] if column.type == "string" else np.full(rows, float(provenance[key]))
         for key, column in heads.items()

@@ -45,6 +45,8 @@ def _row(studies: pd.DataFrame, printed: pd.DataFrame, length: int, fixed_joints
     paper = np.array([scatter.p_value(value) for scatter, value in found])
     others = np.array([_left_out(scatter) for scatter, _ in found]).T
     row: dict[str, Any] = {"joints": "fixed joints" if fixed_joints else "all joints", "cells": len(paper)}
+    if not found:
+        paper, others = np.full(1, np.nan), np.full((1, 1), np.nan)
     row |= {"differ": int((holm(paper) < LEVEL).sum()), "studies": len(others)}
     row |= _ranked("below", int((paper < LEVEL).sum()), (others < LEVEL).sum(axis=1))
     return row | _ranked("statistic", float(-2 * np.log(paper).sum()), -2 * np.log(others).sum(axis=1))

@@ -163,7 +163,8 @@ def few_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
             row: dict[str, Any] = {"robot": robot, "nominal_error_percent": 100 * error, "strategy": strategy}
             row |= {"configurations": length, "rms_um": MICRO * rms, "rms_um_std_error": MICRO * spread}
             rows.append(row | {"median_um": MICRO * np.sqrt(cell.mean_square.median(skipna=False))})
-    return pd.DataFrame(rows)
+    names = ("robot", "nominal_error_percent", "strategy", "configurations", "rms_um", "rms_um_std_error", "median_um")
+    return pd.DataFrame(rows, columns=[*names])
 
 
 def kinds_table(frames: Mapping[str, pd.DataFrame], length: int) -> pd.DataFrame:

@@ -24,10 +24,17 @@ def few_blocks(
     """Mean square error of each data set at every length, by each strategy.
 
     `study`: with as many configurations as are looked at. `nominal_errors`: standard deviations of the logarithm of the nominal
-    compliances over the true ones, which each data set has its own of. A strategy without a prior does not look at them. Yields
+    compliances over the true ones, which each data set has its own of. A strategy without a prior does not look at them;
+    strategies of points or joints that the robot lacks are left out. Yields
     columns of one block of the few table: one strategy with one error of the nominal values in one block of data sets.
     """
     robot, n, form = study.robot, study.robot.joints, mean_form(study.judge())
+    there = {point.name for point in robot.chain.points}
+    strategies = [
+        strategy
+        for strategy in strategies
+        if there.issuperset(strategy.points) and {j for stage in strategy.stages for j in stage.identified} == {*range(n)}
+    ]
     points = tuple(dict.fromkeys(name for strategy in strategies for name in strategy.points))
     for sets in study.blocks():
         measurements = study.measured(sets, points)
