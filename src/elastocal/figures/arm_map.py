@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -44,7 +44,7 @@ def arm_map(table: pd.DataFrame, outlines: Mapping[str, np.ndarray], titles: Map
 
 def draw_links(axis: Axes, plane: np.ndarray) -> None:
     """The corners (K, 2) of an arm joined, behind all else."""
-    style = {"solid_capstyle": "round", "solid_joinstyle": "round", "gid": "arm"}
+    style: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round", "gid": "arm"}
     axis.plot(*plane.T, color="#c8c8c8", linewidth=6, zorder=1, **style)
 
 

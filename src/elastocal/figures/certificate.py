@@ -72,7 +72,7 @@ def _edges(errors: WorkspaceErrors) -> tuple[np.ndarray, np.ndarray, list[np.nda
     return radius, height, [np.linspace(values.min(), values.max(), _BINS + 1) for values in (radius, height)]
 
 
-def _statistic(errors: WorkspaceErrors, values: np.ndarray, how: str) -> np.ndarray:
+def _statistic(errors: WorkspaceErrors, values: np.ndarray, how: Any) -> np.ndarray:
     radius, height, edges = _edges(errors)
     return np.asarray(binned_statistic_2d(radius, height, values, how, bins=edges).statistic)
 

@@ -10,6 +10,7 @@ from elastocal.io.storage import read_table
 from elastocal.loop.schemas import residuals
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
 
@@ -19,11 +20,11 @@ def read_residuals(path: str | Path, joints: int) -> dict[str, np.ndarray]:
     return {name: values[~columns["gross_error"]] for name, values in columns.items()}
 
 
-def worst_measurement(table: dict[str, np.ndarray]) -> int:
+def worst_measurement(table: Mapping[str, np.ndarray]) -> int:
     """Row of a residuals table with the largest position error of the declared model."""
     return int(np.argmax(np.linalg.norm([table[f"before_d{axis}"] for axis in "xyz"], axis=0)))
 
 
-def angles_of(table: dict[str, np.ndarray], joints: int) -> np.ndarray:
+def angles_of(table: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
     """Joint angles (N, n) of a residuals table, as the model of the robot counts them, rad."""
     return np.column_stack([table[f"q{joint}"] for joint in range(1, joints + 1)])

@@ -173,12 +173,12 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
         ]
     (effect,) = found
     if kind == "class":
-        first = [f"The declared model lacks one mechanism, most probably {named[0]}.", _ambiguity(effect)]
+        parts = [f"The declared model lacks one mechanism, most probably {named[0]}.", _ambiguity(effect)]
     else:
-        first = [f"The declared model lacks one mechanism: {named[0]}.", *_unsure_location(effect)]
+        parts = [f"The declared model lacks one mechanism: {named[0]}.", *_unsure_location(effect)]
     if effect["cost_m"] is not None:
-        first.append(f"Its cost, {_COST}: {cost_words(effect, verdict['heldout'])}.")
-    return [*first, alarm]
+        parts.append(f"Its cost, {_COST}: {cost_words(effect, verdict['heldout'])}.")
+    return [*parts, alarm]
 
 
 def probability_sentence(probabilities: Mapping[str, Any]) -> str:
