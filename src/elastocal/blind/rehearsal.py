@@ -127,7 +127,7 @@ def with_lost_beam(sheet: pd.DataFrame, seed: int) -> tuple[pd.DataFrame, int]:
     return damaged, row
 
 
-def errors_measured(
+def measure_errors(
     robot: PhysicalRobot, shown: np.ndarray, wrench: np.ndarray, wanted: np.ndarray, seed: int, source: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Distances of where the tracker sees the robot from where it is wanted (N, 3), m, in the tracker's frame of the base.
