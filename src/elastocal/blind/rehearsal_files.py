@@ -10,7 +10,7 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from elastocal.blind.closed_loop import bow
-from elastocal.blind.rehearsal import measure_errors, filled_sheet, require_numbers, with_lost_beam
+from elastocal.blind.rehearsal import filled_sheet, measure_errors, require_numbers, with_lost_beam
 from elastocal.errors import InputError
 from elastocal.exchange.csv_dialect import LARGEST_BYTES
 from elastocal.exchange.target_path import read_target_path
