@@ -18,7 +18,7 @@ from elastocal.effects.catalogue import effects
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site" / "html"
 CHROMIUM = shutil.which("chromium")
-PAGES = ("index.html", "docs/tutorial.html", "docs/study.html", "reference/effects.html", "reference/files/campaign.html")
+PAGES = ("index.html", "docs/tutorial.html", "docs/study.html", "reference/gallery.html", "reference/files/campaign.html")
 BACKGROUND = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
 
 pytestmark = pytest.mark.skipif(not (SITE / "index.html").is_file(), reason="no site: `make site` builds it")
@@ -77,6 +77,23 @@ def test_every_effect_has_a_formula_and_a_picture(pages):
     assert set(formulas) == set(effects())
 
 
+def test_the_gallery_has_every_figure_of_the_pages_and_every_effect(pages):
+    page = pages[SITE / "reference" / "gallery.html"]
+    drawn = {
+        Path(link).name
+        for path in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+        for link in re.findall(r"!\[[^]]+\]\(([^)]+)\)", path.read_text(encoding="utf-8"))
+    }
+    assert len(drawn) > 20
+    assert {Path(picture).name for picture in page.pictures} >= drawn | {f"{name}.svg" for name in effects()}
+
+
+def test_headings_of_the_contents_have_a_level_and_code_can_be_reached_by_keyboard(pages):
+    """What axe calls critical and serious."""
+    wrong = re.compile(r'role="heading"(?! aria-level)|<pre>')
+    assert [path.name for path in pages if wrong.search(path.read_text(encoding="utf-8"))] == []
+
+
 def test_no_command_is_described_by_half_a_sentence():
     """As a terminal shows them, and typer in its pages."""
     page = (SITE / "reference" / "commands.html").read_text(encoding="utf-8")
@@ -110,6 +127,8 @@ def test_in_a_browser_pages_fit_the_screen_are_searched_and_fetch_nothing(width,
             page.goto((SITE / name).as_uri())
             assert page.evaluate("document.documentElement.scrollWidth") <= width, name
             assert (min(page.evaluate(BACKGROUND)) > 200) == (scheme == "light"), name
+            filters = set(page.evaluate("[...document.querySelectorAll('article img')].map(e => getComputedStyle(e).filter)"))
+            assert all(("invert" in found) == (scheme == "dark") for found in filters), name
             page.evaluate("document.querySelectorAll('img').forEach(e => e.loading = 'eager')")
             page.wait_for_function("[...document.images].every(e => e.complete)")
             assert page.evaluate("[...document.images].filter(e => !e.naturalWidth).map(e => e.src)") == [], name

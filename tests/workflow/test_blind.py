@@ -74,14 +74,14 @@ EDITS = {
 @pytest.mark.parametrize("edit", EDITS)
 def test_edit_reruns_scores_and_no_diagnosis_of(edit, copy):
     path, expected = EDITS[edit]
-    copy.append(path, "# an edit\n")
+    copy.edit(path)
     planned = rules(copy.planned(*BLIND))
     assert planned >= expected
     assert not planned & ({"make_cases", "seal_cases"} | ANALYSIS)
 
 
 def test_a_figure_reruns_itself_and_the_report(copy):
-    copy.append("src/elastocal/figures/blind_errors.py", "# an edit\n")
+    copy.edit("src/elastocal/figures/blind_errors.py")
     assert rules(copy.planned(*BLIND)) == {"draw_blind_errors", "compile_blind_report", "blind"}
 
 
@@ -90,7 +90,7 @@ def test_a_truth_that_was_edited_ends_in_one_line_with_its_file(copy, module):
     truth = copy.files(f"{SEALED}/*.json")[0]
     copy.append(truth, "\n")
     # It is not sealed anew: what reads it next refuses it.
-    copy.append(f"src/elastocal/blind/{module}.py", "# an edit\n")
+    copy.edit(f"src/elastocal/blind/{module}.py")
     ended = copy.snakemake("-j1", *BLIND)
     assert ended.returncode != 0
     said = [line for line in ended.stderr.splitlines() if line.startswith(truth)]

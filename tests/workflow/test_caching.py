@@ -50,9 +50,6 @@ COMPARED_STRATEGIES = {
 }
 
 
-EDIT = "\nEDITED = True\n"
-
-
 def jobs(rule, *axes):
     return set(product([rule], *axes))
 
@@ -190,7 +187,7 @@ def test_more_data_sets_rerun_their_draws_but_not_those_of_the_test(finished, ev
 
 
 def test_an_edit_of_the_bounds_reruns_the_bounds(finished):
-    finished.append("src/elastocal/study/bounds.py", EDIT)
+    finished.edit("src/elastocal/study/bounds.py")
     asked = jobs("compare_point_sets", ["kuka"]) | {("tabulate_budget",), ("draw_budget",)}
     asked |= jobs("index_observability", ["kuka"]) | {("tabulate_observability",)}
     assert finished.planned() == jobs("bound", ROBOTS) | PER_DATA_SET | asked | REPORT
@@ -204,7 +201,7 @@ def test_an_edit_that_is_older_than_the_results_counts_too(finished):
 
 
 def test_an_edit_of_the_strategy_figures_reruns_figures(finished):
-    finished.append("src/elastocal/figures/strategies.py", EDIT)
+    finished.edit("src/elastocal/figures/strategies.py")
     figures = {
         ("draw_noise_impact",),
         ("draw_stiffness_errors", "a"),
@@ -223,7 +220,7 @@ def test_an_edit_of_the_strategy_figures_reruns_figures(finished):
     ],
 )
 def test_an_edit_of_solver_or_metrics_leaves_data_and_designs(module, kept, finished, every_job):
-    finished.append(f"src/elastocal/study/{module}.py", EDIT)
+    finished.edit(f"src/elastocal/study/{module}.py")
     untouched = of_rules(every_job, *kept, *DATA) | of_the_loop(every_job)
     if module == "gauss_newton":
         untouched |= jobs("typeset_table", ["table1", "table2"])

@@ -231,7 +231,7 @@ EDITS = {
 @pytest.mark.parametrize("edit", EDITS)
 def test_edit_reruns_what_depends_on_it_of(edit, cell):
     path, rerun, untouched = EDITS[edit]
-    cell.append(path, "# an edit\n")
+    cell.edit(path)
     planned = rules_of(cell.planned(OF_THE_STUDY, *OWN))
     assert rerun <= planned
     assert not untouched & planned

@@ -27,7 +27,7 @@ def test_a_dry_run_is_a_summary_and_every_job_is_listed_on_request(unstarted):
     assert (
         first == f"{len(jobs)} jobs would run:" and last == "Nothing was run. `snakemake -n -p` lists every job with its files."
     )
-    counts = re.findall(r"(\d+) (\w+)", " ".join(listed))
+    counts = re.findall(r"(\d+)\s+(\w+)", " ".join(listed))
     assert {rule: int(count) for count, rule in counts} == Counter(rule for rule, *_ in jobs)
     assert len(listed) < 25 and max(map(len, listed)) <= 80
 

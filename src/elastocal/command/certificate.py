@@ -20,7 +20,7 @@ DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
 
 def certificate(
     folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
-    tolerance: Annotated[str, typer.Option(help="On the RMS position error, such as 0.2mm.")],
+    tolerance: Annotated[str, typer.Option(help="Largest allowed RMS position error, such as 0.2mm.")],
     risk: Annotated[float, typer.Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
     measured: Annotated[
         Path | None,
@@ -37,10 +37,10 @@ def certificate(
         ),
     ] = None,
     compare: Annotated[Path | None, typer.Option(help="Earlier diagnosed campaign of the same robot.")] = None,
-    serial: Annotated[str | None, typer.Option(help="Serial number of the robot; the campaign's without.")] = None,
-    date: Annotated[str | None, typer.Option(help="Date of the certificate, as 2026-11-20; today without.")] = None,
-    output: Annotated[Path | None, typer.Option(help="Folder for it; the campaign's reports without.")] = None,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of everything that is drawn.")] = 1,
+    serial: Annotated[str | None, typer.Option(help="Serial number of the robot. Default: the campaign's.")] = None,
+    date: Annotated[str | None, typer.Option(help="Date of the certificate, such as 2026-11-20. Default: today.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Folder for both files. Default: the campaign's reports.")] = None,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Certify a robot against a tolerance: pass, fail or undecided.

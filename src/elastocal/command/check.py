@@ -24,7 +24,7 @@ _NAMED = 8
 
 def check(
     folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
-    as_json: Annotated[bool, typer.Option("--json", help="All that was found, as JSON on standard output.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print everything that was found as JSON.")] = False,
 ) -> None:
     """Show what a campaign identifies and what looks suspicious.
 

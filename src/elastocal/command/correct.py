@@ -41,9 +41,9 @@ def correct(
     ] = "",
     axes: Annotated[
         str,
-        typer.Option(help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6; asked for where it is not plain."),
+        typer.Option(help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6; needed where it is ambiguous."),
     ] = "",
-    partial: Annotated[bool, typer.Option("--partial", help="Write the file though some targets cannot be reached.")] = False,
+    partial: Annotated[bool, typer.Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.

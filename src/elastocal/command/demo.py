@@ -28,10 +28,8 @@ _TOLERANCE = "0.2mm"
 def demo(
     context: typer.Context,
     folder: Annotated[Path, typer.Argument(help="New folder for the campaign.")] = Path("elastocal-demo"),
-    effect: Annotated[
-        list[str] | None, typer.Option(help="What is wrong with the robot, such as joint_tilt; as often as wanted.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of the robot's errors and of the noise.")] = 1,
+    effect: Annotated[list[str] | None, typer.Option(help="Hidden effect, such as joint_tilt; may be repeated.")] = None,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the robot's errors and of the noise.")] = 1,
     show: Annotated[bool, typer.Option("--open/--no-open", help="Open the report in a browser.")] = True,
 ) -> None:
     """Go the whole way on a simulated KUKA, in about a minute.

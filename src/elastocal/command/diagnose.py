@@ -29,7 +29,7 @@ _NO_NEWS = "Using workflow specific profile"
 
 def diagnose(
     folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
-    cores: Annotated[int, typer.Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs at a time.")] = 2,
+    cores: Annotated[int, typer.Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs that run at a time.")] = 2,
 ) -> None:
     """Find which effects the robot's model lacks; write the report.
 

@@ -34,9 +34,7 @@ def export(
     output: Annotated[Path, typer.Option(help="Folder for the files.")],
     urdf: Annotated[
         Path | None,
-        typer.Option(
-            help="The URDF that the robot was imported from: it comes back with its joint origins changed, nothing else."
-        ),
+        typer.Option(help="The URDF that the robot was imported from. Its joint origins are changed, nothing else."),
     ] = None,
     table: Annotated[
         int,
@@ -45,7 +43,7 @@ def export(
         ),
     ] = 0,
     force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Hanging load of the table in N.")] = 0.0,
-    date: Annotated[str, typer.Option(help="Date that the sidecar states; today without.")] = "",
+    date: Annotated[str, typer.Option(help="Date that the sidecar states. Default: today.")] = "",
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Write the calibrated robot: robot file, URDF, DH, effects.

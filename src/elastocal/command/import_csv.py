@@ -69,7 +69,7 @@ def csv(
         int | None, typer.Option(min=1, max=MOST_ROWS, help="Line of the names of columns; found out where not given.")
     ] = None,
     robot: Annotated[
-        Path | None, typer.Option(help="Robot file whose joint_names the columns have; that of FOLDER/campaign.yaml without.")
+        Path | None, typer.Option(help="Robot file whose joint_names the columns have. Default: that of FOLDER/campaign.yaml.")
     ] = None,
     options: Annotated[Path | None, typer.Option(help="import.yaml of an earlier import, to repeat it.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace measurements.csv that is filled in.")] = False,

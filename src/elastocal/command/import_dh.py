@@ -43,7 +43,7 @@ def dh(
     lengths: Annotated[Lengths | None, typer.Option(help="Unit of columns of lengths that state none.")] = None,
     decimal: Annotated[Decimal | None, typer.Option(help="Mark of a CSV table; a comma has to be stated.")] = None,
     ignore: Annotated[list[str] | None, typer.Option(help="Column to leave out; as often as needed.")] = None,
-    name: Annotated[str | None, typer.Option(help="Maker and model; the file's name without.")] = None,
+    name: Annotated[str | None, typer.Option(help="Maker and model. Default: the name of the file.")] = None,
     mass_std: Annotated[
         float,
         typer.Option(

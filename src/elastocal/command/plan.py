@@ -32,25 +32,32 @@ _LONGEST_NAME = 80
 def plan(
     robot: Annotated[Path, typer.Argument(help="Robot file.")],
     output: Annotated[Path | None, typer.Option(help="CSV of the plan; the sheet and a picture go beside it.")] = None,
-    folder: Annotated[Path | None, typer.Option(help="New campaign folder, whose measurement columns are empty.")] = None,
+    folder: Annotated[Path | None, typer.Option(help="New campaign folder, with a sheet to fill in.")] = None,
     poses: Annotated[int, typer.Option(min=1, max=MOST_POSES, help="Poses to fit.")] = 20,
     held_out: Annotated[
-        int, typer.Option(min=3, max=MOST_POSES, help="Poses that judge the result and choose nothing, drawn at random.")
+        int, typer.Option(min=3, max=MOST_POSES, help="Random poses that judge the result and fit nothing.")
     ] = 9,
-    accuracy: Annotated[str | None, typer.Option(help="Wanted accuracy such as 0.1mm: as few poses as reach it.")] = None,
+    accuracy: Annotated[
+        str | None, typer.Option(help="Wanted accuracy such as 0.1mm; takes the fewest poses that reach it.")
+    ] = None,
     number: Annotated[
-        int, typer.Option("--candidates", min=10, max=MOST_ROWS, help="Configurations among which is chosen.")
+        int, typer.Option("--candidates", min=10, max=MOST_ROWS, help="Random configurations to choose from.")
     ] = 10_000,
-    criterion: Annotated[str, typer.Option(help="D, A or I: determinant, parameters, error over the workspace.")] = "D",
+    criterion: Annotated[
+        str,
+        typer.Option(
+            help="D, A or I: minimize the determinant or the trace of the covariance, or the error over the workspace."
+        ),
+    ] = "D",
     force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0,
-    pull: Annotated[bool, typer.Option("--pull", help="The load pulls in any direction; otherwise it hangs.")] = False,
+    pull: Annotated[bool, typer.Option("--pull", help="The load pulls in any direction. Default: it hangs.")] = False,
     sensor: Annotated[
         str | None,
         typer.Option(
-            help="What reads the targets, for the noise: tracker (30 µm), t-mac (30 µm, 0.005°), camera (120 µm, 0.05°)."
+            help="The instrument, for the assumed noise: tracker (30 µm), t-mac (30 µm, 0.005°), camera (120 µm, 0.05°)."
         ),
     ] = None,
-    measured: Annotated[str | None, typer.Option(help="position or pose; what the sensor usually reads.")] = None,
+    measured: Annotated[str | None, typer.Option(help="position or pose. Default: what the sensor usually measures.")] = None,
     base_known: Annotated[bool, typer.Option("--base-known", help="Measurements are in the base frame.")] = False,
     target: Annotated[
         list[str] | None,
@@ -58,13 +65,17 @@ def plan(
             help="A target and its measuring point: POINT, POINT=x,y,z in m, or with a name of its own A:POINT=x,y,z."
         ),
     ] = None,
-    tracker: Annotated[str | None, typer.Option(help="Where the tracker stands, x,y,z in m, base axes.")] = None,
-    box: Annotated[list[str] | None, typer.Option(help="Keep out of xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")] = None,
-    noise: Annotated[str | None, typer.Option(help="Standard deviation of a coordinate, such as 0.03mm; the sensor's.")] = None,
-    orientation_noise: Annotated[
-        str | None, typer.Option(help="Standard deviation of a turn about an axis, such as 0.01deg; the sensor's.")
+    tracker: Annotated[str | None, typer.Option(help="Position of the tracker, x,y,z in m, base axes.")] = None,
+    box: Annotated[
+        list[str] | None, typer.Option(help="Box to keep out of: xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of everything that is drawn.")] = 1,
+    noise: Annotated[
+        str | None, typer.Option(help="Standard deviation of a coordinate, such as 0.03mm. Default: the sensor's.")
+    ] = None,
+    orientation_noise: Annotated[
+        str | None, typer.Option(help="Standard deviation of a rotation about an axis, such as 0.01deg. Default: the sensor's.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1,
 ) -> None:
     """Choose where to measure; write a sheet to print.
 

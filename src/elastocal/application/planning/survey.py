@@ -1,4 +1,4 @@
-"""What shall be measured and how well, and what one configuration tells about the parameters of the robot's model.
+"""What shall be measured and how well, and what one configuration contributes to the parameters of the robot's model.
 
 The model is the one that a campaign declares: offsets of the joints, lengths and angles of the links, joint compliances where
 loads are measured, the errors of declared masses, and where tracker and reflectors are, if unknown. Sensitivities are those of
@@ -104,7 +104,7 @@ def count_parameters(survey: Survey) -> int:
 
 
 def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray, about: Estimate | None = None) -> Information:
-    """What each configuration tells.
+    """What each configuration contributes.
 
     `reported_angles` (N, n): rad. `force` (N, 3): N, base axes, at the last measuring point; read at each of the shares.
     `about`: values at which the model is linearized; those of the robot file without.
