@@ -138,7 +138,7 @@ def test_a_robot_that_was_measured_at_corrected_targets_is_called_so_and_a_fail_
 
 def test_a_prediction_that_fails_exits_with_1(run, top, tmp_path):
     result = run(top / "made", "--tolerance", "1um", "--output", tmp_path / "out")
-    assert result.exit_code == 1 and result.output.startswith("fail") and "Nobody has measured" in result.output
+    assert result.exit_code == 1 and result.output.startswith("! fail") and "Nobody has measured" in result.output
 
 
 def test_a_stated_use_is_what_is_judged_and_denies_a_pass_where_it_lies_beyond_what_was_fitted(run, top, corrected, tmp_path):

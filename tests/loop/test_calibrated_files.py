@@ -14,6 +14,7 @@ from support import refused
 from elastocal.application.calibrated import calibrated_from
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
+from elastocal.io.sources import source_digest
 from elastocal.io.storage import read_table
 from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.loop.diagnosis_tables import diagnosis_from
@@ -60,7 +61,7 @@ def test_it_says_what_code_data_and_environment_made_it(made):
     files["kuka.yaml"] = hashlib.sha256((ROBOTS / "kuka.yaml").read_bytes()).hexdigest()
     assert origin == {
         "commit": "c0ffee",
-        "code_sha256": digest({ENGINE: hashlib.sha256((made / ENGINE).read_bytes()).hexdigest()}),
+        "code_sha256": digest({ENGINE: source_digest(made / ENGINE)}),
         "data_sha256": digest(sorted(files.items())),
         "environment": environment(made),
     }
@@ -117,6 +118,6 @@ def test_a_campaign_that_was_never_diagnosed_is_refused(made, tmp_path):
 
 
 def test_results_of_another_engine_are_refused(changed):
-    (changed / ENGINE).write_text("'''Another version.'''\n", encoding="utf-8")
+    (changed / ENGINE).write_text("VERSION = 2\n", encoding="utf-8")
     with refused(changed / ENGINE, "", "not what read_campaign made was made with", f"elastocal diagnose {changed}/made"):
         load_diagnosed(changed / "made", ROBOTS, changed)

@@ -127,7 +127,7 @@ def with_lost_beam(sheet: pd.DataFrame, seed: int) -> tuple[pd.DataFrame, int]:
     return damaged, row
 
 
-def errors_of_readings(
+def errors_along_path(
     robot: PhysicalRobot, shown: np.ndarray, wrench: np.ndarray, wanted: np.ndarray, seed: int, source: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Distances of where the tracker sees the robot from where it is wanted (N, 3), m, in the tracker's frame of the base.
@@ -137,7 +137,7 @@ def errors_of_readings(
     """
     visits = [reached(robot, shown, wrench, number, source) for number in (seed, seed + 1)]
     position, rotation = (part[:, None] for part in visits[0])
-    noise = robot.tracker.read(position, rotation, stream(seed, "readings of a path"))[0][:, 0] - visits[0][0]
+    noise = robot.tracker.read(position, rotation, stream(seed, "noise along a path"))[0][:, 0] - visits[0][0]
     repeatability = (visits[0][0] - visits[1][0]) / np.sqrt(2.0)
     errors = visits[0][0] + noise - wanted, noise + repeatability
     return np.linalg.norm(errors[0], axis=1), np.linalg.norm(errors[1], axis=1)

@@ -10,7 +10,7 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from elastocal.blind.closed_loop import bow
-from elastocal.blind.rehearsal import errors_of_readings, filled_sheet, require_numbers, with_lost_beam
+from elastocal.blind.rehearsal import errors_along_path, filled_sheet, require_numbers, with_lost_beam
 from elastocal.errors import InputError
 from elastocal.exchange.csv_dialect import LARGEST_BYTES
 from elastocal.exchange.target_path import read_target_path
@@ -75,7 +75,7 @@ def measured_errors(path: Path, targets: Path, robot: PhysicalRobot, seed: int) 
         columns = [f"q{joint}{ending}" for joint in range(1, robot.arm.joints + 1)]
         require_numbers(table, columns, targets.as_posix())
         angles = table[columns].to_numpy(float)
-        off[name], noise = errors_of_readings(robot, angles, wrench, wanted.position, seed, targets.as_posix())
+        off[name], noise = errors_along_path(robot, angles, wrench, wanted.position, seed, targets.as_posix())
     return off | {"noise alone": noise}
 
 

@@ -35,6 +35,8 @@ def compile_document(
         for each in resources.files("elastocal.report").iterdir():
             if each.name.endswith(".typ"):
                 Path(folder, each.name).write_text(each.read_text(encoding="utf-8"), encoding="utf-8")
+        if not source.is_file():
+            raise FileNotFoundError(document)
         for name, contents in {**data, "origin": "" if origin is None else origin.words}.items():
             (Path(folder) / f"{name}.json").write_text(json.dumps(contents, allow_nan=False), encoding="utf-8")
         for figure in figures:
