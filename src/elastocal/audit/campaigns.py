@@ -176,9 +176,9 @@ def _errors(run: Audited, campaign: str, frame: pd.DataFrame, model: Sagging | N
     loaded = frame.iloc[np.argsort(np.linalg.norm(frame[["fx", "fy", "fz"]], axis=1), kind="stable")[-run.sample :]]
     allowed = STEP_BACK + 0.5 * reach * float((turned.abs().sum(axis=1) ** 2).max())
     allowed += max((stand.left_m for stand in model.standing(loaded)), default=0.0) if model else 0.0
-    frame, names = run.table(table), {*_document(run, campaign)["campaign"]["declared"]}
-    rows = {"before": frame[frame["kind"] == "declared"].iloc[:1], "after": frame.iloc[-1:]}
-    for number, (state, row) in enumerate(rows.items()):
+    stated, names = run.table(table), {*_document(run, campaign)["campaign"]["declared"]}
+    models = {"before": stated[stated["kind"] == "declared"].iloc[:1], "after": stated.iloc[-1:]}
+    for number, (state, row) in enumerate(models.items()):
         if state == "after":
             names |= {each["name"] for each in run.document(f"reports/loop/{campaign}/verdict.json")["effects"]}
         # Of a model that goes with time or row repeats have predictions of their own, and a fit that of their mean.

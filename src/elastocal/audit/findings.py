@@ -79,7 +79,7 @@ def require(checked: str, by: str, holds: Any, note: str = "", count: int = 1) -
 
 def require_each_once(frame: pd.DataFrame, **ranges: Iterable[int]) -> Finding:
     """Whether rows are numbered by all combinations of ranges, the last one changing fastest."""
-    expected = pd.MultiIndex.from_product(ranges.values()).to_frame()
+    expected = pd.MultiIndex.from_product([*ranges.values()]).to_frame()
     checked = f"each {' and '.join(ranges).replace('_', ' ')} once"
     return compare(checked, "counting", frame[list(ranges)], expected, 0.0)
 
@@ -99,7 +99,8 @@ def compare_columns(
     """
     names = [*keys]
     left, right = (_with_names(frame, names) for frame in (stored, expected))
-    odd = [*sorted(set(left.index) ^ set(right.index)), *left.index[left.index.duplicated()]]
+    twice = [name for each in (left, right) for name in each.index[each.index.duplicated()]]
+    odd = sorted(set(left.index) ^ set(right.index)) + twice
     note = f"row {', '.join(odd[:1])} is in only one of both, or twice"
     yield require("rows", by, not odd, note, len(right))
     if odd:
@@ -108,17 +109,14 @@ def compare_columns(
     columns = [name for name in left if name in right and name not in names]
     for name in columns:
         kept = np.array([value is not pd.NA for value in right[name]], bool)
-        found, wanted = left.loc[kept, name], right.loc[kept, name]
+        found, wanted = left[name][kept], right[name][kept]
         followed += int(kept.sum())
         if {found.dtype.kind, wanted.infer_objects().dtype.kind} <= set("iuf"):
             scale = np.nan_to_num(np.abs(wanted.to_numpy(float)), posinf=0.0)
             yield compare(f"column {name}", by, found, wanted, relative, absolute, scale)
         else:
-            off = [
-                f"{row}: {one}, expected {other}"
-                for row, one, other in zip(found.index, *map(_words, (found, wanted)), strict=True)
-                if one != other
-            ]
+            pairs = zip(found.index, map(_word, found), map(_word, wanted), strict=True)
+            off = [f"{row}: {one}, expected {other}" for row, one, other in pairs if one != other]
             yield require(f"column {name}", by, not off, ", ".join(off[:1]), len(found))
     rest = ", ".join(str(name) for name in stored if name not in (*columns, *names))
     yield Finding(f"{followed} of {stored.size} cells followed{'; not ' * bool(rest)}{rest}", by, 0, 0.0)
@@ -127,10 +125,6 @@ def compare_columns(
 def _with_names(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     """The rows under the words of their keys, numbers to six digits."""
     return frame.set_axis(pd.Index([", ".join(map(_word, row)) for row in frame[keys].itertuples(index=False)], dtype=object))
-
-
-def _words(values: pd.Series) -> list[str]:
-    return [_word(value) for value in values]
 
 
 def _word(value: object) -> str:

@@ -134,7 +134,7 @@ def _rate(hits: float, cases: float) -> dict[str, Any]:
     return {"rate": hits / cases if cases else np.nan, "low": ends[0], "high": ends[1]}
 
 
-def _target(row: dict[str, Any]) -> dict[str, Any]:
+def _target(row: Mapping[Any, Any]) -> dict[str, Any]:
     """The range that the words of a target mean, and whether a figure lies in it."""
     words = "" if pd.isna(row["target"]) else row["target"]
     if isinstance(words, float):
@@ -227,14 +227,14 @@ def gains(run: Audited, file: str) -> Iterator[Finding]:
 def bad_rows(run: Audited, file: str) -> Iterator[Finding]:
     """Every slip is there once, and verdicts count as the same that are."""
     stated = run.table(file)
-    slips = pd.concat(
-        [run.table(f"results/bad_rows/{robot}.parquet").assign(robot=robot) for robot in stated["robot"].unique()]
-    )
+    robots = stated["robot"].unique()
+    slips = pd.concat([run.table(f"results/bad_rows/{robot}.parquet").assign(robot=robot) for robot in robots])
     for version in ("damaged", "fewer"):
         same = [slips[f"{version}_{what}"] == slips[f"clean_{what}"] for what in ("verdict", "found")]
         slips[f"{version}_same"] = same[0] & same[1]
     # Slips of a case are in the order of the file.
-    yield from compare_columns(*(each.assign(slip=np.arange(len(each))) for each in (stated, slips)), ["slip"])
+    numbered = [each.assign(slip=np.arange(len(each))) for each in (stated, slips)]
+    yield from compare_columns(numbered[0], numbered[1], ["slip"])
 
 
 def folds(run: Audited, file: str, data: str) -> Iterator[Finding]:

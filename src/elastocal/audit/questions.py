@@ -18,6 +18,8 @@ from elastocal.audit.streams import draw, numbers
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    import pandas as pd
+
     from elastocal.audit.audited import Audited
 
 # Estimates of single data sets on exact deflections, whose least squares lose digits.
@@ -46,7 +48,7 @@ def estimate(run: Audited, robot: str, strategy: str, data_set: int, length: int
 
 
 def _compare_worth(
-    run: Audited, robot: str, at: str, row: dict[str, float], matrix: np.ndarray, right: np.ndarray
+    run: Audited, robot: str, at: str, row: pd.Series, matrix: np.ndarray, right: np.ndarray
 ) -> Iterator[Finding]:
     """Mean square error and Cramér-Rao bound of a data set."""
     error = (errors_of(run, robot, sm.OLS(right, matrix).fit().params[None]) ** 2).mean()

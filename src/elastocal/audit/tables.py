@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from elastocal.audit.audited import Audited
 
-    _Rows = Iterator[dict[str, Any]]
+    _Rows = Iterator[dict[Any, Any]]
 
 _REFERENCE = "config/paper/reference.csv"
 # Percentages and differences of what agrees to rounding, in the units of the tables.
@@ -45,12 +45,12 @@ def _cells(run: Audited, robots: list[str]) -> Iterator[tuple[str, str, dict[str
         yield from ((robot, key, {"strategy": document["name"], "robot": robot}) for robot in robots)
 
 
-def _at(run: Audited, robot: str, key: str) -> pd.Series:
+def _at(run: Audited, robot: str, key: str) -> Any:
     """Metrics at the length of the tables."""
     return run.cell("metrics", robot, key).set_index("length").loc[run.configuration["tables"]["length"]]
 
 
-def _with_error(head: str, at: Mapping[str, float], name: str, factor: float) -> dict[str, float]:
+def _with_error(head: str, at: Any, name: str, factor: float) -> dict[str, float]:
     """A figure with its standard error in another unit."""
     return {f"{head}{end}": factor * at[f"{name}{end}"] for end in ("", "_std_error")}
 
@@ -130,11 +130,13 @@ def extended(run: Audited) -> _Rows:
     length, share = run.configuration["tables"]["length"], "share_compensated_percent"
     for robot, key, head in _cells(run, run.extended):
         at, drawn = _at(run, robot, key), run.cell("replicates", robot, key).groupby("length").get_group(length)
-        row = _with_error("initial_mean_mm", at, "initial_deviation", 1e3) | _with_error(
-            "residual_mean_um", at, "deviation", 1e6
+        stated, again = (100 * (1 - each["deviation"] / each["initial_deviation"]) for each in (at, drawn))
+        row = (
+            head
+            | {share: stated, f"{share}_std_error": np.std(again, ddof=1)}
+            | _with_error("residual_mean_um", at, "deviation", 1e6)
         )
-        row[share], replicated = (100 * (1 - each["deviation"] / each["initial_deviation"]) for each in (at, drawn))
-        yield head | row | {f"{share}_std_error": replicated.std()}
+        yield row | _with_error("initial_mean_mm", at, "initial_deviation", 1e3)
 
 
 def per_dataset(run: Audited) -> _Rows:
@@ -180,9 +182,9 @@ def designs(run: Audited) -> _Rows:
 
 def observability(run: Audited) -> _Rows:
     for robot in run.reduced:
-        ranked = run.table(f"results/observability/{robot}.parquet").corr("spearman")
+        ranked: Any = run.table(f"results/observability/{robot}.parquet").corr("spearman")
         for index in ("O1", "O2", "O3", "O4", "O5", "bound"):
-            row = {"robot": robot, "index": index}
+            row: dict[str, Any] = {"robot": robot, "index": index}
             for name, column in (("bound", "bound"), ("error", "mean_square")):
                 row[f"rank_correlation_with_{name}"] = found = ranked.loc[index, column]
                 error = (1 - found**2) / np.sqrt(run.configuration["data_sets"] - 1)
@@ -237,7 +239,7 @@ def strategy_scores(run: Audited) -> _Rows:
             means = uses[column].agg(lambda some: some.mean(skipna=False)) if file == "uses" else metrics[column]
             values = factor * means.astype(float) ** power
             # Strategies that are one estimator agree to six digits, and share a rank.
-            ranks = values.abs().map("{:.6g}".format).astype(float).rank(method="min")
+            ranks: Any = values.abs().map("{:.6g}".format).astype(float).rank(method="min")
             for name, value in values.dropna().items():
                 row = {"robot": robot, "metric": metric, "strategy": name, "value": value, "rank": ranks[name]}
                 yield row | {"ratio": value / values[classical]}
@@ -282,7 +284,7 @@ def comparison(run: Audited) -> _Rows:
         yield row | {"p_holm": mine.get("p_holm")}
 
 
-def _ours(run: Audited, row: dict[str, Any]) -> tuple[Any, Any]:
+def _ours(run: Audited, row: Mapping[Any, Any]) -> tuple[Any, Any]:
     """Our value of a printed figure and its Monte Carlo error from our table; NA of figures of the text."""
     number, column = row["table"], row["quantity"]
     if number == "text":
@@ -305,9 +307,8 @@ def expectations(run: Audited) -> _Rows:
         column += "_first_stage" * row["quantity"].endswith("_first_stage")
         closed = run.cell("expected", row["robot"], run.keys[row["strategy"]]).set_index("length").loc[length, column]
         again = {name: row[name] for name in ("robot", "strategy", "quantity")} | {"expected": factor * closed}
-        figures = (row[name] for name in ("studies_mean", "studies_std", "studies", "paper"))
-        known = row["studies"] > 1 and np.isfinite(row["paper"])
-        yield again | {"p_value": find_p_value(*figures, _DIGIT) if known else np.nan}
+        known, (mean, std) = row["studies"] > 1 and np.isfinite(row["paper"]), (row["studies_mean"], row["studies_std"])
+        yield again | {"p_value": find_p_value(mean, std, row["studies"], row["paper"], _DIGIT) if known else np.nan}
 
 
 # What makes each table again, and the columns that name a row.

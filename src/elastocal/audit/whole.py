@@ -81,8 +81,8 @@ def require_all(table: pd.DataFrame, page: str) -> str:
 
 def _recompute(run: Audited, file: str) -> Iterator[Finding]:
     """Findings of one file; whatever a damaged file makes of a check is a finding too."""
-    of_every_table = [(file, described, {})] if file.endswith(".parquet") else []
-    for _, check, arguments in [*of_every_table, *checks_of(file)]:
+    checks = [(described, dict[str, str]())] * file.endswith(".parquet") + [each[1:] for each in checks_of(file)]
+    for check, arguments in checks:
         try:
             for finding in check(run, file, **arguments):
                 yield finding if finding.file else replace(finding, file=file)
