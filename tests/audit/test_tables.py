@@ -78,7 +78,7 @@ PAIR |= {"ratio": 2.0, "ratio_low": 1.6, "ratio_high": 2.5, "rms_ratio_low": 1.0
         ("ratio_high", 2.49, ["column ratio_high"]),
         ("reversed", True, ["column reversed"]),
         ("ratio", 2.1, ["column ratio"]),
-        ("other", "c", ["check"]),
+        ("other", "c", ["rows"]),
     ],
 )
 def test_pairs_follow_from_the_scores(run, column, value, expected):
@@ -86,9 +86,6 @@ def test_pairs_follow_from_the_scores(run, column, value, expected):
     rows = [{"robot": "two", "metric": metric, "strategy": name, "value": value} for name, metric, value in scores]
     pd.DataFrame(rows).to_csv(run.folder / "reports/tables/strategy_scores.csv", index=False)
     file = "reports/tables/strategy_pairs.csv"
-    pd.DataFrame([PAIR | {column: value}]).to_csv(run.folder / file, index=False)
-    if expected == ["check"]:
-        with pytest.raises(KeyError):
-            failed(tables.tables(run, file, "strategy_pairs"))
-    else:
-        assert failed(tables.tables(run, file, "strategy_pairs")) == expected
+    by_rms = PAIR | {"metric": "rms_um", "ratio": 1.25, "ratio_low": 1.0, "ratio_high": 1.5625}
+    pd.DataFrame([PAIR | {column: value}, by_rms]).to_csv(run.folder / file, index=False)
+    assert failed(tables.tables(run, file, "strategy_pairs")) == expected

@@ -63,18 +63,12 @@ def cases(run: Audited, file: str) -> Iterator[Finding]:
     for path in paths:
         if path.name in listed:
             verdict, oracle = verdicts[path.stem], oracles[path.stem]
-            held_out = verdict["heldout"] or {
-                "before": {"rms_m": np.nan},
-                "after": {"rms_m": np.nan},
-                "reduction_std_error": np.nan,
-            }
-            row = judge(json.loads(path.read_text("utf-8")), verdict) | {"case": path.stem}
-            row |= {f"{state}_rms_m": held_out[state]["rms_m"] for state in ("before", "after")}
-            row |= {
-                "reduction": 1 - row["after_rms_m"] / row["before_rms_m"],
-                "reduction_std_error": held_out["reduction_std_error"],
-            }
-            row |= {"oracle_p_value": np.nan, "oracle_rms_m": np.nan}
+            names = ("before_rms_m", "after_rms_m", "reduction", "reduction_std_error", "oracle_p_value", "oracle_rms_m")
+            row = judge(json.loads(path.read_text("utf-8")), verdict) | {"case": path.stem} | dict.fromkeys(names, np.nan)
+            if (held_out := verdict["heldout"]) is not None:
+                before, after = (held_out[state]["rms_m"] for state in ("before", "after"))
+                row |= {"before_rms_m": before, "after_rms_m": after, "reduction": 1 - after / before}
+                row["reduction_std_error"] = held_out["reduction_std_error"]
             if oracle is not None:
                 row |= {"oracle_p_value": oracle["p_value"], "oracle_rms_m": oracle["heldout"]["rms_m"]}
             rows.append(row)
@@ -104,8 +98,9 @@ def judge(truth: _Document, verdict: _Document) -> dict[str, Any]:
 def probabilities(run: Audited, file: str) -> Iterator[Finding]:
     """What was stated of each case: the most probable mechanisms, and the smallest set that reaches 95 %."""
     rows = []
-    for case, verdict in _entries(run).items():
-        stated = verdict.get("probabilities") or {}
+    verdicts = _entries(run)
+    for case in (file.removesuffix(".json") for file in _manifest(run)):
+        stated = verdicts[case].get("probabilities") or {}
         if sets := sorted(stated.get("sets", ()), key=lambda entry: -entry["probability"]):
             reached = np.cumsum([entry["probability"] for entry in sets])
             size = min(int(np.searchsorted(reached, 0.95)) + 1, len(sets))

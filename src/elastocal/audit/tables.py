@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -225,7 +227,7 @@ def tubes(run: Audited) -> _Rows:
 _METRICS = {
     **{f"{name}_um": ("uses", name, 1.0, 1e6) for name in ("mean", "p95", "iso_9283", "path_max", "pooled_p95")},
     **{f"{head}_um": ("uses", name, 0.5, 1e6) for head, name in (("rms", "mean_square"), ("path_rms", "path_mean_square"))},
-    **{f"{name}_percent{end}": ("metrics", f"{name}{end}", 1.0, 1.0) for name in ("k_sigma",) for end in ("", "_first_stage")},
+    **{f"k_sigma_percent{end}": ("metrics", f"k_sigma{end}", 1.0, 1.0) for end in ("", "_first_stage")},
     "dev_um": ("metrics", "deviation", 1.0, 1e6),
 }
 
@@ -246,15 +248,20 @@ def strategy_scores(run: Audited) -> _Rows:
 
 
 def strategy_pairs(run: Audited) -> _Rows:
+    keys = ["robot", "metric", "strategy", "other"]
+    stated = run.table("reports/tables/strategy_pairs.csv").set_index(keys).to_dict("index")
     scores = run.table("reports/tables/strategy_scores.csv").set_index(["robot", "metric", "strategy"])["value"]
-    for row in run.table("reports/tables/strategy_pairs.csv").to_dict("records"):
-        apart = row["ratio_low"] > 1 and row["rms_ratio_high"] < 1, row["ratio_high"] < 1 and row["rms_ratio_low"] > 1
-        again = {name: row[name] for name in ("robot", "metric", "strategy", "other")} | {"reversed": any(apart)}
-        for head, metric in (("ratio", row["metric"]), ("rms_ratio", "rms_um")):
-            one, other = (scores[row["robot"], metric, row[name]] for name in ("strategy", "other"))
-            # Intervals are symmetric in the logarithm.
-            again |= {head: one / other, f"{head}_high": (one / other) ** 2 / row[f"{head}_low"]}
-        yield again
+    for robot, metric in dict.fromkeys(zip(*(scores.index.get_level_values(name) for name in keys[:2]), strict=True)):
+        names = scores[robot, "rms_um"].map("{:.6g}".format).drop_duplicates().index
+        for pair in combinations(names, 2):
+            row = defaultdict(lambda: 1.0, stated.get((robot, metric, *pair), {}))
+            apart = row["ratio_low"] > 1 and row["rms_ratio_high"] < 1, row["ratio_high"] < 1 and row["rms_ratio_low"] > 1
+            again = dict(zip(keys, (robot, metric, *pair), strict=True)) | {"reversed": any(apart)}
+            for head, by in (("ratio", metric), ("rms_ratio", "rms_um")):
+                ratio = scores[robot, by, pair[0]] / scores[robot, by, pair[1]]
+                # Intervals are symmetric in the logarithm.
+                again |= {head: ratio, f"{head}_high": ratio**2 / row[f"{head}_low"]}
+            yield again
 
 
 def find_p_value(mean: float, std: float, count: int, printed: float, digit: float) -> float:
@@ -278,9 +285,10 @@ def comparison(run: Audited) -> _Rows:
         row["ours"], row["mc_std"] = _ours(run, row)
         known = mine and mine["mc_std"] > 0 and np.isfinite(mine["ours"])
         row["z"] = (mine["ours"] - row["paper"]) / mine["mc_std"] if known else np.nan
-        if mine and row["table"] in ("3", "4") and not row["quantity"].startswith("n_") and np.isfinite(mine["p_value"]):
+        if mine and row["table"] in ("3", "4") and row["robot"] in run.reduced and not row["quantity"].startswith("n_"):
             count = run.table(f"results/studies/as_configured/{row['robot']}.parquet")["study"].nunique()
-            row["p_value"] = find_p_value(mine["studies_mean"], mine["studies_std"], count, row["paper"], _DIGIT)
+            figures = mine["studies_mean"], mine["studies_std"]
+            row["p_value"] = find_p_value(*figures, count, row["paper"], _DIGIT) if count > 1 else np.nan
         yield row | {"p_holm": mine.get("p_holm")}
 
 
@@ -301,14 +309,16 @@ def _ours(run: Audited, row: Mapping[Any, Any]) -> tuple[Any, Any]:
 
 def expectations(run: Audited) -> _Rows:
     length = run.configuration["tables"]["length"]
-    columns = {"k_sigma": ("k_sigma", 1.0), "dev": ("deviation", 1e6)}
-    for row in run.table("reports/tables/expectations.csv").to_dict("records"):
-        column, factor = columns[row["quantity"].partition(f"_{length}")[0]]
-        column += "_first_stage" * row["quantity"].endswith("_first_stage")
-        closed = run.cell("expected", row["robot"], run.keys[row["strategy"]]).set_index("length").loc[length, column]
-        again = {name: row[name] for name in ("robot", "strategy", "quantity")} | {"expected": factor * closed}
-        known, (mean, std) = row["studies"] > 1 and np.isfinite(row["paper"]), (row["studies_mean"], row["studies_std"])
-        yield again | {"p_value": find_p_value(mean, std, row["studies"], row["paper"], _DIGIT) if known else np.nan}
+    stated = run.table("reports/tables/expectations.csv").set_index(["robot", "strategy", "quantity"]).to_dict("index")
+    columns = {f"k_sigma_{length}_percent{end}": (f"k_sigma{end}", 1.0) for end in ("", "_first_stage")}
+    columns[f"dev_{length}_um"] = ("deviation", 1e6)
+    for robot, key, head in _cells(run, run.reduced):
+        closed = run.cell("expected", robot, key).set_index("length").loc[length]
+        for quantity, (column, factor) in columns.items():
+            row = stated.get((robot, head["strategy"], quantity), {"studies": 0, "paper": np.nan})
+            mean, std, count, paper = (row.get(name, np.nan) for name in ("studies_mean", "studies_std", "studies", "paper"))
+            p_value = find_p_value(mean, std, count, paper, _DIGIT) if count > 1 and np.isfinite(paper) else np.nan
+            yield head | {"quantity": quantity, "expected": factor * closed[column], "p_value": p_value}
 
 
 # What makes each table again, and the columns that name a row.
