@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
+from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.robot import Robot, with_rigid_joints
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from typing import Any
-
-    from elastocal.mechanics.chain import Chain
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}

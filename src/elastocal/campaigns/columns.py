@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
 from elastocal.campaigns.campaign import Measurements
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
 

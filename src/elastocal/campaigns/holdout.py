@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import DOCUMENT
+from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.campaigns.places import is_file_in
 from elastocal.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-    from typing import Any
-
-    from elastocal.campaigns.campaign import Campaign, Measurements
 
 HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
 # Below these a fit or a test says nothing.

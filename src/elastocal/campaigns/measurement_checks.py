@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.campaigns.campaign import Measurements, Target
 from elastocal.campaigns.column_bounds import FARTHEST_RAD
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.campaigns.joint_space import SAME_POSE_RAD
+from elastocal.campaigns.measurements import MeasurementFile
 from elastocal.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elastocal.campaigns.campaign import Measurements, Target
-    from elastocal.campaigns.measurements import MeasurementFile
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Robot
 
 # From pose to pose, in an order that has nothing to do with the time, it falls as often as not: in more than this share of at
 # least so many steps with a probability of one in 700 at most.

@@ -8,28 +8,30 @@ wrong is left for the diagnosis to trace.
 from __future__ import annotations
 
 import os
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, Measurements, described_campaign, targets_from
+from elastocal.campaigns.campaign import (
+    DEFAULT_HOLDOUT,
+    DOCUMENT,
+    Campaign,
+    Measurements,
+    Target,
+    described_campaign,
+    targets_from,
+)
 from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, holdout_from, measured_poses, other_folder
 from elastocal.campaigns.measurement_checks import check_angles, check_measurements
-from elastocal.campaigns.measurements import CSV, PARQUET, closest_first, read_measurements, shown
+from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, closest_first, read_measurements, shown
 from elastocal.campaigns.places import is_file, is_file_in
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import kind_of
+from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-    from typing import Any
-
-    from elastocal.campaigns.campaign import Campaign, Target
-    from elastocal.campaigns.measurements import MeasurementFile
-    from elastocal.mechanics.robot import Robot
 
 
 def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collection[str] | None = None) -> Campaign:

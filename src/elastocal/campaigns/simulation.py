@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,10 +11,8 @@ from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.elastostatics import generalized_forces, wrench_of_offset_force
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.links import extended_chain, spring_compliance
+from elastocal.mechanics.robot import Robot
 from elastocal.random_streams import stream
-
-if TYPE_CHECKING:
-    from elastocal.mechanics.robot import Robot
 
 
 @dataclass(frozen=True)

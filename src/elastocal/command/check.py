@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -14,9 +15,6 @@ from rich.table import Table
 from elastocal.command.pipeline import pipeline
 from elastocal.command.printed import print_answer, print_lines
 from elastocal.errors import escaped
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 # Parameters that are not identifiable and are named; more would be too many to read.
 _NAMED = 8

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -16,9 +17,6 @@ from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import print_lines
 from elastocal.command.quantities import MOST_JOBS
 from elastocal.errors import InputError, steering
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 # What `snakemake_logger_plugin_elastocal` writes when a job starts.
 _JOB = re.compile(r"(\d+) of (\d+): (.+)")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -20,9 +21,6 @@ from elastocal.command.init import init
 from elastocal.command.plan import plan
 from elastocal.command.printed import example
 from elastocal.errors import InputError, fault_of_machine
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 # Each subcommand with an example, in the order in which a calibration needs them; `import` is a group of its own.
 COMMANDS: dict[Callable[..., None], str] = {

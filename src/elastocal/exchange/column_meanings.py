@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from elastocal.exchange.column_names import (
     unit_scale,
     units_of,
 )
+from elastocal.exchange.csv_dialect import TextTable
 from elastocal.exchange.joint_states import joints_by_name
 from elastocal.exchange.rotations import (
     ALLOWED,
@@ -37,12 +38,7 @@ from elastocal.exchange.rotations import (
     is_rotation,
 )
 from elastocal.io.texts import plain_number
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from elastocal.exchange.csv_dialect import TextTable
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Robot
 
 # Columns that a table may have in two meanings: external axes E1 to E3 beside an orientation.
 _OTHER_ANGLES = (("A", "B", "C"), ("W", "P", "R"), ("O", "A", "T"))

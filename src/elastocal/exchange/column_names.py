@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 from scipy import constants
 
 from elastocal.mechanics.components import WRENCH_NAMES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
 
 LENGTH, ANGLE, FORCE, MOMENT, TIME, TEMPERATURE, NONE = "length", "angle", "force", "moment", "time", "temperature", "none"
 # SI value of one of each unit, by kind.

@@ -6,16 +6,13 @@ import codecs
 import csv
 import re
 from collections import Counter
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError, steering
 from elastocal.io.texts import decoded, read_bytes
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
 
 # In this order: a header that holds a semicolon is not separated by its commas.
 SEPARATORS = {"tab": "\t", "semicolon": ";", "bar": "|", "comma": ",", "space": " "}

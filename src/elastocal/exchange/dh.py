@@ -12,27 +12,21 @@ added to theta, a prismatic joint's shift to d.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.exchange.dh_table import AS_STATED, FIXED, PRISMATIC, REVOLUTE, read_dh_table
+from elastocal.exchange.dh_table import AS_STATED, FIXED, PRISMATIC, REVOLUTE, DhOptions, DhRow, read_dh_table
 from elastocal.exchange.fixed_transforms import rotation_about, shift_word, turn_word
-from elastocal.exchange.robot_text import imported
+from elastocal.exchange.robot_text import Imported, imported
 from elastocal.exchange.ros_kinematics import KINEMATICS, robot_from_kinematics
-from elastocal.exchange.slid_frames import lengths_of, slid_words
+from elastocal.exchange.slid_frames import Piece, lengths_of, slid_words
 from elastocal.exchange.urdf_chain import point_name
 from elastocal.io.documents import read_document
 from elastocal.mechanics.usual_values import UNLIMITED_DEG
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elastocal.exchange.dh_table import DhOptions, DhRow
-    from elastocal.exchange.robot_text import Imported
-    from elastocal.exchange.slid_frames import Piece
 
 # A table with masses is a maker's or was identified; a tenth is what such masses are known to at best.
 RELATIVE_STD = 0.1

@@ -22,9 +22,10 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
@@ -32,9 +33,6 @@ from elastocal.exchange.column_names import units_in, without_unit
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.io.documents import read_document
 from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
 
 ANGLE_UNITS = {"deg": math.radians(1.0), "rad": 1.0}
 LENGTH_UNITS = {"m": 1.0, "mm": 1e-3}

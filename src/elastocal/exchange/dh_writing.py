@@ -11,19 +11,16 @@ fixed and a and b are the offset. All parameters then change as little as the ro
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from elastocal.errors import InputError
 from elastocal.exchange.fixed_transforms import elementary, rotation_about
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Robot
 
 # Axes within this angle are parallel, and lines within this distance are one: what decimals of a robot file leave.
 _PARALLEL_RAD, _TOGETHER_M = 1e-6, 1e-7

@@ -6,12 +6,9 @@ A rigid displacement becomes ``Tx Ty Tz Rz Ry Rx``, the rotation by yaw, pitch a
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
 
 # Picometres, and as many degrees: a chain of any length keeps to far less than a nanometre, and cos(90 deg) is no length.
 _DECIMALS = 12

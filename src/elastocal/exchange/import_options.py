@@ -5,15 +5,12 @@ from __future__ import annotations
 import hashlib
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import yaml
 
 from elastocal.exchange.measurement_table import ImportOptions
 from elastocal.io.documents import check_document, read_document
-
-if TYPE_CHECKING:
-    from typing import Any
 
 IMPORT = "import.yaml"
 

@@ -9,15 +9,11 @@ name says and not for its place.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import recognized, unit_of_joint, without_unit
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elastocal.exchange.csv_dialect import TextTable
+from elastocal.exchange.csv_dialect import TextTable
 
 _COUNTED = re.compile(r"(.*?)(name|position)s?[\s_.]?[\[(]?\s*([0-9]{1,2})\s*[\])]?", re.ASCII | re.IGNORECASE)
 

@@ -7,8 +7,9 @@ the markers that are targets are stated, never guessed.
 from __future__ import annotations
 
 import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import (
@@ -22,11 +23,7 @@ from elastocal.exchange.column_names import (
     recognized_plainly,
     without_unit,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
-
-    from elastocal.exchange.csv_dialect import TextTable
+from elastocal.exchange.csv_dialect import TextTable
 
 # What a marker has of its own; all else of a row is of the robot.
 _OWN = frozenset((*POSITION, *VECTOR, *QUATERNION, *EULER, *MATRIX, *HOMOGENEOUS, "u95_m"))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,12 +12,8 @@ from elastocal.campaigns.measurements import shown
 from elastocal.errors import InputError
 from elastocal.exchange.column_meanings import units_of_columns
 from elastocal.exchange.column_names import COVARIATES, TIME, UNITS, kind_of, unit_scale
+from elastocal.exchange.csv_dialect import TextTable
 from elastocal.io.texts import A_NUMBER, plain_number
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from elastocal.exchange.csv_dialect import TextTable
 
 # Nanoseconds since 1970 are 2e18.
 _LARGEST_TIME = 1e19

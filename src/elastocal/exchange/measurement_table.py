@@ -6,8 +6,10 @@ rotation vector or Euler angles. What was found out is returned as options with 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,12 +26,7 @@ from elastocal.exchange.measurement_cells import CellReader, covariates_of, rows
 from elastocal.exchange.planned_sheet import sheet_options
 from elastocal.exchange.rotations import HOMOGENEOUS_MATRICES, QUATERNIONS, columns_of_rotation, rotation_vectors
 from elastocal.mechanics.components import WRENCH_NAMES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Robot
 
 ON_ROBOT, BY_ROBOT = "on-robot", "by-robot"
 # Angles that a controller reports twice at one standstill agree to better; poses of a plan lie degrees apart.

@@ -5,19 +5,16 @@ from __future__ import annotations
 import hashlib
 import math
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from elastocal.errors import InputError, reason_of
 from elastocal.io.atomic_writes import check_places, write_text
 from elastocal.io.documents import check_document, one_line
+from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elastocal.mechanics.robot import Robot
 
 _WIDTH = 128
 _INDENT = "  "

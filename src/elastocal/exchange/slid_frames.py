@@ -10,14 +10,11 @@ metres that cancel [1]; the frames of a chain need not be there.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from elastocal.exchange.fixed_transforms import displacement_words, elementary
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 # A displacement, ndarray (4, 4), and the measuring point at its end; empty for none.
 Piece = tuple[np.ndarray, str]

@@ -8,7 +8,7 @@ loaded; ``q1 .. qn`` (rad, as the controller reports them) near which the robot 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,14 +16,9 @@ from scipy.spatial.transform import Rotation
 from elastocal.campaigns.column_bounds import BOUNDS, FARTHEST_RAD, beyond
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
-from elastocal.exchange.csv_dialect import Dialect, read_text_table
+from elastocal.exchange.csv_dialect import Dialect, TextTable, read_text_table
 from elastocal.io.texts import A_NUMBER, plain_number
 from elastocal.mechanics.components import WRENCH
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from elastocal.exchange.csv_dialect import TextTable
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
 _WRENCH = tuple(name for name, _, _ in WRENCH)

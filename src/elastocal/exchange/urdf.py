@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.exchange.dh_table import MOST_TURNS
-from elastocal.exchange.robot_text import imported
+from elastocal.exchange.robot_text import Imported, imported
 from elastocal.exchange.urdf_chain import chain_between
-from elastocal.exchange.urdf_reading import read_urdf
+from elastocal.exchange.urdf_reading import Joint, Urdf, read_urdf
 from elastocal.exchange.urdf_weights import RELATIVE_STD, gravity_in_base, weights_of
 from elastocal.mechanics.usual_values import UNLIMITED_DEG
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from elastocal.exchange.robot_text import Imported
-    from elastocal.exchange.urdf_reading import Joint, Urdf
 
 # Limits to a billionth of a degree, or to a nanometre.
 _DECIMALS = 9

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,11 +24,7 @@ from elastocal.exchange.fixed_transforms import (
     turn_word,
     turned_axis,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from elastocal.exchange.urdf_reading import Joint, Urdf
+from elastocal.exchange.urdf_reading import Joint, Urdf
 
 # Of a shorter one the direction is no more than rounding.
 _SHORTEST_AXIS = 1e-9

@@ -9,10 +9,11 @@ file; meshes, materials and plug-ins are left out, and no other file is opened.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 import numpy as np
@@ -20,10 +21,6 @@ import numpy as np
 from elastocal.errors import InputError
 from elastocal.exchange.fixed_transforms import origin_transform
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from xml.etree.ElementTree import Element
 
 # The longest public descriptions, of humanoids with hands, have less than a megabyte.
 LARGEST_BYTES = 20_000_000

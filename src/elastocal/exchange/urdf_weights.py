@@ -6,16 +6,13 @@ All that a joint carries rigidly is one mass, side branches and what stands behi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from elastocal.exchange.urdf_chain import joints_above, parent_joints
+from elastocal.exchange.urdf_chain import Carried, UrdfChain, joints_above, parent_joints
+from elastocal.exchange.urdf_reading import Urdf
 from elastocal.mechanics.robot import STANDARD_GRAVITY
-
-if TYPE_CHECKING:
-    from elastocal.exchange.urdf_chain import Carried, UrdfChain
-    from elastocal.exchange.urdf_reading import Urdf
 
 # A URDF does not say where its masses come from: of a drawing without cables, grease and covers, or guessed. Where dynamic
 # parameters of robots were identified, masses and centres of such models were off by a tenth to a third.

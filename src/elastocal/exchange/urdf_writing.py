@@ -11,16 +11,13 @@ from which the robot was imported comes back by `urdf_origins`.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
 from elastocal.exchange.fixed_transforms import elementary, yaw_pitch_roll
-
-if TYPE_CHECKING:
-    from elastocal.mechanics.chain import Transform
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.chain import Transform
+from elastocal.mechanics.robot import Robot
 
 # URDF asks for them, and 0 is a joint that nothing moves; a robot file does not know them.
 _UNLIMITED = "1e9"

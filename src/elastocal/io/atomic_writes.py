@@ -7,15 +7,12 @@ import re
 import secrets
 import shutil
 import stat
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
 from elastocal.io.texts import kind_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 _PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 

@@ -6,32 +6,18 @@ import difflib
 import json
 import math
 import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import Any, ClassVar
 
 import jsonschema
 import yaml
 
 from elastocal.errors import InputError, text_fault
 from elastocal.io.texts import read_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-    from typing import Any, Protocol
-
-    class _Violation(Protocol):
-        """An error of jsonschema, of which a validator sets every part."""
-
-        absolute_path: Iterable[str | int]
-        validator: str
-        validator_value: Any
-        schema: dict[str, Any]
-        instance: Any
-        message: str
-
 
 # Far above what people write by hand (no schema goes deeper than 7), and read in seconds whatever it holds.
 LARGEST_BYTES, MOST_VALUES, DEEPEST = 300_000, 100_000, 20
@@ -263,7 +249,7 @@ def _key_of(path: Iterable[str | int]) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
 
 
-def _explained(error: _Violation) -> tuple[str, str, str]:
+def _explained(error: Any) -> tuple[str, str, str]:
     """Key, what was found and what is allowed, of one violation."""
     key = _key_of(error.absolute_path)
     rule, value = error.validator, error.validator_value

@@ -7,11 +7,7 @@ import json
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from typing import Any
-
+from typing import Any
 
 # Of what a run on one machine has installed; a wheel comes without.
 _LOCK = "requirements.lock"

@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import hashlib
 import sys
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import Origin, configuration_sha256
 from elastocal.io.sources import source_digest
 from elastocal.io.texts import check_file
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
 
 RECORDS = Path("results/records")
 # What the pipeline makes, folders and a file; the rest is the user's.

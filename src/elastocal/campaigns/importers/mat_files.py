@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import scipy.io
 
+from elastocal.campaigns.public_data import LARGEST_BYTES
 from elastocal.errors import InputError
 from elastocal.io.texts import read_bytes
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-    from typing import Any
-
 KIND = "a MAT file of version 5"
-# Of the sources here the largest has four megabytes.
-LARGEST_BYTES = 200_000_000
 
 
 def read_mat(path: str | Path, names: Sequence[str]) -> dict[str, Any]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import elastocal.exchange.controllers
 from elastocal.errors import InputError
+from elastocal.exchange.controllers.protocol import Controller
 from elastocal.io.modules import modules_with
-
-if TYPE_CHECKING:
-    from elastocal.exchange.controllers.protocol import Controller
 
 
 def controllers() -> dict[str, Controller]:
