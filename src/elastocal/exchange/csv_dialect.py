@@ -97,7 +97,7 @@ def read_text_table(
     lines, encoding = _lines(path, stated.encoding)
     filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
     kept = [(number, line) for number, line in filled if not line.lstrip().startswith(_COMMENTS)]
-    comments = [(number, _without_mark(line)) for number, line in filled if line.lstrip().startswith(_COMMENTS)]
+    comments = [(number, line.lstrip().lstrip("#%/").strip()) for number, line in filled if line.lstrip().startswith(_COMMENTS)]
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
     separator, header, line = _header(kept, comments, is_header, stated, wanted, source)
@@ -125,7 +125,7 @@ def read_text_table(
     places = [
         place
         for place, name in enumerate(names)
-        if name not in ignored and (not _nameless(name, place) or any(cells_by_place[place]))
+        if name not in ignored and (name != f"column {place + 1}" or any(cells_by_place[place]))
     ]
     if twice := [name for name, times in Counter(names[place] for place in places).items() if times > 1]:
         allowed = f"each column once (import csv --ignore {twice[0]!r} leaves out those that nobody needs)"
@@ -140,21 +140,16 @@ def read_text_table(
     decimal = stated.decimal or _decimal_of(columns, numbers, separator, thousands, source)
     if decimal == "comma":
         columns = {name: tuple(map(_with_point, cells)) for name, cells in columns.items()}
-    left_out = _left_out(
-        {
-            "rows of empty cells": len(table) - len(rows) - bool(units),
-            "lines above the header": sum(number < header for number, _ in filled) - named_above,
-            "lines of comments below the header": sum(number > header for number, _ in comments),
-            "columns without name and values": len(names) - len(places) - sum(name in ignored for name in names),
-        }
-    )
+    counted = {
+        "rows of empty cells": len(table) - len(rows) - bool(units),
+        "lines above the header": sum(number < header for number, _ in filled) - named_above,
+        "lines of comments below the header": sum(number > header for number, _ in comments),
+        "columns without name and values": len(names) - len(places) - sum(name in ignored for name in names),
+    }
+    left_out = tuple(f"{number} {what}" for what, number in counted.items() if number)
     dialect = Dialect(separator, decimal, header, encoding, thousands)
     stated_units = {name: unit for name, unit in units.items() if unit and name in columns}
     return TextTable(source, dialect, columns, tuple(numbers), left_out, stated_units)
-
-
-def _left_out(counted: dict[str, int]) -> tuple[str, ...]:
-    return tuple(f"{number} {what}" for what, number in counted.items() if number)
 
 
 def _names(cells: Sequence[str], kept: Sequence[tuple[int, str]], separator: str, header: int) -> tuple[list[str], bool]:
@@ -171,14 +166,6 @@ def _names(cells: Sequence[str], kept: Sequence[tuple[int, str]], separator: str
         of = group or of
         both.append(f"{of} {name}" if name in twice and of else name)
     return (both, True) if len(set(both)) == len(both) else (names, False)
-
-
-def _nameless(name: str, place: int) -> bool:
-    return name == f"column {place + 1}"
-
-
-def _without_mark(line: str) -> str:
-    return line.lstrip().lstrip("#%/").strip()
 
 
 def lines_of(text: str, path: str | Path) -> list[str]:
@@ -243,7 +230,8 @@ def _header(
         line = dict((*kept, *comments)).get(stated.header)
         if not line:
             raise InputError(source, f"line {stated.header}", "no header", "the line that names the columns")
-        return stated.separator or _separator_of(line), stated.header, line
+        usual = next((name for name, mark in SEPARATORS.items() if mark in line), "comma")
+        return stated.separator or usual, stated.header, line
 
     def separator_of(line: str, cells: Callable[[str, str], list[str]]) -> str | None:
         tried = [stated.separator] if stated.separator else [name for name, mark in SEPARATORS.items() if mark in line]
@@ -268,10 +256,6 @@ def _tried_cells(line: str, separator: str) -> list[str]:
         return cells_of(line, separator, "", 0)
     except InputError:
         return []
-
-
-def _separator_of(line: str) -> str:
-    return next((name for name, mark in SEPARATORS.items() if mark in line), "comma")
 
 
 def cells_of(line: str, separator: str, source: str, number: int) -> list[str]:

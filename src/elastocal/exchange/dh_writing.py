@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import elementary, rotation_about
+from elastocal.exchange.fixed_transforms import elementary
 from elastocal.mechanics.robot import Robot
 
 # Axes within this angle are parallel, and lines within this distance are one: what decimals of a robot file leave.
@@ -111,7 +111,7 @@ def dh_deltas(nominal: Robot, calibrated: Robot) -> pd.DataFrame:
 
 def _imported(kind: str, joint: int | None, values: Sequence[float]) -> dict[str, Any]:
     theta, d, a, alpha = values
-    head = {"joint": "" if joint is None else f"{joint}", "type": kind, "theta_offset_deg": math.degrees(theta)}
+    head = {"joint": f"{joint or ''}", "type": kind, "theta_offset_deg": math.degrees(theta)}
     return head | {"d_m": d, "a_m": a, "alpha_deg": math.degrees(alpha), "point": ""}
 
 
@@ -200,12 +200,8 @@ def _parallel(point: np.ndarray, axis: np.ndarray, kind: _Kind) -> Row:
 
 def _transform(row: Row) -> np.ndarray:
     found = np.eye(4)
-    for axis, angle, shift in (
-        ("z", row.theta, (0.0, 0.0, row.d)),
-        ("x", row.alpha, (row.a, 0.0, 0.0)),
-        ("y", row.beta, (0.0, row.b, 0.0)),
-    ):
-        step = np.eye(4)
-        step[:3, :3], step[:3, 3] = rotation_about(axis, angle), shift
+    for axis, angle, shift in ((2, row.theta, row.d), (0, row.alpha, row.a), (1, row.beta, row.b)):
+        step = elementary("R", axis, angle)
+        step[axis, 3] = shift
         found = found @ step
     return found

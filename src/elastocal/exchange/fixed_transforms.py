@@ -21,7 +21,7 @@ def displacement_words(transform: np.ndarray) -> list[str]:
     """
     yaw, pitch, roll = yaw_pitch_roll(transform[:3, :3])
     shifts = [shift_word(axis, amount) for axis, amount in zip("xyz", transform[:3, 3], strict=True)]
-    return _there([*shifts, turn_word("z", yaw), turn_word("y", pitch), turn_word("x", roll)])
+    return [word for word in (*shifts, turn_word("z", yaw), turn_word("y", pitch), turn_word("x", roll)) if word]
 
 
 def turned_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str]]:
@@ -38,7 +38,7 @@ def axis_rotation(axis: np.ndarray) -> np.ndarray:
     """The fixed rotation before a joint about an axis, as in `turned_axis`, ndarray (3, 3)."""
     turn = np.eye(3)
     for name, angle in _aligned(axis)[0]:
-        turn = turn @ rotation_about(name, math.radians(_rounded(math.degrees(angle))))
+        turn = turn @ rotation_about(name, math.radians(round(math.degrees(angle), _DECIMALS)))
     return turn
 
 
@@ -51,7 +51,7 @@ def _aligned(axis: np.ndarray) -> tuple[list[tuple[str, float]], str, str]:
 
 
 def _words_of(turns: Iterable[tuple[str, float]]) -> list[str]:
-    return _there([turn_word(name, angle) for name, angle in turns])
+    return [word for name, angle in turns if (word := turn_word(name, angle))]
 
 
 def shift_word(letter: str, amount_m: float) -> str | None:
@@ -106,16 +106,8 @@ def origin_transform(xyz: Sequence[float], rpy: Sequence[float]) -> np.ndarray:
     return found
 
 
-def _rounded(amount: float) -> float:
-    return round(amount, _DECIMALS)
-
-
 def _word(name: str, amount: float, unit: str) -> str | None:
-    amount = _rounded(amount)
+    amount = round(amount, _DECIMALS)
     if amount == 0:
         return None
     return f"{name}({'-' if amount < 0 else ''}{np.format_float_positional(abs(amount), trim='-')}{unit})"
-
-
-def _there(words: Iterable[str | None]) -> list[str]:
-    return [word for word in words if word is not None]
