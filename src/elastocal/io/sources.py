@@ -14,7 +14,7 @@ from pathlib import Path
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.texts import check_file
 
-_KEPT = Path("results/.source_digests")
+_KEPT = Path(".snakemake/source_digests.json")
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
