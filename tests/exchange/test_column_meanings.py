@@ -141,8 +141,7 @@ NAMED = ("rail", "shoulder_pan_joint", "J1")
 def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
     robot = replace(robot_of("Tx(q1) Rz(q2) Tx(1) Rz(q3) [A]"), joint_names=NAMED)
     velocity = "/joint_states/rail/velocity"
-    (tmp_path / "t.csv").write_text(f"{headers},{velocity},x,y,z\n1,2,3,9,{ROW}\n")
-    found = read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
+    found = table(tmp_path, f"{headers},{velocity},x,y,z\n1,2,3,9,{ROW}\n", PLAIN, robot)
     np.testing.assert_allclose([found.table[name][0] for name in ("q1", "q2", "q3")], [0.001, *np.radians([2, 3])])
     assert found.ignored == (velocity,)
     # What was found out needs no robot a second time.
@@ -152,18 +151,21 @@ def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
 def test_a_rail_is_measured_in_lengths_and_a_joint_in_angles(tmp_path):
     robot = robot_of("Tx(q1) Rz(q2) [A]")
     for names, unit in (("J1 [deg],J2", "J1 [deg]"), ("J1,J2 [mm]", "J2 [mm]")):
-        (tmp_path / "t.csv").write_text(f"{names},x,y,z\n1,2,{ROW}\n")
         with refused(tmp_path / "t.csv", f"unit of {unit!r}", "--unit"):
-            read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
+            table(tmp_path, f"{names},x,y,z\n1,2,{ROW}\n", PLAIN, robot)
 
 
 @pytest.mark.parametrize(
     ("names", "words"), [("J1,J2,J3", ["3 joints", "--ignore"]), ("J1", ["no column q2"]), ("a,b", ["no joint angles"])]
 )
 def test_as_many_joints_as_the_robot_has_are_needed(tmp_path, names, words):
-    (tmp_path / "t.csv").write_text(f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n")
     with refused(tmp_path / "t.csv", "header", *words):
-        read_measurement_table(tmp_path / "t.csv", PLAIN, robot_of("Rz(q1) Tx(1) Rz(q2) [A]"))
+        table(
+            tmp_path,
+            f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n",
+            PLAIN,
+            robot_of("Rz(q1) Tx(1) Rz(q2) [A]"),
+        )
 
 
 def test_topics_have_positions_orientations_and_forces(tmp_path):

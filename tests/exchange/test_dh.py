@@ -8,6 +8,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from imported_tables import UR5E
 from scipy.spatial.transform import Rotation
 from support import refused
 from synthetic import made_states
@@ -23,14 +24,6 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import sites_of
 
 PLAIN = DhOptions("deg", "m")
-UR5E = """joint, theta_offset_deg, d_m,    a_m,     alpha_deg, type
-1,     0,                0.1625, 0,       90,        R
-2,     0,                0,      -0.425,  0,         R
-3,     0,                0,      -0.3922, 0,         R
-4,     0,                0.1333, 0,       90,        R
-5,     0,                0.0997, 0,       -90,       R
-6,     0,                0.0996, 0,       0,         R
-"""
 
 
 def written(folder, rows, header="theta_offset,d,a,alpha,type,lower,upper"):

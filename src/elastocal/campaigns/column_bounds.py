@@ -1,7 +1,5 @@
 """What physics allows in a column of measurements, or of wanted poses: from, to, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

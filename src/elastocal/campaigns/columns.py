@@ -1,7 +1,5 @@
 """Measurements to columns of tables and back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

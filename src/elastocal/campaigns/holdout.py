@@ -1,7 +1,5 @@
 """Which poses of a campaign are fitted and which are held out to test the fit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

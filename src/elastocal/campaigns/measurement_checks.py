@@ -1,7 +1,5 @@
 """Checks of measurements as a whole: what can be recognised as wrong in them without fitting anything."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -5,8 +5,6 @@ of one target. All that is wrong on its face is refused here, in one line; a uni
 wrong is left for the diagnosis to trace.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path

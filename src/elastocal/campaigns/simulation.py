@@ -1,7 +1,5 @@
 """Campaigns of a simulated robot: ladders of loads at random poses, read with noise, as a calibrator would measure them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which campaigns a configuration names and where they come from, and the user's own: checked before any job starts."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A campaign's folder to begin with: every key explained, by the descriptions of the schemas that check it."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """A campaign's folder, written so that it is never half a campaign."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`elastocal certificate`: how good a robot is, against a tolerance, as PDF and JSON."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Annotated

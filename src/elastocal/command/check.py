@@ -1,7 +1,5 @@
 """`elastocal check`: what a campaign can show, before it is diagnosed."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Mapping

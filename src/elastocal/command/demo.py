@@ -1,7 +1,5 @@
 """`elastocal demo`: the whole way, from a plan to a certificate, on a simulated robot."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import sys

@@ -1,7 +1,5 @@
 """`elastocal diagnose`: the Snakemake target of a campaign, with its progress, verdict and report."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """`elastocal import`: what people have, to the files that elastocal reads; robots here, measurements in `import_csv`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """`elastocal init`: a campaign's folder to begin with."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """The application of all subcommands, in the order of the work; bad input ends in one line."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """Options that state quantities: lengths and angles with their unit, and lists of numbers."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

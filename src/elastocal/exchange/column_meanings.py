@@ -6,8 +6,6 @@ Messages of joint states, as rosbag and PlotJuggler write them, have joints in a
 [1] Open Robotics, sensor_msgs/JointState, docs.ros.org.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 

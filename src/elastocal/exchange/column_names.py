@@ -4,8 +4,6 @@ A column is recognized by what it is usually called, such as ``J1``, ``A1``, ``J
 Its unit stands in brackets or behind the name (``x_mm``), or is stated by an option.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Sequence

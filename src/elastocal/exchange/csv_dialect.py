@@ -1,7 +1,5 @@
 """Tables of numbers as text, in whatever dialect: encoding, separator, decimal mark, lines before the header, comments."""
 
-from __future__ import annotations
-
 import codecs
 import csv
 import re

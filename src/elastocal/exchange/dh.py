@@ -14,8 +14,6 @@ them, and a calibrated table has lengths d of hundreds of metres that cancel [3]
 [3] Hayati, S., Robot arm geometric link parameter estimation, 22nd IEEE Conference on Decision and Control, 1983.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -18,8 +18,6 @@ in the frame of the row), and ``point`` (name of a measuring point at the frame 
 with the same keys.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence

@@ -8,8 +8,6 @@ fixed and a and b are the offset. All parameters then change as little as the ro
 [1] Hayati, S. A., Robot arm geometric link parameter estimation, IEEE Conference on Decision and Control, 1983.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass

@@ -3,8 +3,6 @@
 A rigid displacement becomes ``Tx Ty Tz Rz Ry Rx``, the rotation by yaw, pitch and roll; what is zero is left out.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 

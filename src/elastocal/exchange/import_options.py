@@ -1,7 +1,5 @@
 """The options of an import: as a file, with which it can be repeated, and those that a saved sheet of a plan needs."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace

@@ -4,8 +4,6 @@ What such columns are called says of which marker they are, and not whether this
 the markers that are targets are stated, never guessed.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Cells of a table as numbers in SI units, with the line of what is none."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 

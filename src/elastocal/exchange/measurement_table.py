@@ -4,8 +4,6 @@ What a name, a unit or a notation leaves open is asked for, never guessed: an an
 rotation vector or Euler angles. What was found out is returned as options with which the import can be repeated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path

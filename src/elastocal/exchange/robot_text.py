@@ -1,7 +1,5 @@
 """A robot file as text that a person reads: where it came from, keys in their usual order, a line for each joint's mass."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import textwrap

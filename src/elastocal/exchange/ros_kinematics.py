@@ -6,8 +6,6 @@ the joint turns about z. The base frame is that of the controller (``base`` of u
 [1] Universal Robots, ur_calibration: extracts the factory calibration of a robot, github.com/UniversalRobots.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Orientations as people write them, to rotation vectors: quaternions, Euler angles, matrices."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Collection

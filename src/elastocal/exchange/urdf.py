@@ -1,7 +1,5 @@
 """A URDF to the contents of a robot file."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -5,8 +5,6 @@ becomes ``Tx Ty Tz Rz Ry Rx``; an axis that is not x, y or z is turned into z an
 mimics another one of the chain, by +1 or -1, stands in the chain as a passive joint ``Ry(-q2)``.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Sequence

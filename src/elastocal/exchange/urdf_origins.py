@@ -6,8 +6,6 @@ before it moves, its origin O becomes O G E R G^-1; what lies behind the last jo
 are those of the URDF, before and after.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ file; meshes, materials and plug-ins are left out, and no other file is opened.
 [1] Open Robotics, XML Robot Description Format (URDF), wiki.ros.org/urdf/XML.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 All that a joint carries rigidly is one mass, side branches and what stands behind the tip included.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

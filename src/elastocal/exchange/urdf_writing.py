@@ -8,8 +8,6 @@ from which the robot was imported comes back by `urdf_origins`.
 [1] ROS, XML Robot Description Format (URDF), https://wiki.ros.org/urdf/XML
 """
 
-from __future__ import annotations
-
 import math
 from xml.etree import ElementTree as Xml
 

@@ -1,7 +1,5 @@
 """The one way to write: files that appear whole or not at all, and never where a link, a pipe or a device stands."""
 
-from __future__ import annotations
-
 import os
 import re
 import secrets

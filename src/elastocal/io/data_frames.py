@@ -1,7 +1,5 @@
 """Tables on disk as pandas data frames, and data frames as the tables that people read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """YAML documents that users write: read, and checked against a JSON schema that knows every key."""
 
-from __future__ import annotations
-
 import difflib
 import json
 import math

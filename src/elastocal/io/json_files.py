@@ -1,7 +1,5 @@
 """JSON files of the steps, read and written with nothing but the standard library behind it: jobs start quickly."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

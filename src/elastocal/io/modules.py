@@ -1,7 +1,5 @@
 """Modules that a catalogue finds by itself: what is added to its package is one file."""
 
-from __future__ import annotations
-
 import pkgutil
 from importlib import import_module
 from types import ModuleType

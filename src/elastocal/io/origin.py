@@ -1,7 +1,5 @@
 """Which commit, configuration, seed and environment a file comes from, in words that stand in the file or beside it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Where a table comes from: package version, settings and a digest of them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable

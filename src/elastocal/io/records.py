@@ -5,8 +5,6 @@ next finds a byte that was altered, in it or in anything behind it. `python -m e
 all files, with the name of one behind `records` this one.
 """
 
-from __future__ import annotations
-
 import hashlib
 import sys
 from collections.abc import Collection, Iterable, Mapping

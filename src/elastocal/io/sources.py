@@ -3,8 +3,6 @@
 To parse all modules takes seconds, so the digests are kept by the bytes of the files that they are of.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 from collections.abc import Iterable

@@ -5,8 +5,6 @@ the schema and the provenance. Row groups are blocks of data sets, so that any n
 That a file is as it was written says its record, see `io.records`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Sources that are tables of text with a header: their columns by name, and the numbers in these."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress

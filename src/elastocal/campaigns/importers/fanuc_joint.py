@@ -1,7 +1,5 @@
 """Both sessions of the FANUC as one campaign: one robot, two tools, two tracker frames."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ Measured with a GTS3800 laser tracker for P. Jacobi's master's thesis (Tsinghua 
 position of the reflector, which the nominal chain and a tool along its last axis reproduce to 12 um, and a difference from it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

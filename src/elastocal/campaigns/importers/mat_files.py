@@ -1,7 +1,5 @@
 """Variables of MAT files; what is none, or is damaged, is one line."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from pathlib import Path

@@ -3,8 +3,6 @@
 A file holds a row for each camera image that was taken of a pose; rows of one pose repeat its joint angles and its reflector.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

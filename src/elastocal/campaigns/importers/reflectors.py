@@ -1,7 +1,5 @@
 """Public campaigns: targets on an unloaded flange, measured by a tracker in a frame that nobody knows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """All languages that are there: each module of this package that has a NAME."""
 
-from __future__ import annotations
-
 from typing import cast
 
 import elastocal.exchange.controllers

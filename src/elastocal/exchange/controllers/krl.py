@@ -3,8 +3,6 @@
 After KUKA System Software 8.3, Operating and Programming Instructions for System Integrators, KUKA Roboter GmbH.
 """
 
-from __future__ import annotations
-
 from elastocal.exchange.controllers.protocol import JointTargets
 
 NAME, WORDS, SUFFIX = "krl", "KUKA KRL", ".src"

@@ -6,8 +6,6 @@ program matches, and what that is in words; ``RESERVED``, names in lower case th
 ``program(name, targets)``, the text of the file.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ After ABB, Technical reference manual: RAPID Instructions, Functions and Data ty
 RAPID Overview, 3HAC050947 (identifiers, reserved words).
 """
 
-from __future__ import annotations
-
 from elastocal.exchange.controllers.protocol import JointTargets
 
 NAME, WORDS, SUFFIX = "rapid", "ABB RAPID", ".mod"

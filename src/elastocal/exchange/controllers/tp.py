@@ -3,8 +3,6 @@
 After FANUC, R-30iB Plus Operator's Manual (Basic Operation), B-83284EN (program names, joint positions, ASCII upload).
 """
 
-from __future__ import annotations
-
 from elastocal.exchange.controllers.protocol import JointTargets
 
 NAME, WORDS, SUFFIX = "tp", "FANUC TP", ".ls"

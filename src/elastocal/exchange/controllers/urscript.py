@@ -3,8 +3,6 @@
 After Universal Robots, The URScript Programming Language for e-Series (movej; identifiers, keywords).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from elastocal.exchange.controllers.protocol import JointTargets
