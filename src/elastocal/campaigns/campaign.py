@@ -15,7 +15,7 @@ from elastocal.mechanics.robot import Robot, with_rigid_joints
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
-NO_REMAINDER = "none"
+_NO_REMAINDER = "none"
 UNKNOWN = "unknown"
 NOT_TURNED = (0.0, 0.0, 0.0)
 
@@ -121,7 +121,7 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
     `document`: contents of ``campaign.yaml``. `source`: named in errors.
     """
     compliance = document.get("compliance", "nominal")
-    remainder = document.get("remainder", NO_REMAINDER)
+    remainder = document.get("remainder", _NO_REMAINDER)
     rigid = compliance == "nominal" and not robot.compliance_known
     return Campaign(
         name=document["campaign"],
@@ -134,7 +134,7 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
         noise=document.get("noise"),
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
         measurements=measurements,
-        remainder=None if remainder == NO_REMAINDER else remainder,
+        remainder=None if remainder == _NO_REMAINDER else remainder,
         table=document.get("table", ""),
         header_line=document.get("header_line"),
     )

@@ -12,7 +12,7 @@ from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.campaigns.places import is_file_in
 from elastocal.errors import InputError
 
-HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
+_HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
 # Below these a fit or a test says nothing.
 FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
 
@@ -34,7 +34,7 @@ def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[s
     `described`: ``holdout`` of ``campaign.yaml``. `folder`: folder of the campaign. `source`: named in errors. Raises
     `InputError`: no way or more than one, a seed where nothing is drawn, or as `other_folder`.
     """
-    ways = [way for way in HOLDOUTS if way in described]
+    ways = [way for way in _HOLDOUTS if way in described]
     drawn = ways in (["fraction"], ["blocks"])
     if len(ways) != 1 or ("seed" in described and not drawn):
         allowed = "one of {fraction, seed}, {blocks, seed}, {session}, {poses} or {campaign}"

@@ -65,7 +65,7 @@ def correct(
     from elastocal.validation.fitted_range import beyond_campaign
 
     console = Console(stderr=True)
-    controller, table, program = places_of(output, language)
+    controller, table, program = _places_of(output, language)
     if axes and controller is None:
         raise InputError("--axes", "", repr(axes), "with --format, or an --output that is a program")
     name = check_name(controller, program) if controller else ""
@@ -104,7 +104,7 @@ def correct(
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
     files = [table, program] if controller else [table]
     with write_together(output.parent, [file.name for file in files]) as folder_of_all:
-        write_csv(folder_of_all / table.name, joint_targets(wanted, found, before, errors, beyond))
+        write_csv(folder_of_all / table.name, _joint_targets(wanted, found, before, errors, beyond))
         if controller:
             targets = targets_of(found.joint_angles[good], prismatic, named)
             write_text(folder_of_all / program.name, controller.program(name, targets))
@@ -126,7 +126,7 @@ def correct(
     print_answer(not len(bad), answer, [*lines, *map(str, files)], following, console)
 
 
-def places_of(output: Path, language: str) -> tuple[Controller | None, Path, Path]:
+def _places_of(output: Path, language: str) -> tuple[Controller | None, Path, Path]:
     """The language of a program, if there shall be one, and where the CSV and the program go."""
     from elastocal.exchange.controllers.catalogue import controller_of
 
@@ -141,7 +141,7 @@ def places_of(output: Path, language: str) -> tuple[Controller | None, Path, Pat
     return controller, output.with_suffix(".csv") if by_suffix else output, output.with_suffix(controller.SUFFIX)
 
 
-def joint_targets(
+def _joint_targets(
     wanted: TargetPath, found: Correction, before: np.ndarray, errors: Prediction, beyond: np.ndarray
 ) -> pd.DataFrame:
     """The file of joint targets: wanted poses, commands q1..qn (rad, as the controller reports them), predicted errors, status.

@@ -20,7 +20,7 @@ THOUSANDS = {"point": ".", "comma": ",", "space": " \u00a0\u2009\u202f", "apostr
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 # What Western spreadsheets and instruments write beyond ASCII. Another encoding that gives these alone is not to be expected:
 # that of Windows is taken where a file is no UTF-8, and asked for where anything else comes out.
-WESTERN, _WESTERN_SIGNS = "cp1252", frozenset("°µ±²³·äöüÄÖÜßàâçèéêëîïôùûñÉ\u00a0")
+_WESTERN, _WESTERN_SIGNS = "cp1252", frozenset("°µ±²³·äöüÄÖÜßàâçèéêëîïôùûñÉ\u00a0")
 _COMMENTS = ("#", "%", "//")
 _POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
@@ -99,8 +99,8 @@ def read_text_table(
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
     separator, header, line = _header(kept, comments, is_header, stated, wanted, source)
-    table = [(number, cells_of(line, separator, source, number)) for number, line in kept if number > header]
-    names, named_above = _names(cells_of(line, separator, source, header), kept, separator, header)
+    table = [(number, _cells_of(line, separator, source, number)) for number, line in kept if number > header]
+    names, named_above = _names(_cells_of(line, separator, source, header), kept, separator, header)
     rows = [row for row in table if any(row[1])]
     for number, cells in rows:
         # Separators at the end of the rows and not of the header are common.
@@ -208,9 +208,9 @@ def _text(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, 
     try:
         return decoded(content, path, "utf-8"), "utf-8"
     except InputError as error:
-        western = content.decode(WESTERN, errors="replace")
+        western = content.decode(_WESTERN, errors="replace")
         if all(character in _WESTERN_SIGNS for character in western if not character.isascii()):
-            return western, WESTERN
+            return western, _WESTERN
         allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
         raise InputError(path, error.key, error.found, allowed) from None
 
@@ -236,7 +236,7 @@ def _header(
         return next((name for name in tried if is_header(cells(line, name))), None)
 
     for number, line in kept:
-        if separator := separator_of(line, lambda line, name: cells_of(line, name, source, number)):  # noqa: B023
+        if separator := separator_of(line, lambda line, name: _cells_of(line, name, source, number)):  # noqa: B023
             return separator, number, line
     found = [(separator, number, line) for number, line in comments if (separator := separator_of(line, _tried_cells))]
     if len({line for _, _, line in found}) > 1:
@@ -251,12 +251,12 @@ def _header(
 def _tried_cells(line: str, separator: str) -> list[str]:
     """Cells of a comment, in which quotes need not be in pairs."""
     try:
-        return cells_of(line, separator, "", 0)
+        return _cells_of(line, separator, "", 0)
     except InputError:
         return []
 
 
-def cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
+def _cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
     """Cells of one line.
 
     `separator`: a name in `SEPARATORS`, or the mark itself. `source`: named in errors. `number`: of the line. Raises

@@ -15,7 +15,7 @@ from elastocal.exchange.csv_dialect import TextTable
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import plain_number
 
-IMPORT, ON_ROBOT, BY_ROBOT = "import.yaml", "on-robot", "by-robot"
+IMPORT, _ON_ROBOT, BY_ROBOT = "import.yaml", "on-robot", "by-robot"
 # A table names no more.
 _MOST_JOINTS = 99
 
@@ -38,7 +38,7 @@ class ImportOptions:
     units: Mapping[str, str] | None = None
     rotation: str | None = None
     target: str | None = None
-    wrench: str = ON_ROBOT
+    wrench: str = _ON_ROBOT
     skip_empty: bool = False
     encoding: str | None = None
     thousands: str | None = None

@@ -36,15 +36,15 @@ _JOINED = (
 )
 
 _Value = TypeVar("_Value")
-Markers = dict[str, dict[str, str]]
+_Markers = dict[str, dict[str, str]]
 
 
-def markers_in(headers: Iterable[str]) -> Markers:
+def markers_in(headers: Iterable[str]) -> _Markers:
     """Headers by the names of their quantities, of each marker that has a position in every row.
 
     The marker of headers without one, such as ``x``, is called "".
     """
-    found: Markers = {}
+    found: _Markers = {}
     for header in headers:
         if part := _marker_and_name(without_unit(header)[0]):
             found.setdefault(part[0], {}).setdefault(part[1], header)

@@ -21,7 +21,7 @@ from elastocal.mechanics.components import WRENCH
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
 _WRENCH = tuple(name for name, _, _ in WRENCH)
 # Of a corrected target, and where it is.
-OK, STATUS = "ok", "status"
+OK, _STATUS = "ok", "status"
 # A position farther from the base than any arm reaches is in other units.
 _FARTHEST_M = 10.0
 
@@ -97,11 +97,11 @@ def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
     """
     read = _cells(path)
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
-    for name in (*_POSE, *angles, STATUS):
+    for name in (*_POSE, *angles, _STATUS):
         if name not in read.columns:
             raise InputError(path, f"line {read.text.dialect.header}", f"no column {name!r}", "a file of elastocal correct")
     commands = np.column_stack([read.numbers(name) for name in angles])
-    return CorrectedTargets(*_poses(read), commands, np.array(read.cells(STATUS)))
+    return CorrectedTargets(*_poses(read), commands, np.array(read.cells(_STATUS)))
 
 
 def _cells(path: str | Path) -> CellReader:

@@ -18,7 +18,7 @@ from elastocal.mechanics.usual_values import UNLIMITED_DEG
 # Limits to a billionth of a degree, or to a nanometre.
 _DECIMALS = 9
 # Two turns, and rounding; the limits of a joint in degrees are farther, and few joints turn so often.
-_FARTHEST_RAD, DEG = 4.0 * math.pi + 0.01, "deg"
+_FARTHEST_RAD, _DEG = 4.0 * math.pi + 0.01, "deg"
 # An angle this close to a right one, and none, is one that was written with few digits: 1.57 and 1.5708 are.
 _NEARLY_RAD, _EXACTLY_RAD = 1e-3, 1e-9
 
@@ -48,7 +48,7 @@ def robot_from_urdf(
         *weights.notes,
     ]
     limits = [_limits(joint, limits_in, notes, source) for joint in chain.joints]
-    if limits_in == DEG:
+    if limits_in == _DEG:
         notes.append("limits read in degrees, as the option says")
     document: dict[str, Any] = {
         "name": urdf.name,
@@ -87,7 +87,7 @@ def _limits(joint: Joint, limits_in: str | None, notes: list[str], source: str) 
         turns = max(-low, high) / (2.0 * math.pi)
         allowed = "radians; --limits deg where the file has degrees, or --limits rad where the joint does turn as often"
         raise InputError(source, f"joint {joint.name!r}: limit", f"{low:g} to {high:g}, {turns:.0f} turns", allowed)
-    return [round(value if prismatic or limits_in == DEG else math.degrees(value), _DECIMALS) for value in (low, high)]
+    return [round(value if prismatic or limits_in == _DEG else math.degrees(value), _DECIMALS) for value in (low, high)]
 
 
 def _few_digits(urdf: Urdf, children: Sequence[str]) -> str:
