@@ -150,9 +150,8 @@ def targets_from(described: Mapping[str, Any], chain: Chain, source: str) -> tup
     targets = []
     for name, target in described.items():
         if not isinstance(name, str):
-            raise InputError(
-                source, "targets", f"the name {name!r}, which YAML takes for no text", "a name, in quotes where need be"
-            )
+            allowed = "a name, in quotes where need be"
+            raise InputError(source, "targets", f"the name {name!r}, which YAML takes for no text", allowed)
         if target["point"] not in points:
             allowed = f"a measuring point of the chain: {closest_first(target['point'], points)}"
             raise InputError(source, f"targets.{name}.point", repr(target["point"]), allowed)

@@ -104,18 +104,16 @@ def _chosen_poses(
         for entry in holdout["poses"]:
             match = (pairs == entry).all(axis=1) if isinstance(entry, list | tuple) else pairs[:, 1] == entry
             if not match.any():
-                raise InputError(
-                    source, "holdout.poses", str(entry), f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
-                )
+                allowed = f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
+                raise InputError(source, "holdout.poses", str(entry), allowed)
             chosen |= match
         return chosen
     if "session" in holdout:
         wanted, there = np.atleast_1d(holdout["session"]), np.unique(pairs[:, 0])
         for session in wanted:
             if session not in there:
-                raise InputError(
-                    source, "holdout.session", str(session), f"sessions that were measured: {', '.join(map(str, there))}"
-                )
+                allowed = f"sessions that were measured: {', '.join(map(str, there))}"
+                raise InputError(source, "holdout.session", str(session), allowed)
         return np.isin(pairs[:, 0], wanted)
     draws = np.random.Generator(np.random.PCG64(holdout["seed"]))
     if "blocks" in holdout:

@@ -144,9 +144,8 @@ def held_out_campaign(
     source, key = (Path(folder) / DOCUMENT).as_posix(), "holdout.campaign"
     other = read_campaign(other_folder(campaign.holdout["campaign"], Path(folder), source), robots_folder, effects)
     if other.robot.chain != campaign.robot.chain:
-        raise InputError(
-            source, key, f"another chain, of {other.robot.name}", f"a campaign of the same chain, {campaign.robot.name}"
-        )
+        allowed = f"a campaign of the same chain, {campaign.robot.name}"
+        raise InputError(source, key, f"another chain, of {other.robot.name}", allowed)
     poses = len(measured_poses(other.measurements)[0])
     if poses < FEWEST_HELD_OUT_POSES:
         raise InputError(source, key, f"{poses} poses there", f"{FEWEST_HELD_OUT_POSES} or more")
@@ -215,9 +214,8 @@ def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target
     labels = table.texts("target")
     for index, label in enumerate(labels):
         if label not in names:
-            raise table.cell_fault(
-                index, "target", shown(label), f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
-            )
+            allowed = f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
+            raise table.cell_fault(index, "target", shown(label), allowed)
     approach = None
     if table.has(table.approach):
         senses = table.numbers(table.approach)

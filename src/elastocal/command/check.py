@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.table import Table
+from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline
 from elastocal.command.printed import print_answer, print_lines
@@ -19,8 +20,8 @@ _NAMED = 8
 
 
 def check(
-    folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print everything that was found as JSON.")] = False,
+    folder: Annotated[Path, Argument(help="Folder of the campaign.")],
+    as_json: Annotated[bool, Option("--json", help="Print everything that was found as JSON.")] = False,
 ) -> None:
     """Show what a campaign identifies and what looks suspicious.
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.console import Console
 from rich.progress import Progress
+from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.printed import print_answer, print_lines
@@ -27,23 +27,21 @@ _NAMED = 5
 
 
 def correct(
-    folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
-    path: Annotated[Path, typer.Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..mz, q1..qn.")],
+    folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
+    path: Annotated[Path, Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..mz, q1..qn.")],
     output: Annotated[
         Path,
-        typer.Option(
+        Option(
             help="CSV of joint targets; or a program for a controller by its suffix, .src, .mod, .ls, .script, beside a CSV."
         ),
     ],
     language: Annotated[
-        str,
-        typer.Option("--format", help="Write a program beside the CSV too: krl (KUKA), rapid (ABB), tp (FANUC), urscript."),
+        str, Option("--format", help="Write a program beside the CSV too: krl (KUKA), rapid (ABB), tp (FANUC), urscript.")
     ] = "",
     axes: Annotated[
-        str,
-        typer.Option(help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6; needed where it is ambiguous."),
+        str, Option(help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6; needed where it is ambiguous.")
     ] = "",
-    partial: Annotated[bool, typer.Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
+    partial: Annotated[bool, Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.
@@ -135,9 +133,8 @@ def _places_of(output: Path, language: str) -> tuple[Controller | None, Path, Pa
     if controller is None:
         return None, output, output
     if by_suffix not in (None, controller):
-        raise InputError(
-            output, "--output", f"a program in another language than {controller.WORDS}", f"{controller.SUFFIX} | .csv"
-        )
+        allowed = f"{controller.SUFFIX} | .csv"
+        raise InputError(output, "--output", f"a program in another language than {controller.WORDS}", allowed)
     return controller, output.with_suffix(".csv") if by_suffix else output, output.with_suffix(controller.SUFFIX)
 
 

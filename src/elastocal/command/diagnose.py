@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import print_lines
@@ -25,8 +26,8 @@ _NO_NEWS = "Using workflow specific profile"
 
 
 def diagnose(
-    folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
-    cores: Annotated[int, typer.Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs that run at a time.")] = 2,
+    folder: Annotated[Path, Argument(help="Folder of the campaign.")],
+    cores: Annotated[int, Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs that run at a time.")] = 2,
 ) -> None:
     """Find which effects the robot's model lacks; write the report.
 

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+from typer import Argument, Option
 
 from elastocal.command.import_csv import csv
 from elastocal.command.printed import example
@@ -16,11 +17,11 @@ from elastocal.exchange.robot_text import Imported, refuse_existing, summary, wr
 from elastocal.exchange.urdf import robot_from_urdf
 
 importing = typer.Typer(name="import", no_args_is_help=True)
-_Output = Annotated[Path, typer.Option("--output", "-o", help="The robot file to write.")]
-_Force = Annotated[bool, typer.Option("--force", help="Replace the file that is there.")]
+_Output = Annotated[Path, Option("--output", "-o", help="The robot file to write.")]
+_Force = Annotated[bool, Option("--force", help="Replace the file that is there.")]
 _MassStd = Annotated[
     float,
-    typer.Option(min=0.001, max=LARGEST_RELATIVE_STD, help="How well the masses are known: standard deviation over the value."),
+    Option(min=0.001, max=LARGEST_RELATIVE_STD, help="How well the masses are known: standard deviation over the value."),
 ]
 
 
@@ -31,14 +32,14 @@ def import_() -> None:
 
 @importing.command(epilog=example("elastocal import urdf arm.urdf --base base_link --tip tool0 -o robot.yaml"))
 def urdf(
-    file: Annotated[Path, typer.Argument(help="The URDF; of a xacro file, what xacro makes of it.")],
-    base: Annotated[str, typer.Option(help="Link whose frame is the robot's base frame.")],
-    tip: Annotated[str, typer.Option(help="Link at the end; its frame is the last measuring point.")],
+    file: Annotated[Path, Argument(help="The URDF; of a xacro file, what xacro makes of it.")],
+    base: Annotated[str, Option(help="Link whose frame is the robot's base frame.")],
+    tip: Annotated[str, Option(help="Link at the end; its frame is the last measuring point.")],
     output: _Output,
-    point: Annotated[list[str] | None, typer.Option(help="A link between them that targets may sit on; any number.")] = None,
+    point: Annotated[list[str] | None, Option(help="A link between them that targets may sit on; any number.")] = None,
     limits: Annotated[
         Literal["deg", "rad"] | None,
-        typer.Option(help="Unit of the limits of joints that turn; asked for where they look like degrees."),
+        Option(help="Unit of the limits of joints that turn; asked for where they look like degrees."),
     ] = None,
     mass_std: _MassStd = urdf_weights.RELATIVE_STD,
     force: _Force = False,
@@ -53,16 +54,14 @@ def urdf(
 
 @importing.command(epilog=example("elastocal import dh arm.csv -o robot.yaml"))
 def dh(
-    file: Annotated[Path, typer.Argument(help="The table, .csv or .yaml; or the kinematics file of the ROS driver.")],
+    file: Annotated[Path, Argument(help="The table, .csv or .yaml; or the kinematics file of the ROS driver.")],
     output: _Output,
-    modified: Annotated[bool, typer.Option("--modified", help="Craig's notation: alpha and a come before the joint.")] = False,
-    angles: Annotated[Literal["deg", "rad"] | None, typer.Option(help="Unit of columns of angles that state none.")] = None,
-    lengths: Annotated[Literal["m", "mm"] | None, typer.Option(help="Unit of columns of lengths that state none.")] = None,
-    decimal: Annotated[
-        Literal["point", "comma"] | None, typer.Option(help="Mark of a CSV table; a comma has to be stated.")
-    ] = None,
-    ignore: Annotated[list[str] | None, typer.Option(help="Column to leave out; as often as needed.")] = None,
-    name: Annotated[str | None, typer.Option(help="Maker and model. Default: the name of the file.")] = None,
+    modified: Annotated[bool, Option("--modified", help="Craig's notation: alpha and a come before the joint.")] = False,
+    angles: Annotated[Literal["deg", "rad"] | None, Option(help="Unit of columns of angles that state none.")] = None,
+    lengths: Annotated[Literal["m", "mm"] | None, Option(help="Unit of columns of lengths that state none.")] = None,
+    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of a CSV table; a comma has to be stated.")] = None,
+    ignore: Annotated[list[str] | None, Option(help="Column to leave out; as often as needed.")] = None,
+    name: Annotated[str | None, Option(help="Maker and model. Default: the name of the file.")] = None,
     mass_std: _MassStd = exchange_dh.RELATIVE_STD,
     force: _Force = False,
 ) -> None:

@@ -154,15 +154,13 @@ def _counted_joints(text: TextTable, headers: Sequence[str], mapped: set[str]) -
                 f"--column qw={headers[0]!r} … qz={headers[3]!r} (real part first) and --column q1={first!r} …, or "
                 f"for joints --column q1={headers[0]!r} …"
             )
-            raise InputError(
-                text.path, "header", f"{', '.join(headers)}: joints, or quaternions, as they have length 1", allowed
-            )
+            found = f"{', '.join(headers)}: joints, or quaternions, as they have length 1"
+            raise InputError(text.path, "header", found, allowed)
     numbered = [set(members) - {0} for members in families.values()]
     if len(families) > 1 and not set.intersection(*numbered):
         named = " and ".join(repr(members[min(members)]) for members in families.values())
-        raise InputError(
-            text.path, "header", f"joints called {named} …", "--column q1=NAME …, or --ignore NAME for those of one kind"
-        )
+        allowed = "--column q1=NAME …, or --ignore NAME for those of one kind"
+        raise InputError(text.path, "header", f"joints called {named} …", allowed)
     for members in families.values():
         if 0 not in members:
             continue

@@ -107,18 +107,16 @@ def read_text_table(
         while len(cells) > len(names) and not cells[-1]:
             cells.pop()
         if len(cells) != len(names):
-            raise InputError(
-                source, f"line {number}", f"{len(cells)} cells", f"{len(names)}, one for each column of line {header}"
-            )
+            allowed = f"{len(names)}, one for each column of line {header}"
+            raise InputError(source, f"line {number}", f"{len(cells)} cells", allowed)
     units = dict(zip(names, (rows and units_in(rows[0][1])) or (), strict=False))
     rows = rows[1:] if units else rows
     if not rows:
         raise InputError(source, "", "a header alone", "one row for each measurement")
     for name in ignored:
         if name not in names:
-            raise InputError(
-                source, f"line {header}", f"no column {name!r} to ignore", closest_first(name, list(dict.fromkeys(names)))
-            )
+            allowed = closest_first(name, list(dict.fromkeys(names)))
+            raise InputError(source, f"line {header}", f"no column {name!r} to ignore", allowed)
     cells_by_place = list(zip(*(cells for _, cells in rows), strict=True))
     places = [
         place
@@ -298,15 +296,13 @@ def _decimal_of(
         if len(seen) == 2:
             (one, left), (other, right) = seen["point"], seen["comma"]
             found = f"{left!r} in line {one} and {right!r} in line {other}"
-            raise InputError(
-                source, "", found, "one decimal mark: --decimal point or comma says which, --thousands that the other is none"
-            )
+            allowed = "one decimal mark: --decimal point or comma says which, --thousands that the other is none"
+            raise InputError(source, "", found, allowed)
     decimal = next(iter(seen), "comma" if thousands == "point" else "point")
     if decimal == thousands:
         number, cell = seen[decimal]
-        raise InputError(
-            source, f"line {number}", repr(cell), f"three digits behind each {decimal}, as it is between thousands"
-        )
+        allowed = f"three digits behind each {decimal}, as it is between thousands"
+        raise InputError(source, f"line {number}", repr(cell), allowed)
     if "comma" in seen and (separator == "comma" or not sure):
         number, cell = seen["comma"]
         allowed = "--decimal comma where the comma is the decimal mark, or --thousands comma"

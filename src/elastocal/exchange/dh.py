@@ -62,9 +62,8 @@ def robot_from_dh(
             if modified:
                 raise InputError("--modified", "", f"a file of {KINEMATICS}, which is no table", "the file without --modified")
             if options.ignore:
-                raise InputError(
-                    "--ignore", "", f"a file of {KINEMATICS}, of which nothing is left out", "the file without --ignore"
-                )
+                allowed = "the file without --ignore"
+                raise InputError("--ignore", "", f"a file of {KINEMATICS}, of which nothing is left out", allowed)
             return robot_from_kinematics(described, path, name)
     rows, understood = read_dh_table(path, options)
     joints = [row for row in rows if row.kind != FIXED]

@@ -219,9 +219,8 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
         turns = name in _ANGLES or (name in _LIMITS and kind != PRISMATIC)
         if name not in _PLAIN and not (meaning.angle if turns else meaning.length):
             option = "--angles deg or rad" if turns else "--lengths m or mm"
-            raise InputError(
-                source, f"{where}, {column}", f"a limit without a unit of {'angles' if turns else 'lengths'}", option
-            )
+            found = f"a limit without a unit of {'angles' if turns else 'lengths'}"
+            raise InputError(source, f"{where}, {column}", found, option)
         value = _number(text(name), turns and meaning.angle == "rad")
         largest = MOST_TURNS * (2.0 * math.pi if meaning.angle == "rad" else 360.0) if turns else LARGEST_NUMBER
         if value is None or abs(value) > largest:

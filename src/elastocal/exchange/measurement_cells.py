@@ -29,9 +29,8 @@ def rows_with_position(text: TextTable, columns: Mapping[str, str], position: Se
     if not filled.all() and not skip_empty:
         row = int(np.argmin(filled))
         of = f" of {text.columns[columns['target']][row]}" if "target" in columns else ""
-        raise InputError(
-            text.path, f"line {text.lines[row]}", f"no position{of}", "three numbers, or --skip-empty to leave such rows out"
-        )
+        allowed = "three numbers, or --skip-empty to leave such rows out"
+        raise InputError(text.path, f"line {text.lines[row]}", f"no position{of}", allowed)
     if not filled.any():
         raise InputError(text.path, "", "no position in any row", "at least one measurement")
     return np.flatnonzero(filled)

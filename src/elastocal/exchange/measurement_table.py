@@ -150,9 +150,8 @@ def _targets(read: CellReader, name: str | None) -> np.ndarray:
             raise InputError(read.text.path, f"column {read.columns['target']}", *fault)
         return np.array(names)
     if name is None:
-        raise InputError(
-            read.text.path, "header", "no column target", "--target NAME, the target of all rows, or --column target=NAME"
-        )
+        allowed = "--target NAME, the target of all rows, or --column target=NAME"
+        raise InputError(read.text.path, "header", "no column target", allowed)
     if fault := text_fault(name):
         raise InputError("--target", "", *fault)
     return np.full(len(read.kept), name)

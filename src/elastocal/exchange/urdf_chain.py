@@ -88,9 +88,8 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
             raise InputError(source, "point", repr(name), allowed)
     marked = {name: point_name(name) for name in (*points, tip)}
     if len(set(marked.values())) < len(marked):
-        raise InputError(
-            source, "point", ", ".join(map(repr, marked)), "links whose names differ by more than blanks and brackets"
-        )
+        allowed = "links whose names differ by more than blanks and brackets"
+        raise InputError(source, "point", ", ".join(map(repr, marked)), allowed)
     words = [f"[{marked[base]}]"] if base in marked else []
     numbers: dict[str, int] = {}
     place = Carried(0, np.eye(4), False)

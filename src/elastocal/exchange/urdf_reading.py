@@ -184,9 +184,8 @@ def _check_numbers(text: str | None, count: int, key: str, source: str, largest:
         return
     words = text.split(None, count)
     if len(words) != count or any(plain_number(word, largest) is None for word in words):
-        raise InputError(
-            source, key, repr(text), f"{'a number' if count == 1 else f'{count} numbers'}, up to {largest:g} in size"
-        )
+        allowed = f"{'a number' if count == 1 else f'{count} numbers'}, up to {largest:g} in size"
+        raise InputError(source, key, repr(text), allowed)
 
 
 def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str) -> None:

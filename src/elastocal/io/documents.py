@@ -158,9 +158,8 @@ def _check_events(text: str) -> None:
         if len(frames) + frames[-1][2] - 1 > DEEPEST:
             raise _UnclearError(event.start_mark, "lists or keys in each other", f"at most {DEEPEST} deep")
         if frames[-1][1] > MOST_VALUES:
-            raise _UnclearError(
-                event.start_mark, "more values than a document has", f"at most {MOST_VALUES}, aliases written out"
-            )
+            allowed = f"at most {MOST_VALUES}, aliases written out"
+            raise _UnclearError(event.start_mark, "more values than a document has", allowed)
 
 
 def _enlarged(frame: tuple[str | None, int, int], count: int, height: int) -> tuple[str | None, int, int]:

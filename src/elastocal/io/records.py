@@ -180,12 +180,8 @@ def _intact(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
     for file in sorted(written.keys() | found.keys()):
         if written.get(file) != found.get(file):
             what = "other contents than were written" if file in found else "nothing"
-            raise InputError(
-                Path(within, file),
-                "",
-                what,
-                _AS_WRITTEN if file == path else _AS_WRITTEN.replace("delete it", f"delete {path}"),
-            )
+            allowed = _AS_WRITTEN if file == path else _AS_WRITTEN.replace("delete it", f"delete {path}")
+            raise InputError(Path(within, file), "", what, allowed)
     return job, _joint(written)
 
 
