@@ -186,14 +186,12 @@ def check_document(document: Any, schema: str, source: str) -> None:
     names the first key at fault, what was found and what is allowed.
     """
     validator = _Validator(read_schema(schema), format_checker=_FORMATS)
-    errors = sorted(
-        islice(validator.iter_errors(document), _MOST_FAULTS), key=lambda error: [str(part) for part in error.absolute_path]
-    )
-    if errors:
-        key, found, allowed = _explained(errors[0])
-        path = [*errors[0].absolute_path]
-        if errors[0].validator == "additionalProperties":
-            path.append(next(name for name in errors[0].instance if name not in errors[0].schema.get("properties", {})))
+    errors = islice(validator.iter_errors(document), _MOST_FAULTS)
+    if error := min(errors, key=lambda error: [str(part) for part in error.absolute_path], default=None):
+        key, found, allowed = _explained(error)
+        path = [*error.absolute_path]
+        if error.validator == "additionalProperties":
+            path.append(next(name for name in error.instance if name not in error.schema.get("properties", {})))
         line = _line_of(source, path)
         raise InputError(source, ", ".join(part for part in (line, key) if part), found, allowed)
     for place, text in _texts(document):
