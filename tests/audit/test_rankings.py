@@ -28,7 +28,7 @@ def run(tmp_path):
         part = pd.DataFrame(scale * rng.uniform(1, 2, (9, len(USES))), columns=USES)
         part["pooled_p95"], part["iso_9283"] = scale, np.nan
         parts.append(part.assign(strategy=STRATEGIES[key]["name"], data_set=np.arange(9)))
-        at = {"length": [5], "k_sigma": [-scale], "k_sigma_first_stage": [scale], "deviation": [1e-6 * scale]}
+        at = {"length": [5], "k_sigma": [-scale], "k_sigma_fixed_joints": [scale], "deviation": [1e-6 * scale]}
         pd.DataFrame(at).to_parquet(tmp_path / f"results/metrics/two/100um/{key}.parquet")
         drawn = {name: values[0] * rng.uniform(0.9, 1.1, 10) for name, values in at.items() if name != "length"}
         drawn |= {"length": np.full(10, 5), "replicate": np.arange(1, 11)}

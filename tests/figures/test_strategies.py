@@ -11,6 +11,7 @@ from elastocal.figures.strategies import (
     bias_and_accuracy,
     deviations,
     noise_impact,
+    over_studies,
     stiffness_errors,
 )
 from elastocal.figures.style import PALETTE
@@ -22,7 +23,7 @@ TITLES = {"kuka": "Kuka KR 270", "fanuc": "Fanuc R-2000"}
 
 def metrics_of(robot, strategy, size, noise_um=200.0, untrusted=0):
     frame = pd.DataFrame({"robot": robot, "strategy": strategy, "noise_um": noise_um, "length": LENGTHS})
-    for name, scale in (("k_sigma", 1.0), ("k_sigma_first_stage", 0.5), ("deviation", 1e-6)):
+    for name, scale in (("k_sigma", 1.0), ("k_sigma_fixed_joints", 0.5), ("deviation", 1e-6)):
         frame[name], frame[f"{name}_std_error"] = scale * size / LENGTHS, 0.1 * scale * size / LENGTHS
     return frame.assign(trustworthy=untrusted < LENGTHS)
 
@@ -85,10 +86,10 @@ def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
         np.testing.assert_allclose(other.get_ydata(), 20 * scale / LENGTHS)
         assert band(axis.collections[1])[2] == pytest.approx((9 * scale, 11 * scale))
         assert list(limit.get_ydata()) == [3.0, 3.0] and [text.get_text() for text in axis.texts] == ["3 %"]
-    assert "all joints" in whole.get_title() and "first stage" in first.get_title()
+    assert "all joints" in whole.get_title() and "fixed in the last stage" in first.get_title()
     assert whole.get_ylabel() == r"$k_\Sigma$ (%)"
     assert [text.get_text() for text in first.get_legend().get_texts()] == [*ORDER, PAPER]
-    # Both counts are the first stage's in the paper: its score at 4 configurations, and where it reaches 3 %.
+    # Both counts are those of the fixed joints in the paper: its score at 4 configurations, and where it reaches 3 %.
     marks = [line for line in first.lines if line.get_marker() == "D"]
     assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [[[4, 2.2]], [[5, 3]]]
     assert marks[0].get_color() == first.lines[1].get_color()
@@ -150,4 +151,19 @@ def test_bars_of_one_data_set_stand_in_the_given_order_with_bound_error_and_effi
         assert axis.get_xlabel() == "RMS end-effector error (µm)"
     assert row_labels(figure.axes[0]) == ORDER[::-1]
     assert legend_entries(figure) == ["Cramér-Rao bound", "RMS error"] and "20 configurations" in figure.get_suptitle()
+    assert_nothing_cut_off(figure)
+
+
+def test_studies_are_drawn_as_their_mean_and_one_estimator_once():
+    parts = [
+        metrics_of(robot, name, size * (1 + 0.1 * study)).assign(study=study)
+        for robot in TITLES
+        for name, size in (("6DoF", 20.0), ("6DoF again", 20.0), ("2DoF+6DoF", 10.0))
+        for study in (0, 1, 2)
+    ]
+    figure = over_studies(pd.concat(parts), PRINTED, TITLES, ["6DoF", "6DoF again", "2DoF+6DoF"])
+    deviation = figure.axes[2]
+    lines = [line for line in deviation.lines if line.get_marker() != "D"]
+    assert len(lines) == 2 and "6DoF again" not in legend_entries(figure)
+    np.testing.assert_allclose(lines[0].get_ydata(), 22.0 / LENGTHS, rtol=1e-9)
     assert_nothing_cut_off(figure)

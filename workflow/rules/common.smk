@@ -212,7 +212,7 @@ def loading_of(interpretations):
 
 def conventions_of(interpretations):
     kept = {key: interpretations[key] for key in ("wrench_at", "average", "deviation_of")}
-    return kept | {"rows": rows_read(interpretations["measured"])}
+    return kept | {"rows": rows_read(interpretations["measured"]), "reflectors_m": interpretations.get("reflectors_m", [])}
 
 
 def study_in_memory(**size):

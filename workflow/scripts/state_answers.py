@@ -8,7 +8,21 @@ import pandas as pd
 
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_long
+from elastocal.io.documents import read_document
 from elastocal.report.answers import answers
+from elastocal.report.decision_answers import (
+    break_even_rows,
+    claim_rows,
+    cost_facts,
+    few_rows,
+    joint_rows,
+    kind_rows,
+    measured_rows,
+    simulated_design_rows,
+    smallest_designs,
+    stiffness_rows,
+    study_facts,
+)
 from elastocal.report.metric_answers import METRIC_NAMES, metric_summary, score_rows, staged_rows
 from elastocal.report.question_answers import (
     budget_rows,
@@ -47,7 +61,25 @@ def state_answers(job: Job) -> None:
     ladder, pairs = pd.read_csv(job.input.ladder, dtype={"link_springs": str}), pd.read_csv(job.input.pairs)
     observability, designs = pd.read_csv(job.input.observability), pd.read_csv(job.input.designs)
     scores = pd.read_csv(job.input.scores)
+    simulated, measured = pd.read_csv(job.input.simulated, dtype={"unobservable": str}), pd.read_csv(job.input.studies)
+    citation = read_document(job.input.citation)
+    authors = ", ".join(each["name"] for each in citation["authors"])
     facts |= {
+        "citation": {"authors": authors, "date": str(citation["date-released"])},
+        "claims": claim_rows(pd.read_csv(job.input.claims, keep_default_na=False, na_values={"p": [""]}), titles),
+        "joint": joint_rows(pd.read_csv(job.input.joint)),
+        "table4": measured_rows(measured, titles),
+        "over_studies": [
+            {"title": title} | study_facts(measured, robot, settings.cells["classical_strategy"], settings.best)
+            for robot, title in titles.items()
+        ],
+        "break_even": break_even_rows(pd.read_csv(job.input.break_even), accuracy, titles),
+        "costs": cost_facts(pd.read_csv(job.input.costs), titles),
+        "simulated": simulated_design_rows(simulated, length, titles),
+        "smallest": smallest_designs(simulated, accuracy, titles),
+        "few": few_rows(pd.read_csv(job.input.few), titles),
+        "kinds": kind_rows(pd.read_csv(job.input.kinds), length, titles),
+        "stiffness": stiffness_rows(pd.read_csv(job.input.stiffness), titles),
         "strategies": strategy_rows([strategy_from_document(document) for document in settings.strategies]),
         "ladder": ladder_rows(ladder),
         "budget": budget_rows(pd.read_csv(job.input.budget), pairs, length, [*titles]),

@@ -23,7 +23,7 @@ _INITIAL = {"deviation_mean": "mean_mm", "deviation_std": "std_mm", "deviation_m
 _SCORES = {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}
 _EXPECTED = {
     "k_sigma_{}_percent": ("k_sigma", "", 1.0),
-    "k_sigma_{}_percent_first_stage": ("k_sigma_first_stage", "k_sigma_{}", 1.0),
+    "k_sigma_{}_percent_fixed_joints": ("k_sigma_fixed_joints", "k_sigma_{}", 1.0),
     "dev_{}_um": ("deviation", "dev_{}", 1e6),
 }
 
@@ -101,7 +101,7 @@ def _ours(run: Audited, printed: pd.Series) -> tuple[float, float]:
     if number == "text":
         return _TEXT[quantity](run)
     column = {"2": _INITIAL, "4": _SCORES}.get(number, {}).get(quantity, quantity)
-    column = f"{column}_first_stage" if "k_sigma" in column else column
+    column = f"{column}_fixed_joints" if "k_sigma" in column else column
     table = run.table(f"reports/tables/table{number}.csv")
     here = table["robot"] == printed["robot"]
     if number == "4":
@@ -153,7 +153,7 @@ def _scatter(run: Audited, printed: pd.Series, paper: float) -> tuple[float, flo
         column, at, factor = f"compliance_{quantity[1:]}", length, 1e6
     else:
         name, _, words = quantity.rpartition("_")
-        column, factor = ("k_sigma_first_stage", 1.0) if name == "k_sigma" else ("deviation", 1e6)
+        column, factor = ("k_sigma_fixed_joints", 1.0) if name == "k_sigma" else ("deviation", 1e6)
         at = int(words)
     values = factor * studies.loc[studies["length"] == at, column].to_numpy()
     if len(values) < 2:
@@ -164,7 +164,7 @@ def _scatter(run: Audited, printed: pd.Series, paper: float) -> tuple[float, flo
 def _limit(quantity: str) -> tuple[str, float]:
     """Score and limit of a length, such as n_dev_2_um."""
     limit = float(quantity.split("_")[-2])
-    return ("deviation", 1e-6 * limit) if quantity.startswith("n_dev") else ("k_sigma_first_stage", limit)
+    return ("deviation", 1e-6 * limit) if quantity.startswith("n_dev") else ("k_sigma_fixed_joints", limit)
 
 
 def _studies(run: Audited, robot: str, strategy: str) -> pd.DataFrame:

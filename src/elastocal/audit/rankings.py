@@ -30,7 +30,7 @@ _OF_ONE_SET = {
 # Metrics of the averaged model by the columns of results/metrics, with the factor to their units.
 _AVERAGED = {
     "k_sigma_percent": ("k_sigma", 1.0),
-    "k_sigma_percent_first_stage": ("k_sigma_first_stage", 1.0),
+    "k_sigma_percent_fixed_joints": ("k_sigma_fixed_joints", 1.0),
     "dev_um": ("deviation", 1e6),
 }
 

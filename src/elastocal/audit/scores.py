@@ -55,7 +55,7 @@ def moment(run: Audited, robot: str) -> np.ndarray:
     return np.einsum("tki,tkj->ij", slope, slope) / len(slope)
 
 
-def first_stage(strategy: Mapping[str, Any]) -> np.ndarray:
+def fixed_joints(strategy: Mapping[str, Any]) -> np.ndarray:
     """Joints that the paper's k_sigma counts alone (interpretation R10), from 0."""
     last = strategy["stages"][-1]
     every = sorted({joint for stage in strategy["stages"] for joint in stage["joints"]})
@@ -92,9 +92,9 @@ def metrics(run: Audited, file: str, robot: str, noise_um: str, key: str) -> lis
         stored = [row[f"delta_k_{j + 1}"] for j in range(arm.joints)]
         # A difference of two nearly equal numbers, in percent.
         found.append(compared(file, f"delta_k, {at}", "pandas", stored, relative, 0.0, 100 * ROUNDING))
-        sums = [relative.sum(), relative[first_stage(run.strategies[key])].sum()]
+        sums = [relative.sum(), relative[fixed_joints(run.strategies[key])].sum()]
         found.append(
-            compared(file, f"k_sigma, {at}", "pandas", row[["k_sigma", "k_sigma_first_stage"]], sums, 0.0, 600 * ROUNDING)
+            compared(file, f"k_sigma, {at}", "pandas", row[["k_sigma", "k_sigma_fixed_joints"]], sums, 0.0, 600 * ROUNDING)
         )
         size = np.linalg.norm(error_rows(run, robot)[2], axis=1).mean()
         found.append(
@@ -109,7 +109,7 @@ def metrics(run: Audited, file: str, robot: str, noise_um: str, key: str) -> lis
         # A spread of noise-free estimates is a root of rounding.
         found.append(compared(file, f"whether to be trusted, {at}", "pandas", row[names].astype(float), expected, 1e-6, 1e-7))
         there = drawn[drawn["length"] == length]
-        for name in ("k_sigma", "k_sigma_first_stage", "deviation", "initial_deviation"):
+        for name in ("k_sigma", "k_sigma_fixed_joints", "deviation", "initial_deviation"):
             checked = f"standard error of {name}, {at}"
             found.append(compared(file, checked, "pandas", row[f"{name}_std_error"], there[name].std(ddof=1), 1e-6, 1e-12))
         weights = _weights(run, robot)[0]
@@ -144,9 +144,9 @@ def replicates(run: Audited, file: str, robot: str, noise_um: str, key: str) -> 
             deviation = np.average(errors_of(run, robot, mean[None])[0], weights=of_tests[number])
         else:
             deviation = np.average(errors_of(run, robot, compliance).mean(axis=1), weights=of_sets[number])
-        expected = [relative.sum(), relative[first_stage(run.strategies[key])].sum()]
+        expected = [relative.sum(), relative[fixed_joints(run.strategies[key])].sum()]
         at = f"replicate {number + 1}, length {length}"
-        stored = row[["k_sigma", "k_sigma_first_stage"]]
+        stored = row[["k_sigma", "k_sigma_fixed_joints"]]
         found.append(compared(file, f"k_sigma, {at}", "pandas", stored, expected, 0.0, 600 * ROUNDING))
         expected = [deviation, np.average(size, weights=of_tests[number])]
         stored = row[["deviation", "initial_deviation"]]

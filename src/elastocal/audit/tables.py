@@ -88,7 +88,7 @@ def table4(run: Audited) -> pd.DataFrame:
             at = frame.set_index("length").loc[length]
             drawn = run.cell("replicates", robot, key)
             row: dict[str, Any] = {"strategy": strategy["name"], "robot": robot}
-            for suffix in ("", "_first_stage"):
+            for suffix in ("", "_fixed_joints"):
                 name, limit = f"k_sigma{suffix}", tables["k_sigma_limit_percent"]
                 row[f"k_sigma_{length}_percent{suffix}"] = at[name]
                 row[f"k_sigma_{length}_percent{suffix}_std_error"] = at[f"{name}_std_error"]

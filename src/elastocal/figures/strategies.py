@@ -58,11 +58,11 @@ def stiffness_errors(
 ) -> Figure:
     """Figures 5a and 5b: summed stiffness error of all strategies against the data set length, under both counts of joints.
 
-    `metrics`: long, of one noise level. `printed`: the printed figures; those of k_sigma are taken to count the joints of the
-    first stage. `order`: strategies. `limit_percent`: marked by a line.
+    `metrics`: long, of one noise level. `printed`: the printed figures; those of k_sigma are taken to count the
+    joints fixed in the last stage. `order`: strategies. `limit_percent`: marked by a line.
     """
     figure, axes = panels(1, 2, 92, sharey=True)
-    counts = {"k_sigma": "all joints (equation 14)", "k_sigma_first_stage": "joints of the first stage"}
+    counts = {"k_sigma": "all joints (equation 14)", "k_sigma_fixed_joints": "joints fixed in the last stage"}
     for axis, (quantity, count) in zip(axes[0], counts.items(), strict=True):
         _strategy_lines(axis, metrics, robot, quantity, 1.0, order)
         _limit(axis, limit_percent, "%")
@@ -89,6 +89,39 @@ def deviations(
     _printed_marks(axis, printed, robot, "dev", order)
     axis.set(title=title, xlabel=_LENGTH, ylabel="dev, equation 15 (µm)", ylim=(0, 40))
     axis.legend(loc="upper right", ncols=2, title=_BANDS, title_fontsize=7.5)
+    return figure
+
+
+@styled
+def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str]) -> Figure:
+    """k_sigma over the fixed joints and deviation against the data set length: mean over studies and how they scatter.
+
+    `studies`: robot and the columns of `table_schemas.repeated`. `printed`: the printed figures. `titles`: name of each robot
+    to draw, by its key. `order`: strategies; one estimator under several names is drawn once, under the first of them.
+    """
+    figure, axes = panels(2, len(titles), 128, sharex=True, sharey="row")
+    quantities = (("k_sigma_fixed_joints", 1.0, "k_sigma", (0, 12)), ("deviation", MICRO, "dev", (0, 25)))
+    for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
+        for axis, (quantity, scale, name, span) in zip(column, quantities, strict=True):
+            seen: set[float] = set()
+            for index, strategy in enumerate(order):
+                mine = studies[(studies.robot == robot) & (studies.strategy == strategy)]
+                curves = scale * mine.pivot(index="study", columns="length", values=quantity)
+                middle, spread, style = curves.mean(), curves.std(), line_style(index)
+                if (key := float(f"{middle.iloc[-1]:.6g}")) in seen:
+                    continue
+                seen.add(key)
+                axis.plot(middle.index, middle, label=strategy, **style)
+                axis.fill_between(middle.index, middle - spread, middle + spread, color=style["color"], alpha=0.12, linewidth=0)
+            _printed_marks(axis, printed, robot, name, order)
+            axis.set(xlim=(8, studies.length.max()), ylim=span)
+        column[0].set_title(title)
+        column[1].set_xlabel(_LENGTH)
+    axes[0, 0].set_ylabel(r"$k_\Sigma$ of the fixed joints (%)")
+    axes[1, 0].set_ylabel("dev, equation 15 (µm)")
+    handles = {label: handle for axis in axes.flat for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    title = "bands: ± one standard deviation between studies; one estimator under several names is drawn once"
+    figure.legend([*handles.values()], [*handles], title=title, loc="outside lower center", ncols=3, title_fontsize=7.5)
     return figure
 
 

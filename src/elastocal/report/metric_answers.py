@@ -23,7 +23,7 @@ METRIC_NAMES = {
     "path_max_um": "largest on a milling path",
     "dev_um": "dev (equation 15)",
     "k_sigma_percent": "k_Σ of all joints",
-    "k_sigma_percent_first_stage": "k_Σ of the first stage",
+    "k_sigma_percent_fixed_joints": "k_Σ of the fixed joints",
 }
 
 
