@@ -5,7 +5,7 @@ import pytest
 from made_audits import CONFIGURATION, ROBOT
 
 from elastocal.audit.arm import Arm
-from elastocal.audit.assumptions import qualities, stretched
+from elastocal.audit.assumptions import qualities, stretch
 from elastocal.audit.audited import Audited
 
 QUESTIONS = {"geometry_errors": {"zero_rad": 1e-3, "length_m": 5e-4}}
@@ -18,7 +18,7 @@ def run(tmp_path):
 
 def test_columns_of_lengths_are_what_a_longer_robot_moves(run):
     angles, step = np.array([0.4, -0.9]), 1e-6
-    longer = stretched(run, "two")
+    longer = stretch(run, "two")
     assert longer.joints == 5
     found = longer.jacobian(np.array([*angles, 0, 0, 0]), "hand target")[:3, 2:]
     for column, (old, new) in enumerate(
@@ -31,7 +31,7 @@ def test_columns_of_lengths_are_what_a_longer_robot_moves(run):
 
 def test_a_length_of_zero_is_none(run):
     run.robots["two"] = ROBOT | {"chain": ROBOT["chain"].replace("Tx(0.1)", "Tx(a1)"), "lengths_m": {"a1": 0.0}}
-    assert stretched(run, "two").joints == 4
+    assert stretch(run, "two").joints == 4
 
 
 def test_what_is_estimated_at_once_leaks_nothing_and_what_is_left_out_does(run):

@@ -7,8 +7,8 @@ import pytest
 from made_audits import CONFIGURATION
 
 from elastocal.audit.audited import Audited
-from elastocal.audit.choices import _best_weights, _chosen, _error, _least_squares, _springs, _taken, _value
-from elastocal.audit.questions import drawn
+from elastocal.audit.choices import _best_weights, _error, _exchange, _least_squares, _springs, _taken, _value
+from elastocal.audit.streams import draw
 
 # A cantilever that is askew to the axes of its chain, behind a joint.
 BENT = {
@@ -28,7 +28,7 @@ def candidates():
 def test_the_design_chosen_is_the_best_of_all(candidates):
     products, weight = candidates
     best = min(combinations(range(12), 3), key=lambda some: _error(products[list(some)], weight))
-    assert sorted(_chosen(products, 3, _value("I", weight))) == list(best)
+    assert sorted(_exchange(products, 3, _value("I", weight))) == list(best)
 
 
 def test_no_design_is_better_than_the_best_weights_and_none_of_them_better_than_one_of_many(candidates):
@@ -69,6 +69,6 @@ def test_least_squares_leave_what_is_not_taken_at_zero():
 def test_candidates_within_the_limits_are_drawn_from_a_stream_of_their_own(tmp_path):
     limited = BENT | {"joint_limits_deg": [[-10, 10]]}
     run = Audited(tmp_path, CONFIGURATION, {"bent": limited}, {}, 4)
-    ours, theirs = (np.array(drawn(run, "bent", 0, 50, purpose=name, joint_range="limits")[0]) for name in ("one", "other"))
+    ours, theirs = (np.array(draw(run, "bent", 0, 50, purpose=name, joint_range="limits")[0]) for name in ("one", "other"))
     assert np.abs(ours).max() <= np.deg2rad(10)
     assert not np.isclose(ours, theirs).any()

@@ -15,20 +15,20 @@ def run(tmp_path):
 
 
 def test_data_as_they_were_drawn_hold(run):
-    assert failed(data.experiments(run, EXPERIMENTS, "two", "")) == []
-    assert failed(data.ideal(run, IDEAL, "two", "")) == []
+    assert failed(data.experiments(run, EXPERIMENTS, "two")) == []
+    assert failed(data.ideal(run, IDEAL, "two")) == []
     assert failed(data.measured(run, MEASURED, "two", "100")) == []
 
 
-@pytest.mark.parametrize(("column", "word"), [("q2", "joint angles"), ("my", "wrenches"), ("data_set", "each once")])
+@pytest.mark.parametrize(("column", "word"), [("q2", "joint angles"), ("my", "wrenches"), ("data_set", " once")])
 def test_an_altered_experiment_is_found(run, column, word):
     altered(run, EXPERIMENTS, column, 7, 1)
-    assert any(word in checked for checked in failed(data.experiments(run, EXPERIMENTS, "two", "")))
+    assert any(word in checked for checked in failed(data.experiments(run, EXPERIMENTS, "two")))
 
 
 def test_an_altered_deflection_is_found(run):
     altered(run, IDEAL, "dz", slice(None), 1e-8)
-    assert any("deflection" in checked for checked in failed(data.ideal(run, IDEAL, "two", "")))
+    assert any("deflection" in checked for checked in failed(data.ideal(run, IDEAL, "two")))
 
 
 def test_noise_of_another_size_is_found(run):

@@ -6,7 +6,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.audit.audited import WRENCH
-from elastocal.audit.elastic import Robot, Springs, averages, far_off
+from elastocal.audit.elastic import Robot, Springs, averages, far_off, find_configurations
+from elastocal.campaigns.joint_space import configurations
 
 BEAM = {"name": "beam", "chain": "Rz(q1) Tx(2.0) [tip]", "compliance_urad_per_Nm": [0.5]}
 LENGTH, BENDING, TORSION = 2.0, 1e-6, 2e-6
@@ -78,3 +79,11 @@ def test_a_repeat_far_from_the_others_is_left_out():
     assert averages(frame, False).repeats.tolist() == [3]
     # Of two nothing tells which.
     assert not far_off(table(2, far=1)[0]).any()
+
+
+def test_configurations_are_those_that_hold_out_goes_by():
+    rng = np.random.default_rng(1)
+    angles = np.concatenate([rng.uniform(-0.1, 0.1, (60, 3)), np.linspace(0.0, 1.0, 60)[:, None] * [1.0, 0.0, 0.0]])
+    found = find_configurations(angles)
+    np.testing.assert_array_equal(found, configurations(angles, np.arange(120)))
+    assert 10 < found.max() < 119

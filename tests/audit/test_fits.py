@@ -87,10 +87,10 @@ def run(made, tmp_path):
     (tmp_path / FOLDER / "diagnosis.json").write_text(json.dumps({"steps": steps, "document": {"gross_errors": []}}))
     table = pd.DataFrame({"step": 1, "owner": "joint_compliance", "parameter": ["c1", "c2"], "value": value})
     table.assign(std_error=error, held=False, prior_std=np.nan).to_parquet(tmp_path / FOLDER / "steps.parquet")
-    known = fits.Campaign(robot, True, [])
+    known = fits.Campaign(robot, True, [], parts["training"], averages(parts["training"], True))
     step = fits.Step("declared", table, noise, Springs(value))
     for unseen, part in ((False, parts["training"]), (True, parts["held_out"])):
-        off = fits.each_residual(known, step, part)
+        off = fits.residuals_of(known, step, part)
         for state in ("before", "after"):
             part = part.assign(**{f"{state}_{name}": off[:, place] for place, name in enumerate(COMPONENTS)})
         parts["held_out" if unseen else "training"] = part.assign(held_out=unseen)
@@ -106,8 +106,8 @@ def changed(run, file, row, column, change):
 
 
 def checked(run):
-    found = fits.fits(run, f"{FOLDER}/steps.parquet", "cell") + fits.predictions(run, f"{REPORTS}/residuals.parquet", "cell")
-    return failed(found)
+    found = fits.fits(run, f"{FOLDER}/steps.parquet", "cell"), fits.predictions(run, f"{REPORTS}/residuals.parquet", "cell")
+    return [name for each in found for name in failed(each)]
 
 
 def test_a_fit_by_scipy_stands_still_with_its_standard_errors(run):
@@ -159,4 +159,4 @@ def test_what_is_not_written_down_here_is_left_out(run, other):
     document = json.loads(path.read_text())
     document["campaign"] |= other
     path.write_text(json.dumps(document))
-    assert fits.fits(run, f"{FOLDER}/steps.parquet", "cell") == []
+    assert [*fits.fits(run, f"{FOLDER}/steps.parquet", "cell")] == []

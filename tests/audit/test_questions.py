@@ -3,20 +3,21 @@
 import numpy as np
 from made_audits import made_run
 
-from elastocal.audit.questions import drawn, mean_square, simulated
+from elastocal.audit.questions import estimate, simulate
+from elastocal.audit.streams import draw
 
 
 def test_a_data_set_that_is_drawn_again_is_the_one_in_the_file(tmp_path):
     run = made_run(tmp_path)
     angles, wrenches = run.experiments("two")
-    again = drawn(run, "two", 2, 5)
+    again = draw(run, "two", 2, 5)
     np.testing.assert_allclose(again[0], angles[2])
     np.testing.assert_allclose(again[1], wrenches[2])
 
 
 def test_its_measurements_are_those_in_the_file(tmp_path):
     run = made_run(tmp_path)
-    matrix, right = simulated(run, "two", 3, 5, "hand")
+    matrix, right = simulate(run, "two", 3, 5, "hand")
     stored = run.deflections("data/simulated/two/100um/measured.parquet", "hand")[3]
     np.testing.assert_allclose(right, stored.ravel(), atol=1e-12)
     assert matrix.shape == (30, 2)
@@ -24,10 +25,11 @@ def test_its_measurements_are_those_in_the_file(tmp_path):
 
 def test_a_point_measured_again_has_noise_of_its_own(tmp_path):
     run = made_run(tmp_path)
-    once, again = (simulated(run, "two", 0, 5, name)[1] for name in ("hand", "hand/again"))
+    once, again = (simulate(run, "two", 0, 5, name)[1] for name in ("hand", "hand/again"))
     assert 1e-6 < np.abs(once - again).max() < 1e-3
 
 
-def test_the_truth_has_no_mean_square_error(tmp_path):
+def test_an_estimate_by_one_stage_is_least_squares(tmp_path):
     run = made_run(tmp_path)
-    assert mean_square(run, "two", run.arm("two").compliance) < 1e-24
+    expected = np.linalg.lstsq(*simulate(run, "two", 1, 5, "hand"), rcond=None)[0]
+    np.testing.assert_allclose(estimate(run, "two", "hand alone", 1, 5), expected)

@@ -27,7 +27,7 @@ def test_a_file_that_cannot_be_read_is_a_finding_and_no_traceback(tmp_path):
 
 
 def test_a_run_of_which_a_check_does_not_hold_is_refused_by_the_file():
-    rows = [Finding("a.csv", "rows", "pandas", 1, 0.0), Finding("b.csv", "column x", "pandas", 3, 2.0, "found 1")]
+    rows = [Finding("rows", "pandas", 1, 0.0, file="a.csv"), Finding("column x", "pandas", 3, 2.0, "found 1", "b.csv")]
     with refused("b.csv", "column x", "1 of 2 checks"):
         require_all(as_table(rows), "audit.html")
     assert require_all(as_table(rows[:1]), "audit.html") == "1 files, 1 checks, 1 values compared: all hold\n"

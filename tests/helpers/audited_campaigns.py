@@ -6,8 +6,8 @@ import pandas as pd
 from analysed_robots import ROBOTS
 from made_audits import CONFIGURATION
 
-from elastocal.audit import campaigns, fits, held_out
 from elastocal.audit.audited import Audited
+from elastocal.audit.whole import checks_of
 from elastocal.blind.folders import write_blind_campaign
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
@@ -65,12 +65,5 @@ def diagnosed_campaign(top, robot, effects=(), weighs=False, **design):
 def audit_of(top):
     """Findings of all files of the campaign `cell`, every row looked at."""
     run = Audited(top, CONFIGURATION, {}, {}, sys.maxsize)
-    checks = [check for module in (campaigns, fits, held_out) for check in module.CHECKS]
     files = [path.relative_to(top).as_posix() for path in sorted(top.glob("re*/loop/cell/*"))]
-    return [
-        finding
-        for file in files
-        for pattern, check in checks
-        if (match := pattern.fullmatch(file))
-        for finding in check(run, file, *match.groups())
-    ]
+    return [finding for file in files for _, check, arguments in checks_of(file) for finding in check(run, file, **arguments)]

@@ -133,6 +133,10 @@ class Arm:
         """Name of the last measuring point."""
         return self.points[-1]
 
+    def link_block(self, number: int) -> slice:
+        """Coordinates of the six springs of a link, from 0."""
+        return slice(self.joints + 6 * number, self.joints + 6 * number + 6)
+
     def pose(self, coordinates: np.ndarray, point: str) -> tuple[np.ndarray, np.ndarray]:
         """Position (m) and rotation of the target at a measuring point."""
         pin.framesForwardKinematics(self._model, self._data, self._ordered(coordinates))
@@ -157,18 +161,14 @@ class Arm:
     def torques(self, joint_angles: np.ndarray, wrench: np.ndarray, point: str, wrench_at: str) -> np.ndarray:
         """Generalized forces of the wrench on every coordinate (right-hand factor of equation 7)."""
         frame = self.end_effector if wrench_at == "end_effector" else f"{point} target"
-        return self.jacobian(self.unloaded(joint_angles), frame).T @ wrench
+        return self.jacobian(self.extend(joint_angles), frame).T @ wrench
 
     def deflection(
         self, joint_angles: np.ndarray, wrench: np.ndarray, point: str, wrench_at: str, compliance: np.ndarray | None = None
     ) -> np.ndarray:
         """Exact deflection (6,), m and rad: by all springs, or by joints of the given compliances alone."""
-        unloaded, torques = self.unloaded(joint_angles), self.torques(joint_angles, wrench, point, wrench_at)
-        if compliance is None:
-            springs = self.springs @ torques
-        else:
-            springs = np.zeros(self.coordinates)
-            springs[: self.joints] = compliance * torques[: self.joints]
+        unloaded, torques = self.extend(joint_angles), self.torques(joint_angles, wrench, point, wrench_at)
+        springs = self.springs @ torques if compliance is None else self.extend(compliance * torques[: self.joints])
         position_0, rotation_0 = self.pose(unloaded, point)
         position, rotation = self.pose(unloaded + springs, point)
         return np.concatenate([position - position_0, pin.log3(rotation @ rotation_0.T)])
@@ -176,12 +176,12 @@ class Arm:
     def regressor(self, joint_angles: np.ndarray, wrench: np.ndarray, point: str, wrench_at: str) -> np.ndarray:
         """Matrix A (6, joints) of equation 10."""
         torques = self.torques(joint_angles, wrench, point, wrench_at)
-        return (self.jacobian(self.unloaded(joint_angles), f"{point} target") * torques)[:, : self.joints]
+        return (self.jacobian(self.extend(joint_angles), f"{point} target") * torques)[:, : self.joints]
 
     def mujoco_regressor(self, joint_angles: np.ndarray, wrench: np.ndarray, point: str, wrench_at: str) -> np.ndarray:
         """The same matrix by MuJoCo's kinematics."""
         model, data = self._mujoco
-        unloaded = self.unloaded(joint_angles)
+        unloaded = self.extend(joint_angles)
         data.qpos[:] = self._ordered(unloaded)
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
@@ -224,7 +224,7 @@ class Arm:
             found[:, coordinate] += step.sign * column
         return found
 
-    def unloaded(self, joint_angles: np.ndarray) -> np.ndarray:
+    def extend(self, joint_angles: np.ndarray) -> np.ndarray:
         """Coordinates (rad) of joints with all other springs at rest."""
         return np.concatenate([joint_angles, np.zeros(self.coordinates - self.joints)])
 
@@ -236,8 +236,7 @@ class Arm:
             return found
         links = self.document["links"]
         for number, vector in enumerate(self.links):
-            tube = links["tubes"][number if len(links["tubes"]) > 1 else 0]
-            block = slice(self.joints + 6 * number, self.joints + 6 * number + 6)
+            tube, block = links["tubes"][number if len(links["tubes"]) > 1 else 0], self.link_block(number)
             found[block, block] = _tube(vector, tube, diameter, links)
         return found
 

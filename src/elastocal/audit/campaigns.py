@@ -3,217 +3,237 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+import pinocchio as pin
+import yaml
 from pandas.api.types import is_numeric_dtype
 
-from elastocal.audit.configurations import configurations
-from elastocal.audit.elastic import STATE, far_off, good_rows
+from elastocal.audit.arm import Arm
+from elastocal.audit.audited import WRENCH
+from elastocal.audit.elastic import STATE, far_off, find_configurations, good_rows
 from elastocal.audit.equilibrium import Sagging, sagging
-from elastocal.audit.findings import Finding, compared, held
+from elastocal.audit.findings import Finding, compare, require
 from elastocal.audit.fits import SETTLED, STEP_BACK
+from elastocal.audit.streams import numbers
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from elastocal.audit.audited import Audited
 
 _POSE = ["session", "pose"]
 # Effects that go with the time or with the row of a measurement.
 _DATED = {"frame_drift", "setup_step", "temperature_gradient", "thermal_growth"}
+# Positions are some metres, rotations some radians; near half a turn rotation vectors lose digits.
+_DIGITS = 1e-10
 
 
-def measurements(run: Audited, file: str, campaign: str) -> list[Finding]:
+def simulated(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
+    """Every angle, load and noise of a simulated campaign from its stream, every pose of the elastic arm by pinocchio."""
+    source = _configured(run, "campaigns", campaign)
+    if source.get("source") != "simulated":
+        return
+    document, table = _configured(run, "robots", source["robot"]), run.table(file)
+    arm, draws = Arm(document), numbers(run.seed, campaign, "campaign")
+    low, high = np.deg2rad(document["joint_limits_deg"]).T
+    angles = low + (high - low) * draws.random((source["poses"], arm.joints))
+    normal = draws.standard_normal((source["poses"], 3))
+    forces = source["force_N"] * normal / np.linalg.norm(normal, axis=1)[:, None]
+    # Without load and under the whole one the first poses are approached again and again.
+    visits = [
+        (pose, load, repeat)
+        for pose in range(source["poses"])
+        for load in range(len(source["ladder"]))
+        for repeat in range(source["repeats"] if pose < source["repeated_poses"] and load < 2 else 1)
+    ]
+    wrenches, loaded = [], []
+    for pose, load, _ in visits:
+        force = source["ladder"][load] * forces[pose]
+        wrenches.append(np.concatenate([force, np.cross(source["offset_m"], force)]))
+        torques = arm.torques(angles[pose], wrenches[-1], arm.end_effector, "end_effector")
+        loaded.append(arm.extend(angles[pose]) + arm.springs @ torques)
+    for point in source["points"]:
+        position, turned = (draws.standard_normal((len(visits), 3)) for _ in range(2))
+        exact = [arm.pose(coordinates, point) for coordinates in loaded]
+        seen = [
+            (*(place + source["noise_m"] * off), *pin.log3(pin.exp3(source["noise_rad"] * turn) @ rotation))
+            for (place, rotation), off, turn in zip(exact, position, turned, strict=True)
+        ]
+        rows, of_pose = table[table["target"] == point], angles[[pose for pose, _, _ in visits]]
+        columns = [("visits", ["pose", "load", "repeat"], visits), ("wrenches", [*WRENCH], wrenches)]
+        columns += [("joint angles", [f"q{j}" for j in range(1, arm.joints + 1)], of_pose)]
+        for words, names, expected in [*columns, ("measured poses", ["x", "y", "z", "rx", "ry", "rz"], seen)]:
+            yield compare(f"{words} of {point}", "pinocchio, numpy's Philox stream", rows[names], expected, _DIGITS)
+
+
+def _configured(run: Audited, kind: str, name: str) -> dict[str, Any]:
+    path = run.folder / f"config/{kind}/{name}.yaml"
+    return dict(yaml.safe_load(path.read_text("utf-8"))) if path.is_file() else {}
+
+
+def measurements(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
     """Fitted and held-out measurements are those of the campaign's file, each once, and share no pose."""
-    held_out = run.table(file.replace("training", "held_out"))
-    fitted, source = run.table(file), f"data/campaigns/{campaign}/measurements.parquet"
+    fitted, held_out = run.table(file), run.table(file.replace("training", "held_out"))
     # Poses of another campaign are numbered anew; measurements of it are others all the same.
-    another = _session(run, campaign)
-    names, words = (list("xyz"), "measurement") if another else (_POSE, "pose")
-    poses = [set(map(tuple, frame[names].to_numpy())) for frame in (fitted, held_out)]
-    shared = poses[0] & poses[1]
+    names, words = (list("xyz"), "measurement") if _is_session(run, campaign) else (_POSE, "pose")
+    shared = set.intersection(*(set(map(tuple, frame[names].to_numpy())) for frame in (fitted, held_out)))
     note = f"{words}s {sorted(shared)[:3]}"
-    found = [held(file, f"no {words} is fitted and held out", "pandas", not shared, note, len(poses[0]))]
+    yield require(f"no {words} is fitted and held out", "pandas", not shared, note, len(fitted))
     if {"fraction", "blocks"} & set(_document(run, campaign).get("campaign", {}).get("holdout", {})):
         both = pd.concat([fitted.assign(unseen=False), held_out.assign(unseen=True)]).groupby(_POSE).mean(numeric_only=True)
-        parts = both["unseen"].groupby(configurations(both.filter(regex=r"^q\d+$").to_numpy())).nunique()
+        parts = both["unseen"].groupby(find_configurations(both.filter(regex=r"^q\d+$").to_numpy())).nunique()
         note = f"{(parts > 1).sum()} of {len(parts)}"
-        found.append(held(file, "no configuration is fitted and held out", "numpy", bool(parts.eq(1).all()), note, len(both)))
-    if run.there(source) and _document(run, campaign).get("held_out") is None:
-        rows, original = pd.concat([fitted, held_out]).sort_values("row"), run.table(source)
-        numbered = compared(
-            file, "every row of the campaign once", "counting", rows["row"], np.arange(1, len(original) + 1), 0.0
-        )
-        found.append(numbered)
-        if numbered.holds:
-            for name in ("pose", "x", "y", "z", "fx", "fy", "fz"):
-                if name in original:
-                    found.append(compared(file, f"column {name} as measured", "pandas", rows[name], original[name], 1e-12))
-    return found
+        yield require("no configuration is fitted and held out", "numpy", parts.eq(1).all(), note, len(both))
+    original = _original(run, campaign)
+    if original is not None:
+        rows = pd.concat([fitted, held_out]).sort_values("row")
+        yield compare("every row of the campaign once", "counting", rows["row"], np.arange(1, len(original) + 1), 0.0)
+        if len(rows) == len(original):
+            columns = [name for name in ("pose", *"xyz", *WRENCH[:3]) if name in original]
+            yield compare("columns as measured", "pandas", rows[columns], original[columns], 0.0)
 
 
-def kept_back(run: Audited, file: str, campaign: str) -> list[Finding]:
+def kept_back(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
     """Held-out measurements are those of the campaign's file, by their rows."""
-    source = f"data/campaigns/{campaign}/measurements.parquet"
-    if not run.there(source) or _document(run, campaign).get("held_out") is not None:
-        return []
-    rows, original = run.table(file), run.table(source)
-    names = [name for name in rows if name in original and name != "target" and is_numeric_dtype(original[name])]
-    expected = original.iloc[rows["row"].to_numpy() - 1][names]
-    return [compared(file, "measurements as the campaign has them", "pandas", rows[names], expected, 0.0)]
+    rows, original = run.table(file), _original(run, campaign)
+    if original is not None:
+        names = [name for name in rows if name in original and name != "target" and is_numeric_dtype(original[name])]
+        expected = original.iloc[rows["row"].to_numpy() - 1][names]
+        yield compare("measurements as the campaign has them", "pandas", rows[names], expected, 0.0)
 
 
-def confounding(run: Audited, file: str, campaign: str) -> list[Finding]:
+def confounding(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
     """Angles between every two candidates that were tested, each pair once."""
     frame = run.table(file)
-    tested = sorted({*frame["one"], *frame["other"]})
-    pairs = {frozenset(pair) for pair in zip(frame["one"], frame["other"], strict=True)}
+    tested, pairs = {*frame["one"], *frame["other"]}, {*map(frozenset, zip(frame["one"], frame["other"], strict=True))}
     every = len(pairs) == len(frame) == len(tested) * (len(tested) - 1) // 2
-    right = bool(frame["angle_deg"].between(0, 90).all())
-    return [
-        held(file, "every two candidates once", "counting", every, f"{len(frame)} pairs of {len(tested)}", len(frame)),
-        held(file, "angles between 0 and 90 degrees", "counting", right, "another one", len(frame)),
-    ]
+    yield require("every two candidates once", "counting", every, f"{len(frame)} pairs of {len(tested)}", len(frame))
+    right = frame["angle_deg"].between(0, 90).all()
+    yield require("angles between 0 and 90 degrees", "counting", right, "another one", len(frame))
 
 
-def diagnosis(run: Audited, file: str, campaign: str) -> list[Finding]:
+def diagnosis(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
     """Probabilities of mechanisms are sums over the models; correlations lie within one."""
-    document = run.document(file)["document"]
     models = run.table(f"results/loop/{campaign}/models.parquet")
     probability = models["probability"].to_numpy()
-    total = bool(probability.min(initial=0.0) >= 0 and probability.sum() <= 1 + 1e-9)
-    found = [held(file, "probabilities of the models", "pandas", total, f"they sum to {probability.sum():.9g}", len(models))]
-    falling = bool((np.diff(probability) <= 1e-12).all())
-    found.append(held(file, "the most probable model comes first", "pandas", falling, "another one", len(models)))
-    kept = probability.sum()
-    for name, stated in (document.get("probabilities") or {}).get("mechanisms", {}).items():
-        having = models["mechanisms"].map(lambda text, name=name: name in text.split(" + ")).to_numpy()
+    total = probability.sum()
+    proper = probability.min(initial=0.0) >= 0 and total <= 1 + 1e-9
+    yield require("probabilities of the models", "pandas", proper, f"they sum to {total:.9g}", len(models))
+    falling = (np.diff(probability) <= 1e-12).all()
+    yield require("the most probable model comes first", "pandas", falling, "another one", len(models))
+    stated = (run.document(file)["document"].get("probabilities") or {}).get("mechanisms", {})
+    for name, value in stated.items():
+        having = np.array([name in text.split(" + ") for text in models["mechanisms"]], bool)
         # Models that are not kept hold the rest.
-        off = abs(stated - probability[having].sum()) <= 1 - kept + 1e-6
-        note = f"stated {stated:.6g}, models sum to {probability[having].sum():.6g}"
-        found.append(held(file, f"probability of {name}", "pandas", off, note, int(having.sum())))
+        summed = probability[having].sum()
+        near, note = abs(value - summed) <= 1 - total + 1e-6, f"stated {value:.6g}, models sum to {summed:.6g}"
+        yield require(f"probability of {name}", "pandas", near, note, int(having.sum()))
     correlations = run.table(f"results/loop/{campaign}/correlations.parquet")["correlation"]
-    within = bool((correlations.abs() <= 1 + 1e-9).all())
-    found.append(held(file, "correlations lie within one", "pandas", within, "one beyond", len(correlations)))
-    return found
+    within = (correlations.abs() <= 1 + 1e-9).all()
+    yield require("correlations lie within one", "pandas", within, "one beyond", len(correlations))
 
 
-def models(run: Audited, file: str, campaign: str) -> list[Finding]:
+def models(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
     """Probabilities of the models follow from their odds; each model's mechanisms are those of its parts."""
     frame = run.table(file)
     odds = np.exp(frame["log_odds"] - frame["log_odds"].max())
-    expected = odds * frame["probability"].sum() / odds.sum()
-    found = [compared(file, "probabilities by odds", "numpy", frame["probability"], expected)]
-    off = []
-    for stated, units in zip(frame["mechanisms"], frame["units"], strict=True):
-        named = sorted({re.split(r"[@\[ ]", unit)[0] for unit in units.split("; ") if unit}) or ["nothing"]
-        if " + ".join(named) != stated:
-            off.append(f"{stated}: {units}"[:80])
-    return [*found, held(file, "mechanisms of the parts of each model", "text", not off, ", ".join(off[:2]), len(frame))]
+    yield compare("probabilities by odds", "numpy", frame["probability"], odds * frame["probability"].sum() / odds.sum())
+    parts = [{re.split(r"[@\[ ]", unit)[0] for unit in units.split("; ") if unit} for units in frame["units"]]
+    off = frame["mechanisms"][[" + ".join(sorted(named)) or "nothing" for named in parts] != frame["mechanisms"]]
+    yield require("mechanisms of the parts of each model", "text", not len(off), ", ".join(off[:2]), len(frame))
 
 
-def residuals(run: Audited, file: str, campaign: str) -> list[Finding]:
+def residuals(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
     """Errors before and after from the residuals; residuals of the declared model from pinocchio where it is springs alone."""
-    frame, model, found = run.table(file).query("not gross_error"), sagging(run, campaign), []
-    if not _session(run, campaign):
-        table = f"reports/loop/{campaign}/before_after.csv"
-        before_after, means = run.table(table), _means(run, campaign, frame)
-        loaded = frame.iloc[np.argsort(np.linalg.norm(frame[["fx", "fy", "fz"]], axis=1), kind="stable")[-run.sample :]]
-        left = max((stand.left_m for stand in model.standing(loaded)), default=0.0) if model else 0.0
-        allowed = STEP_BACK + means.apart_m + left
-        rows = {"before": before_after[before_after["kind"] == "declared"].iloc[:1], "after": before_after.iloc[-1:]}
-        for part, errors in (("train", means.errors[~means.held_out]), ("heldout", means.errors[means.held_out])):
-            for number, (state, row) in enumerate(rows.items()):
-                if not len(errors) or row.empty or f"{part}_rms_m" not in row or _dated(run, campaign, state, means):
-                    continue
-                each = errors[:, number]
-                expected = [each.mean(), np.sqrt((each**2).mean()), each.max()]
-                stored = row[[f"{part}_{name}_m" for name in ("mean", "rms", "max")]].to_numpy(float)
-                found.append(compared(table, f"{part} errors {state}", "numpy", stored, expected, 1e-8, allowed))
-    return found + (_predicted(run, file, campaign, model, frame) if model else [])
+    frame, model = run.table(file).query("not gross_error"), sagging(run, campaign)
+    if not _is_session(run, campaign):
+        yield from _errors(run, campaign, frame, model)
+    if model is not None:
+        yield from _predicted(run, file, campaign, model, frame)
 
 
-@dataclass(frozen=True)
-class _Means:
-    """Errors before and after (M, 2) of the mean of what was repeated, m, and which are held out.
+def _errors(run: Audited, campaign: str, frame: pd.DataFrame, model: Sagging | None) -> Iterator[Finding]:
+    """Mean, RMS and maximum in before_after.csv of the means of what was repeated.
 
-    `apart_m`: by how much a mean of predictions is off the prediction at the mean joint angles, at most. `repeated`: whether
-    anything was.
+    Repeats are of one state, target and sense of approach; those that are far off count nowhere, as in a fit.
     """
-
-    errors: np.ndarray
-    held_out: np.ndarray
-    apart_m: float
-    repeated: bool
-
-
-def _means(run: Audited, campaign: str, frame: pd.DataFrame) -> _Means:
-    """Repeats are of one state, target and sense of approach; those that are far off count nowhere, as in a fit."""
+    table = f"reports/loop/{campaign}/before_after.csv"
     parts = [good_rows(run, campaign, part) for part in ("training", "held_out")]
     approach = [name for name in map(str, parts[0]) if name.startswith("approach")]
     rows = frame.merge(pd.concat([part.loc[~far_off(part), ["row", *approach]] for part in parts]), on="row")
-    state = ["held_out", *STATE, *approach]
-    groups = rows.groupby([*state, "target"], dropna=False)
+    groups = rows.groupby(["held_out", *STATE, *approach, "target"], dropna=False)
     means = groups[[f"{when}_d{axis}" for when in ("before", "after") for axis in "xyz"]].mean()
     errors = np.linalg.norm(means.to_numpy().reshape(-1, 2, 3), axis=2)
-    angles = [name for name in map(str, rows) if name[0] == "q" and name[1:].isdigit()]
+    unseen = means.index.get_level_values("held_out").to_numpy(bool)
     # Over turns of joints by t about their mean the target bends off a straight line by t^2 / 2 of its distance.
-    turned = rows[angles] - rows.groupby(state, dropna=False)[angles].transform("mean")
+    angles = rows.filter(regex=r"^q\d+$")
+    turned = angles - angles.groupby([rows[name] for name in ("held_out", *STATE, *approach)], dropna=False).transform("mean")
     reach = np.linalg.norm(rows[list("xyz")].to_numpy(), axis=1).max(initial=0.0)
-    apart = 0.5 * reach * float((turned.abs().sum(axis=1) ** 2).max())
-    return _Means(errors, means.index.get_level_values("held_out").to_numpy(bool), apart, bool((groups.size() > 1).any()))
+    loaded = frame.iloc[np.argsort(np.linalg.norm(frame[["fx", "fy", "fz"]], axis=1), kind="stable")[-run.sample :]]
+    allowed = STEP_BACK + 0.5 * reach * float((turned.abs().sum(axis=1) ** 2).max())
+    allowed += max((stand.left_m for stand in model.standing(loaded)), default=0.0) if model else 0.0
+    stated, names = run.table(table), {*_document(run, campaign)["campaign"]["declared"]}
+    models = {"before": stated[stated["kind"] == "declared"].iloc[:1], "after": stated.iloc[-1:]}
+    for number, (state, row) in enumerate(models.items()):
+        if state == "after":
+            names |= {each["name"] for each in run.document(f"reports/loop/{campaign}/verdict.json")["effects"]}
+        # Of a model that goes with time or row repeats have predictions of their own, and a fit that of their mean.
+        if row.empty or (names & _DATED and (groups.size() > 1).any()):
+            continue
+        for part, each in (("train", errors[~unseen, number]), ("heldout", errors[unseen, number])):
+            if len(each) and f"{part}_rms_m" in row:
+                stored = row[[f"{part}_{name}_m" for name in ("mean", "rms", "max")]]
+                expected = [each.mean(), np.sqrt((each**2).mean()), each.max()]
+                found = compare(f"{part} errors {state}", "numpy", stored, expected, 1e-8, allowed)
+                yield replace(found, file=table)
 
 
-def _dated(run: Audited, campaign: str, state: str, means: _Means) -> bool:
-    """Whether a model goes with time or row: repeats then have predictions of their own, and a fit that of their mean."""
-    names = set(_document(run, campaign)["campaign"]["declared"])
-    if state == "after":
-        names |= {effect["name"] for effect in run.document(f"reports/loop/{campaign}/verdict.json")["effects"]}
-    return means.repeated and bool(names & _DATED)
-
-
-def _predicted(run: Audited, file: str, campaign: str, model: Sagging, frame: pd.DataFrame) -> list[Finding]:
+def _predicted(run: Audited, file: str, campaign: str, model: Sagging, frame: pd.DataFrame) -> Iterator[Finding]:
     """Residuals of sampled rows by pinocchio, in the base frame with known targets, of a robot of springs and masses alone."""
-    asked = _document(run, campaign)["campaign"]
+    asked, steps = _document(run, campaign)["campaign"], run.table(f"results/loop/{campaign}/steps.parquet")
     known = all(target["offset_m"] != "unknown" for target in asked["targets"].values())
-    if asked["frame"] != "base" or asked["declared"] or not known or not model.complete or _moved_base(run, campaign):
-        return []
-    rows = frame.iloc[run.picked(file, len(frame))]
+    moved = steps[steps["step"] == steps["step"].min()]["owner"].str.contains("frame|session", regex=True).any()
+    if asked["frame"] != "base" or asked["declared"] or not known or not model.complete or moved:
+        return
+    rows = frame.iloc[run.pick(file, len(frame))]
     stands = list(model.standing(rows))
     expected = rows[list("xyz")].to_numpy(float) - [stand.position for stand in stands]
     stored = frame[["before_dx", "before_dy", "before_dz"]]
     # Springs may still settle, all rows together, by thousandths of a standard error of the scatter that is there.
     scatter = max(float(np.sqrt((stored[~frame["held_out"]] ** 2).to_numpy().mean())) / model.noise_m, 1.0)
-    columns = np.concatenate([stand.slack_m for stand in stands])
-    picked = stored.loc[rows.index].to_numpy(float)
-    settling = np.linalg.lstsq(columns, (expected - picked).ravel(), rcond=None)[0]
-    expected = expected - (columns @ np.clip(settling, -SETTLED * scatter, SETTLED * scatter)).reshape(expected.shape)
-    checked = f"residuals of the declared model, {len(rows)} rows"
-    allowed = STEP_BACK + max(stand.left_m for stand in stands)
-    return [compared(file, checked, "pinocchio", picked, expected, 0.0, allowed)]
+    columns, picked = np.concatenate([stand.slack_m for stand in stands]), stored.loc[rows.index].to_numpy(float)
+    settling = np.clip(
+        np.linalg.lstsq(columns, (expected - picked).ravel(), rcond=None)[0], -SETTLED * scatter, SETTLED * scatter
+    )
+    allowed, checked = STEP_BACK + max(stand.left_m for stand in stands), f"residuals of the declared model, {len(rows)} rows"
+    yield compare(checked, "pinocchio", picked, expected - (columns @ settling).reshape(expected.shape), 0.0, allowed)
 
 
 def _document(run: Audited, campaign: str) -> dict[str, Any]:
     return dict(run.document(f"results/loop/{campaign}/campaign.json"))
 
 
-def _session(run: Audited, campaign: str) -> bool:
+def _is_session(run: Audited, campaign: str) -> bool:
     """Whether another campaign is the test, whose frames are fitted anew."""
     return _document(run, campaign).get("held_out") is not None
 
 
-def _moved_base(run: Audited, campaign: str) -> bool:
-    steps = run.table(f"results/loop/{campaign}/steps.parquet")
-    first = steps[steps["step"] == steps["step"].min()]
-    return bool(first["owner"].str.contains("frame|session", regex=True).any())
+def _original(run: Audited, campaign: str) -> pd.DataFrame | None:
+    """What was measured, of a campaign whose test is part of it."""
+    source = f"data/campaigns/{campaign}/measurements.parquet"
+    return run.table(source) if run.has(source) and not _is_session(run, campaign) else None
 
 
-CHECKS = (
-    (re.compile(r"results/loop/([^/]+)/training\.parquet"), measurements),
-    (re.compile(r"results/loop/([^/]+)/diagnosis\.json"), diagnosis),
-    (re.compile(r"results/loop/([^/]+)/held_out\.parquet"), kept_back),
-    (re.compile(r"results/loop/([^/]+)/confounding\.parquet"), confounding),
-    (re.compile(r"results/loop/([^/]+)/models\.parquet"), models),
-    (re.compile(r"reports/loop/([^/]+)/residuals\.parquet"), residuals),
-)
+CHECKS = {
+    "data/campaigns/{campaign}/measurements.parquet": simulated,
+    "results/loop/{campaign}/training.parquet": measurements,
+    "results/loop/{campaign}/diagnosis.json": diagnosis,
+    "results/loop/{campaign}/held_out.parquet": kept_back,
+    "results/loop/{campaign}/confounding.parquet": confounding,
+    "results/loop/{campaign}/models.parquet": models,
+    "reports/loop/{campaign}/residuals.parquet": residuals,
+}

@@ -28,6 +28,8 @@ _PASSES = 6
 _FAR = 12.0
 # Links shorter than this (m) do not bend.
 _SHORTEST_M = 0.05
+# Joint angles of poses of one configuration, rad, as docs/campaign.md states it.
+_SAME_RAD = 0.02
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
@@ -58,10 +60,7 @@ class Averages:
 
 
 def averages(frame: pd.DataFrame, poses: bool) -> Averages:
-    """Average the repeats of a table of measurements.
-
-    `frame`: of one approach to each state; without the approach in the key. `poses`: whether orientations count.
-    """
+    """Average the repeats of a table of measurements of one approach to each state; `poses`: whether orientations count."""
     kept = frame[~far_off(frame)]
     angles = [name for name in map(str, kept) if name[0] == "q" and name[1:].isdigit()]
     grouped = kept.groupby([*STATE, "target"])
@@ -88,10 +87,7 @@ def good_rows(run: Audited, campaign: str, part: str) -> pd.DataFrame:
 
 
 def far_off(frame: pd.DataFrame) -> np.ndarray:
-    """Measurements far from the median of at least three repeats, by the median distance of all repeats (Hampel).
-
-    `frame`: of measurements. Returns (N,) of bool.
-    """
+    """Which measurements (N,) are far from the median of at least three repeats, by the median distance of all (Hampel)."""
     approach = [name for name in map(str, frame) if name.startswith("approach")]
     group = frame.groupby([*STATE, "target", *approach], dropna=False)[list("xyz")]
     off = (frame[list("xyz")] - group.transform("median")).abs().to_numpy()
@@ -99,6 +95,15 @@ def far_off(frame: pd.DataFrame) -> np.ndarray:
     apart = off[repeated]
     usual = np.median(apart[apart > 0]) if apart.any() else np.inf
     return repeated & (off > _FAR * usual).any(axis=1)
+
+
+def find_configurations(joint_angles: np.ndarray) -> np.ndarray:
+    """The configuration of each pose (P, n), rad: the first without one takes all that are near it; ndarray of int (P,)."""
+    found = np.full(len(joint_angles), -1)
+    while (found < 0).any():
+        first = joint_angles[np.argmax(found < 0)]
+        found[(found < 0) & (np.abs(joint_angles - first).max(axis=1) <= _SAME_RAD)] = found.max() + 1
+    return found
 
 
 def _mean_rotation(vectors: np.ndarray) -> np.ndarray:
@@ -124,7 +129,7 @@ class Springs:
 class Robot:
     """The robot that a campaign declares, its links able to bend.
 
-    `document`: a robot file. `targets`: with ``point``, ``offset_m`` and, where it is mounted turned, ``rotation``.
+    `targets`: with ``point``, ``offset_m`` and, where it is mounted turned, ``rotation``.
     """
 
     def __init__(self, document: Mapping[str, Any], targets: Sequence[Mapping[str, Any]]) -> None:
@@ -141,14 +146,13 @@ class Robot:
         found[: self.joints, : self.joints] = np.diag(springs.joints)
         for number, vector in enumerate(arm.links):
             if np.linalg.norm(vector) > _SHORTEST_M:
-                block = slice(self.joints + 6 * number, self.joints + 6 * number + 6)
-                found[block, block] = _cantilever(vector, springs)
+                found[arm.link_block(number), arm.link_block(number)] = _cantilever(vector, springs)
         return found
 
     def loaded(self, compliance: np.ndarray, angles: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates to which the robot yields and the generalized forces there, by iteration."""
         arm = self.arms[0]
-        commanded = arm.unloaded(angles)
+        commanded = arm.extend(angles)
         coordinates = commanded
         for _ in range(_PASSES):
             forces = arm.jacobian(coordinates, arm.end_effector).T @ wrench

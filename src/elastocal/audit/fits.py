@@ -19,10 +19,10 @@ from statsmodels.robust.norms import HuberT
 
 from elastocal.audit.audited import COMPONENTS
 from elastocal.audit.elastic import STATE, Averages, Robot, Springs, averages, far_off, good_rows
-from elastocal.audit.findings import Finding, compared, held
+from elastocal.audit.findings import Finding, compare, require
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from elastocal.audit.audited import Audited
 
@@ -41,19 +41,28 @@ _HUBER = 0.99
 _LARGEST_TAPER = 0.6
 # Of a taper; for its slope.
 _DIFFERENCE = 1e-4
+_BY = "statsmodels on pinocchio"
 
 
 @dataclass(frozen=True)
 class Step:
-    """One model of a campaign as its files have it.
-
-    `parameters`: rows of steps.parquet. `noise`: of diagnosis.json.
-    """
+    """One model of a campaign: `parameters` are rows of steps.parquet, `noise` is that of diagnosis.json."""
 
     kind: str
     parameters: pd.DataFrame
     noise: Mapping[str, Any]
     springs: Springs
+
+    @property
+    def free(self) -> np.ndarray:
+        """Which parameters were fitted."""
+        return ~self.parameters["held"].to_numpy(bool)
+
+    @property
+    def inside(self) -> np.ndarray:
+        """Which of these can move: a taper that is as small as it may be, or as large, does not go on beyond it."""
+        ends = self.parameters["value"].isin([0.0, _LARGEST_TAPER]) & (self.parameters["parameter"] == _TAPER)
+        return self.free & ~ends.to_numpy()
 
 
 @dataclass(frozen=True)
@@ -61,12 +70,14 @@ class Campaign:
     """A campaign whose models can be worked out again.
 
     `poses`: whether orientations were measured. `steps`: in the order of the files; None where a step has what is not written
-    down here.
+    down here. `training`: what was fitted, `seen` with the repeats averaged.
     """
 
     robot: Robot
     poses: bool
     steps: list[Step | None]
+    training: pd.DataFrame
+    seen: Averages
 
 
 def campaign_of(run: Audited, name: str) -> Campaign | None:
@@ -78,11 +89,9 @@ def campaign_of(run: Audited, name: str) -> Campaign | None:
     asked, robot = described["campaign"], described["robot"]
     targets = list(asked["targets"].values())
     known = all(target[key] != "unknown" for target in targets for key in ("offset_m", "rotation") if key in target)
-    placed = asked["frame"] == "base" and known
     weightless = "masses" not in robot and "compliance_urad_per_Nm" in robot
-    if not placed or not weightless or asked["declared"] or described.get("held_out") is not None:
-        return None
-    if run.table(f"results/loop/{name}/training.parquet")["approach1"].notna().any():
+    placed = asked["frame"] == "base" and known and not asked["declared"] and described.get("held_out") is None
+    if not placed or not weightless or run.table(f"results/loop/{name}/training.parquet")["approach1"].notna().any():
         return None
     compliant, facts = Robot(robot, targets), run.document(f"results/loop/{name}/diagnosis.json")
     table = run.table(f"results/loop/{name}/steps.parquet")
@@ -90,14 +99,14 @@ def campaign_of(run: Audited, name: str) -> Campaign | None:
     # Where a fixed rotation or a coupled joint parts a link, its ends are not those of a stretch of translations.
     plain = "deg)" not in robot["chain"] and len(re.findall(r"q\d+", robot["chain"])) == compliant.joints
     steps = [_step(stated, table[table["step"] == number], nominal, plain) for number, stated in enumerate(facts["steps"])]
-    return Campaign(compliant, asked["measured"] == "pose", steps)
+    poses, training = asked["measured"] == "pose", good_rows(run, name, "training")
+    return Campaign(compliant, poses, steps, training, averages(training, poses))
 
 
 def _step(stated: Mapping[str, Any], parameters: pd.DataFrame, nominal: np.ndarray, plain: bool) -> Step | None:
     links = [key for key in stated["effects"] if key.startswith(_LINKS)]
-    others = set(stated["effects"]) - {_SPRINGS, *links}
     # One section of all links; links of their own sections are not written down here.
-    if others or len(links) > 1 or (links and not (plain and "one section" in links[0])):
+    if {*stated["effects"]} - {_SPRINGS, *links} or len(links) > 1 or (links and not (plain and "one section" in links[0])):
         return None
     values = dict(zip(parameters["parameter"], parameters["value"], strict=True))
     joints = np.array([values.get(f"c{j}", c) for j, c in enumerate(nominal, 1)])
@@ -105,90 +114,88 @@ def _step(stated: Mapping[str, Any], parameters: pd.DataFrame, nominal: np.ndarr
     return Step(stated["kind"], parameters, stated["noise"], springs)
 
 
-def fits(run: Audited, file: str, campaign: str) -> list[Finding]:
+def fits(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
     """Noise, estimates and standard errors of every step."""
     known = campaign_of(run, campaign)
-    if known is None:
-        return []
-    training = good_rows(run, campaign, "training")
-    seen, found = averages(training, known.poses), []
     stated = run.document(f"results/loop/{campaign}/diagnosis.json")["document"].get("noise") or {}
-    factor = stated.get("factor", 1.0)
-    for number, step in enumerate(known.steps):
-        if step is None:
+    for number, step in enumerate(known.steps if known else ()):
+        if step is None or known is None:
             continue
         # Most steps go by the noise of the one before.
         earlier = known.steps[number - 1] if number else None
         if earlier is None or earlier.noise != step.noise:
-            found += _noise(file, number, step, training, known, factor)
-        if len(step.parameters):
-            found += _fit(file, number, step, seen, known.robot)
-    return found
+            yield from _noise(number, step, known, stated.get("factor", 1.0))
+        if not len(step.parameters):
+            continue
+        error, inside = step.parameters["std_error"].to_numpy(), step.inside
+        columns, residual, scale = _whiten(step, known.seen, known.robot)
+        moved = _least_squares(columns[:, inside], residual).params / (scale * error[inside])
+        checked = f"estimates of step {number} ({step.kind}) stand still, in standard errors"
+        yield compare(checked, _BY, moved, np.zeros(len(moved)), absolute=SETTLED)
+        expected = _least_squares(columns[:, step.free], residual).bse
+        yield compare(
+            f"standard errors of step {number} ({step.kind})", _BY, error[step.free], expected, _OF_ERRORS, scale=expected
+        )
 
 
-def _noise(file: str, number: int, step: Step, training: pd.DataFrame, known: Campaign, factor: float) -> list[Finding]:
+def _noise(number: int, step: Step, known: Campaign, factor: float) -> Iterator[Finding]:
     """Noise of a measurement from the repeats about their means, where the joints have no part in it.
 
     Where measurements scatter more about the model than about each other, it may be larger by the factor that is stated.
     """
     noise = step.noise
     if noise["source"] != "repeats" or any(noise["joint_rad"]) or noise["pose_rad"] or noise["usual_m"]:
-        return []
-    training = training[~far_off(training)]
-    repeated = training[training.groupby([*STATE, "target"])["row"].transform("size") > 1]
-    residual = each_residual(known, step, repeated)
-    groups = repeated.groupby([*STATE, "target"]).ngroup().to_numpy()
+        return
+    near = known.training[~far_off(known.training)]
+    repeated = near[near.groupby([*STATE, "target"])["row"].transform("size") > 1]
+    residual, groups = residuals_of(known, step, repeated), repeated.groupby([*STATE, "target"]).ngroup().to_numpy()
     off = residual - pd.DataFrame(residual).groupby(groups).transform("mean").to_numpy()
-    free = len(groups) - len(np.unique(groups))
-    squares = (off**2).sum(axis=0)
-    expected = [np.sqrt(squares[first : first + 3].sum() / (3 * free)) for first in range(0, len(squares), 3)]
-    stated = np.array([noise["position_m"], noise["orientation_rad"]][: len(expected)])
+    free, squares = len(groups) - len(np.unique(groups)), (off**2).sum(axis=0)
+    expected = np.sqrt(squares.reshape(-1, 3).sum(axis=1) / (3 * free))
+    stated = np.array([noise["position_m"], noise["orientation_rad"]])[: len(expected)]
     if abs(stated[0] / factor - expected[0]) < abs(stated[0] - expected[0]):
         stated = stated / factor
-    degrees = len(squares) * free
-    return [
-        compared(file, f"noise of step {number}, from repeats", "pandas on pinocchio", stated, expected, 1e-4),
-        compared(file, f"repeats of step {number}", "counting", noise["degrees_of_freedom"], degrees, 0.0),
-    ]
+    yield compare(f"noise of step {number}, from repeats", "pandas on pinocchio", stated, expected, 1e-4)
+    yield compare(f"repeats of step {number}", "counting", noise["degrees_of_freedom"], len(squares) * free, 0.0)
 
 
-def _fit(file: str, number: int, step: Step, seen: Averages, robot: Robot) -> list[Finding]:
-    """Whether a step stands still, and its standard errors."""
-    free = ~step.parameters["held"].to_numpy(bool)
-    error = step.parameters["std_error"].to_numpy()
-    columns, residual, scale = _whitened(step, seen, robot)
-    by = "statsmodels on pinocchio"
-    fitted = _least_squares(columns[:, free], residual)
-    # A shape at the end of its range does not go on beyond it.
-    inside = free & ~_at_an_end(step)
-    moved = _least_squares(columns[:, inside], residual).params
-    checked = f"estimates of step {number} ({step.kind}) stand still, in standard errors"
-    found = [compared(file, checked, by, moved / (scale * error[inside]), np.zeros(inside.sum()), absolute=SETTLED)]
-    checked = f"standard errors of step {number} ({step.kind})"
-    return [*found, compared(file, checked, by, error[free], fitted.bse, _OF_ERRORS, scale=fitted.bse)]
-
-
-def correlations(run: Audited, file: str, campaign: str) -> list[Finding]:
+def correlations(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
     """Correlations of the estimates of the last step."""
     known = campaign_of(run, campaign)
     step = known.steps[-1] if known else None
-    if known is None or step is None or step.parameters["held"].all():
-        return []
-    table, free = run.table(file), ~step.parameters["held"].to_numpy(bool)
-    seen = averages(good_rows(run, campaign, "training"), known.poses)
-    names = (step.parameters["owner"] + " " + step.parameters["parameter"]).to_numpy()[free]
-    columns, residual, _ = _whitened(step, seen, known.robot)
-    covariance = np.asarray(_least_squares(columns[:, free], residual).cov_params())
-    deviation = np.sqrt(np.diag(covariance))
-    place = {name: number for number, name in enumerate(names)}
-    pairs = [(place[one], place[other]) for one, other in zip(table["one"], table["other"], strict=True)]
-    expected = [covariance[pair] / (deviation[pair[0]] * deviation[pair[1]]) for pair in pairs]
-    every = len({frozenset(pair) for pair in pairs}) == len(names) * (len(names) - 1) // 2 == len(pairs)
-    by = "statsmodels on pinocchio"
-    return [
-        held(file, "every pair of parameters once", "counting", every, f"{len(pairs)} of {len(names)} parameters", len(pairs)),
-        compared(file, "correlations of the estimates", by, table["correlation"], expected, absolute=_OF_ERRORS),
-    ]
+    if known is None or step is None or not step.free.any():
+        return
+    table, names = run.table(file), (step.parameters["owner"] + " " + step.parameters["parameter"]).to_numpy()[step.free]
+    columns, residual, _ = _whiten(step, known.seen, known.robot)
+    covariance = np.asarray(_least_squares(columns[:, step.free], residual).cov_params())
+    deviation, place = np.sqrt(np.diag(covariance)), {name: number for number, name in enumerate(names)}
+    one, other = (np.array([place[name] for name in table[end]], int) for end in ("one", "other"))
+    every = len({*map(frozenset, zip(one, other, strict=True))}) == len(names) * (len(names) - 1) // 2 == len(table)
+    note = f"{len(table)} of {len(names)} parameters"
+    yield require("every pair of parameters once", "counting", every, note, len(table))
+    expected = (covariance / np.outer(deviation, deviation))[one, other]
+    yield compare("correlations of the estimates", _BY, table["correlation"], expected, absolute=_OF_ERRORS)
+
+
+def predictions(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
+    """Residuals of all measurements, fitted and held out, by the declared and by the final model."""
+    known = campaign_of(run, campaign)
+    if known is None:
+        return
+    table, names = run.table(file), COMPONENTS if known.poses else COMPONENTS[:3]
+    declared = next(step for step in known.steps if step is None or step.kind == "declared")
+    for state, step in (("before", declared), ("after", known.steps[-1])):
+        if step is None:
+            continue
+        stored, expected = [], []
+        for part in ("training", "held_out"):
+            mine = table[table["held_out"] == (part == "held_out")].sort_values("row")
+            stored.append(mine[[f"{state}_{name}" for name in names]].to_numpy())
+            measured = run.table(f"results/loop/{campaign}/{part}.parquet").sort_values("row")
+            expected.append(residuals_of(known, step, measured))
+        pair = np.concatenate(stored), np.concatenate(expected)
+        checked = f"residuals {state}, fitted and held out, all rows"
+        yield compare(checked, "pinocchio", *pair, 0.0, unsettled(step, known))
 
 
 def _least_squares(columns: np.ndarray, residual: np.ndarray) -> Any:
@@ -196,13 +203,7 @@ def _least_squares(columns: np.ndarray, residual: np.ndarray) -> Any:
     return sm.OLS(residual, columns).fit(cov_type="fixed scale", cov_kwds={"scale": 1.0})
 
 
-def _at_an_end(step: Step) -> np.ndarray:
-    """Which parameters are a taper that is as small as it may be, or as large."""
-    ends = step.parameters["value"].isin([0.0, _LARGEST_TAPER])
-    return (ends & (step.parameters["parameter"] == _TAPER)).to_numpy()
-
-
-def _whitened(step: Step, seen: Averages, robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
+def _whiten(step: Step, seen: Averages, robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     """Weighted, whitened regressors and residual with rows for the priors below them, and the scale of the scatter."""
     loaded = robot.all_loaded(step.springs, seen)
     residual, jacobian = robot.residuals(loaded, seen), robot.jacobians(loaded, seen)
@@ -210,12 +211,12 @@ def _whitened(step: Step, seen: Averages, robot: Robot) -> tuple[np.ndarray, np.
     moved = np.stack([units @ forces for _, forces in loaded])
     rows = np.concatenate([jacobian @ moved[seen.state].transpose(0, 2, 1), residual[:, :, None]], axis=2)
     blocks = _whitener(step.noise, seen, jacobian[:, :, : robot.joints])
-    distance = np.sqrt((_applied(blocks, rows[..., -1:]) ** 2).mean(axis=(1, 2)))
+    distance = np.sqrt((_apply(blocks, rows[..., -1:]) ** 2).mean(axis=(1, 2)))
     # Where scatter is larger than the noise, distances count by that of the middle one.
     count = residual.shape[1]
     scale = max(float(np.median(distance) / np.sqrt(stats.chi2.median(count) / count)), 1.0)
     weights = HuberT(np.sqrt(stats.chi2.ppf(_HUBER, count) / count)).weights(distance / scale)
-    white = _applied(blocks, np.sqrt(weights)[:, None, None] * rows).reshape(-1, rows.shape[2])
+    white = _apply(blocks, np.sqrt(weights)[:, None, None] * rows).reshape(-1, rows.shape[2])
     prior = step.parameters["prior_std"].to_numpy()
     known = np.isfinite(prior)
     below = (np.eye(len(prior)) / np.where(known, prior, 1.0)[:, None])[known]
@@ -223,36 +224,30 @@ def _whitened(step: Step, seen: Averages, robot: Robot) -> tuple[np.ndarray, np.
     return np.vstack([white[:, :-1], below]), np.concatenate([white[:, -1], -value]), scale
 
 
-def unsettled(step: Step, seen: Averages, robot: Robot) -> float:
+def unsettled(step: Step, known: Campaign) -> float:
     """By how much (m, rad) a prediction moves, at most, where a fit goes on from its estimates to where it stands still."""
-    inside = ~step.parameters["held"].to_numpy(bool) & ~_at_an_end(step)
+    inside, robot, seen = step.inside, known.robot, known.seen
     if not inside.any():
         return STEP_BACK
-    columns, residual, _ = _whitened(step, seen, robot)
+    columns, residual, _ = _whiten(step, seen, robot)
     left = np.abs(_least_squares(columns[:, inside], residual).params)
     loaded = robot.all_loaded(step.springs, seen)
     moved = np.stack([_units(step, robot)[inside] @ forces for _, forces in loaded])
-    sensitivities = np.abs(robot.jacobians(loaded, seen) @ moved[seen.state].transpose(0, 2, 1))
-    return STEP_BACK + float((sensitivities @ left).max())
+    return STEP_BACK + float((np.abs(robot.jacobians(loaded, seen) @ moved[seen.state].transpose(0, 2, 1)) @ left).max())
 
 
 def _units(step: Step, robot: Robot) -> np.ndarray:
     """What a unit of each parameter makes of the loads on the coordinates, (P, C, C)."""
-    springs, still = step.springs, np.zeros(robot.joints)
-    found = []
+    springs, still, found = step.springs, np.zeros(robot.joints), []
     for name in step.parameters["parameter"]:
-        if name == _BENDING:
-            found.append(robot.compliance(Springs(still, 1.0, 0.0, springs.taper)))
-        elif name == _TORSION:
-            found.append(robot.compliance(Springs(still, 0.0, 1.0, springs.taper)))
-        elif name == _TAPER:
-            more, less = (
-                robot.compliance(Springs(still, springs.bending, springs.torsion, springs.taper + sign * _DIFFERENCE))
-                for sign in (1, -1)
-            )
+        if name == _TAPER:
+            ends = (springs.taper + _DIFFERENCE, springs.taper - _DIFFERENCE)
+            more, less = (robot.compliance(Springs(still, springs.bending, springs.torsion, taper)) for taper in ends)
             found.append((more - less) / (2 * _DIFFERENCE))
+        elif name in (_BENDING, _TORSION):
+            found.append(robot.compliance(Springs(still, float(name == _BENDING), float(name == _TORSION), springs.taper)))
         else:
-            found.append(robot.compliance(Springs((np.arange(1, robot.joints + 1) == int(name[1:])).astype(float))))
+            found.append(robot.compliance(Springs(np.eye(robot.joints)[int(name[1:]) - 1])))
     return np.array(found)
 
 
@@ -263,8 +258,7 @@ def _whitener(noise: Mapping[str, Any], seen: Averages, jacobian: np.ndarray) ->
     """
     rows, joints = jacobian.shape[1], np.array(noise["joint_rad"])
     sensor = np.repeat([noise["position_m"], noise["orientation_rad"]], 3)[:rows] ** 2
-    poses, repeats = seen.pose, seen.repeats
-    found = []
+    poses, repeats, found = seen.pose, seen.repeats, []
     for pose in np.unique(poses):
         members = np.flatnonzero(poses == pose)
         stacked = jacobian[members].reshape(len(members) * rows, -1)
@@ -275,7 +269,7 @@ def _whitener(noise: Mapping[str, Any], seen: Averages, jacobian: np.ndarray) ->
     return found
 
 
-def _applied(blocks: Sequence[tuple[np.ndarray, np.ndarray]], values: np.ndarray) -> np.ndarray:
+def _apply(blocks: Sequence[tuple[np.ndarray, np.ndarray]], values: np.ndarray) -> np.ndarray:
     """Whitened rows (M, rows, K)."""
     found = np.empty(values.shape)
     for members, factor in blocks:
@@ -284,35 +278,8 @@ def _applied(blocks: Sequence[tuple[np.ndarray, np.ndarray]], values: np.ndarray
     return found
 
 
-def predictions(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """Residuals of all measurements, fitted and held out, by the declared and by the final model."""
-    known = campaign_of(run, campaign)
-    if known is None:
-        return []
-    table, found = run.table(file), []
-    parts = [run.table(f"results/loop/{campaign}/{part}.parquet") for part in ("training", "held_out")]
-    names = COMPONENTS if known.poses else COMPONENTS[:3]
-    declared = next(number for number, step in enumerate(known.steps) if step is None or step.kind == "declared")
-    for state, step in (("before", known.steps[declared]), ("after", known.steps[-1])):
-        if step is None:
-            continue
-        stored, expected = [], []
-        for measured, unseen in zip(parts, (False, True), strict=True):
-            mine = table[table["held_out"] == unseen].sort_values("row")
-            stored.append(mine[[f"{state}_{name}" for name in names]].to_numpy())
-            expected.append(each_residual(known, step, measured.sort_values("row")))
-        checked = f"residuals {state}, fitted and held out, all rows"
-        pair = np.concatenate(stored), np.concatenate(expected)
-        allowed = unsettled(step, averages(good_rows(run, campaign, "training"), known.poses), known.robot)
-        found.append(compared(file, checked, "pinocchio", *pair, 0.0, absolute=allowed))
-    return found
-
-
-def each_residual(known: Campaign, step: Step, measured: pd.DataFrame) -> np.ndarray:
-    """Residual of every single measurement, in the order of the rows of a table.
-
-    Returns (N, 3 or 6).
-    """
+def residuals_of(known: Campaign, step: Step, measured: pd.DataFrame) -> np.ndarray:
+    """Residual (N, 3 or 6) of every single measurement, in the order of the rows of a table."""
     approach = [*STATE, "repeat"]
     order = measured.reset_index(drop=True).sort_values([*approach, "target"])
     seen = averages(order.assign(load=order.groupby(approach).ngroup()), known.poses)
@@ -321,8 +288,8 @@ def each_residual(known: Campaign, step: Step, measured: pd.DataFrame) -> np.nda
     return found
 
 
-CHECKS = (
-    (re.compile(r"results/loop/([^/]+)/steps\.parquet"), fits),
-    (re.compile(r"results/loop/([^/]+)/correlations\.parquet"), correlations),
-    (re.compile(r"reports/loop/([^/]+)/residuals\.parquet"), predictions),
-)
+CHECKS = {
+    "results/loop/{campaign}/steps.parquet": fits,
+    "results/loop/{campaign}/correlations.parquet": correlations,
+    "reports/loop/{campaign}/residuals.parquet": predictions,
+}

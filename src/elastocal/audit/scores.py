@@ -1,234 +1,192 @@
-"""Metrics, replicates, accuracies, bounds and expectations from the files before them, by pandas and pinocchio."""
+"""Metrics, replicates, accuracies, bounds and expectations from the files before them, by numpy, scipy and pinocchio."""
 
 from __future__ import annotations
 
-import re
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import gammaln
 
-from elastocal.audit.estimates import points_of
-from elastocal.audit.findings import ROUNDING, SINGLE, Finding, compared, held
+from elastocal.audit.estimates import of_length, points_of
+from elastocal.audit.findings import ROUNDING, SINGLE, Finding, compare, require, require_each_once
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
     from typing import Any
 
     from elastocal.audit.audited import Audited
 
 # From when on the mean of 1/c does not exist in practice (docs/study.md).
 _TRUSTED_SPREAD = 0.25
-# Lengths of a file of metrics whose scores are worked out again.
+# Lengths of a file whose scores are worked out again.
 _LENGTHS = 3
+# Sums of differences of nearly equal numbers, in percent.
+_PERCENT = 600 * ROUNDING
+# A bound is a mean over all data sets: of longer ones it would take minutes.
+_SHORT = 12
+_SCORES = ("k_sigma", "k_sigma_fixed_joints", "deviation", "initial_deviation")
 
 
 @cache
-def error_rows(run: Audited, robot: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def judge_on(run: Audited, robot: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What judges a model: on each test configuration the regressor of positions, its offset, and the deflection.
 
     Returns `slope` (tests, 3, n): by which compliances move the predicted position, m per rad/(N m); `offset` (tests, 3): exact
     prediction at the true compliances less the true position, m; `deflection` (tests, 3).
     """
     arm, (angles, wrench) = run.arm(robot), run.experiments(robot, test=True)
-    file = f"data/simulated/{robot}/test/ideal.parquet"
-    truth = run.deflections(file, arm.end_effector)[0, :, :3]
-    slope = np.array([run.regressor(robot, 0, k, arm.end_effector, True)[:3] for k in range(len(truth))])
-    exact = [
-        arm.deflection(q, w, arm.end_effector, run.wrench_at, arm.compliance)[:3]
-        for q, w in zip(angles[0], wrench[0], strict=True)
-    ]
+    end, truth = arm.end_effector, run.deflections(f"data/simulated/{robot}/test/ideal.parquet", arm.end_effector)[0, :, :3]
+    slope = np.array([run.regressor(robot, 0, k, end, True)[:3] for k in range(len(truth))])
+    pairs = zip(angles[0], wrench[0], strict=True)
+    exact = [arm.deflection(q, w, end, run.wrench_at, arm.compliance)[:3] for q, w in pairs]
     return slope, np.array(exact) - truth, truth
 
 
 def errors_of(run: Audited, robot: str, compliance: np.ndarray) -> np.ndarray:
     """Position errors (models, tests) in m of models (models, n)."""
-    slope, offset, _ = error_rows(run, robot)
-    moved = np.einsum("tij,mj->mti", slope, compliance - run.arm(robot).compliance) + offset
-    return np.linalg.norm(moved, axis=-1)
+    slope, offset, _ = judge_on(run, robot)
+    return np.linalg.norm(np.einsum("tij,mj->mti", slope, compliance - run.arm(robot).compliance) + offset, axis=-1)
 
 
 def moment(run: Audited, robot: str) -> np.ndarray:
     """Mean over the test configurations of A'A of the position, (n, n)."""
-    slope = error_rows(run, robot)[0]
+    slope = judge_on(run, robot)[0]
     return np.einsum("tki,tkj->ij", slope, slope) / len(slope)
 
 
 def fixed_joints(strategy: Mapping[str, Any]) -> np.ndarray:
     """Joints that the paper's k_sigma counts alone (interpretation R10), from 0."""
-    last = strategy["stages"][-1]
     every = sorted({joint for stage in strategy["stages"] for joint in stage["joints"]})
-    return np.array(last.get("held") or every) - 1
+    return np.array(strategy["stages"][-1].get("held") or every) - 1
 
 
-def averaged(compliance: np.ndarray, method: str, weights: np.ndarray | None = None) -> np.ndarray:
+def average(compliance: np.ndarray, method: str, weights: np.ndarray | None = None) -> np.ndarray:
     """Equation 12 over data sets (sets, n), each as often as its weight says."""
-    counted = np.ones(len(compliance)) if weights is None else weights
+    counted = np.ones(len(compliance), int) if weights is None else weights
     if method == "median":
         return np.median(np.repeat(compliance, counted.astype(int), axis=0), axis=0)
-    values = compliance if method == "compliance" else 1.0 / compliance
-    mean = np.average(values, axis=0, weights=counted)
-    return mean if method == "compliance" else 1.0 / mean
+    power = 1.0 if method == "compliance" else -1.0
+    return np.average(compliance**power, axis=0, weights=counted) ** power
 
 
-def metrics(run: Audited, file: str, robot: str, noise_um: str, key: str) -> list[Finding]:
+def _score(
+    run: Audited, robot: str, strategy: str, compliance: np.ndarray, of_sets: np.ndarray, of_tests: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, list[float]]:
+    """Averaged compliances, relative stiffness errors in percent and the scores, with weights of data sets and tests."""
+    read, truth = run.configuration["interpretations"], run.arm(robot).compliance
+    mean = average(compliance, read["average"], of_sets)
+    if read["deviation_of"] == "averaged_model":
+        deviation = np.average(errors_of(run, robot, mean[None])[0], weights=of_tests)
+    else:
+        deviation = np.average(errors_of(run, robot, compliance).mean(axis=1), weights=of_sets)
+    relative = 100 * (truth / mean - 1)
+    size = np.average(np.linalg.norm(judge_on(run, robot)[2], axis=1), weights=of_tests)
+    return mean, relative, [relative.sum(), relative[fixed_joints(run.strategies[strategy])].sum(), deviation, size]
+
+
+def metrics(run: Audited, file: str, robot: str, noise_um: str, strategy: str) -> Iterator[Finding]:
     """Equations 12 to 15 at sampled lengths, from the identified compliances; standard errors from the replicates."""
-    frame, arm = run.table(file).set_index("length"), run.arm(robot)
-    lengths, replicates = run.configuration["configurations"], run.configuration["evaluation"]["bootstrap_replicates"]
-    found = [compared(file, "lengths, each once", "counting", frame.index, np.arange(1, lengths + 1), 0.0)]
-    drawn = run.table(f"results/replicates/{robot}/{noise_um}um/{key}.parquet")
-    for length in 1 + run.picked(file, lengths, _LENGTHS):
-        row, at = frame.loc[length], f"length {length}"
-        compliance = _of_length(run, robot, noise_um, key, length)
+    frame, arm = run.table(file), run.arm(robot)
+    yield require_each_once(frame, length=range(1, run.configuration["configurations"] + 1))
+    drawn = run.table(f"results/replicates/{robot}/{noise_um}um/{strategy}.parquet")
+    of_sets, of_tests = weights_of(run, robot)
+    for row in run.pick_rows(file, frame, _LENGTHS):
+        at, compliance = f"length {row['length']:g}", _identified(run, robot, noise_um, strategy, row["length"])
         if np.isnan(compliance).any():
             # A score of data sets of which one determines nothing exists for none.
-            found.append(held(file, f"no scores, {at}", "pandas", bool(np.isnan(row["k_sigma"])), "a number"))
+            yield require(f"no scores, {at}", "numpy", np.isnan(row["k_sigma"]), "a number")
             continue
-        mean, errors = _mean_and_deviation(run, robot, compliance)
-        relative = 100 * (arm.compliance / mean - 1)
-        stored = [row[f"compliance_{j + 1}"] for j in range(arm.joints)]
-        found.append(compared(file, f"averaged compliances, {at}", "pandas", stored, mean))
-        stored = [row[f"delta_k_{j + 1}"] for j in range(arm.joints)]
-        # A difference of two nearly equal numbers, in percent.
-        found.append(compared(file, f"delta_k, {at}", "pandas", stored, relative, 0.0, 100 * ROUNDING))
-        sums = [relative.sum(), relative[fixed_joints(run.strategies[key])].sum()]
-        found.append(
-            compared(file, f"k_sigma, {at}", "pandas", row[["k_sigma", "k_sigma_fixed_joints"]], sums, 0.0, 600 * ROUNDING)
-        )
-        size = np.linalg.norm(error_rows(run, robot)[2], axis=1).mean()
-        found.append(
-            compared(file, f"deviation, {at}", "pinocchio", row[["deviation", "initial_deviation"]], [errors, size], 1e-8)
-        )
+        ones = np.ones(len(compliance)), np.ones(of_tests.shape[1])
+        mean, relative, scores = _score(run, robot, strategy, compliance, *ones)
+        yield compare(f"averaged compliances, {at}", "numpy", row.filter(regex=r"compliance_\d+$"), mean)
+        yield compare(f"delta_k, {at}", "numpy", row.filter(regex=r"delta_k_\d+$"), relative, 0.0, _PERCENT)
+        yield compare(f"k_sigma, {at}", "numpy", row[[*_SCORES[:2]]], scores[:2], 0.0, _PERCENT)
+        yield compare(f"deviation, {at}", "pinocchio", row[[*_SCORES[2:]]], scores[2:], 1e-8)
         scaled = compliance / arm.compliance
-        spread = float((scaled.std(axis=0) / np.abs(scaled.mean(axis=0))).max())
-        share = float((compliance <= 0).any(axis=1).mean())
+        spread, share = (scaled.std(axis=0) / np.abs(scaled.mean(axis=0))).max(), (compliance <= 0).any(axis=1).mean()
+        stored = row[["nonpositive_share", "relative_spread", "trustworthy"]].astype(float)
         trusted = share == 0 and spread <= _TRUSTED_SPREAD
-        expected = [share, spread, trusted]
-        names = ["nonpositive_share", "relative_spread", "trustworthy"]
         # A spread of noise-free estimates is a root of rounding.
-        found.append(compared(file, f"whether to be trusted, {at}", "pandas", row[names].astype(float), expected, 1e-6, 1e-7))
-        there = drawn[drawn["length"] == length]
-        for name in ("k_sigma", "k_sigma_fixed_joints", "deviation", "initial_deviation"):
-            checked = f"standard error of {name}, {at}"
-            found.append(compared(file, checked, "pandas", row[f"{name}_std_error"], there[name].std(ddof=1), 1e-6, 1e-12))
-        weights = _weights(run, robot)[0]
-        again = [averaged(compliance, run.configuration["interpretations"]["average"], each) for each in weights]
-        stored = [row[f"compliance_{j + 1}_std_error"] for j in range(arm.joints)]
-        expected = np.std(again, axis=0, ddof=1)
-        found.append(compared(file, f"standard errors of compliances, {at}", "numpy", stored, expected, 1e-6, 1e-17))
-        count = compared(file, f"replicates, {at}", "counting", [len(there)], [replicates], 0.0)
-        found.append(count)
-    return found
+        yield compare(f"whether to be trusted, {at}", "numpy", stored, [share, spread, trusted], 1e-6, 1e-7)
+        there = drawn[drawn["length"] == row["length"]]
+        yield compare(f"replicates, {at}", "counting", [len(there)], [len(of_sets)], 0.0)
+        for name in _SCORES:
+            error = there[name].std(ddof=1)
+            yield compare(f"standard error of {name}, {at}", "pandas", row[f"{name}_std_error"], error, 1e-6, 1e-12)
+        again = [average(compliance, run.configuration["interpretations"]["average"], each) for each in of_sets]
+        stored = row.filter(regex=r"compliance_\d+_std_error$")
+        yield compare(f"standard errors of compliances, {at}", "numpy", stored, np.std(again, axis=0, ddof=1), 1e-6, 1e-17)
 
 
-def replicates(run: Audited, file: str, robot: str, noise_um: str, key: str) -> list[Finding]:
+def replicates(run: Audited, file: str, robot: str, noise_um: str, strategy: str) -> Iterator[Finding]:
     """Scores of sampled bootstrap replicates."""
-    frame, arm, read = run.table(file), run.arm(robot), run.configuration["interpretations"]
-    drawn, lengths = run.configuration["evaluation"]["bootstrap_replicates"], run.configuration["configurations"]
-    expected_index = np.stack([np.repeat(np.arange(1, drawn + 1), lengths), np.tile(np.arange(1, lengths + 1), drawn)], axis=1)
-    found = [
-        compared(file, "replicates and lengths, each once", "counting", frame[["replicate", "length"]], expected_index, 0.0)
-    ]
-    of_sets, of_tests = _weights(run, robot)
-    size = np.linalg.norm(error_rows(run, robot)[2], axis=1)
-    for place in run.picked(file, len(frame)):
-        row = frame.iloc[place]
-        number, length = int(row["replicate"]) - 1, int(row["length"])
-        compliance = _of_length(run, robot, noise_um, key, length)
-        if np.isnan(compliance).any():
-            continue
-        mean = averaged(compliance, read["average"], of_sets[number])
-        relative = 100 * (arm.compliance / mean - 1)
-        if read["deviation_of"] == "averaged_model":
-            deviation = np.average(errors_of(run, robot, mean[None])[0], weights=of_tests[number])
-        else:
-            deviation = np.average(errors_of(run, robot, compliance).mean(axis=1), weights=of_sets[number])
-        expected = [relative.sum(), relative[fixed_joints(run.strategies[key])].sum()]
-        at = f"replicate {number + 1}, length {length}"
-        stored = row[["k_sigma", "k_sigma_fixed_joints"]]
-        found.append(compared(file, f"k_sigma, {at}", "pandas", stored, expected, 0.0, 600 * ROUNDING))
-        expected = [deviation, np.average(size, weights=of_tests[number])]
-        stored = row[["deviation", "initial_deviation"]]
-        found.append(compared(file, f"deviation, {at}", "pinocchio", stored, expected, 1e-8))
-    return found
+    frame, (of_sets, of_tests) = run.table(file), weights_of(run, robot)
+    lengths = range(1, run.configuration["configurations"] + 1)
+    yield require_each_once(frame, replicate=range(1, len(of_sets) + 1), length=lengths)
+    for row in run.pick_rows(file, frame):
+        compliance, number = _identified(run, robot, noise_um, strategy, row["length"]), int(row["replicate"]) - 1
+        if not np.isnan(compliance).any():
+            *_, scores = _score(run, robot, strategy, compliance, of_sets[number], of_tests[number])
+            at = f"replicate {number + 1}, length {row['length']:g}"
+            yield compare(f"k_sigma, {at}", "numpy", row[[*_SCORES[:2]]], scores[:2], 0.0, _PERCENT)
+            yield compare(f"deviation, {at}", "pinocchio", row[[*_SCORES[2:]]], scores[2:], 1e-8)
 
 
-def accuracy(run: Audited, file: str, robot: str, noise_um: str, key: str) -> list[Finding]:
+def accuracy(run: Audited, file: str, robot: str, noise_um: str, strategy: str) -> Iterator[Finding]:
     """What one data set gives, at a sampled length."""
-    frame, arm = run.table(file), run.arm(robot)
-    lengths = run.configuration["evaluation"]["lengths"]
-    found = [compared(file, "evaluated lengths", "counting", frame["length"], lengths, 0.0)]
-    for place in run.picked(file, len(frame), 1):
-        row = frame.iloc[place]
-        at = f"length {int(row['length'])}"
-        compliance = _of_length(run, robot, noise_um, key, int(row["length"]))
+    frame, truth = run.table(file), run.arm(robot).compliance
+    yield compare("evaluated lengths", "counting", frame["length"], run.configuration["evaluation"]["lengths"], 0.0)
+    for row in run.pick_rows(file, frame, 1):
+        at, compliance = f"length {row['length']:g}", _identified(run, robot, noise_um, strategy, row["length"])
         if np.isnan(compliance).any():
             continue
         errors = errors_of(run, robot, compliance)
-        rank = int(np.ceil(0.95 * errors.shape[1])) - 1
-        scores = [
-            errors.mean(),
-            np.sqrt((errors**2).mean()),
-            np.sort(errors, axis=1)[:, rank].mean(),
-            errors.max(axis=1).mean(),
-        ]
-        found.append(
-            compared(file, f"errors of one data set, {at}", "pinocchio", row[["mean", "rms", "p95", "max"]], scores, 1e-8)
-        )
-        squares = (errors**2).mean(axis=1)
-        error = squares.std() / np.sqrt(len(squares) - 1) / (2 * np.sqrt(squares.mean()))
-        found.append(
-            compared(file, f"standard error of the RMS error, {at}", "numpy", row["rms_std_error"], error, 1e-5, 1e-15)
-        )
-        relative = 100 * np.sqrt((((compliance - arm.compliance) / arm.compliance) ** 2).mean(axis=0))
-        stored = [row[f"relative_error_{j + 1}"] for j in range(arm.joints)]
-        found.append(compared(file, f"relative errors of compliances, {at}", "pandas", stored, relative, 1e-8))
-    return found
+        squares, rank = (errors**2).mean(axis=1), int(np.ceil(0.95 * errors.shape[1])) - 1
+        rms, p95 = np.sqrt(squares.mean()), np.sort(errors, axis=1)[:, rank].mean()
+        stored, expected = row[["mean", "rms", "p95", "max"]], [errors.mean(), rms, p95, errors.max(axis=1).mean()]
+        yield compare(f"errors of one data set, {at}", "pinocchio", stored, expected, 1e-8)
+        error = squares.std() / np.sqrt(len(squares) - 1) / (2 * rms)
+        yield compare(f"standard error of the RMS error, {at}", "numpy", row["rms_std_error"], error, 1e-5, 1e-15)
+        relative = 100 * np.sqrt(((compliance / truth - 1) ** 2).mean(axis=0))
+        stored = row.filter(regex=r"relative_error_\d+$")
+        yield compare(f"relative errors of compliances, {at}", "numpy", stored, relative, 1e-8)
 
 
-def bounds(run: Audited, file: str, robot: str) -> list[Finding]:
+def bounds(run: Audited, file: str, robot: str) -> Iterator[Finding]:
     """Cramér-Rao bounds of sampled sets of points and lengths, by pinocchio."""
     frame, sets = run.table(file), run.configuration["data_sets"]
-    most = run.configuration["configurations"]
     names = {"+".join(sorted(points_of(strategy))) for strategy in run.strategies.values()}
-    found = [held(file, "sets of measuring points", "counting", set(frame["points"]) == names, f"{set(frame['points'])}")]
-    found.append(compared(file, "lengths of each", "counting", frame.groupby("points").size(), [most] * len(names), 0.0))
-    weighted = moment(run, robot)
+    counts, most = frame.groupby("points").size(), run.configuration["configurations"]
+    yield require("sets of measuring points", "counting", set(counts.index) == names, f"{set(counts.index)}", len(names))
+    yield compare("lengths of each", "counting", counts, [most] * len(names), 0.0)
     rows = frame[np.isfinite(frame["rms_per_noise"]) & (frame["length"] <= _SHORT)]
-    for place in run.picked(file, len(rows), 2):
-        row = rows.iloc[place]
-        total = 0.0
-        for data_set in range(sets):
-            matrix = run.stacked(robot, data_set, int(row["length"]), row["points"].split("+"))
-            total += float(np.trace(weighted @ np.linalg.inv(matrix.T @ matrix)))
-        checked = f"bound of {row['points']}, length {int(row['length'])}"
-        found.append(compared(file, checked, "pinocchio", row["rms_per_noise"], np.sqrt(total / sets), 1e-6))
-    return found
+    for row in run.pick_rows(file, rows, 2):
+        matrices = [run.regressors(robot, data_set, row["length"], row["points"].split("+")) for data_set in range(sets)]
+        total = sum(np.trace(moment(run, robot) @ np.linalg.inv(matrix.T @ matrix)) for matrix in matrices)
+        checked = f"bound of {row['points']}, length {row['length']}"
+        yield compare(checked, "pinocchio", row["rms_per_noise"], np.sqrt(total / sets), 1e-6)
 
 
-# A bound is a mean over all data sets: of longer ones it would take minutes.
-_SHORT = 12
-
-
-def expected(run: Audited, file: str, robot: str, noise_um: str, key: str) -> list[Finding]:
+def expected(run: Audited, file: str, robot: str, noise_um: str, strategy: str) -> Iterator[Finding]:
     """Expectations in closed form at sampled lengths, from the covariances of the design."""
     frame, arm, read = run.table(file), run.arm(robot), run.configuration["interpretations"]
-    covariances, sets = run.table(f"results/design/{robot}/{key}.parquet"), run.configuration["data_sets"]
-    found = [compared(file, "lengths, each once", "counting", frame["length"], np.arange(1, len(frame) + 1), 0.0)]
-    slope, offset, _ = error_rows(run, robot)
-    for place in run.picked(file, len(frame), _LENGTHS):
-        row = frame.iloc[place]
+    covariances = run.table(f"results/design/{robot}/{strategy}.parquet").groupby("length")
+    yield require_each_once(frame, length=range(1, len(frame) + 1))
+    slope, offset, _ = judge_on(run, robot)
+    triangle, free = np.tril_indices(arm.joints), arm.compliance
+    for row in run.pick_rows(file, frame[frame["k_sigma"].notna()], _LENGTHS):
         length = int(row["length"])
-        free = _noise_free(run, robot, key, length)
+        if run.has(f"results/identified/{robot}/0um/{strategy}.parquet"):
+            free = average(_identified(run, robot, "0", strategy, length), read["average"])
         spread = np.zeros((arm.joints, arm.joints))
-        rows = covariances[covariances["length"] == length].filter(like="cov_").astype(float).mean().to_numpy()
-        if np.isnan(row["k_sigma"]) or np.isnan(rows).any() or np.isnan(free).any():
+        of_length = covariances.get_group(length).filter(like="cov_").to_numpy(float)
+        spread[triangle] = (1e-6 * float(noise_um)) ** 2 * of_length.mean(axis=0)
+        if np.isnan(spread).any() or np.isnan(free).any():
             continue
-        spread[np.tril_indices(arm.joints)] = (1e-6 * float(noise_um)) ** 2 * rows
         spread += np.tril(spread, -1).T
         mean = free / (1 + np.diag(spread) / free**2) if read["average"] == "stiffness" else free
-        scatter = spread / sets if read["deviation_of"] == "averaged_model" else spread
+        scatter = spread / len(of_length) if read["deviation_of"] == "averaged_model" else spread
         error = slope @ (mean - arm.compliance) + offset
         within = np.einsum("tki,ij,tlj->tkl", slope, scatter, slope)
         square = (error**2).sum(axis=1) + np.trace(within, axis1=1, axis2=2)
@@ -237,51 +195,33 @@ def expected(run: Audited, file: str, robot: str, noise_um: str, key: str) -> li
             shape = square**2 / variance
             # Mean of the root of a gamma variable; its limit where nothing scatters.
             ratio = np.where(shape > 1e4, 1 - 0.125 / shape, np.exp(gammaln(shape + 0.5) - gammaln(shape)) / np.sqrt(shape))
+        stored = row.filter(regex=r"compliance_\d+$")
+        yield compare(f"expected compliances, length {length}", "numpy", stored, mean, SINGLE)
         deviation = float((np.sqrt(square) * ratio).mean())
-        stored = [row[f"compliance_{j + 1}"] for j in range(arm.joints)]
-        found.append(compared(file, f"expected compliances, length {length}", "pandas", stored, mean, SINGLE))
         checked = f"expected deviation, length {length}"
-        found.append(compared(file, checked, "Satterthwaite's gamma, scipy", row["deviation"], deviation, 1e-4))
-    return found
+        yield compare(checked, "Satterthwaite's gamma, scipy", row["deviation"], deviation, 1e-4)
 
 
-def _noise_free(run: Audited, robot: str, key: str, length: int) -> np.ndarray:
-    file = f"results/identified/{robot}/0um/{key}.parquet"
-    if not run.there(file):
-        return run.arm(robot).compliance
-    compliance = _of_length(run, robot, "0", key, length)
-    return averaged(compliance, run.configuration["interpretations"]["average"])
-
-
-def _of_length(run: Audited, robot: str, noise_um: str, key: str, length: int) -> np.ndarray:
+def _identified(run: Audited, robot: str, noise_um: str, strategy: str, length: float) -> np.ndarray:
     """Identified compliances (sets, n) of one length."""
-    frame = run.table(f"results/identified/{robot}/{noise_um}um/{key}.parquet")
-    return frame[frame["length"] == length].filter(regex=r"^c\d+$").to_numpy(float)
-
-
-def _mean_and_deviation(run: Audited, robot: str, compliance: np.ndarray) -> tuple[np.ndarray, float]:
-    read = run.configuration["interpretations"]
-    mean = averaged(compliance, read["average"])
-    models = mean[None] if read["deviation_of"] == "averaged_model" else compliance
-    return mean, float(errors_of(run, robot, models).mean())
+    return of_length(run.table(f"results/identified/{robot}/{noise_um}um/{strategy}.parquet"), int(length))
 
 
 @cache
-def _weights(run: Audited, robot: str) -> tuple[np.ndarray, np.ndarray]:
+def weights_of(run: Audited, robot: str) -> tuple[np.ndarray, np.ndarray]:
     """Weights of data sets and of test configurations, (replicates, members) each."""
     frame = run.table(f"results/weights/{robot}.parquet")
-    found = [
+    of_sets, of_tests = (
         frame[frame["members"] == name].pivot(index="replicate", columns="number", values="count").to_numpy()
         for name in ("data sets", "test configurations")
-    ]
-    return found[0], found[1]
+    )
+    return of_sets, of_tests
 
 
-_CELL = r"([^/]+)/([^/]+)um/([^/]+)\.parquet"
-CHECKS = (
-    (re.compile(rf"results/metrics/{_CELL}"), metrics),
-    (re.compile(rf"results/replicates/{_CELL}"), replicates),
-    (re.compile(rf"results/accuracy/{_CELL}"), accuracy),
-    (re.compile(r"results/bounds/([^/]+)\.parquet"), bounds),
-    (re.compile(rf"results/expected/{_CELL}"), expected),
-)
+CHECKS = {
+    "results/metrics/{robot}/{noise_um}um/{strategy}.parquet": metrics,
+    "results/replicates/{robot}/{noise_um}um/{strategy}.parquet": replicates,
+    "results/accuracy/{robot}/{noise_um}um/{strategy}.parquet": accuracy,
+    "results/bounds/{robot}.parquet": bounds,
+    "results/expected/{robot}/{noise_um}um/{strategy}.parquet": expected,
+}

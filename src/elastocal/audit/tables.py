@@ -1,392 +1,332 @@
-"""Cells of the study's tables, followed back to the files that they come from, by pandas alone.
-
-Each function makes a table again, or those of its columns that follow from files; every cell of these columns is compared.
-Columns that are left are named in the finding.
-"""
+"""Cells of the study's tables, followed back to the files that they come from: each table as rows of formulas over these."""
 
 from __future__ import annotations
 
 import re
+from collections import defaultdict
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy import special, stats
+from statsmodels.stats.multitest import multipletests
 
-from elastocal.audit import paper_figures, rankings
 from elastocal.audit.estimates import points_of
-from elastocal.audit.findings import ROUNDING, Finding, compared, held
+from elastocal.audit.findings import NINE_DIGITS, Finding, compare_columns, require
+from elastocal.audit.scores import weights_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from elastocal.audit.audited import Audited
 
-# Tables are written with nine digits.
-_NINE_DIGITS = 5.1e-9
+    _Rows = Iterator[dict[Any, Any]]
+
+_REFERENCE = "config/paper/reference.csv"
 # Percentages and differences of what agrees to rounding, in the units of the tables.
 _ZERO = 1e-7
+# Of what is worked out of cells with nine digits, of which others are subtracted.
+_OF_DIGITS = 1e-6
 # Of a normal distribution: 95 % within.
 _QUANTILE = 1.96
+# The last digit that the paper prints of everything but lengths.
+_DIGIT = 1e-3
 
 
-def table1(run: Audited) -> pd.DataFrame:
-    """Compliances of the robot files."""
-    rows = {name: run.robots[name]["compliance_urad_per_Nm"] for name in run.reduced}
-    return pd.DataFrame([{"robot": name} | {f"c{j}": c for j, c in enumerate(row, 1)} for name, row in rows.items()])
+def _groups(run: Audited, robots: Iterable[str], kind: str, *by: str) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
+    """Rows of files of the robots that go together, with what names them."""
+    for robot in robots:
+        for key, cell in run.table(f"results/{kind}/{robot}.parquet").groupby([*by], sort=False, observed=True):
+            yield {"robot": robot} | dict(zip(by, key, strict=True)), cell
 
 
-def table2(run: Audited) -> pd.DataFrame:
-    """Deflections before calibration, from results/initial and results/weights."""
-    rows = []
+def _cells(run: Audited, robots: list[str]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Every robot and strategy: names of the robot and of the strategy's file, and the row's head."""
+    for key, document in run.strategies.items():
+        yield from ((robot, key, {"strategy": document["name"], "robot": robot}) for robot in robots)
+
+
+def _at(run: Audited, robot: str, key: str) -> Any:
+    """Metrics at the length of the tables."""
+    return run.cell("metrics", robot, key).set_index("length").loc[run.configuration["tables"]["length"]]
+
+
+def _with_error(head: str, at: Any, name: str, factor: float) -> dict[str, float]:
+    """A figure with its standard error in another unit."""
+    return {f"{head}{end}": factor * at[f"{name}{end}"] for end in ("", "_std_error")}
+
+
+def _single_sets(frame: pd.DataFrame) -> pd.DataFrame:
+    """Deflections of single data sets, mm."""
+    spread = (frame["mean_square"] - frame["mean"] ** 2) ** 0.5
+    return 1e3 * pd.DataFrame({"mean_mm": frame["mean"], "std_mm": spread, "max_mm": frame["maximum"]})
+
+
+def _root_mean(squares: pd.Series, head: str = "rms_um", error: str = "rms_um_std_error") -> dict[str, float]:
+    """Root of a mean and its standard error by the delta method, µm."""
+    root = np.sqrt(squares.mean())
+    return {head: 1e6 * root, error: 1e6 * stats.sem(squares) / (2 * root)}
+
+
+def _ratio(ours: pd.Series, theirs: pd.Series) -> dict[str, float]:
+    """Ratio of two roots of means of pairs, with its 95 % interval on the logarithm."""
+    error = _QUANTILE * stats.sem(ours / ours.mean() - theirs / theirs.mean()) / 2
+    ratio = np.sqrt(ours.mean() / theirs.mean())
+    return {"ratio": ratio, "ratio_low": ratio * np.exp(-error), "ratio_high": ratio * np.exp(error)}
+
+
+def table1(run: Audited) -> _Rows:
+    for robot in run.reduced:
+        yield {"robot": robot} | {f"c{j}": c for j, c in enumerate(run.robots[robot]["compliance_urad_per_Nm"], 1)}
+
+
+def table2(run: Audited) -> _Rows:
     for robot in run.configuration["robots"]:
-        frame, weights = run.table(f"results/initial/{robot}.parquet"), run.table(f"results/weights/{robot}.parquet")
-        counts = weights[weights["members"] == "data sets"].pivot(index="replicate", columns="number", values="count")
+        frame, weights = run.table(f"results/initial/{robot}.parquet"), weights_of(run, robot)[0]
         # Data sets are of one size: weights are those of their configurations.
-        drawn = np.array(
-            [[np.average(frame[name], weights=each) for name in ("mean", "mean_square")] for each in counts.to_numpy()]
-        )
-        mean, square = frame["mean"].mean(), frame["mean_square"].mean()
-        single: dict[str, pd.Series] = {
-            "mean": frame["mean"],
-            "std": (frame["mean_square"] - frame["mean"] ** 2) ** 0.5,
-            "max": frame["maximum"],
-        }
-        row: dict[str, Any] = {
+        means, single = 1e3 * frame["mean"].to_numpy(), _single_sets(frame)
+        drawn = [weights @ values / weights.sum(axis=1) for values in (means, 1e6 * frame["mean_square"].to_numpy())]
+        row = {
             "robot": robot,
-            "mean_mm": mean,
-            "std_mm": np.sqrt(square - mean**2),
-            "max_mm": frame["maximum"].max(),
+            "mean_mm": means.mean(),
+            "std_mm": np.sqrt(1e6 * frame["mean_square"].mean() - means.mean() ** 2),
         }
-        row["mean_mm_std_error"] = drawn[:, 0].std(ddof=1)
-        row["std_mm_std_error"] = np.sqrt(drawn[:, 1] - drawn[:, 0] ** 2).std(ddof=1)
-        for name, values in single.items():
-            row |= {f"{name}_mm_one_set": values.mean(), f"{name}_mm_one_set_std": values.std(ddof=1)}
-        rows.append({name: value if name == "robot" else 1e3 * value for name, value in row.items()})
-    return pd.DataFrame(rows)
+        row |= {"max_mm": single["max_mm"].max(), "mean_mm_std_error": drawn[0].std(ddof=1)}
+        row["std_mm_std_error"] = np.sqrt(drawn[1] - drawn[0] ** 2).std(ddof=1)
+        yield row | dict(single.mean().add_suffix("_one_set")) | dict(single.std().add_suffix("_one_set_std"))
 
 
-def table3(run: Audited) -> pd.DataFrame:
-    """Compliances by the classical strategy, from results/metrics."""
-    tables, rows = run.configuration["tables"], []
+def table3(run: Audited) -> _Rows:
     for robot in run.reduced:
-        frame = run.cell("metrics", robot, tables["classical_strategy"]).set_index("length")
-        at, row = frame.loc[tables["length"]], {"robot": robot}
-        for j in range(1, run.arm(robot).joints + 1):
-            row |= {f"c{j}": 1e6 * at[f"compliance_{j}"], f"c{j}_std_error": 1e6 * at[f"compliance_{j}_std_error"]}
-        rows.append(row)
-    return pd.DataFrame(rows)
+        at = _at(run, robot, run.configuration["tables"]["classical_strategy"])
+        figures = (_with_error(f"c{j}", at, f"compliance_{j}", 1e6) for j in range(1, run.arm(robot).joints + 1))
+        yield {"robot": robot} | {name: value for each in figures for name, value in each.items()}
 
 
-def table4(run: Audited) -> pd.DataFrame:
-    """Strategies side by side, from results/metrics and results/replicates."""
-    tables, rows = run.configuration["tables"], []
-    length = tables["length"]
-    for key, strategy in run.strategies.items():
-        for robot in run.reduced:
-            frame = run.cell("metrics", robot, key)
-            at = frame.set_index("length").loc[length]
-            drawn = run.cell("replicates", robot, key)
-            row: dict[str, Any] = {"strategy": strategy["name"], "robot": robot}
-            for suffix in ("", "_fixed_joints"):
-                name, limit = f"k_sigma{suffix}", tables["k_sigma_limit_percent"]
-                row[f"k_sigma_{length}_percent{suffix}"] = at[name]
-                row[f"k_sigma_{length}_percent{suffix}_std_error"] = at[f"{name}_std_error"]
-                reached = f"n_k_sigma_{limit:g}_percent{suffix}"
-                row[reached], row[f"{reached}_std_error"] = _reached(frame, drawn, name, limit)
-            row |= {f"dev_{length}_um": 1e6 * at["deviation"], f"dev_{length}_um_std_error": 1e6 * at["deviation_std_error"]}
-            limit = tables["deviation_limit_um"]
-            reached = f"n_dev_{limit:g}_um"
-            row[reached], row[f"{reached}_std_error"] = _reached(frame, drawn, "deviation", 1e-6 * limit)
-            rows.append(row)
-    return pd.DataFrame(rows)
+def table4(run: Audited) -> _Rows:
+    tables = run.configuration["tables"]
+    length, percent, microns = (tables[name] for name in ("length", "k_sigma_limit_percent", "deviation_limit_um"))
+    # Score, factor to its unit, columns of its value and of the length at which it reaches a limit.
+    columns = [("deviation", 1e6, f"dev_{length}_um", f"n_dev_{microns:g}_um", microns)]
+    for end in ("", "_fixed_joints"):
+        reached = f"n_k_sigma_{percent:g}_percent{end}"
+        columns.append((f"k_sigma{end}", 1.0, f"k_sigma_{length}_percent{end}", reached, percent))
+    for robot, key, row in _cells(run, run.reduced):
+        frame, drawn = (run.cell(kind, robot, key).sort_values("length") for kind in ("metrics", "replicates"))
+        for name, factor, value, reached, limit in columns:
+            row |= _with_error(value, _at(run, robot, key), name, factor)
+            first = reach(frame[name], limit / factor)
+            lengths = [reach(curve, limit / factor) for _, curve in drawn.groupby("replicate")[name]]
+            row |= {reached: first if first <= len(frame) else np.inf, f"{reached}_std_error": np.std(lengths, ddof=1)}
+        yield row
 
 
-def _reached(frame: pd.DataFrame, drawn: pd.DataFrame, name: str, limit: float) -> tuple[float, float]:
-    """First length at which a score is at most its limit, and its standard error over replicates, continued as 1 / length."""
-
-    def first(values: np.ndarray) -> float:
-        below = np.flatnonzero(np.abs(values) <= limit)
-        return float(below[0] + 1) if len(below) else np.inf
-
-    lengths = []
-    for _, some in drawn.groupby("replicate"):
-        values = some.sort_values("length")[name].to_numpy()
-        reached = first(values)
-        lengths.append(reached if np.isfinite(reached) else len(values) * max(abs(values[-1]) / limit, 1.0))
-    return first(frame.sort_values("length")[name].to_numpy()), float(np.std(lengths, ddof=1))
+def reach(curve: pd.Series, limit: float) -> float:
+    """First length from 1 at which a score is at most its limit; past the last one it is continued as 1 over the length."""
+    below = np.flatnonzero(curve.abs() <= limit)
+    return float(below[0] + 1) if len(below) else len(curve) * max(abs(curve.iloc[-1]) / limit, 1.0)
 
 
-def extended_table(run: Audited) -> pd.DataFrame:
-    """What the reduced model leaves, from results/metrics and results/replicates."""
-    rows, length = [], run.configuration["tables"]["length"]
-    for robot in run.extended:
-        for key, strategy in run.strategies.items():
-            at = run.cell("metrics", robot, key).set_index("length").loc[length]
-            drawn = run.cell("replicates", robot, key)
-            drawn = drawn[drawn["length"] == length]
-            rows.append(
-                {
-                    "strategy": strategy["name"],
-                    "robot": robot,
-                    "initial_mean_mm": 1e3 * at["initial_deviation"],
-                    "initial_mean_mm_std_error": 1e3 * at["initial_deviation_std_error"],
-                    "residual_mean_um": 1e6 * at["deviation"],
-                    "residual_mean_um_std_error": 1e6 * at["deviation_std_error"],
-                    "share_compensated_percent": 100 * (1 - at["deviation"] / at["initial_deviation"]),
-                    "share_compensated_percent_std_error": (100 * (1 - drawn["deviation"] / drawn["initial_deviation"])).std(
-                        ddof=1
-                    ),
-                }
-            )
-    return pd.DataFrame(rows)
-
-
-def per_dataset(run: Audited) -> pd.DataFrame:
-    """Accuracy of one data set beside its bound, from results/accuracy and results/bounds."""
-    rows = []
-    for robot in run.configuration["robots"]:
-        bounds = run.table(f"results/bounds/{robot}.parquet").set_index(["points", "length"])["rms_per_noise"]
-        for noise_um in run.configuration["noise_um"]:
-            for key, strategy in run.strategies.items():
-                points = "+".join(sorted(points_of(strategy)))
-                for _, at in run.cell("accuracy", robot, key, noise_um).iterrows():
-                    row = {"strategy": strategy["name"], "robot": robot, "noise_um": float(noise_um), "ds": at["length"]}
-                    row |= {f"{name}_um": 1e6 * at[name] for name in ("mean", "rms", "p95", "max")}
-                    row |= {f"{name}_um_std_error": 1e6 * at[f"{name}_std_error"] for name in ("mean", "rms", "p95", "max")}
-                    row["crlb_rms_um"] = bounds[points, int(at["length"])] * noise_um
-                    row["efficiency"] = (row["crlb_rms_um"] / row["rms_um"]) ** 2 if noise_um else np.nan
-                    row["efficiency_std_error"] = 2 * row["efficiency"] * row["rms_um_std_error"] / row["rms_um"]
-                    for j in range(1, run.arm(robot).joints + 1):
-                        for error in ("", "_std_error"):
-                            row[f"relative_error_{j}_percent{error}"] = at[f"relative_error_{j}{error}"]
-                    rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def solvers(run: Audited) -> pd.DataFrame:
-    """How far the solvers lie apart, from results/solvers."""
-    rows: list[dict[str, Any]] = []
-    stated = _keyed(run.table("reports/tables/solvers.csv"), ("robot", "strategy"))["closest_strategy"].to_dict()
-    for robot in run.reduced:
-        frame = run.table(f"results/solvers/{robot}.parquet").sort_values("data_set")
-        names = list(dict.fromkeys(frame["strategy"]))
-        linear, exact = (
-            {name: frame[frame["strategy"] == name].filter(like=solver).to_numpy() for name in names}
-            for solver in ("equation_11", "gauss_newton")
+def extended(run: Audited) -> _Rows:
+    length, share = run.configuration["tables"]["length"], "share_compensated_percent"
+    for robot, key, head in _cells(run, run.extended):
+        at, drawn = _at(run, robot, key), run.cell("replicates", robot, key).groupby("length").get_group(length)
+        stated, again = (100 * (1 - each["deviation"] / each["initial_deviation"]) for each in (at, drawn))
+        row = (
+            head
+            | {share: stated, f"{share}_std_error": np.std(again, ddof=1)}
+            | _with_error("residual_mean_um", at, "deviation", 1e6)
         )
-        for name in names:
-            row: dict[str, Any] = {"robot": robot, "strategy": name, "between_solvers": _apart(linear[name], exact[name])}
-            apart = pd.Series({other: _apart(exact[name], exact[other]) for other in names if other != name})
-            row["closest_strategy"] = closest = _closest(stated.get(f"{robot}|{name}"), apart) if len(apart) else name
-            row |= {"gauss_newton_difference": _apart(exact[name], exact[closest])}
-            rows.append(row | {"equation_11_difference": _apart(linear[name], linear[closest])})
-    return pd.DataFrame(rows)
+        yield row | _with_error("initial_mean_mm", at, "initial_deviation", 1e3)
 
 
-def budget(run: Audited) -> pd.DataFrame:
-    """Sets of points, from results/budget."""
-    rows, length = [], run.configuration["tables"]["length"]
+def per_dataset(run: Audited) -> _Rows:
+    for robot, key, head in _cells(run, run.configuration["robots"]):
+        bounds = run.table(f"results/bounds/{robot}.parquet").set_index(["points", "length"])["rms_per_noise"]
+        points = "+".join(sorted(points_of(run.strategies[key])))
+        for noise in run.configuration["noise_um"]:
+            for at in run.cell("accuracy", robot, key, noise).to_dict("records"):
+                row = head | {"noise_um": float(noise), "ds": at["length"], "crlb_rms_um": bounds[points, at["length"]] * noise}
+                for name in ("mean", "rms", "p95", "max"):
+                    row |= _with_error(f"{name}_um", at, name, 1e6)
+                row["efficiency"] = (row["crlb_rms_um"] / row["rms_um"]) ** 2 if noise else np.nan
+                row["efficiency_std_error"] = 2 * row["efficiency"] * row["rms_um_std_error"] / row["rms_um"]
+                for j in range(1, run.arm(robot).joints + 1):
+                    row |= _with_error(f"relative_error_{j}_percent", at, f"relative_error_{j}", 1.0)
+                yield row
+
+
+def budget(run: Audited) -> _Rows:
+    length, sets = run.configuration["tables"]["length"], run.configuration["questions"]["point_sets"]
+    for head, at in _groups(run, run.reduced, "budget", "points", "length"):
+        count = len(sets[head["points"]])
+        row = head | {"configurations": head["length"], "measurements_per_configuration": count}
+        row |= {"crlb_rms_um": 1e6 * np.sqrt(at["bound"].mean())} | _root_mean(at["mean_square"], error="std_error_um")
+        if head["length"] in (length, 2 * length // count):
+            yield row
+
+
+def ladder(run: Audited) -> _Rows:
+    for head, cell in _groups(run, run.extended, "ladder", "noise", "length"):
+        head |= {"noise_um": round(1e6 * head["noise"], 6)}
+        for springs, some in cell.groupby("link_springs"):
+            row = head | {"link_springs": str(springs), "chosen_percent": 100 * some["chosen"].mean()}
+            yield row | {"usual_link": some["added_link"].mode()[0] if springs else np.nan} | _root_mean(some["mean_square"])
+        row = head | {"link_springs": "by cross-validation", "usual_link": np.nan, "chosen_percent": np.nan}
+        yield row | _root_mean(cell["mean_square"][cell["chosen"]])
+
+
+def designs(run: Audited) -> _Rows:
+    for head, at in _groups(run, run.reduced, "designs", "joint_range", "design", "configurations"):
+        yield head | {f"{name}_um": 1e6 * at[name].iloc[0] for name in ("rms", "low", "high")}
+
+
+def observability(run: Audited) -> _Rows:
     for robot in run.reduced:
-        frame = run.table(f"results/budget/{robot}.parquet")
-        for points, names in run.configuration["questions"]["point_sets"].items():
-            for count in sorted({length, 2 * length // len(names)}):
-                at = frame[(frame["points"] == points) & (frame["length"] == count)]
-                if len(at):
-                    rms, error = _root_mean(at["mean_square"])
-                    row = {
-                        "robot": robot,
-                        "points": points,
-                        "configurations": count,
-                        "measurements_per_configuration": len(names),
-                    }
-                    row |= {"crlb_rms_um": 1e6 * np.sqrt(at["bound"].mean()), "rms_um": 1e6 * rms, "std_error_um": 1e6 * error}
-                    rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def budget_pairs(run: Audited) -> pd.DataFrame:
-    """Sets of points against the first one at as many measurements, from results/budget."""
-    rows, length, sets = [], run.configuration["tables"]["length"], run.configuration["questions"]["point_sets"]
-    first = next(iter(sets))
-    for robot in run.reduced:
-        frame = run.table(f"results/budget/{robot}.parquet").set_index(["points", "length"]).sort_values("data_set")
-        for points, names in sets.items():
-            keys = (points, 2 * length // len(names)), (first, 2 * length // len(sets[first]))
-            if points == first or any(key not in frame.index for key in keys):
-                continue
-            ours, theirs = (frame.loc[[key]]["mean_square"].to_numpy() for key in keys)
-            roots = [np.sqrt(each.mean()) for each in (ours, theirs)]
-            row: dict[str, Any] = {"robot": robot, "points": points, "against": first}
-            row |= {"measurements": keys[0][1] * len(names)}
-            row |= {"configurations": keys[0][1], "configurations_against": keys[1][1]}
-            row["difference_um"] = 1e6 * (roots[0] - roots[1])
-            row["difference_um_std_error"] = 1e6 * stats.sem(ours / (2 * roots[0]) - theirs / (2 * roots[1]))
-            rows.append(row | dict(zip(("ratio", "ratio_low", "ratio_high"), _ratio(ours, theirs), strict=True)))
-    return pd.DataFrame(rows) if rows else pd.DataFrame(columns=["robot", "points"])
-
-
-def configurations_needed(run: Audited) -> pd.DataFrame:
-    """How many configurations reach an accuracy for good, from results/budget."""
-    rows, questions = [], run.configuration["questions"]
-    for robot in run.reduced:
-        frame = run.table(f"results/budget/{robot}.parquet")
-        for points, names in questions["point_sets"].items():
-            mine = frame[frame["points"] == points]
-            if mine.empty:
-                continue
-            # A length at which some data set determines nothing reaches no accuracy.
-            by_length = mine.groupby("length")
-            rms = by_length["mean_square"].agg(lambda some: np.sqrt(some.mean(skipna=False)))
-            error = by_length["mean_square"].agg(lambda some: some.sem(skipna=False)) / (2 * rms)
-            bound = np.sqrt(by_length["bound"].mean())
-            curves = {"": rms, "_low": rms - _QUANTILE * error, "_high": rms + _QUANTILE * error, "_by_bound": bound}
-            for accuracy in questions["accuracies_um"]:
-                row = {"robot": robot, "points": points, "accuracy_um": accuracy}
-                row |= {f"configurations{name}": _for_good(1e6 * curve, accuracy) for name, curve in curves.items()}
-                rows.append(row | {"measurements": row["configurations"] * len(names)})
-    return pd.DataFrame(rows)
-
-
-def _for_good(curve: pd.Series, limit: float) -> float:
-    """Length from which on a curve stays at its limit or below."""
-    missed = curve.index[~(curve <= limit)]
-    needed = float(missed[-1] + 1) if len(missed) else float(curve.index[0])
-    return needed if needed <= curve.index[-1] else np.inf
-
-
-def ladder(run: Audited) -> pd.DataFrame:
-    """Errors by number of link springs, from results/ladder."""
-    rows = []
-    for robot in run.extended:
-        frame = run.table(f"results/ladder/{robot}.parquet")
-        for (noise, length), cell in frame.groupby(["noise", "length"]):
-            parts = {str(springs): some for springs, some in cell.groupby("link_springs")}
-            for springs, some in (parts | {"by cross-validation": cell[cell["chosen"]]}).items():
-                rms, error = _root_mean(some["mean_square"])
-                row = {"robot": robot, "noise_um": round(1e6 * float(str(noise)), 6), "length": length, "link_springs": springs}
-                row |= {"rms_um": 1e6 * rms, "rms_um_std_error": 1e6 * error}
-                counted = some["added_link"].value_counts().sort_index()
-                row["usual_link"] = counted.idxmax() if springs.isdigit() and springs != "0" else np.nan
-                rows.append(row | {"chosen_percent": 100 * some["chosen"].mean() if springs.isdigit() else np.nan})
-    return pd.DataFrame(rows)
-
-
-def designs(run: Audited) -> pd.DataFrame:
-    """Designs, from results/designs."""
-    parts = []
-    for robot in run.reduced:
-        frame = run.table(f"results/designs/{robot}.parquet").copy()
-        for name in ("rms", "low", "high"):
-            frame[f"{name}_um"] = 1e6 * frame.pop(name)
-        parts.append(frame.assign(robot=robot))
-    return pd.concat(parts)
-
-
-def observability(run: Audited) -> pd.DataFrame:
-    """Rank correlations, from results/observability, by pandas."""
-    rows = []
-    for robot in run.reduced:
-        frame = run.table(f"results/observability/{robot}.parquet")
-        ranked, sets = frame.corr("spearman"), len(frame)
+        ranked: Any = run.table(f"results/observability/{robot}.parquet").corr("spearman")
         for index in ("O1", "O2", "O3", "O4", "O5", "bound"):
             row: dict[str, Any] = {"robot": robot, "index": index}
             for name, column in (("bound", "bound"), ("error", "mean_square")):
-                row[f"rank_correlation_with_{name}"] = found = float(ranked[column].to_dict()[index])
-                row[f"rank_correlation_with_{name}_std_error"] = (1 - found**2) / np.sqrt(sets - 1)
-            rows.append(row)
-    return pd.DataFrame(rows)
+                row[f"rank_correlation_with_{name}"] = found = ranked.loc[index, column]
+                error = (1 - found**2) / np.sqrt(run.configuration["data_sets"] - 1)
+                row[f"rank_correlation_with_{name}_std_error"] = error
+            yield row
 
 
-def places(run: Audited) -> pd.DataFrame:
-    """A second target at each place, from results/places."""
-    rows = []
-    for robot in run.reduced:
-        for key, cell in run.table(f"results/places/{robot}.parquet").groupby(["joints", "along", "side"], sort=False):
-            row = {"robot": robot} | dict(zip(("joints", "along_m", "side"), key, strict=True))
-            pair = cell["bound"].to_numpy(), cell["bound_end_effector"].to_numpy()
-            row |= dict(zip(("ratio", "ratio_low", "ratio_high"), _ratio(*pair), strict=True))
-            rows.append(row | {f"seen_{name}_percent": 100 * cell[name].mean() for name in ("turned", "fixed")})
-    return pd.DataFrame(rows)
+def places(run: Audited) -> _Rows:
+    for head, cell in _groups(run, run.reduced, "places", "joints", "along", "side"):
+        row = head | {"along_m": head["along"]} | _ratio(cell["bound"], cell["bound_end_effector"])
+        yield row | {f"seen_{name}_percent": 100 * cell[name].mean() for name in ("turned", "fixed")}
 
 
-def geometry(run: Audited) -> pd.DataFrame:
-    """Geometry and compliances, from results/geometry."""
-    parts = []
-    for robot in run.reduced:
-        frame = run.table(f"results/geometry/{robot}.parquet")
-        part = frame.rename(columns={f"compliance_{name}": f"compliance_{name}_percent" for name in ("noise", "leak")})
-        part = part.assign(robot=robot, rms_um=1e6 * np.sqrt(frame["noise"] ** 2 + frame["leak"] ** 2))
+def geometry(run: Audited) -> _Rows:
+    for head, cell in _groups(run, run.reduced, "geometry", "estimator"):
+        at = cell.iloc[0]
+        row = head | {"rms_um": 1e6 * np.hypot(at["noise"], at["leak"])}
         for name in ("noise", "leak"):
-            part[f"{name}_um"], part[f"zero_{name}_urad"] = 1e6 * frame[name], 1e6 * frame[f"zero_{name}"]
-        parts.append(part)
-    return pd.concat(parts)
+            row |= {f"{name}_um": 1e6 * at[name], f"zero_{name}_urad": 1e6 * at[f"zero_{name}"]}
+            row[f"compliance_{name}_percent"] = at[f"compliance_{name}"]
+        yield row
 
 
-def weighting(run: Audited) -> pd.DataFrame:
-    """What equal weights cost, from results/weighting."""
-    parts = []
+def weighting(run: Audited) -> _Rows:
+    for head, _ in _groups(run, run.reduced, "weighting", "orientation_ratio", "per_metre", "equal", "weighted"):
+        row = head | {"ratio": head["equal"] / head["weighted"]}
+        yield row | {f"{name}_um": 1e6 * head[name] for name in ("per_metre", "equal", "weighted")}
+
+
+def tubes(run: Audited) -> _Rows:
+    for head, cell in _groups(run, run.extended, "tubes", "diameter"):
+        single = _single_sets(cell)
+        row = head | {"diameter_mm": 1e3 * head["diameter"]} | _root_mean(cell["left"], "left_um", "left_um_std_error")
+        yield row | dict(single.mean()) | dict(single.std().add_suffix("_between"))
+
+
+# Metrics by the file, its column, by which power of the mean of the column, and the factor to their units.
+_METRICS = {
+    **{f"{name}_um": ("uses", name, 1.0, 1e6) for name in ("mean", "p95", "iso_9283", "path_max", "pooled_p95")},
+    **{f"{head}_um": ("uses", name, 0.5, 1e6) for head, name in (("rms", "mean_square"), ("path_rms", "path_mean_square"))},
+    **{f"k_sigma_percent{end}": ("metrics", f"k_sigma{end}", 1.0, 1.0) for end in ("", "_fixed_joints")},
+    "dev_um": ("metrics", "deviation", 1.0, 1e6),
+}
+
+
+def strategy_scores(run: Audited) -> _Rows:
+    classical = run.strategies[run.configuration["tables"]["classical_strategy"]]["name"]
     for robot in run.reduced:
-        frame = run.table(f"results/weighting/{robot}.parquet")
-        scaled = {f"{name}_um": 1e6 * frame[name] for name in ("per_metre", "equal", "weighted")}
-        parts.append(frame[["orientation_ratio"]].assign(robot=robot, ratio=frame["equal"] / frame["weighted"], **scaled))
-    return pd.concat(parts)
+        uses = run.table(f"results/uses/{robot}.parquet").groupby("strategy")
+        metrics = pd.DataFrame({name: _at(run, robot, key) for name, key in run.keys.items()}).T
+        for metric, (file, column, power, factor) in _METRICS.items():
+            means = uses[column].agg(lambda some: some.mean(skipna=False)) if file == "uses" else metrics[column]
+            values = factor * means.astype(float) ** power
+            # Strategies that are one estimator agree to six digits, and share a rank.
+            ranks: Any = values.abs().map("{:.6g}".format).astype(float).rank(method="min")
+            for name, value in values.dropna().items():
+                row = {"robot": robot, "metric": metric, "strategy": name, "value": value, "rank": ranks[name]}
+                yield row | {"ratio": value / values[classical]}
 
 
-def tubes(run: Audited) -> pd.DataFrame:
-    """Other diameters, from results/tubes."""
-    rows = []
-    for robot in run.extended:
-        for diameter, cell in run.table(f"results/tubes/{robot}.parquet").groupby("diameter", sort=False):
-            single: dict[str, pd.Series] = {
-                "mean": cell["mean"],
-                "std": (cell["mean_square"] - cell["mean"] ** 2) ** 0.5,
-                "max": cell["maximum"],
-            }
-            row: dict[str, Any] = {"robot": robot, "diameter_mm": 1e3 * float(str(diameter))}
-            for name, values in single.items():
-                row |= {f"{name}_mm": 1e3 * values.mean(), f"{name}_mm_between": 1e3 * values.std(ddof=1)}
-            left, error = _root_mean(cell["left"])
-            rows.append(row | {"left_um": 1e6 * left, "left_um_std_error": 1e6 * error})
-    return pd.DataFrame(rows)
+def strategy_pairs(run: Audited) -> _Rows:
+    keys = ["robot", "metric", "strategy", "other"]
+    stated = run.table("reports/tables/strategy_pairs.csv").set_index(keys).to_dict("index")
+    scores = run.table("reports/tables/strategy_scores.csv").set_index(["robot", "metric", "strategy"])["value"]
+    for robot, metric in dict.fromkeys(zip(*(scores.index.get_level_values(name) for name in keys[:2]), strict=True)):
+        names = scores[robot, "rms_um"].map("{:.6g}".format).drop_duplicates().index
+        for pair in combinations(names, 2):
+            row = defaultdict(lambda: 1.0, stated.get((robot, metric, *pair), {}))
+            apart = row["ratio_low"] > 1 and row["rms_ratio_high"] < 1, row["ratio_high"] < 1 and row["rms_ratio_low"] > 1
+            again = dict(zip(keys, (robot, metric, *pair), strict=True)) | {"reversed": any(apart)}
+            for head, by in (("ratio", metric), ("rms_ratio", "rms_um")):
+                ratio = scores[robot, by, pair[0]] / scores[robot, by, pair[1]]
+                # Intervals are symmetric in the logarithm.
+                again |= {head: ratio, f"{head}_high": ratio**2 / row[f"{head}_low"]}
+            yield again
 
 
-def _closest(stated: str | None, apart: pd.Series) -> str:
-    """The closest strategy; of several that are one estimator, to rounding, the one that is stated."""
-    return str(stated if stated is not None and stated in apart and apart[stated] <= apart.min() + ROUNDING else apart.idxmin())
+def find_p_value(mean: float, std: float, count: int, printed: float, digit: float) -> float:
+    """Two-sided p value of one more study at a figure that is printed to a digit, by the incomplete beta function.
+
+    Studies of one size lie about their mean by Student's distribution; rounding adds the variance of a uniform distribution.
+    """
+    square = (printed - mean) ** 2 / (std**2 * (count + 1) / count + digit**2 / 12)
+    return float(special.betainc((count - 1) / 2, 0.5, (count - 1) / (count - 1 + square)))
 
 
-def _apart(values: np.ndarray, others: np.ndarray) -> float:
-    """Largest relative difference."""
-    return float(np.max(np.abs(values - others) / np.abs(others)))
+def comparison(run: Audited) -> _Rows:
+    stated = run.table("reports/tables/comparison.csv")
+    printed = pd.read_csv(run.folder / _REFERENCE, dtype={"table": str}, keep_default_na=False)
+    p_values, corrected = stated["p_value"].dropna(), pd.Series(np.nan, stated.index)
+    corrected[p_values.index] = multipletests(p_values, method="holm")[1]
+    names = ["table", "robot", "strategy", "quantity"]
+    ours = stated.assign(p_holm=corrected).fillna(dict.fromkeys(names, "")).set_index(names).to_dict("index")
+    for row in printed.assign(paper=printed["value"].astype(float)).drop(columns="value").to_dict("records"):
+        mine, row["p_value"] = ours.get(tuple(row[name] for name in names), {}), pd.NA
+        row["ours"], row["mc_std"] = _ours(run, row)
+        known = mine and mine["mc_std"] > 0 and np.isfinite(mine["ours"])
+        row["z"] = (mine["ours"] - row["paper"]) / mine["mc_std"] if known else np.nan
+        if mine and row["table"] in ("3", "4") and row["robot"] in run.reduced and not row["quantity"].startswith("n_"):
+            count = run.table(f"results/studies/as_configured/{row['robot']}.parquet")["study"].nunique()
+            figures = mine["studies_mean"], mine["studies_std"]
+            row["p_value"] = find_p_value(*figures, count, row["paper"], _DIGIT) if count > 1 else np.nan
+        yield row | {"p_holm": mine.get("p_holm")}
 
 
-def _root_mean(squares: pd.Series) -> tuple[float, float]:
-    """Root of a mean and its standard error by the delta method."""
-    values = squares.to_numpy(float)
-    root = float(np.sqrt(values.mean()))
-    return root, float(stats.sem(values) / (2 * root))
+def _ours(run: Audited, row: Mapping[Any, Any]) -> tuple[Any, Any]:
+    """Our value of a printed figure and its Monte Carlo error from our table; NA of figures of the text."""
+    number, column = row["table"], row["quantity"]
+    if number == "text":
+        return pd.NA, pd.NA
+    column = {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}.get(column, re.sub("deviation_(.*)", r"\1_mm", column))
+    column += "_fixed_joints" * ("k_sigma" in column)
+    table, names = run.table(f"reports/tables/table{number}.csv"), ["robot", "strategy"] if number == "4" else ["robot"]
+    rows = table[(table[names] == [row[name] for name in names]).all(axis=1)]
+    if rows.empty or column not in rows:
+        return np.nan, 0.0 if number == "1" else np.nan
+    # Inputs have no error, nor has a maximum.
+    return rows[column].iloc[0], rows.get(f"{column}_std_error", pd.Series([0.0])).iloc[0]
 
 
-def _ratio(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float, float]:
-    """Ratio of two roots of means of pairs, with its 95 % interval on the logarithm."""
-    ratio = float(np.sqrt(ours.mean() / theirs.mean()))
-    error = _QUANTILE * float(stats.sem(ours / ours.mean() - theirs / theirs.mean())) / 2
-    return ratio, ratio * np.exp(-error), ratio * np.exp(error)
+def expectations(run: Audited) -> _Rows:
+    length = run.configuration["tables"]["length"]
+    stated = run.table("reports/tables/expectations.csv").set_index(["robot", "strategy", "quantity"]).to_dict("index")
+    columns = {f"k_sigma_{length}_percent{end}": (f"k_sigma{end}", 1.0) for end in ("", "_fixed_joints")}
+    columns[f"dev_{length}_um"] = ("deviation", 1e6)
+    for robot, key, head in _cells(run, run.reduced):
+        closed = run.cell("expected", robot, key).set_index("length").loc[length]
+        for quantity, (column, factor) in columns.items():
+            row = stated.get((robot, head["strategy"], quantity), {"studies": 0, "paper": np.nan})
+            mean, std, count, paper = (row.get(name, np.nan) for name in ("studies_mean", "studies_std", "studies", "paper"))
+            p_value = find_p_value(mean, std, count, paper, _DIGIT) if count > 1 and np.isfinite(paper) else np.nan
+            yield head | {"quantity": quantity, "expected": factor * closed[column], "p_value": p_value}
 
 
-# By the name of the table: what makes it again, and the columns that name a row.
-TABLES: Mapping[str, tuple[Any, tuple[str, ...]]] = {
-    "table1": (table1, ("robot",)),
-    "table2": (table2, ("robot",)),
-    "table3": (table3, ("robot",)),
-    "table4": (table4, ("strategy", "robot")),
-    "extended": (extended_table, ("strategy", "robot")),
+# What makes each table again, and the columns that name a row.
+TABLES: Mapping[str, tuple[Callable[[Audited], _Rows], tuple[str, ...]]] = {
+    **{name: (make, ("robot",)) for name, make in (("table1", table1), ("table2", table2), ("table3", table3))},
+    **{name: (make, ("strategy", "robot")) for name, make in (("table4", table4), ("extended", extended))},
     "per_dataset": (per_dataset, ("strategy", "robot", "noise_um", "ds")),
-    "solvers": (solvers, ("robot", "strategy")),
     "budget": (budget, ("robot", "points", "configurations")),
-    "budget_pairs": (budget_pairs, ("robot", "points")),
-    "configurations_needed": (configurations_needed, ("robot", "points", "accuracy_um")),
     "ladder": (ladder, ("robot", "noise_um", "length", "link_springs")),
     "designs": (designs, ("robot", "joint_range", "design", "configurations")),
     "observability": (observability, ("robot", "index")),
@@ -394,97 +334,53 @@ TABLES: Mapping[str, tuple[Any, tuple[str, ...]]] = {
     "geometry": (geometry, ("robot", "estimator")),
     "weighting": (weighting, ("robot", "orientation_ratio", "per_metre_um")),
     "tubes": (tubes, ("robot", "diameter_mm")),
-    "strategy_scores": (rankings.strategy_scores, ("robot", "metric", "strategy")),
-    "strategy_pairs": (rankings.strategy_pairs, ("robot", "metric", "strategy", "other")),
-    "comparison": (paper_figures.comparison, ("table", "robot", "strategy", "quantity")),
-    "expectations": (paper_figures.expectations, ("robot", "strategy", "quantity")),
+    "strategy_scores": (strategy_scores, ("robot", "metric", "strategy")),
+    "strategy_pairs": (strategy_pairs, ("robot", "metric", "strategy", "other")),
+    "comparison": (comparison, ("table", "robot", "strategy", "quantity")),
+    "expectations": (expectations, ("robot", "strategy", "quantity")),
 }
 
-
-def table(run: Audited, file: str, name: str) -> list[Finding]:
-    """Every cell of a table that follows from files."""
-    if name not in TABLES:
-        return []
-    make, keys = TABLES[name]
-    stored, again = run.table(file), make(run)
-    # Names of rows as texts, numbers with the digits of the file.
-    left, right = (_keyed(frame, keys) for frame in (stored, again))
-    odd = sorted(set(right.index) ^ set(left.index))[:1]
-    twice = left.index[left.index.duplicated()].tolist()[:1]
-    note = f"row {(odd + twice)[0]} is {'there twice' if not odd else 'in only one of both'}" if odd or twice else ""
-    found = [held(file, "rows", "pandas", not note, note, len(right))]
-    if note:
-        return found
-    left = left.loc[right.index]
-    columns = [column for column in left.columns if column in right.columns and column not in keys]
-    for column in columns:
-        if pd.api.types.is_numeric_dtype(right[column]) and not pd.api.types.is_bool_dtype(right[column]):
-            one = compared(file, f"column {column}", "pandas", left[column], right[column], _NINE_DIGITS, _ZERO, right[column])
-        else:
-            texts = (frame[column].fillna("").astype(str) for frame in (left, right))
-            off = [
-                f"{name}: {here!r}, expected {there!r}"
-                for name, here, there in zip(right.index, *texts, strict=True)
-                if here != there
-            ]
-            one = held(file, f"column {column}", "pandas", not off, ", ".join(off[:1]), len(right))
-        found.append(one)
-    followed = len(right) * len(columns)
-    rest = [column for column in stored.columns if column not in (*columns, *keys)] if len(stored) else []
-    words = f"{followed} of {len(stored) * (len(columns) + len(rest))} cells followed" + (
-        f"; not {', '.join(rest)}" if rest else ""
-    )
-    return [*found, Finding(file, words, "counting", followed, 0.0)]
+_OF_CELLS = (strategy_pairs, comparison, expectations)
 
 
-def printed(run: Audited, file: str, name: str, ending: str) -> list[Finding]:
+def tables(run: Audited, file: str, table: str) -> Iterator[Finding]:
+    """Every cell of a table of the study that follows from files."""
+    if table in TABLES:
+        make, keys = TABLES[table]
+        rows = [*make(run)]
+        again = pd.DataFrame(rows) if rows else pd.DataFrame(columns=[*keys])
+        digits = (_OF_DIGITS, _OF_DIGITS) if make in _OF_CELLS else (NINE_DIGITS, _ZERO)
+        yield from compare_columns(run.table(file), again, keys, "pandas and scipy", *digits)
+
+
+def printed_tables(run: Audited, file: str, number: str) -> Iterator[Finding]:
     """Values of a table for people against those of its CSV, to the digits that are printed."""
-    source = run.table(f"reports/tables/{name}.csv")
+    source = run.table(f"reports/tables/table{number}.csv")
     columns = [column for column in source.columns if not column.endswith("_std_error")]
-    lines = (run.folder / file).read_text("utf-8").splitlines()
-    if ending == "md":
-        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:] if line.startswith("|")]
+    lines, off = (run.folder / file).read_text("utf-8").splitlines(), []
+    if file.endswith("md"):
+        rows = [line.strip("|").split("|") for line in lines[2:] if line.startswith("|")]
     else:
-        rows = [[cell.strip() for cell in line.removesuffix(r"\\").split("&")] for line in lines if line.endswith(r"\\")][1:]
+        rows = [line.removesuffix(r"\\").split("&") for line in lines if line.endswith(r"\\")][1:]
     shown = [row for row in rows if len(row) == len(columns)]
-    if len(shown) != len(source):
-        return [held(file, "rows", "counting", False, f"found {len(shown)}, expected {len(source)}")]
-    off = [
-        f"{column}: {text}"
-        for row, (_, values) in zip(shown, source.iterrows(), strict=True)
-        for column, text in zip(columns, row, strict=True)
-        if not _says(text, values[column])
-    ]
-    checked = f"values as in {name}.csv, to the digits shown"
-    return [held(file, checked, "pandas", not off, ", ".join(off[:3]), len(source) * len(columns))]
+    yield require("rows", "counting", len(shown) == len(source), f"found {len(shown)}, expected {len(source)}", len(source))
+    for row, values in zip(shown, source.to_dict("records"), strict=False):
+        off += [f"{name}: {text}" for name, text in zip(columns, row, strict=True) if not _agrees(text.strip(), values[name])]
+    yield require(f"values as in table{number}.csv, to the digits shown", "pandas", not off, ", ".join(off[:3]), source.size)
 
 
-def _says(text: str, value: str | float) -> bool:
+def _agrees(text: str, value: str | float) -> bool:
     if isinstance(value, str):
-        return re.sub(r"\\", "", text) == value
-    number = float(value)
-    if np.isnan(number) or np.isinf(number):
+        return text.replace("\\", "") == value
+    if not np.isfinite(value):
         return text in ("", "not reached")
     shown = re.split(r"\s*(?:±|\$\\pm\$)\s*", text)[0]
-    decimals = len(shown.partition("e")[0].partition(".")[2])
-    exponent = int(shown.partition("e")[2] or 0)
-    digits = max(10.0 ** (exponent - decimals), 0.0)
-    # Three digits of a number without error.
-    return abs(float(shown) - number) <= 0.5000001 * digits
+    mantissa, _, exponent = shown.partition("e")
+    return abs(float(shown) - value) <= 0.5000001 * 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
 
 
-def _keyed(frame: pd.DataFrame, keys: Iterable[str]) -> pd.DataFrame:
-    names = ["|".join(_text(value) for value in row) for row in frame[list(keys)].itertuples(index=False)]
-    return frame.assign(**{"row": names}).set_index("row")
-
-
-def _text(value: str | float) -> str:
-    if isinstance(value, str):
-        return value
-    return "" if np.isnan(value) else f"{float(value):.6g}"
-
-
-CHECKS = (
-    (re.compile(r"reports/tables/(\w+)\.csv"), table),
-    (re.compile(r"reports/tables/(table\d)\.(md|tex)"), printed),
-)
+CHECKS = {
+    "reports/tables/{table}.csv": tables,
+    "reports/tables/table{number}.md": printed_tables,
+    "reports/tables/table{number}.tex": printed_tables,
+}

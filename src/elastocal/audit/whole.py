@@ -2,63 +2,62 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from elastocal.audit import (
     assumptions,
-    bad_rows,
-    blind_cases,
-    blind_tables,
-    campaign_data,
     campaigns,
     choices,
-    closed_loop,
     data,
     estimates,
     fits,
     held_out,
-    league,
+    proofs,
     questions,
     scores,
     tables,
 )
 from elastocal.audit.files import described, intact
-from elastocal.audit.findings import Finding, held
+from elastocal.audit.findings import Finding, require
 from elastocal.errors import InputError
 from elastocal.io.records import RECORDS, recorded
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable
+    from collections.abc import Callable, Collection, Iterable, Iterator
 
     from elastocal.audit.audited import Audited
 
-_CHECKED = (
-    *(data, estimates, scores, questions, choices, assumptions, tables),
-    *(campaign_data, campaigns, fits, held_out, league, closed_loop, bad_rows, blind_cases, blind_tables),
-)
-_CHECKS = tuple(check for module in _CHECKED for check in module.CHECKS)
+_ROOMS = (data, estimates, scores, questions, choices, assumptions, tables, campaigns, fits, held_out, proofs)
+# What works a file out again, by the form of its name; what stands in braces are arguments.
+CHECKS = tuple((form, check) for room in _ROOMS for form, check in room.CHECKS.items())
+_PATTERNS = [re.compile(re.sub(r"{(\w+)}", r"(?P<\1>[^/]+)", form.replace(".", r"\."))) for form, _ in CHECKS]
 # What an audit itself wrote is not audited.
 _OWN = "reports/audit."
 COLUMNS = ("file", "checked", "by", "compared", "worst", "holds", "note")
 
 
 def audit(run: Audited, only: Collection[str] | None = None) -> list[Finding]:
-    """Check a finished run.
+    """Check a finished run: every file that a job has recorded, or those that are named.
 
-    `only`: these files; without it every file that a job has recorded. Returns a check that cannot be carried out, for a file
-    that cannot be read or lacks a column, does not hold.
+    A check that cannot be carried out, for a file that cannot be read or has no such column, does not hold.
     """
     found = []
     for file, digest in recorded(run.folder).items():
         if file in only if only is not None else not file.startswith(_OWN):
-            found.append(intact(run, file, digest))
-            if run.there(file):
-                found += _recomputed(run, file)
-    if not found:
-        found.append(held(RECORDS.as_posix(), "files that a job recorded", "counting", False, "none; is the run finished?"))
-    return found
+            found.append(replace(intact(run, file, digest), file=file))
+            found += _recompute(run, file) if run.has(file) else ()
+    nothing = require("files that a job recorded", "counting", False, "none; is the run finished?")
+    return found or [replace(nothing, file=RECORDS.as_posix())]
+
+
+def checks_of(file: str) -> list[tuple[str, Callable[..., Iterator[Finding]], dict[str, str]]]:
+    """The checks of a file: the form of its name, what works it out again, and with which arguments."""
+    pairs = zip(CHECKS, _PATTERNS, strict=True)
+    return [(*check, match.groupdict()) for check, pattern in pairs if (match := pattern.fullmatch(file))]
 
 
 def as_table(findings: Iterable[Finding]) -> pd.DataFrame:
@@ -67,10 +66,9 @@ def as_table(findings: Iterable[Finding]) -> pd.DataFrame:
 
 
 def require_all(table: pd.DataFrame, page: str) -> str:
-    """One line on a run whose audit finds no fault with it.
+    """One line on a run whose audit finds no fault with it; `page`: where the findings stand.
 
-    `table`: from `as_table`. `page`: where the findings stand. Raises `InputError`: some check does not hold; the first one is
-    named.
+    Raises `InputError`: some check does not hold; the first one is named.
     """
     wrong = table[~table["holds"].astype(bool)]
     if len(wrong):
@@ -81,17 +79,13 @@ def require_all(table: pd.DataFrame, page: str) -> str:
     return f"{table['file'].nunique()} files, {len(table)} checks, {values} values compared: all hold\n"
 
 
-def _recomputed(run: Audited, file: str) -> list[Finding]:
+def _recompute(run: Audited, file: str) -> Iterator[Finding]:
     """Findings of one file; whatever a damaged file makes of a check is a finding too."""
-    found: list[Finding] = []
-    checks: list[tuple[Callable[..., list[Finding]], tuple[str, ...]]] = []
-    if file.endswith(".parquet"):
-        checks.append((described, ()))
-    checks += [(check, match.groups()) for pattern, check in _CHECKS if (match := pattern.fullmatch(file))]
-    for check, places in checks:
+    checks = [(described, dict[str, str]())] * file.endswith(".parquet") + [each[1:] for each in checks_of(file)]
+    for check, arguments in checks:
         try:
-            found += check(run, file, *places)
+            for finding in check(run, file, **arguments):
+                yield finding if finding.file else replace(finding, file=file)
         except (ArithmeticError, LookupError, OSError, TypeError, ValueError) as error:
-            reason = str(error).splitlines()[0] if str(error) else ""
-            found.append(held(file, f"check {check.__name__}", "", False, f"{type(error).__name__}: {reason}"[:200]))
-    return found
+            note = f"{type(error).__name__}: {next(iter(str(error).splitlines()), '')}"[:200]
+            yield replace(require(f"check {check.__name__}", "", False, note), file=file)

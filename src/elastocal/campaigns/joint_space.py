@@ -62,7 +62,8 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     tree = cKDTree(mean)
     # What is farther from all others is not asked for its neighbours, and the neighbours of all are never held at once.
     beyond = np.nextafter(SAME_POSE_RAD, 1.0)
-    alone = np.isinf(tree.query(mean, k=2, p=np.inf, distance_upper_bound=beyond)[0][:, 1])
+    nearest, _ = tree.query(mean, k=[2], p=np.inf, distance_upper_bound=beyond)
+    alone = np.isinf(np.ravel(nearest))
     found, count = np.full(len(mean), -1), 0
     for leader in range(len(mean)):
         if found[leader] < 0:

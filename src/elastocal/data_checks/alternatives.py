@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import combinations, permutations, product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -446,7 +446,7 @@ def _with_rotations(
     return correct
 
 
-def _with_unknown(parts: Mapping[str, None]) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
+def _with_unknown(parts: Mapping[str, Any]) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
     def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
         seen = set(measurements.target.tolist())
         targets = [replace(t, **parts) if number in seen else t for number, t in enumerate(campaign.targets)]
@@ -507,10 +507,10 @@ def _target_fault(
             ]
     words, keys = [], []
     if away.max() > far_m:
-        words.append(f"{targets[np.argmax(away)].name} would sit {1e3 * away.max():.3g} mm from there")
+        words.append(f"{targets[int(np.argmax(away))].name} would sit {1e3 * away.max():.3g} mm from there")
         keys.append("offset_m")
     if turns.max() > far_rad:
-        words.append(f"{targets[np.argmax(turns)].name} would be turned by {np.degrees(turns.max()):.3g}°")
+        words.append(f"{targets[int(np.argmax(turns))].name} would be turned by {np.degrees(turns.max()):.3g}°")
         keys.append("rotation")
     remedy = " and ".join(f"{key}: unknown" for key in keys)
     if not words:

@@ -9,6 +9,7 @@ import numpy as np
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.words import (
     NOTHING,
+    RELATED,
     UNKNOWN,
     alternative_words,
     effect_words,
@@ -34,7 +35,7 @@ from elastocal.report.wording import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
     from typing import Any
 
 TITLES = {
@@ -104,17 +105,18 @@ def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
     if stated is None:
         return []
     rows = [(_found(effect), effect["probability"], cost_words(effect, verdict["heldout"])) for effect in found.values()]
-    others = [
-        (UNKNOWN if name == OTHER else physical_name(name), value, "")
-        for name, value in stated["mechanisms"].items()
-        if name not in found
-    ]
+    others = [(_name_of(name, found), value, "") for name, value in stated["mechanisms"].items() if name not in found]
     others = [*others, (NOTHING, stated["nothing"], "")]
     others = sorted((row for row in others if row[1] >= LEAST_SHOWN), key=lambda row: -row[1])[:_MOST_CAUSES]
     return [
         {"name": capital(name), "probability": probability, "words": probability_words(probability), "cost": cost}
         for name, probability, cost in sorted([*rows, *others], key=lambda row: -row[1])
     ]
+
+
+def _name_of(mechanism: str, found: Collection[str]) -> str:
+    """A mechanism that was not found: beside one that was, what is unknown is a related one."""
+    return (RELATED if found else UNKNOWN) if mechanism == OTHER else physical_name(mechanism)
 
 
 def sentences(verdict: Mapping[str, Any]) -> list[str]:
