@@ -59,7 +59,10 @@ rule study:
         expand("reports/tables/{table}.csv", table=["comparison", "expectations", "extended", "per_dataset", "solvers"]),
         rules.tabulate_budget.output,
         rules.tabulate_assumptions.output,
-        expand("reports/tables/{table}.csv", table=["ladder", "designs", "observability", "claims", "table4_studies", "joint_test"]),
+        expand(
+            "reports/tables/{table}.csv",
+            table=["ladder", "designs", "observability", "claims", "table4_studies", "joint_test"],
+        ),
         expand("reports/tables/{table}.csv", table=["costs", "break_even", "simulated_designs_few"]),
         rules.tabulate_decisions.output,
         expand("reports/figures/{figure}.{format}", figure=FIGURES, format=["pdf", "png"]),

@@ -29,7 +29,7 @@ def metrics_of(robot, strategy, size, noise_um=200.0, untrusted=0):
 
 
 METRICS = pd.concat([metrics_of(robot, name, 10.0 * n) for robot in TITLES for n, name in enumerate(ORDER, 1)])
-PAPER = "paper: score, and length at the limit"
+PAPER = "the paper's Table 4"
 PRINTED = pd.DataFrame(
     [
         ("4", "kuka", "2DoF+6DoF", "k_sigma_4", 2.2),
@@ -79,7 +79,8 @@ def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_ar
 
 
 def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
-    whole, first = stiffness_errors(METRICS, PRINTED, "Kuka KR 270", "kuka", ORDER, 3.0).axes
+    figure = stiffness_errors(METRICS, PRINTED, "Kuka KR 270", "kuka", ORDER, 3.0)
+    whole, first = figure.axes
     for axis, scale in ((whole, 1.0), (first, 0.5)):
         one, other, limit = axis.lines[:3]
         np.testing.assert_allclose(one.get_ydata(), 10 * scale / LENGTHS)
@@ -88,7 +89,8 @@ def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
         assert list(limit.get_ydata()) == [3.0, 3.0] and [text.get_text() for text in axis.texts] == ["3 %"]
     assert "all joints" in whole.get_title() and "fixed in the last stage" in first.get_title()
     assert whole.get_ylabel() == r"$k_\Sigma$ (%)"
-    assert [text.get_text() for text in first.get_legend().get_texts()] == [*ORDER, PAPER]
+    assert legend_entries(figure) == [*ORDER, PAPER]
+    assert_nothing_cut_off(figure)
     # Both counts are those of the fixed joints in the paper: its score at 4 configurations, and where it reaches 3 %.
     marks = [line for line in first.lines if line.get_marker() == "D"]
     assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [[[4, 2.2]], [[5, 3]]]
@@ -118,8 +120,14 @@ def test_deviations_of_one_robot_are_in_micrometres_and_each_strategy_keeps_its_
     assert band(axis.collections[0])[5] == pytest.approx((1.8, 2.2))
     assert limit.get_ydata()[0] == 2.5 and texts_in_axes(figure) == ["2.5 µm"]
     assert one.get_color() != other.get_color() and one.get_linestyle() != other.get_linestyle()
-    assert axis.get_ylabel() == "dev, equation 15 (µm)" and axis.get_xlim() == (2, 5)
+    assert axis.get_ylabel() == "dev, equation 15 (µm)" and axis.get_xlim() == (2, 5.1)
     assert_nothing_cut_off(figure)
+
+
+def test_one_estimator_under_two_names_is_one_line():
+    twice = pd.concat([METRICS, METRICS[METRICS.strategy == "6DoF"].assign(strategy="6DoF again")])
+    figure = deviations(twice, PRINTED, "Kuka", "kuka", [*ORDER, "6DoF again"], 2.5)
+    assert legend_entries(figure) == [*ORDER, PAPER]
 
 
 def test_bias_and_accuracy_puts_the_averaged_model_below_the_error_of_one_data_set():

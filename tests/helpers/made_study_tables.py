@@ -293,7 +293,7 @@ def question_facts():
     robots = [*TITLES]
     strategies = [Strategy("6DoF", (Stage(("6DoF",), tuple(range(6))),))]
     return {
-        "citation": {"authors": "the developers", "date": "2026-11-25"},
+        "citation": {"authors": "the developers", "date": "2026-11-25", "version": "0.1.0", "license": "MIT"},
         "claims": claim_rows(claims(), TITLES),
         "joint": joint_rows(joint()),
         "table4": measured_rows(measured(), TITLES),
@@ -314,7 +314,7 @@ def question_facts():
         "places": place_facts(places(), TITLES),
         "scores": score_rows(strategy_scores(), robots),
         "staged": staged_rows(strategy_scores(), robots),
-        "metrics": metric_summary(score_pairs()),
+        "metrics": metric_summary(score_pairs(), TITLES),
         "metric_names": METRIC_NAMES,
         "tubes": tube_rows(tubes()),
         "observability": observability_rows(observability(), robots),
@@ -322,6 +322,8 @@ def question_facts():
         "geometry": geometry_rows(geometry(), robots),
         "weighting": weighting_rows(weighting(), robots),
         "titles": TITLES,
+        "names": TITLES,
+        "full_names": [*TITLES.values()],
         "stated": stated(STATED),
         "size": {"data_sets": "1000", "configurations": "100", "test_configurations": "500", "seed": "1"},
     }

@@ -351,7 +351,13 @@ rule draw_costs:
         sources=sources("draw_costs.py"),
     output:
         pdf="reports/figures/costs.pdf",
-        png=shown("reports/figures/costs.png", "costs", "Questions beyond the paper", shows="Cost of an accuracy (RQ2)", kind="figure"),
+        png=shown(
+            "reports/figures/costs.png",
+            "costs",
+            "Questions beyond the paper",
+            shows="Cost of an accuracy (RQ2)",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_costs.log",
     benchmark:
@@ -370,7 +376,13 @@ rule draw_studies:
         sources=sources("draw_studies.py"),
     output:
         pdf="reports/figures/studies.pdf",
-        png=shown("reports/figures/studies.png", "studies", "Tables and figures of the paper", shows="Strategies over studies", kind="figure"),
+        png=shown(
+            "reports/figures/studies.png",
+            "studies",
+            "Tables and figures of the paper",
+            shows="Strategies over studies",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_studies.log",
     benchmark:

@@ -5,7 +5,6 @@ results/expected/{robot}/{noise}um/{strategy}.parquet, reports/tables/expectatio
 reports/tables/interpretations.csv.
 """
 
-
 # Interpretations by what is measured, as Table 4 is shown.
 MEASURED = {"pose": USUAL} | {
     {1: "one reflector", 3: "three reflectors"}.get(len(some["reflectors_m"]), f"{len(some['reflectors_m'])} reflectors"): name

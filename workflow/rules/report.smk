@@ -81,7 +81,8 @@ rule state_answers:
     benchmark:
         "results/timings/state_answers.tsv"
     params:
-        titles=REDUCED_TITLES,
+        robots=REDUCED,
+        names=TITLES,
         cells={key: config["tables"][key] for key in ("noise_um", "length")} | {"classical_strategy": NAMES[CLASSICAL]},
         strategies=list(STUDY.strategies.values()),
         best=NAMES.get("3+6DoF-comb", NAMES[CLASSICAL]),

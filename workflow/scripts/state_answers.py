@@ -25,6 +25,7 @@ from elastocal.report.decision_answers import (
 )
 from elastocal.report.metric_answers import METRIC_NAMES, metric_summary, score_rows, staged_rows
 from elastocal.report.question_answers import (
+    brief_names,
     budget_rows,
     design_facts,
     geometry_rows,
@@ -44,6 +45,8 @@ from elastocal.study.table_schemas import REPLICATES, metrics
 
 def state_answers(job: Job) -> None:
     settings = job.params
+    names, length, accuracy = brief_names(settings.names), settings.cells["length"], settings.accuracy_um
+    titles = {robot: names[robot] for robot in settings.robots}
     facts = answers(
         comparison=pd.read_csv(job.input.comparison, dtype={"table": str}),
         expectations=pd.read_csv(job.input.expectations),
@@ -54,18 +57,17 @@ def state_answers(job: Job) -> None:
         metrics=read_long(job.input.metrics, metrics),
         replicates=read_long(job.input.replicates, lambda joints: REPLICATES),
         noisiest=read_long(job.input.noisiest, metrics),
-        titles=settings.titles,
+        titles=titles,
         cells=settings.cells,
     )
-    titles, length, accuracy = settings.titles, settings.cells["length"], settings.accuracy_um
     ladder, pairs = pd.read_csv(job.input.ladder, dtype={"link_springs": str}), pd.read_csv(job.input.pairs)
     observability, designs = pd.read_csv(job.input.observability), pd.read_csv(job.input.designs)
     scores = pd.read_csv(job.input.scores)
     simulated, measured = pd.read_csv(job.input.simulated, dtype={"unobservable": str}), pd.read_csv(job.input.studies)
     citation = read_document(job.input.citation)
-    authors = ", ".join(each["name"] for each in citation["authors"])
+    cited = {name: str(citation[key]) for name, key in (("date", "date-released"), ("version", "version"), ("license", "license"))}
     facts |= {
-        "citation": {"authors": authors, "date": str(citation["date-released"])},
+        "citation": {"authors": ", ".join(each["name"] for each in citation["authors"])} | cited,
         "claims": claim_rows(pd.read_csv(job.input.claims, keep_default_na=False, na_values={"p": [""]}), titles),
         "joint": joint_rows(pd.read_csv(job.input.joint)),
         "table4": measured_rows(measured, titles),
@@ -89,7 +91,7 @@ def state_answers(job: Job) -> None:
         "places": place_facts(pd.read_csv(job.input.places), titles),
         "scores": score_rows(scores, [*titles]),
         "staged": staged_rows(scores, [*titles]),
-        "metrics": metric_summary(pd.read_csv(job.input.score_pairs)),
+        "metrics": metric_summary(pd.read_csv(job.input.score_pairs), titles),
         "metric_names": METRIC_NAMES,
         "tubes": tube_rows(pd.read_csv(job.input.tubes)),
         "observability": observability_rows(observability, [*titles]),
@@ -97,6 +99,8 @@ def state_answers(job: Job) -> None:
         "geometry": geometry_rows(pd.read_csv(job.input.geometry), [*titles]),
         "weighting": weighting_rows(pd.read_csv(job.input.weighting), [*titles]),
         "titles": titles,
+        "names": names,
+        "full_names": [settings.names[robot] for robot in titles],
         "size": {name: f"{value:g}" for name, value in settings.size.items()},
         "stated": stated(settings.stated),
     }

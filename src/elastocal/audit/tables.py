@@ -34,7 +34,7 @@ _QUANTILE = 1.96
 _DIGIT = 1e-3
 
 
-def _groups(run: Audited, robots: Iterable[str], kind: str, *by: str) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
+def find_groups(run: Audited, robots: Iterable[str], kind: str, *by: str) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
     """Rows of files of the robots that go together, with what names them."""
     for robot in robots:
         for key, cell in run.table(f"results/{kind}/{robot}.parquet").groupby([*by], sort=False, observed=True):
@@ -63,7 +63,7 @@ def _single_sets(frame: pd.DataFrame) -> pd.DataFrame:
     return 1e3 * pd.DataFrame({"mean_mm": frame["mean"], "std_mm": spread, "max_mm": frame["maximum"]})
 
 
-def _root_mean(squares: pd.Series, head: str = "rms_um", error: str = "rms_um_std_error") -> dict[str, float]:
+def find_root_mean(squares: pd.Series, head: str = "rms_um", error: str = "rms_um_std_error") -> dict[str, float]:
     """Root of a mean and its standard error by the delta method, µm."""
     root = np.sqrt(squares.mean())
     return {head: 1e6 * root, error: 1e6 * stats.sem(squares) / (2 * root)}
@@ -159,26 +159,28 @@ def per_dataset(run: Audited) -> _Rows:
 
 def budget(run: Audited) -> _Rows:
     length, sets = run.configuration["tables"]["length"], run.configuration["questions"]["point_sets"]
-    for head, at in _groups(run, run.reduced, "budget", "points", "length"):
+    for head, at in find_groups(run, run.reduced, "budget", "points", "length"):
         count = len(sets[head["points"]])
         row = head | {"configurations": head["length"], "measurements_per_configuration": count}
-        row |= {"crlb_rms_um": 1e6 * np.sqrt(at["bound"].mean())} | _root_mean(at["mean_square"], error="std_error_um")
+        row |= {"crlb_rms_um": 1e6 * np.sqrt(at["bound"].mean())} | find_root_mean(at["mean_square"], error="std_error_um")
         if head["length"] in (length, 2 * length // count):
             yield row
 
 
 def ladder(run: Audited) -> _Rows:
-    for head, cell in _groups(run, run.extended, "ladder", "noise", "length"):
+    for head, cell in find_groups(run, run.extended, "ladder", "noise", "length"):
         head |= {"noise_um": round(1e6 * head["noise"], 6)}
         for springs, some in cell.groupby("link_springs"):
             row = head | {"link_springs": str(springs), "chosen_percent": 100 * some["chosen"].mean()}
-            yield row | {"usual_link": some["added_link"].mode()[0] if springs else np.nan} | _root_mean(some["mean_square"])
+            yield (
+                row | {"usual_link": some["added_link"].mode()[0] if springs else np.nan} | find_root_mean(some["mean_square"])
+            )
         row = head | {"link_springs": "by cross-validation", "usual_link": np.nan, "chosen_percent": np.nan}
-        yield row | _root_mean(cell["mean_square"][cell["chosen"]])
+        yield row | find_root_mean(cell["mean_square"][cell["chosen"]])
 
 
 def designs(run: Audited) -> _Rows:
-    for head, at in _groups(run, run.reduced, "designs", "joint_range", "design", "configurations"):
+    for head, at in find_groups(run, run.reduced, "designs", "joint_range", "design", "configurations"):
         yield head | {f"{name}_um": 1e6 * at[name].iloc[0] for name in ("rms", "low", "high")}
 
 
@@ -195,13 +197,13 @@ def observability(run: Audited) -> _Rows:
 
 
 def places(run: Audited) -> _Rows:
-    for head, cell in _groups(run, run.reduced, "places", "joints", "along", "side"):
+    for head, cell in find_groups(run, run.reduced, "places", "joints", "along", "side"):
         row = head | {"along_m": head["along"]} | _ratio(cell["bound"], cell["bound_end_effector"])
         yield row | {f"seen_{name}_percent": 100 * cell[name].mean() for name in ("turned", "fixed")}
 
 
 def geometry(run: Audited) -> _Rows:
-    for head, cell in _groups(run, run.reduced, "geometry", "estimator"):
+    for head, cell in find_groups(run, run.reduced, "geometry", "estimator"):
         at = cell.iloc[0]
         row = head | {"rms_um": 1e6 * np.hypot(at["noise"], at["leak"])}
         for name in ("noise", "leak"):
@@ -211,15 +213,15 @@ def geometry(run: Audited) -> _Rows:
 
 
 def weighting(run: Audited) -> _Rows:
-    for head, _ in _groups(run, run.reduced, "weighting", "orientation_ratio", "per_metre", "equal", "weighted"):
+    for head, _ in find_groups(run, run.reduced, "weighting", "orientation_ratio", "per_metre", "equal", "weighted"):
         row = head | {"ratio": head["equal"] / head["weighted"]}
         yield row | {f"{name}_um": 1e6 * head[name] for name in ("per_metre", "equal", "weighted")}
 
 
 def tubes(run: Audited) -> _Rows:
-    for head, cell in _groups(run, run.extended, "tubes", "diameter"):
+    for head, cell in find_groups(run, run.extended, "tubes", "diameter"):
         single = _single_sets(cell)
-        row = head | {"diameter_mm": 1e3 * head["diameter"]} | _root_mean(cell["left"], "left_um", "left_um_std_error")
+        row = head | {"diameter_mm": 1e3 * head["diameter"]} | find_root_mean(cell["left"], "left_um", "left_um_std_error")
         yield row | dict(single.mean()) | dict(single.std().add_suffix("_between"))
 
 

@@ -90,8 +90,9 @@ def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) ->
             axis.plot(cost, cell.ratio, **line_style(index), label=points)
             axis.fill_between(cost, cell.ratio_low, cell.ratio_high, **band)
         axis.set(title=title, xlabel="cost of a configuration (measurements)", xscale="log", yscale="log")
-        for plain in (axis.xaxis, axis.yaxis):
-            _plain(plain)
+        axis.set_xticks([0.01, 0.1, 1, 10])
+        axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        _plain(axis.yaxis)
     axes[0, 0].set_ylabel(f"cost of {accuracy_um:g} µm over that of {labels[0] if labels else ''}")
     title = "points measured in each configuration; bands: 95 % intervals by bootstrap over data sets"
     figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=4, title_fontsize=7.5)
@@ -144,7 +145,7 @@ def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, 
         axis.set(title=title, xscale="log", yticks=range(len(names)), ylim=(len(names) - 0.5, -0.5))
         _plain(axis.xaxis)
         axis.grid(visible=False, axis="y")
-    axes[0, 0].set_yticklabels(names.values())
+    axes[0, 0].set_yticklabels([name.replace("k_Σ", r"$k_\Sigma$") for name in names.values()])
     title = "score over that of the first strategy, 95 % intervals"
     figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
     return figure

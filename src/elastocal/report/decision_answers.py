@@ -54,8 +54,10 @@ def study_facts(table: pd.DataFrame, robot: str, classical: str, best: str) -> d
     `table`: as in `measured_table`. Returns dev, rms and their ratio of the classical strategy; ratio: its dev over that of the
     best; compliance_dev and compliance_k: of averaged compliances; one_k and one_dev: of positions of one reflector.
     """
-    at = table[table.robot == robot].set_index(["strategy", "measured", "average"])
-    plain, other = at.loc[classical, "pose", "stiffness"], at.loc[best, "pose", "stiffness"]
+    mine = table[table.robot == robot]
+    keys = mine[["strategy", "measured", "average"]].itertuples(index=False, name=None)
+    at: dict[Any, Any] = dict(zip(keys, mine.to_dict("records"), strict=True))
+    plain, other = at[classical, "pose", "stiffness"], at[best, "pose", "stiffness"]
     k, _, dev, _ = _figure_columns(table)
     rms = next(name for name in table.columns if name.startswith("rms_") and not name.endswith("_std"))
     found = {
@@ -63,11 +65,10 @@ def study_facts(table: pd.DataFrame, robot: str, classical: str, best: str) -> d
         "rms": _cell(plain, rms),
         "hidden": f"{plain[rms] / plain[dev]:.1f}",
         "ratio": f"{plain[dev] / other[dev]:.2f}",
-        "compliance_dev": _cell(at.loc[classical, "pose", "compliance"], dev),
-        "compliance_k": _cell(at.loc[classical, "pose", "compliance"], k),
+        "compliance_dev": _cell(at[classical, "pose", "compliance"], dev),
+        "compliance_k": _cell(at[classical, "pose", "compliance"], k),
     }
-    if (classical, "one reflector", "stiffness") in at.index:
-        one = at.loc[classical, "one reflector", "stiffness"]
+    if (one := at.get((classical, "one reflector", "stiffness"))) is not None:
         found |= {"one_k": _cell(one, k), "one_dev": _cell(one, dev), "one_rms": _cell(one, rms)}
     return found
 
@@ -85,16 +86,13 @@ def joint_rows(table: pd.DataFrame) -> list[dict[str, str]]:
 
 
 def claim_rows(table: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[str, str]]:
-    """The claims table with p in words; what is found is given once where both counts of joints are the same.
-
-    `titles`: names of robots, of which the first word stands for each.
-    """
-    makers = {robot: title.split()[0] for robot, title in titles.items()}
-    named = re.compile(rf"\b({'|'.join(map(re.escape, makers))})\b")
+    """The claims table with p in words; what is found is given once where both counts of joints are the same."""
+    named = re.compile(rf"\b({'|'.join(map(re.escape, titles))})\b")
     rows = []
     for row in table.itertuples():
-        found = str(row.literal) if row.literal == row.ours else f"all joints: {row.literal}; fixed joints: {row.ours}"
-        found = named.sub(lambda match: makers[match[0]], found)
+        literal, ours = str(row.literal), str(row.ours)
+        found = literal if literal == ours else f"all joints: {literal}; fixed joints: {ours}"
+        found = named.sub(lambda match: titles[match[0]], found)
         p = "" if np.isnan(float(str(row.p))) else f"{row.p:.2g}"
         words = {"number": f"{row.number}", "place": str(row.place), "claim": str(row.claim), "found": found, "p": p}
         rows.append(words | {"verdict": str(row.verdict)})
@@ -195,10 +193,11 @@ def kind_rows(table: pd.DataFrame, length: int, titles: Mapping[str, str]) -> li
 def stiffness_rows(table: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[str, str]]:
     """What K_c changes, from `question_tables.stiffness_table`."""
     names = ("first_order_percent", "by_k_c_percent", "loaded_percent", "bias_percent", "k_sigma_percent")
+    rows: list[dict[Any, Any]] = table[table.robot.isin([*titles])].to_dict("records")
     return [
-        {"robot": titles[str(row.robot)], "force": f"{row.force_N / 1000:g}", "softest": f"{row.softest_N_per_um:.2f}"}
-        | {name.removesuffix("_percent"): f"{getattr(row, name):.3f}" for name in names}
-        for row in table[table.robot.isin([*titles])].itertuples()
+        {"robot": titles[row["robot"]], "force": f"{row['force_N'] / 1000:g}", "softest": f"{row['softest_N_per_um']:.2f}"}
+        | {name.removesuffix("_percent"): f"{row[name]:.2g}" for name in names}
+        for row in rows
     ]
 
 

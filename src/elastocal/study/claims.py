@@ -248,7 +248,7 @@ def _fanuc_better(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
     names = (_PLAIN, _COMB, _BEST, *_OTHERS)
     kuka, fanuc = (np.stack([np.abs(evidence.figures(robot, name, sigma)) for name in names]) for robot in evidence.robots)
     better = fanuc < kuka
-    text, p = _often(better.all(axis=(0, 1)))
+    text, p = _often(np.asarray(better.all(axis=(0, 1))))
     share = 100 * better.mean()
     return f"in {share:.0f} % of the figures; in all {text} (the paper's own n for 2 µm: worse in 3 of 6, one tie)", False, p
 

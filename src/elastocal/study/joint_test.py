@@ -39,8 +39,8 @@ def _row(studies: pd.DataFrame, printed: pd.DataFrame, length: int, fixed_joints
     cells = printed[["robot", "strategy", "quantity"]].itertuples(index=False, name=None)
     found = [
         (scatter, value)
-        for cell, value in zip(cells, printed.value, strict=True)
-        if (scatter := predicted(studies, *cell, length, fixed_joints)) is not None
+        for (robot, strategy, quantity), value in zip(cells, printed.value, strict=True)
+        if (scatter := predicted(studies, robot, strategy, quantity, length, fixed_joints)) is not None
     ]
     paper = np.array([scatter.p_value(value) for scatter, value in found])
     others = np.array([_left_out(scatter) for scatter, _ in found]).T

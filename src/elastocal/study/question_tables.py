@@ -160,7 +160,7 @@ def few_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     for robot, frame in frames.items():
         for (error, strategy, length), cell in frame.groupby(["nominal_error", "strategy", "length"], sort=False):
             rms, spread = root_mean(cell.mean_square.to_numpy())
-            row: dict[str, Any] = {"robot": robot, "nominal_error_percent": 100 * error, "strategy": strategy}
+            row: dict[str, Any] = {"robot": robot, "nominal_error_percent": 100 * float(str(error)), "strategy": strategy}
             row |= {"configurations": length, "rms_um": MICRO * rms, "rms_um_std_error": MICRO * spread}
             rows.append(row | {"median_um": MICRO * np.sqrt(cell.mean_square.median(skipna=False))})
     names = ("robot", "nominal_error_percent", "strategy", "configurations", "rms_um", "rms_um_std_error", "median_um")

@@ -68,7 +68,7 @@ def simulated_design_blocks(
         weights = {"I": candidates.forms[0], TEST_POSE: candidates.forms[1]}
         rules = {kind: Criterion(weights[kind][np.ix_(of, of)] * np.outer(scale, scale)) for kind in weights}
         rules |= {kind: criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"}
-        found = []
+        found: list[tuple[str, int, Sequence[np.ndarray] | np.ndarray | list[int]]] = []
         for kind, rule in rules.items():
             # A greedy choice of fewer is the beginning of that of more.
             longest = greedy(rows, max(sizes), rule)
