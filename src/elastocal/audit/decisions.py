@@ -54,7 +54,8 @@ def table4_studies(run: Audited) -> _Rows:
                     [mine.sort_values("length") for _, mine in cell.groupby("study")],
                 )
                 for average, end in (("stiffness", ""), ("compliance", "_mean_compliance")):
-                    row = {"robot": robot, "strategy": strategy, "measured": measured, "average": average}
+                    row = {"robot": robot, "strategy": strategy, "strategy_file": run.keys[str(strategy)]}
+                    row |= {"measured": measured, "average": average}
                     for column, factor, limit, unit in (*columns, ("deviation", 1e6, microns, "um")):
                         head = column.replace("deviation", "dev")
                         lengths = [reach(mine[f"{column}{end}"], limit / factor) for mine in studies]
@@ -184,12 +185,17 @@ def stiffness(run: Audited) -> _Rows:
             )
 
 
+def starts(run: Audited) -> _Rows:
+    for robot in run.reduced:
+        yield from ({"robot": robot} | row for row in run.table(f"results/starts/{robot}.parquet").to_dict("records"))
+
+
 def simulated_designs(run: Audited, sizes: str) -> _Rows:
     for robot in run.reduced:
         frame = run.table(f"results/simulated_designs/{sizes}/{robot}.parquet")
         random = frame[frame["design"] == "random"].set_index(["load", "configurations"])["rms"]
         for row in frame.to_dict("records"):
-            again = {"robot": robot} | {name: row[name] for name in ("load", "design", "configurations")}
+            again = {"robot": robot} | {name: row[name] for name in ("load", "design", "configurations", "unobservable")}
             again |= {"rms_um": 1e6 * row["rms"], "rms_um_std_error": 1e6 * row["std_error"]}
             gain = random[row["load"], row["configurations"]] / row["rms"]
             yield again | {"at_test_pose_um": 1e6 * row["there"], "gain": gain}
@@ -205,6 +211,7 @@ TABLES: Mapping[str, tuple[Callable[[Audited], _Rows], tuple[str, ...]]] = {
     "few_configurations": (few_configurations, ("robot", "nominal_error_percent", "strategy", "configurations")),
     "measurement_kinds": (measurement_kinds, ("robot", "kind", "configurations")),
     "stiffness": (stiffness, ("robot", "force_N")),
+    "starts": (starts, ("robot", "start")),
     **{
         f"simulated_designs_{sizes}": (
             lambda run, sizes=sizes: simulated_designs(run, sizes),
@@ -220,7 +227,9 @@ def tables(run: Audited, file: str, table: str) -> Iterator[Finding]:
     if table in TABLES:
         make, keys = TABLES[table]
         digits = (_OF_DIGITS, _OF_DIGITS) if make in (joint_test, claims) else (NINE_DIGITS, _ZERO)
-        yield from compare_columns(run.table(file), pd.DataFrame([*make(run)]), keys, "pandas and scipy", *digits)
+        rows = [*make(run)]
+        again = pd.DataFrame(rows) if rows else pd.DataFrame(columns=[*keys])
+        yield from compare_columns(run.table(file), again, keys, "pandas and scipy", *digits)
 
 
 def few(run: Audited, file: str, robot: str) -> Iterator[Finding]:
@@ -259,6 +268,16 @@ def stiffness_columns(run: Audited, file: str, robot: str) -> Iterator[Finding]:
     yield require("what a load changes grows with it", "pandas", grows, "it does not", len(frame))
 
 
+def start_columns(run: Audited, file: str, robot: str) -> Iterator[Finding]:
+    """Starts are those configured, and none is off from itself."""
+    frame = run.table(file)
+    configured = 1e-6 * np.array(run.configuration["questions"]["starts_urad_per_Nm"])
+    yield compare("starts", "counting", frame["start"], configured, 1e-12)
+    yield require("the first start is no distance from itself", "pandas", not frame["difference"].iloc[0], "it is some")
+    shares = frame["unsettled"].between(0, 1).all()
+    yield require("shares lie between 0 and 1", "pandas", shares, "one outside", len(frame))
+
+
 def simulated(run: Audited, file: str, sizes: str, robot: str) -> Iterator[Finding]:
     """Chosen configurations are better than random ones where they are judged, and more are better than fewer."""
     frame = run.table(file)
@@ -278,5 +297,6 @@ CHECKS = {
     "results/few/{robot}.parquet": few,
     "results/kinds/{robot}.parquet": kinds,
     "results/stiffness/{robot}.parquet": stiffness_columns,
+    "results/starts/{robot}.parquet": start_columns,
     "results/simulated_designs/{sizes}/{robot}.parquet": simulated,
 }

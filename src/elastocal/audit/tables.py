@@ -44,7 +44,7 @@ def find_groups(run: Audited, robots: Iterable[str], kind: str, *by: str) -> Ite
 def _cells(run: Audited, robots: list[str]) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Every robot and strategy: names of the robot and of the strategy's file, and the row's head."""
     for key, document in run.strategies.items():
-        yield from ((robot, key, {"strategy": document["name"], "robot": robot}) for robot in robots)
+        yield from ((robot, key, {"strategy": document["name"], "strategy_file": key, "robot": robot}) for robot in robots)
 
 
 def _at(run: Audited, robot: str, key: str) -> Any:
