@@ -67,6 +67,12 @@ _HEADS = {
 }
 
 
+def head_columns(schema: TableSchema, provenance: Mapping[str, Any]) -> dict[str, Column]:
+    """Columns that a file has before those of its schema, by the entries of its provenance that they repeat."""
+    taken = {column.name for column in schema.columns}
+    return {key: column for key, column in _HEADS.items() if key in provenance and column.name not in taken}
+
+
 def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], provenance: Mapping[str, Any]) -> None:
     """Write a table block by block, each a row group; the file appears whole or not at all.
 
@@ -74,8 +80,7 @@ def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], 
     says from what the table was made; a robot, noise and strategy in it become columns of their own, where the schema has none
     of the name. Raises `InputError`: a column that is missing, too many, not finite or out of range.
     """
-    taken = {column.name for column in schema.columns}
-    heads = {key: column for key, column in _HEADS.items() if key in provenance and column.name not in taken}
+    heads = head_columns(schema, provenance)
     blocks = ({**block, **_headed(heads, provenance, block)} for block in blocks)
     schema = replace(schema, columns=(*heads.values(), *schema.columns))
     fields = [pa.field(c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}) for c in schema.columns]
