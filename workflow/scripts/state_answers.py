@@ -65,7 +65,7 @@ def state_answers(job: Job) -> None:
     scores = pd.read_csv(job.input.scores)
     simulated, measured = pd.read_csv(job.input.simulated, dtype={"unobservable": str}), pd.read_csv(job.input.studies)
     citation = read_document(job.input.citation)
-    cited = {name: str(citation[key]) for name, key in (("date", "date-released"), ("version", "version"), ("license", "license"))}
+    cited = {"date": str(citation["date-released"]), "version": citation["version"], "license": citation["license"]}
     facts |= {
         "citation": {"authors": ", ".join(each["name"] for each in citation["authors"])} | cited,
         "claims": claim_rows(pd.read_csv(job.input.claims, keep_default_na=False, na_values={"p": [""]}), titles),
