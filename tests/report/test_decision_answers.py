@@ -94,4 +94,4 @@ def test_kinds_are_compared_at_equal_readings():
 
 def test_stiffness_is_stated_by_load():
     row = stiffness_rows(stiffness(), TITLES)[0]
-    assert (row["force"], row["by_k_c"]) == ("1", "0.060") and np.isfinite(float(row["softest"]))
+    assert (row["force"], row["by_k_c"]) == ("1", "0.06") and np.isfinite(float(row["softest"]))

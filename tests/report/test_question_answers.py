@@ -4,12 +4,19 @@ import json
 
 from made_study_tables import designs, ladder, observability, pairs, question_facts
 
-from elastocal.report.question_answers import design_facts, ladder_rows, strategy_rows, summaries
+from elastocal.report.question_answers import brief_names, design_facts, ladder_rows, strategy_rows, summaries
 from elastocal.study.strategies import Stage, Strategy
 
 
 def test_facts_can_be_written_as_json():
     assert json.loads(json.dumps(question_facts(), allow_nan=False)) == question_facts()
+
+
+def test_names_are_as_brief_as_tells_robots_apart_and_keep_what_a_longer_one_adds():
+    titles = {"kuka": "KUKA KR 270", "extended": "KUKA KR 270 with elastic links", "fanuc": "FANUC R-2000iC/165F"}
+    assert brief_names(titles) == {"kuka": "KUKA", "extended": "KUKA with elastic links", "fanuc": "FANUC"}
+    assert brief_names(titles | {"large": "KUKA KR 500"})["kuka"] == "KUKA KR 270"
+    assert brief_names({"one": "Robot", "other": "Robot"}) == {"one": "Robot", "other": "Robot"}
 
 
 def test_a_strategy_is_told_stage_by_stage_with_the_numbers_of_its_joints():
