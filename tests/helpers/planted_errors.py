@@ -262,6 +262,38 @@ PLANTED = {
         "results/budget/kuka.parquet",
         lambda f: rewritten(f, "results/budget/kuka.parquet", scaled(1.01, "mean_square")),
     ),
+    "errors of few configurations scaled": (
+        "results/few/kuka.parquet",
+        lambda f: rewritten(f, "results/few/kuka.parquet", scaled(1.01, "mean_square")),
+    ),
+    "errors by poses scaled": (
+        "results/kinds/kuka.parquet",
+        lambda f: rewritten(f, "results/kinds/kuka.parquet", scaled(1.01, "mean_square")),
+    ),
+    "a first order too good": (
+        "results/stiffness/kuka.parquet",
+        lambda f: rewritten(f, "results/stiffness/kuka.parquet", scaled(0.9, "first_order")),
+    ),
+    "stiffness errors of other studies scaled": (
+        "results/studies/R5_positions/kuka.parquet",
+        lambda f: rewritten(f, "results/studies/R5_positions/kuka.parquet", scaled(1.01, "k_sigma")),
+    ),
+    "chosen configurations that are worse than random ones": (
+        "results/simulated_designs/few/kuka.parquet",
+        lambda f: rewritten(f, "results/simulated_designs/few/kuka.parquet", scaled(-1.0, "rms")),
+    ),
+    "a cell of Table 4 over studies altered": (
+        "reports/tables/table4_studies.csv",
+        lambda f: cell(f, "reports/tables/table4_studies.csv", "dev_20_um", 1.001),
+    ),
+    "a rank in the joint test that cannot be": (
+        "reports/tables/joint_test.csv",
+        lambda f: cell(f, "reports/tables/joint_test.csv", "below_p", 0.99),
+    ),
+    "an error of a design in other units": (
+        "reports/tables/simulated_designs_few.csv",
+        lambda f: cell(f, "reports/tables/simulated_designs_few.csv", "rms_um", 1e-3),
+    ),
     "a standard error too small": (
         "reports/tables/table3.csv",
         lambda f: cell(f, "reports/tables/table3.csv", "c4_std_error", 0.7),

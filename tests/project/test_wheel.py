@@ -17,6 +17,7 @@ import elastocal
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "Snakefile", "config.yaml", "config", "profiles", "src", "workflow")
+SOURCES += ("paper.bib", "CITATION.cff")
 # Of the checkout alone: it checks, rehearses and explains.
 LEFT_OUT = (
     "workflow/lint.py",
