@@ -14,14 +14,12 @@ def poses_of(measurements):
     return set(zip(measurements.session.tolist(), measurements.pose.tolist(), strict=True))
 
 
-def with_sessions(cell):
-    """The same rows again as another session, with targets of its own."""
-    table = {name: 2 * column for name, column in cell.table.items()}
-    count = len(cell.table["pose"])
-    table["session"] = count * [0] + count * [7]
-    table["target"] = cell.table["target"] + [f"{name}2" for name in cell.table["target"]]
-    cell.document["targets"] = cell.document["targets"] | {"A2": DOCUMENT["targets"]["A"], "B2": DOCUMENT["targets"]["B"]}
-    cell.table = table
+def parts(cell, **holdout):
+    """Poses that are fitted, and poses that are held out."""
+    cell.document |= {"holdout": holdout} if holdout else {}
+    fitted, held_out = map(poses_of, split(cell.read()))
+    assert fitted.isdisjoint(held_out)
+    return fitted, held_out
 
 
 def test_seed_of_a_fraction_is_1_where_none_is_given(cell):
@@ -30,43 +28,30 @@ def test_seed_of_a_fraction_is_1_where_none_is_given(cell):
 
 
 def test_split_parts_no_pose_of_any_session(cell):
-    with_sessions(cell)
+    cell.repeat_as_session_7()
+    fitted, held_out = parts(cell)
+    assert fitted | held_out == {(session, pose) for session in (0, 7) for pose in range(POSES)} and len(held_out) == 6
     campaign = cell.read()
-    training, held_out = split(campaign)
-    assert poses_of(training).isdisjoint(poses_of(held_out))
-    assert poses_of(training) | poses_of(held_out) == {(session, pose) for session in (0, 7) for pose in range(POSES)}
-    assert len(poses_of(held_out)) == 6
-    assert sorted([*training.row, *held_out.row]) == campaign.measurements.row.tolist()
+    assert sorted(row for part in split(campaign) for row in part.row) == campaign.measurements.row.tolist()
 
 
 @given(st.randoms(use_true_random=False))
 def test_split_is_the_same_whatever_the_order_of_the_rows(tmp_path_factory, random):
     cell = Cell(tmp_path_factory.mktemp("campaign"))
-    with_sessions(cell)
-    expected = poses_of(split(cell.read())[1])
-    order = list(range(len(cell.table["pose"])))
+    cell.repeat_as_session_7()
+    expected, order = parts(cell), list(range(len(cell.table["pose"])))
     random.shuffle(order)
-    cell.table = {name: [column[index] for index in order] for name, column in cell.table.items()}
-    assert poses_of(split(cell.read())[1]) == expected
+    cell.keep(order)
+    assert parts(cell) == expected
 
 
 def test_another_seed_holds_out_other_poses(cell):
-    found = set()
-    for seed in range(5):
-        cell.document["holdout"] = {"fraction": 0.3, "seed": seed}
-        held_out = frozenset(poses_of(split(cell.read())[1]))
-        assert len(held_out) == 3
-        found.add(held_out)
-    assert len(found) > 1
+    found = {frozenset(parts(cell, fraction=0.3, seed=seed)[1]) for seed in range(5)}
+    assert len(found) > 1 and {*map(len, found)} == {3}
 
 
 def test_a_block_of_neighbours_is_held_out_by_its_seed(cell):
-    found = set()
-    for seed in range(20):
-        cell.document["holdout"] = {"blocks": 3, "seed": seed}
-        training, held_out = split(cell.read())
-        assert poses_of(training).isdisjoint(poses_of(held_out))
-        found.add(frozenset(poses_of(held_out)))
+    found = {frozenset(parts(cell, blocks=3, seed=seed)[1]) for seed in range(20)}
     # Blocks part the poses: whatever the seed, it is one of three, which together are all.
     assert len(found) == 3 and sum(map(len, found)) == POSES == len(frozenset.union(*found))
     cell.document["holdout"] = {"blocks": 3}
@@ -74,28 +59,20 @@ def test_a_block_of_neighbours_is_held_out_by_its_seed(cell):
 
 
 def test_a_block_does_not_depend_on_the_order_of_the_rows(cell):
-    cell.document["holdout"] = {"blocks": 3, "seed": 2}
-    before = poses_of(split(cell.read())[1])
-    order = np.random.default_rng(1).permutation(len(cell.table["pose"]))
-    cell.table = {name: [column[index] for index in order] for name, column in cell.table.items()}
-    assert poses_of(split(cell.read())[1]) == before
+    before = parts(cell, blocks=3, seed=2)
+    cell.keep(np.random.default_rng(1).permutation(len(cell.table["pose"])))
+    assert parts(cell) == before
 
 
 @pytest.mark.parametrize("named", [7, [7]])
 def test_sessions_are_held_out_as_a_whole(cell, named):
-    with_sessions(cell)
-    cell.document["holdout"] = {"session": named}
-    training, held_out = split(cell.read())
-    assert {session for session, _ in poses_of(held_out)} == {7}
-    assert {session for session, _ in poses_of(training)} == {0}
+    cell.repeat_as_session_7()
+    assert [{session for session, _ in part} for part in parts(cell, session=named)] == [{0}, {7}]
 
 
 def test_named_poses_are_held_out_in_every_session_or_in_one(cell):
-    with_sessions(cell)
-    cell.document["holdout"] = {"poses": [4, [7, 2]]}
-    training, held_out = split(cell.read())
-    assert poses_of(held_out) == {(0, 4), (7, 4), (7, 2)}
-    assert poses_of(training).isdisjoint(poses_of(held_out))
+    cell.repeat_as_session_7()
+    assert parts(cell, poses=[4, [7, 2]])[1] == {(0, 4), (7, 4), (7, 2)}
 
 
 @pytest.mark.parametrize(
@@ -113,24 +90,21 @@ def test_named_poses_are_held_out_in_every_session_or_in_one(cell):
     ],
 )
 def test_five_poses_to_fit_and_two_held_out_are_enough(cell, holdout, fitted, held_out):
-    cell.document["holdout"] = holdout
-    training, testing = split(cell.read())
-    assert (len(poses_of(training)), len(poses_of(testing))) == (fitted, held_out)
+    assert tuple(map(len, parts(cell, **holdout))) == (fitted, held_out)
 
 
 @pytest.mark.parametrize(("poses", "enough"), [(6, False), (7, True)])
 def test_a_session_is_held_out_where_five_poses_of_others_are_left(cell, poses, enough):
     """Of the first so many poses, two were measured in a session of their own."""
-    kept = [n for n, pose in enumerate(cell.table["pose"]) if pose < poses]
-    cell.table = {name: [column[n] for n in kept] for name, column in cell.table.items()}
+    cell.keep([n for n, pose in enumerate(cell.table["pose"]) if pose < poses])
     later = np.array(cell.table["pose"]) < 2
     cell.table["session"] = later.astype(int).tolist()
     cell.table["target"] = [f"{name}2" if late else name for name, late in zip(cell.table["target"], later, strict=True)]
     cell.document["targets"] = cell.document["targets"] | {"A2": DOCUMENT["targets"]["A"], "B2": DOCUMENT["targets"]["B"]}
     cell.document["holdout"] = {"session": 1}
     if enough:
-        training, held_out = split(cell.read())
-        assert poses_of(held_out) == {(1, 0), (1, 1)} and len(poses_of(training)) == 5
+        fitted, held_out = parts(cell)
+        assert held_out == {(1, 0), (1, 1)} and len(fitted) == 5
     else:
         with refused(cell.source, "holdout", "4 configurations to fit and 2 held out"):
             cell.read()
@@ -143,31 +117,24 @@ def test_as_many_blocks_as_poses_are_blocks_of_one_pose_of_which_one_is_too_few(
 
 
 def test_a_block_goes_by_where_a_pose_stands_and_not_by_how_often_it_was_measured(cell):
-    cell.document["holdout"] = {"blocks": 3, "seed": 2}
-    before = poses_of(split(cell.read())[1])
+    before = parts(cell, blocks=3, seed=2)
     again = {name: list(column) for name, column in cell.table.items()}
     for number in range(20):
         more = [n for n, pose in enumerate(cell.table["pose"]) if pose == 3 and cell.table["repeat"][n] == 0]
         for name, column in cell.table.items():
             again[name] += [column[n] if name != "repeat" else 2 + number for n in more]
     cell.table = again
-    assert poses_of(split(cell.read())[1]) == before
+    assert parts(cell) == before
 
 
 def test_a_seed_holds_out_another_block_and_is_kept(cell):
-    found = set()
-    for seed in range(5):
-        cell.document["holdout"] = {"blocks": 2, "seed": seed}
-        campaign = cell.read()
-        assert campaign.holdout == {"blocks": 2, "seed": seed}
-        found.add(frozenset(poses_of(split(campaign)[1])))
-    assert len(found) == 2
+    assert len({frozenset(parts(cell, blocks=2, seed=seed)[1]) for seed in range(5)}) == 2
+    assert cell.read().holdout == {"blocks": 2, "seed": 4}
 
 
 def test_poses_are_numbered_by_session_and_then_by_pose_wherever_their_rows_are(cell):
-    with_sessions(cell)
-    order = np.random.default_rng(3).permutation(len(cell.table["pose"]))
-    cell.table = {name: [column[index] for index in order] for name, column in cell.table.items()}
+    cell.repeat_as_session_7()
+    cell.keep(np.random.default_rng(3).permutation(len(cell.table["pose"])))
     measurements = cell.read().measurements
     pairs, index = measured_poses(measurements)
     assert pairs.tolist() == [[session, pose] for session in (0, 7) for pose in range(POSES)]
@@ -175,7 +142,7 @@ def test_poses_are_numbered_by_session_and_then_by_pose_wherever_their_rows_are(
 
 
 def test_a_session_that_was_not_measured_is_refused_beside_one_that_was(cell):
-    with_sessions(cell)
+    cell.repeat_as_session_7()
     cell.document["holdout"] = {"session": [7, 8]}
     with refused(cell.source, "holdout.session", "found 8", "sessions that were measured: 0, 7"):
         cell.read()
@@ -188,40 +155,40 @@ def test_other_campaign_that_is_not_there_is_refused(cell):
 
 
 @pytest.mark.parametrize(
-    ("changes", "key", "words"),
+    ("holdout", "key", "words"),
     [
-        ({"holdout": {}}, "holdout", ["found {}"]),
-        ({"holdout": {"fraction": 0.3, "poses": [1, 2]}}, "holdout", ["fraction, poses together", "one of"]),
-        ({"holdout": {"poses": [1, 2], "seed": 1}}, "holdout", ["poses, seed together", "one of"]),
-        ({"holdout": {"seed": 1}}, "holdout", ["seed alone", "{fraction, seed}"]),
-        ({"holdout": {"fraction": 1.0}}, "holdout.fraction", ["1.0", "between 0 and 1"]),
-        ({"holdout": {"fraction": 0.3, "seed": 1.5}}, "holdout.seed", ["1.5", "integer"]),
-        ({"holdout": {"poses": ["1"]}}, "holdout.poses[0]", ["'1'", "integer"]),
-        ({"holdout": {"poses": [[0, 1, 2]]}}, "holdout.poses[0]", ["allowed: 2 entries"]),
-        ({"holdout": {"poses": [3, 12]}}, "holdout.poses", ["found 12", "0..9"]),
-        ({"holdout": {"poses": [3, [1, 4]]}}, "holdout.poses", ["[1, 4]", "0..9"]),
-        ({"holdout": {"poses": [3]}}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
+        ({}, "holdout", ["found {}"]),
+        ({"fraction": 0.3, "poses": [1, 2]}, "holdout", ["fraction, poses together", "one of"]),
+        ({"poses": [1, 2], "seed": 1}, "holdout", ["poses, seed together", "one of"]),
+        ({"seed": 1}, "holdout", ["seed alone", "{fraction, seed}"]),
+        ({"fraction": 1.0}, "holdout.fraction", ["1.0", "between 0 and 1"]),
+        ({"fraction": 0.3, "seed": 1.5}, "holdout.seed", ["1.5", "integer"]),
+        ({"poses": ["1"]}, "holdout.poses[0]", ["'1'", "integer"]),
+        ({"poses": [[0, 1, 2]]}, "holdout.poses[0]", ["allowed: 2 entries"]),
+        ({"poses": [3, 12]}, "holdout.poses", ["found 12", "0..9"]),
+        ({"poses": [3, [1, 4]]}, "holdout.poses", ["[1, 4]", "0..9"]),
+        ({"poses": [3]}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
         (
-            {"holdout": {"poses": [1, 2, 3, 4, 5, 6]}},
+            {"poses": [1, 2, 3, 4, 5, 6]},
             "holdout",
             ["4 configurations to fit and 6 held out", "at least 5 to fit"],
         ),
-        ({"holdout": {"fraction": 0.6}}, "holdout", ["4 configurations to fit and 6 held out", "at least 5 to fit"]),
-        ({"holdout": {"fraction": 0.3, "blocks": 3}}, "holdout", ["fraction, blocks together", "{blocks, seed}"]),
-        ({"holdout": {"session": 0, "seed": 1}}, "holdout", ["session, seed together", "{session}"]),
-        ({"holdout": {"blocks": 1}}, "holdout.blocks", ["found 1", "2 or more"]),
-        ({"holdout": {"blocks": 2.5}}, "holdout.blocks", ["2.5", "integer"]),
-        ({"holdout": {"blocks": 11}}, "holdout.blocks", ["11", "at most as many as configurations, 10"]),
-        ({"holdout": {"blocks": 9}}, "holdout", ["1 held out", "2 held out"]),
-        ({"holdout": {"session": 3}}, "holdout.session", ["found 3", "sessions that were measured: 0"]),
-        ({"holdout": {"session": [0, "x"]}}, "holdout.session[1]", ["'x'", "integer"]),
-        ({"holdout": {"session": []}}, "holdout.session", ["session"]),
-        ({"holdout": {"session": 0}}, "holdout", ["0 configurations to fit and 10 held out"]),
-        ({"holdout": {"fraction": 0.1}}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
+        ({"fraction": 0.6}, "holdout", ["4 configurations to fit and 6 held out", "at least 5 to fit"]),
+        ({"fraction": 0.3, "blocks": 3}, "holdout", ["fraction, blocks together", "{blocks, seed}"]),
+        ({"session": 0, "seed": 1}, "holdout", ["session, seed together", "{session}"]),
+        ({"blocks": 1}, "holdout.blocks", ["found 1", "2 or more"]),
+        ({"blocks": 2.5}, "holdout.blocks", ["2.5", "integer"]),
+        ({"blocks": 11}, "holdout.blocks", ["11", "at most as many as configurations, 10"]),
+        ({"blocks": 9}, "holdout", ["1 held out", "2 held out"]),
+        ({"session": 3}, "holdout.session", ["found 3", "sessions that were measured: 0"]),
+        ({"session": [0, "x"]}, "holdout.session[1]", ["'x'", "integer"]),
+        ({"session": []}, "holdout.session", ["session"]),
+        ({"session": 0}, "holdout", ["0 configurations to fit and 10 held out"]),
+        ({"fraction": 0.1}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
     ],
 )
-def test_faulty_holdout_is_refused_in_one_line(cell, changes, key, words):
-    cell.document |= changes
+def test_faulty_holdout_is_refused_in_one_line(cell, holdout, key, words):
+    cell.document["holdout"] = holdout
     with refused(f"{cell.source}: ", f" {key}", *words):
         cell.read()
 
@@ -229,12 +196,11 @@ def test_faulty_holdout_is_refused_in_one_line(cell, changes, key, words):
 @pytest.mark.parametrize("holdout", [{"fraction": 0.3, "seed": 2}, {"blocks": 3, "seed": 1}])
 def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell, holdout):
     """Every configuration is measured again under a pose number of its own: the draw is that of the configurations."""
-    cell.document["holdout"] = holdout
-    once = poses_of(split(cell.read())[1])
+    once = parts(cell, **holdout)[1]
     again = {name: list(column) for name, column in cell.table.items()}
     again["pose"] = [pose + POSES for pose in again["pose"]]
     cell.table = {name: [*column, *again[name]] for name, column in cell.table.items()}
-    assert poses_of(split(cell.read())[1]) == once | {(session, pose + POSES) for session, pose in once}
+    assert parts(cell)[1] == once | {(session, pose + POSES) for session, pose in once}
 
 
 def test_thirty_poses_of_one_configuration_are_refused(cell):

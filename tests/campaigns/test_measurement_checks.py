@@ -41,15 +41,10 @@ def test_whole_file_in_degrees_or_millimetres_is_refused(cell, tmp_path):
             spoilt.read()
 
 
-def test_joint_just_beyond_its_limit_is_no_degrees(cell):
+@pytest.mark.parametrize("angle", [1.2, 1.7])
+def test_a_joint_just_beyond_its_limit_or_with_a_wrong_sign_is_no_degrees(cell, angle):
     for row in range(1, 9):
-        cell.spoil(row, "q2", 1.2)
-    assert len(cell.read().measurements) == len(cell.table["pose"])
-
-
-def test_wrong_sign_beyond_a_limit_is_no_degrees(cell):
-    for row in range(1, 9):
-        cell.spoil(row, "q2", 1.7)
+        cell.spoil(row, "q2", angle)
     assert len(cell.read().measurements) == len(cell.table["pose"])
 
 

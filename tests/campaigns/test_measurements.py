@@ -76,14 +76,6 @@ def test_unknown_column_is_refused_with_the_closest_known(cell, name, hint):
         cell.read()
 
 
-def test_column_that_is_there_twice_is_refused(cell):
-    cell.write()
-    path = cell.folder / "measurements.csv"
-    path.write_text(path.read_text(encoding="utf-8").replace("q2", "q1", 1), encoding="utf-8")
-    with refused(cell.measurements, "header", "column 'q1' twice", "once"):
-        read_campaign(cell.folder, cell.robots)
-
-
 def test_lines_before_the_header_are_passed_over_and_counted(cell):
     whole = cell.read().measurements
     path = cell.folder / "measurements.csv"
@@ -153,6 +145,7 @@ def test_other_separators_are_refused(cell, separator):
         (b"pose,load\n0,0\n" + b"0" * 20_000 + b",0\n", "line 3", ["10000 characters or more"]),
         (b"pose,load\n0,0\n\n0,0,0\n", "row 3 (line 4)", ["3 cells"]),
         (b"," * 9000, "header", ["column '' twice"]),
+        (b"q1,x,q1\n0,0,0\n", "header", ["column 'q1' twice", "once"]),
         (b"# only\n\n", "", ["an empty file"]),
     ],
 )
@@ -204,20 +197,12 @@ def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
 
 
 @pytest.mark.parametrize(
-    ("cell_of", "found"),
-    [(lambda n: [[0.0]] * n, "list"), (lambda n: [b"1"] * n, "binary"), (lambda n: [True] * n, "bool")],
+    ("column", "entry", "found"), [("x", [0.0], "list"), ("x", b"1", "binary"), ("x", True, "bool"), ("target", b"A", "binary")]
 )
-def test_a_column_of_parquet_holds_numbers_or_text(cell, cell_of, found):
-    cell.table["x"] = cell_of(len(cell.table["x"]))
+def test_a_column_of_parquet_holds_numbers_or_text(cell, column, entry, found):
+    cell.table[column] = [entry] * len(cell.table[column])
     cell.write("parquet")
-    with refused(cell.folder / "measurements.parquet", "column x", found, "numbers"):
-        read_campaign(cell.folder, cell.robots)
-
-
-def test_names_of_targets_in_parquet_are_text(cell):
-    cell.table["target"] = [b"A"] * len(cell.table["target"])
-    cell.write("parquet")
-    with refused(cell.folder / "measurements.parquet", "column target", "binary", "text"):
+    with refused(cell.folder / "measurements.parquet", f"column {column}", found, "numbers, or text"):
         read_campaign(cell.folder, cell.robots)
 
 

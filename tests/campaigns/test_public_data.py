@@ -27,6 +27,15 @@ def registered(monkeypatch):
 
 
 @pytest.fixture
+def given(monkeypatch, tmp_path):
+    """The file in a folder that stands for the network."""
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "values.csv").write_bytes(CONTENTS)
+    return tmp_path / "mine" / "values.csv"
+
+
+@pytest.fixture
 def served(registered, monkeypatch, tmp_path):
     """Folder that a server on this machine offers in place of the public one."""
     folder = tmp_path / "served"
@@ -46,19 +55,15 @@ def test_the_address_is_by_commit(registered):
     assert registered.address == "https://raw.githubusercontent.com/owner/name/c0ffee/data/values.csv"
 
 
-def test_file_of_the_given_folder_is_used_where_it_lies(registered, monkeypatch, tmp_path):
-    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "values.csv").write_bytes(CONTENTS)
-    assert fetch("mine", {"mine": registered}, tmp_path / "cache") == tmp_path / "mine" / "values.csv"
+def test_file_of_the_given_folder_is_used_where_it_lies(registered, given, tmp_path):
+    assert fetch("mine", {"mine": registered}, tmp_path / "cache") == given
+    assert not_at_hand(["mine"], {"mine": registered}, tmp_path / "cache") is None
     assert not (tmp_path / "cache").exists()
 
 
-def test_file_of_the_given_folder_with_other_contents_is_refused(registered, monkeypatch, tmp_path):
-    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "values.csv").write_bytes(CONTENTS + b"\n")
-    with refused(tmp_path / "mine" / "values.csv", "", "SHA-256", registered.sha256, registered.address):
+def test_file_of_the_given_folder_with_other_contents_is_refused(registered, given, tmp_path):
+    given.write_bytes(CONTENTS + b"\n")
+    with refused(given, "", "SHA-256", registered.sha256, registered.address):
         fetch("mine", {"mine": registered}, tmp_path / "cache")
 
 
@@ -93,9 +98,6 @@ def test_what_is_missing_is_named_only_where_a_folder_stands_for_the_network(reg
     assert not_at_hand(["mine"], files, tmp_path / "cache") is None
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     assert not_at_hand(["mine"], files, tmp_path / "cache") == "mine/values.csv"
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "values.csv").write_bytes(CONTENTS)
-    assert not_at_hand(["mine"], files, tmp_path / "cache") is None
 
 
 def test_what_was_downloaded_before_is_at_hand(registered, served, monkeypatch, tmp_path):

@@ -31,15 +31,13 @@ def test_campaign_is_read_as_written(cell):
     for name in ("pose", "load", "repeat"):
         np.testing.assert_array_equal(getattr(measurements, name), table[name])
     assert [campaign.targets[index].name for index in measurements.target] == table["target"]
-    np.testing.assert_array_equal(measurements.joint_angles, np.column_stack([table[f"q{j}"] for j in (1, 2, 3)]))
-    np.testing.assert_array_equal(measurements.wrench, np.column_stack([table[name] for name in WRENCH]))
-    np.testing.assert_array_equal(measurements.position, np.column_stack([table[name] for name in "xyz"]))
-    np.testing.assert_array_equal(measurements.rotation_vector, np.column_stack([table[f"r{name}"] for name in "xyz"]))
-    np.testing.assert_array_equal(measurements.approach, np.column_stack([table[f"approach{j}"] for j in (1, 2, 3)]))
-    np.testing.assert_array_equal(measurements.time_s, table["time_s"])
-    np.testing.assert_array_equal(measurements.temperature_c, table["temperature_c"])
-    np.testing.assert_array_equal(measurements.session, np.zeros(len(measurements)))
-    np.testing.assert_array_equal(measurements.row, np.arange(1, len(measurements) + 1))
+    expected = {"time_s": table["time_s"], "temperature_c": table["temperature_c"]}
+    expected |= {"session": np.zeros(len(measurements)), "row": np.arange(1, len(measurements) + 1)}
+    groups = {"joint_angles": ("q1", "q2", "q3"), "wrench": WRENCH, "position": "xyz", "rotation_vector": ("rx", "ry", "rz")}
+    groups["approach"] = ("approach1", "approach2", "approach3")
+    expected |= {part: np.column_stack([table[name] for name in names]) for part, names in groups.items()}
+    for part, values in expected.items():
+        np.testing.assert_array_equal(getattr(measurements, part), values, err_msg=part)
 
 
 def test_a_mount_is_turned_as_stated_or_unknown_and_left_out_as_the_offset_is(cell):
@@ -84,10 +82,9 @@ def test_uncertainties_of_measurements_are_read_and_stand_alone(cell):
 
 
 def test_no_wrench_column_at_all_means_no_load(cell):
-    keep = [index for index, load in enumerate(cell.table["load"]) if load == 0]
-    cell.table = {name: [column[index] for index in keep] for name, column in cell.table.items()}
+    cell.keep(np.flatnonzero(np.equal(cell.table["load"], 0)))
     cell.without(*WRENCH)
-    np.testing.assert_array_equal(cell.read().measurements.wrench, np.zeros((len(keep), 6)))
+    np.testing.assert_array_equal(cell.read().measurements.wrench, np.zeros((len(cell.table["load"]), 6)))
 
 
 def test_orientations_are_left_aside_where_positions_are_measured(cell):
@@ -146,16 +143,10 @@ def test_campaign_that_holds_out_its_own_poses_has_no_other(cell):
     assert held_out_campaign(cell.read(), cell.folder, cell.robots) is None
 
 
-def some_poses(table, count):
-    """Rows of the first poses of a table."""
-    kept = [index for index, pose in enumerate(table["pose"]) if pose < count]
-    return {name: [column[index] for index in kept] for name, column in table.items()}
-
-
 @pytest.mark.parametrize("poses", [4, 5])
 def test_five_poses_are_the_fewest_that_another_campaign_may_test(cell, tmp_path, poses):
     other_campaign(cell, tmp_path)
-    cell.table = some_poses(cell.table, poses)
+    cell.keep(np.flatnonzero(np.less(cell.table["pose"], poses)))
     if poses < 5:
         with refused(cell.source, "holdout", "4 configurations to fit", "at least 5 to fit"):
             cell.read()
@@ -172,13 +163,8 @@ def test_all_of_another_campaign_is_the_test_even_where_that_one_holds_out_poses
 
 def with_sessions(cell):
     """The same poses again in session 7, and pose 3 of session 0 alone is not there."""
-    count = len(cell.table["pose"])
-    twice = {name: 2 * column for name, column in cell.table.items()} | {"session": [0] * count + [7] * count}
-    twice["target"] = cell.table["target"] + [f"{name}2" for name in cell.table["target"]]
-    targets = cell.document["targets"]
-    cell.document["targets"] = targets | {"A2": targets["A"], "B2": targets["B"]}
-    kept = [n for n in range(2 * count) if (twice["session"][n], twice["pose"][n]) != (0, 3)]
-    cell.table = {name: [column[n] for n in kept] for name, column in twice.items()}
+    cell.repeat_as_session_7()
+    cell.keep([n for n, at in enumerate(zip(cell.table["session"], cell.table["pose"], strict=True)) if at != (0, 3)])
 
 
 @pytest.mark.parametrize("of", [1, 2, 3, 4, 7])
@@ -309,8 +295,7 @@ def test_loads_on_compliances_that_nobody_states_nor_identifies_are_refused(cell
 def test_without_loads_joints_of_unknown_compliance_are_rigid_and_masses_turn_nothing(cell):
     del cell.arm["compliance_urad_per_Nm"]
     cell.arm["masses"] = [{"link": 2, "mass_kg": 10, "centre_m": [0.3, 0, 0], "relative_std": 0.2}]
-    keep = [index for index, load in enumerate(cell.table["load"]) if load == 0]
-    cell.table = {name: [column[index] for index in keep] for name, column in cell.table.items()}
+    cell.keep(np.flatnonzero(np.equal(cell.table["load"], 0)))
     robot = cell.read().robot
     np.testing.assert_array_equal(robot.compliance, np.zeros(3))
     assert robot.masses == () and not robot.compliance_known

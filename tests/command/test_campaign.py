@@ -2,22 +2,12 @@
 
 import pytest
 from analysed_robots import ROBOTS
-from certified import certified_checkout, record_jobs
-from support import refused
-from typer.testing import CliRunner
+from certified import record_jobs
 
 from elastocal.campaigns.reading import campaign_files
 from elastocal.command import campaign
 from elastocal.command.campaign import diagnosed_campaign
-from elastocal.command.main import app
 from elastocal.io.origin import environment
-
-
-@pytest.fixture(scope="module")
-def top(tmp_path_factory):
-    found = tmp_path_factory.mktemp("cell")
-    certified_checkout(found)
-    return found
 
 
 def test_robots_are_those_of_the_pipeline_and_results_those_of_the_workplace(top, tmp_path, monkeypatch):
@@ -48,19 +38,18 @@ def another_numpy(_):
 
 
 @pytest.mark.parametrize("change", [edited_pins, another_numpy])
-def test_results_of_another_environment_are_refused_by_every_command_unless_that_is_accepted(top, monkeypatch, capsys, change):
-    monkeypatch.chdir(top)
-    was, now = change(top)
+def test_results_of_another_environment_are_refused_by_every_command_unless_that_is_accepted(
+    there, elastocal, refusal, capsys, change
+):
+    was, now = change(there)
     for command, words in WANTED.items():
-        result = CliRunner().invoke(app, [command, "made", *words])
-        with refused(
-            "made", "", f"results by {was}", f"those of now, {now}", "elastocal diagnose made; or --accept-environment"
-        ):
-            raise result.exception
-    assert diagnosed_campaign(top / "made", True).name == "made"
-    assert capsys.readouterr().err.startswith(f"warning: {top}/made: found results by {was}")
+        line = refusal(command, "made", *words)
+        assert line.startswith(f"made: found results by {was}") and f"those of now, {now}" in line
+        assert line.endswith("elastocal diagnose made; or --accept-environment")
+    assert diagnosed_campaign(there / "made", True).name == "made"
+    assert capsys.readouterr().err.startswith(f"warning: {there}/made: found results by {was}")
     for command, words in WANTED.items():
-        result = CliRunner().invoke(app, [command, "made", *words, *NOWHERE[command], "--accept-environment"])
+        result = elastocal(command, "made", *words, *NOWHERE[command], "--accept-environment")
         assert "nowhere" in str(result.exception) or result.exit_code == 0
-    (top / "requirements.lock").unlink(missing_ok=True)
+    (there / "requirements.lock").unlink(missing_ok=True)
     record_jobs("made", campaign_files("made", ROBOTS))

@@ -1,3 +1,6 @@
+"""Certificates, as they are typed."""
+
+import contextlib
 import json
 import shutil
 from pathlib import Path
@@ -9,40 +12,23 @@ import yaml
 from analysed_robots import ROBOTS, analysed
 from certified import certified_checkout, record_jobs
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.application.calibrated import nominal_forward
 from elastocal.campaigns.reading import campaign_files
-from elastocal.command.main import app
-from elastocal.errors import InputError
-
-
-@pytest.fixture(scope="module")
-def top(tmp_path_factory):
-    found = tmp_path_factory.mktemp("certified")
-    certified_checkout(found)
-    certified_checkout(found, "later", 2e-3)
-    return found
 
 
 @pytest.fixture
-def run(top, monkeypatch):
-    monkeypatch.chdir(top)
-
-    def called(*words):
-        return CliRunner().invoke(app, ["certificate", *map(str, words)])
-
-    return called
+def run(there, elastocal):
+    return lambda *words: elastocal("certificate", *words)
 
 
 @pytest.fixture(scope="module")
-def issued(top):
+def issued(top, elastocal):
     """A certificate's command and the folder that it wrote into."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.chdir(top)
-        words = ["certificate", str(top / "made"), "--tolerance", "0.5mm", "--serial", "7", "--date", "2026-11-20"]
-        return CliRunner().invoke(app, words), top / "reports" / "loop" / "made"
+    with contextlib.chdir(top):
+        result = elastocal("certificate", "made", "--tolerance", "0.5mm", "--serial", "7", "--date", "2026-11-20")
+    return result, top / "reports" / "loop" / "made"
 
 
 def test_pages_and_document_are_written_beside_the_report(issued):
@@ -56,6 +42,7 @@ def test_pages_and_document_are_written_beside_the_report(issued):
 
 
 def test_a_joint_that_slipped_between_two_campaigns_is_seen(run, top, tmp_path):
+    certified_checkout(top, "later", 2e-3)
     result = run(top / "later", "--tolerance", "0.5mm", "--compare", top / "made", "--output", tmp_path / "out")
     assert result.exit_code == 0, result.output
     comparison = json.loads((tmp_path / "out" / "certificate.json").read_text())["comparison"]
@@ -71,25 +58,23 @@ def test_a_joint_that_slipped_between_two_campaigns_is_seen(run, top, tmp_path):
         (["--tolerance", "0.5mm", "--serial", ""], "--serial: found ''; allowed: 1 to 60 characters"),
     ],
 )
-def test_bad_options_end_in_one_line_and_write_nothing(run, top, tmp_path, words, message):
-    result = run(top / "made", *words, "--output", tmp_path / "out")
-    assert isinstance(result.exception, InputError) and message in str(result.exception)
+def test_bad_options_end_in_one_line_and_write_nothing(there, refusal, tmp_path, words, message):
+    assert message in refusal("certificate", "made", *words, "--output", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_data_at_fault_get_no_certificate(run, top, tmp_path, monkeypatch):
+def test_data_at_fault_get_no_certificate(refusal, top, tmp_path, monkeypatch):
     shutil.copytree(top, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(tmp_path / "top")
     path = Path("reports/loop/made/verdict.json")
     verdict = json.loads(path.read_text()) | {"effects": [{"family": "data", "name": "wrong_sign"}], "accuracy": None}
     path.write_text(json.dumps(verdict))
     record_jobs("made", campaign_files("made", ROBOTS))
-    result = CliRunner().invoke(app, ["certificate", "made", "--tolerance", "0.5mm", "--output", "out"])
-    assert isinstance(result.exception, InputError) and "data at fault" in str(result.exception)
+    assert "data at fault" in refusal("certificate", "made", "--tolerance", "0.5mm", "--output", "out")
 
 
 @pytest.fixture(scope="module")
-def corrected(top, tmp_path_factory):
+def corrected(top, elastocal, tmp_path_factory):
     """Targets that `correct` wrote, their folder, and what it said."""
     folder, robot = tmp_path_factory.mktemp("corrected"), analysed("kuka")
     bent = (
@@ -98,10 +83,8 @@ def corrected(top, tmp_path_factory):
     position, rotation = nominal_forward(robot, robot.reported_angles(bent))
     pose = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
     pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz"]).to_csv(folder / "path.csv", index=False)
-    with pytest.MonkeyPatch.context() as patched:
-        patched.chdir(top)
-        words = ["correct", str(top / "made"), str(folder / "path.csv"), "--output", str(folder / "targets.csv")]
-        found = CliRunner().invoke(app, words)
+    with contextlib.chdir(top):
+        found = elastocal("correct", "made", folder / "path.csv", "--output", folder / "targets.csv")
     assert found.exit_code == 0, found.output
     return folder, found.stderr
 

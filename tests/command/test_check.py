@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 from analysed_robots import analysed
 from made_folders import made_folder, made_table
-from typer.testing import CliRunner
 
 from elastocal.command.check import lines
-from elastocal.command.main import app
-from elastocal.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -18,12 +15,13 @@ def folder(tmp_path_factory):
     return made_folder(tmp_path_factory.mktemp("check") / "made", analysed("kuka"))
 
 
-def run(*words):
-    return CliRunner().invoke(app, ["check", *map(str, words)])
+@pytest.fixture(scope="module")
+def facts(elastocal, folder):
+    return json.loads(elastocal("check", folder, "--json").stdout)
 
 
-def test_headings_say_what_was_read_identified_and_testable(folder):
-    result = run(folder)
+def test_headings_say_what_was_read_identified_and_testable(elastocal, folder):
+    result = elastocal("check", folder)
     assert result.exit_code == 0, result.output
     answer, *rest = result.output.splitlines()
     assert answer.startswith("✓ made can be diagnosed: ")
@@ -41,35 +39,27 @@ def test_headings_say_what_was_read_identified_and_testable(folder):
         ([0], 0.0, "unloaded; "),
     ],
 )
-def test_labels_of_loads_are_counted_and_not_printed_as_newtons(folder, loads, force, words):
-    facts = json.loads(run(folder, "--json").stdout) | {"loads": loads, "largest_force_N": force}
-    assert any(text.startswith(words) for _, text in lines(facts))
+def test_labels_of_loads_are_counted_and_not_printed_as_newtons(facts, loads, force, words):
+    assert any(text.startswith(words) for _, text in lines(facts | {"loads": loads, "largest_force_N": force}))
 
 
-def test_json_is_all_of_it(folder):
-    result = run(folder, "--json")
-    assert json.loads(result.stdout)["campaign"] == "made"
-
-
-def test_a_fitted_mount_is_shown_with_its_rotation(folder):
-    facts = json.loads(run(folder, "--json").stdout)
-    assert facts["mounts"] == [] and not any(name == "mount" for name, _ in lines(facts))
+def test_a_fitted_mount_is_shown_with_its_rotation(facts):
+    assert facts["campaign"] == "made" and facts["mounts"] == [] and not any(name == "mount" for name, _ in lines(facts))
     shown = lines(facts | {"mounts": [{"target": "TMAC", "rotation_rad": [0.0, 0.1, 1.5707963]}]})
     assert ("mount", "TMAC: rotation [0.0000, 0.1000, 1.5708] rad in the frame of its point, fitted") in shown
 
 
-def test_faults_of_the_data_end_in_exit_code_one(tmp_path):
+def test_faults_of_the_data_end_in_exit_code_one(elastocal, tmp_path):
     table = made_table(analysed("kuka"), "made")
     table["q3"] = -table["q3"]
-    result = run(made_folder(tmp_path / "made", analysed("kuka"), table=table))
+    result = elastocal("check", made_folder(tmp_path / "made", analysed("kuka"), table=table))
     assert result.exit_code == 1
     assert result.output.startswith("! made cannot be diagnosed: the data are at fault")
     assert "next: mend the data" in result.output
 
 
-def test_a_sheet_that_is_not_filled_in_is_refused_with_its_row(tmp_path):
+def test_a_sheet_that_is_not_filled_in_is_refused_with_its_row(refusal, tmp_path):
     table = {name: values.astype(object) for name, values in made_table(analysed("kuka"), "made").items()}
     table["x"][3] = ""
-    result = run(made_folder(tmp_path / "made", analysed("kuka"), table={k: np.asarray(v) for k, v in table.items()}))
-    assert isinstance(result.exception, InputError)
-    assert "row 4, column x (line 5): found nothing" in str(result.exception)
+    folder = made_folder(tmp_path / "made", analysed("kuka"), table={k: np.asarray(v) for k, v in table.items()})
+    assert "row 4, column x (line 5): found nothing" in refusal("check", folder)

@@ -6,37 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
-from certified import certified_checkout
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
 from elastocal.application.calibrated import forward, nominal_forward
-from elastocal.command.main import app
-from elastocal.errors import InputError
 from elastocal.loop.calibrated_files import load_diagnosed
 
 BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
-
-
-@pytest.fixture(scope="module")
-def cell(tmp_path_factory):
-    """A checkout with a diagnosed campaign in it."""
-    top = tmp_path_factory.mktemp("cell")
-    return top, certified_checkout(top)
-
-
-def path_file(folder: Path, angles: np.ndarray) -> Path:
-    position, rotation = nominal_forward(analysed("kuka"), angles)
-    columns = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
-    path = folder / "path.csv"
-    pd.DataFrame(columns, columns=["x", "y", "z", "rx", "ry", "rz"]).to_csv(path, index=False)
-    return path
-
-
-def run(monkeypatch, cell, path, *more):
-    monkeypatch.chdir(cell[0])
-    output = path.with_name("targets.csv")
-    return CliRunner().invoke(app, ["correct", str(cell[1]), str(path), "--output", str(output), *more]), output
 
 
 @pytest.fixture
@@ -44,12 +19,38 @@ def angles():
     return analysed("kuka").joint_limits.mean(axis=1) + BENT + 0.2 * np.linspace(0, 1, 8)[:, None]
 
 
-def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses(monkeypatch, tmp_path, cell, angles):
-    result, output = run(monkeypatch, cell, path_file(tmp_path, angles))
+@pytest.fixture
+def path(tmp_path, angles):
+    """Wanted poses."""
+    position, rotation = nominal_forward(analysed("kuka"), angles)
+    columns = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
+    pd.DataFrame(columns, columns=["x", "y", "z", "rx", "ry", "rz"]).to_csv(tmp_path / "path.csv", index=False)
+    return tmp_path / "path.csv"
+
+
+@pytest.fixture
+def output(tmp_path):
+    return tmp_path / "targets.csv"
+
+
+@pytest.fixture
+def words(there, path, output):
+    return "correct", there / "made", path, "--output", output
+
+
+def moved_away(path, rows):
+    """The path with some of its poses out of reach."""
+    table = pd.read_csv(path)
+    table.loc[rows, "x"] = 8.0
+    table.to_csv(path, index=False)
+
+
+def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses(elastocal, words, output, top, angles):
+    result = elastocal(*words)
     assert result.exit_code == 0, result.stderr
     assert "8 of 8 targets corrected" in result.stderr
     targets = pd.read_csv(output)
-    robot = load_diagnosed(cell[1], ROBOTS, cell[0]).calibrated
+    robot = load_diagnosed(top / "made", ROBOTS, top).calibrated
     reached, _ = forward(robot, targets[[f"q{j}" for j in range(1, 7)]].to_numpy())
     wanted, _ = nominal_forward(robot.robot, angles)
     np.testing.assert_allclose(reached, wanted, atol=1e-7)
@@ -60,24 +61,17 @@ def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses(monkeypatch, 
     assert targets["outside_range"].dtype == bool
 
 
-def test_a_pose_out_of_reach_is_named_and_nothing_is_written(monkeypatch, tmp_path, cell, angles):
-    path = path_file(tmp_path, angles)
-    table = pd.read_csv(path)
-    table.loc[2, "x"] = 8.0
-    table.to_csv(path, index=False)
-    result, output = run(monkeypatch, cell, path)
-    assert isinstance(result.exception, InputError)
-    assert "line 4 is unreachable" in str(result.exception)
-    assert not output.exists()
-    result, output = run(monkeypatch, cell, path, "--partial")
+def test_a_pose_out_of_reach_is_named_and_nothing_is_written(elastocal, refusal, words, path, output):
+    moved_away(path, [2])
+    assert "line 4 is unreachable" in refusal(*words) and not output.exists()
+    result = elastocal(*words, "--partial")
     assert result.exit_code == 0
     assert pd.read_csv(output)["status"].tolist().count("ok") == 7
     assert "7 of 8 targets corrected" in result.stderr
 
 
-def test_a_program_for_the_controller_stands_beside_the_table(monkeypatch, tmp_path, cell, angles):
-    path = path_file(tmp_path, angles)
-    result, output = run(monkeypatch, cell, path, "--format", "krl")
+def test_a_program_for_the_controller_stands_beside_the_table(elastocal, words, output, tmp_path):
+    result = elastocal(*words, "--format", "krl")
     assert result.exit_code == 0, result.stderr
     assert "targets.src goes to 8 of 8 targets: KUKA KRL, q1 as A1" in " ".join(result.stderr.split())
     moves = [line for line in output.with_suffix(".src").read_text().splitlines() if "PTP" in line]
@@ -85,29 +79,23 @@ def test_a_program_for_the_controller_stands_beside_the_table(monkeypatch, tmp_p
     np.testing.assert_allclose(
         np.radians([[float(word.split()[1]) for word in move[15:-1].split(", ")] for move in moves]), targets, atol=1e-8
     )
-    by_suffix = tmp_path / "go.MOD"
-    result = CliRunner().invoke(app, ["correct", str(cell[1]), str(path), "--output", str(by_suffix)])
+    result = elastocal(*words, "--output", tmp_path / "go.MOD")
     assert result.exit_code == 0, result.stderr
     assert (tmp_path / "go.mod").read_text().startswith("MODULE go") and len(pd.read_csv(tmp_path / "go.csv")) == 8
 
 
-def test_targets_that_are_not_reached_are_in_no_program(monkeypatch, tmp_path, cell, angles):
-    path = path_file(tmp_path, angles)
-    table = pd.read_csv(path)
-    table.loc[2, "x"] = 8.0
-    table.to_csv(path, index=False)
-    result, output = run(monkeypatch, cell, path, "--partial", "--format", "tp")
+def test_targets_that_are_not_reached_are_in_no_program(elastocal, refusal, words, path, output):
+    moved_away(path, [2])
+    result = elastocal(*words, "--partial", "--format", "tp")
     assert result.exit_code == 0 and "targets.ls goes to 7 of 8" in " ".join(result.stderr.split())
     assert output.with_suffix(".ls").read_text().count("GP1:") == 7
-    table["x"] = 8.0
-    table.to_csv(path, index=False)
-    result, _ = run(monkeypatch, cell, path, "--partial", "--format", "urscript")
-    assert isinstance(result.exception, InputError) and "no pose" in str(result.exception)
+    moved_away(path, slice(None))
+    assert "no pose" in refusal(*words, "--partial", "--format", "urscript")
     assert not output.with_suffix(".script").exists()
 
 
 @pytest.mark.parametrize(
-    ("more", "words"),
+    ("more", "message"),
     [
         (("--format", "karel"), "krl | rapid | tp | urscript"),
         (("--axes", "A1,A2"), "with --format"),
@@ -116,7 +104,6 @@ def test_targets_that_are_not_reached_are_in_no_program(monkeypatch, tmp_path, c
         (("--format", "krl", "--output", "my targets.csv"), "as the name of a program"),
     ],
 )
-def test_what_is_no_program_is_refused_before_any_work(monkeypatch, tmp_path, cell, angles, more, words):
-    result, _ = run(monkeypatch, cell, path_file(tmp_path, angles), *more)
-    assert isinstance(result.exception, InputError) and words in str(result.exception)
+def test_what_is_no_program_is_refused_before_any_work(refusal, words, tmp_path, more, message):
+    assert message in refusal(*words, *more)
     assert [file.name for file in tmp_path.iterdir()] == ["path.csv"] and not Path("x.mod").exists()

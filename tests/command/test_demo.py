@@ -4,7 +4,6 @@ import shlex
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from elastocal.command import demo, main
 
@@ -12,7 +11,7 @@ DONE = {"plan": 0, "check": 0, "diagnose": 0, "correct": 0, "certificate": 1}
 
 
 @pytest.fixture
-def run(monkeypatch, tmp_path):
+def run(elastocal, monkeypatch, tmp_path):
     """Run it with subcommands that only note what they were called with; what was called, and what was printed."""
     called = []
 
@@ -41,7 +40,7 @@ def run(monkeypatch, tmp_path):
 
     def ended(*words, **other):
         codes.update(other)
-        return CliRunner().invoke(main.app, ["demo", str(tmp_path / "cell"), *words]), called
+        return elastocal("demo", tmp_path / "cell", *words), called
 
     return ended
 

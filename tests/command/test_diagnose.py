@@ -4,17 +4,14 @@ import io
 
 import pytest
 from rich.console import Console
-from typer.testing import CliRunner
 
 from elastocal.command import diagnose
-from elastocal.command.main import app
-from elastocal.errors import InputError
 
 LINES = ["3 jobs\n", "1 of 3: read_campaign cell7\n", "2 of 3: judge_campaign cell7\n", "cell7: [bold] is missing\n"]
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
+def run(elastocal, tmp_path, monkeypatch):
     """Diagnose a campaign with a pipeline and in a workplace; what is called, and the exit code of that."""
 
     def called(pipeline, code=0, prints=""):
@@ -25,7 +22,7 @@ def run(tmp_path, monkeypatch):
         monkeypatch.setattr(diagnose.sys, "executable", str(stand_in))
         monkeypatch.setattr(diagnose, "pipeline", lambda: pipeline)
         monkeypatch.setattr(diagnose, "workplace", lambda: tmp_path)
-        return CliRunner().invoke(app, ["diagnose", str(tmp_path / "cell7"), "-j", "1"])
+        return elastocal("diagnose", tmp_path / "cell7", "-j", 1)
 
     return called
 
@@ -70,6 +67,5 @@ def test_where_everything_is_up_to_date_the_outcome_is_printed_again(monkeypatch
 
 
 @pytest.mark.parametrize("mark", ["{x}", ": ", " #", "\n", "\x1b", "\u202e"])
-def test_a_path_that_snakemake_takes_for_something_else_is_refused(tmp_path, mark):
-    result = CliRunner().invoke(app, ["diagnose", f"{tmp_path}/a{mark}b"])
-    assert isinstance(result.exception, InputError) and "a path without it" in str(result.exception)
+def test_a_path_that_snakemake_takes_for_something_else_is_refused(refusal, tmp_path, mark):
+    assert "a path without it" in refusal("diagnose", f"{tmp_path}/a{mark}b")

@@ -7,16 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from analysed_robots import analysed
-from certified import certified_checkout
 from made_calibrated import made_calibrated
 from made_urdf import joint, link, written
-from typer.testing import CliRunner
 
 from elastocal.application.calibrated_geometry import folded
 from elastocal.campaigns.reading import read_robot
 from elastocal.command.export import _drop_in
-from elastocal.command.main import app
-from elastocal.errors import InputError
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.exchange.urdf_origins import with_calibrated_origins
@@ -24,15 +20,8 @@ from elastocal.exchange.urdf_writing import urdf_of
 from elastocal.mechanics.kinematics import poses
 
 
-@pytest.fixture(scope="module")
-def cell(tmp_path_factory):
-    top = tmp_path_factory.mktemp("cell")
-    return top, certified_checkout(top)
-
-
-def test_robot_file_urdf_and_sidecar_hold_what_was_found(monkeypatch, tmp_path, cell):
-    monkeypatch.chdir(cell[0])
-    result = CliRunner().invoke(app, ["export", str(cell[1]), "--output", str(tmp_path / "out"), "--date", "2026-11-23"])
+def test_robot_file_urdf_and_sidecar_hold_what_was_found(there, elastocal, tmp_path):
+    result = elastocal("export", "made", "--output", tmp_path / "out", "--date", "2026-11-23")
     assert result.exit_code == 0, result.output
     robot = read_robot(tmp_path / "out" / "robot.yaml")
     nominal = analysed("kuka")
@@ -53,11 +42,10 @@ def test_robot_file_urdf_and_sidecar_hold_what_was_found(monkeypatch, tmp_path, 
     assert document["effects"] == [] and document["date"] == "2026-11-23" and len(document["joint_compliance"]) == 6
 
 
-def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(monkeypatch, tmp_path, cell):
-    monkeypatch.chdir(cell[0])
+def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(there, elastocal, refusal, tmp_path):
     mine, output = tmp_path / "mine.urdf", tmp_path / "out"
     mine.write_text(urdf_of(analysed("kuka")).replace("<robot ", "<!-- mine --><robot ").replace('effort="1e9"', 'effort="77"'))
-    result = CliRunner().invoke(app, ["export", str(cell[1]), "--urdf", str(mine), "--output", str(output)])
+    result = elastocal("export", "made", "--urdf", mine, "--output", output)
     assert result.exit_code == 0, result.output
     told = " ".join(result.stderr.split())
     assert "robot.urdf: " in told and "joint origins changed, nothing else" in told and "cannot hold" not in told
@@ -71,10 +59,8 @@ def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_i
     for wrong, where in ((urdf_of(analysed("gp180")), "imported"), ("<robot/>", "no <link>")):
         other = tmp_path / "other.urdf"
         other.write_text(wrong)
-        result = CliRunner().invoke(app, ["export", str(cell[1]), "--urdf", str(other), "--output", str(tmp_path / "none")])
-        assert isinstance(result.exception, InputError) and where in str(result.exception)
-    result = CliRunner().invoke(app, ["export", str(cell[1]), "--urdf", str(output / "robot.urdf"), "--output", str(output)])
-    assert isinstance(result.exception, InputError) and "would be replaced" in str(result.exception)
+        assert where in refusal("export", "made", "--urdf", other, "--output", tmp_path / "none")
+    assert "would be replaced" in refusal("export", "made", "--urdf", output / "robot.urdf", "--output", output)
     assert not (tmp_path / "none").exists() and (output / "robot.urdf").read_text() == text
 
 

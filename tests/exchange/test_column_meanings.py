@@ -8,7 +8,8 @@ from imported_tables import PLAIN, ROW, table
 from scipy.spatial.transform import Rotation
 from support import refused, robot_of
 
-from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+from elastocal.exchange.import_options import ImportOptions
+from elastocal.exchange.measurement_table import read_measurement_table
 
 
 @pytest.mark.parametrize("header", ["Load [kg]", "load (kg)", "Cycle [s]", "Target [mm]", "Marker (mm)"])
@@ -140,8 +141,7 @@ NAMED = ("rail", "shoulder_pan_joint", "J1")
 def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
     robot = replace(robot_of("Tx(q1) Rz(q2) Tx(1) Rz(q3) [A]"), joint_names=NAMED)
     velocity = "/joint_states/rail/velocity"
-    (tmp_path / "t.csv").write_text(f"{headers},{velocity},x,y,z\n1,2,3,9,{ROW}\n")
-    found = read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
+    found = table(tmp_path, f"{headers},{velocity},x,y,z\n1,2,3,9,{ROW}\n", PLAIN, robot)
     np.testing.assert_allclose([found.table[name][0] for name in ("q1", "q2", "q3")], [0.001, *np.radians([2, 3])])
     assert found.ignored == (velocity,)
     # What was found out needs no robot a second time.
@@ -151,18 +151,21 @@ def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
 def test_a_rail_is_measured_in_lengths_and_a_joint_in_angles(tmp_path):
     robot = robot_of("Tx(q1) Rz(q2) [A]")
     for names, unit in (("J1 [deg],J2", "J1 [deg]"), ("J1,J2 [mm]", "J2 [mm]")):
-        (tmp_path / "t.csv").write_text(f"{names},x,y,z\n1,2,{ROW}\n")
         with refused(tmp_path / "t.csv", f"unit of {unit!r}", "--unit"):
-            read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
+            table(tmp_path, f"{names},x,y,z\n1,2,{ROW}\n", PLAIN, robot)
 
 
 @pytest.mark.parametrize(
     ("names", "words"), [("J1,J2,J3", ["3 joints", "--ignore"]), ("J1", ["no column q2"]), ("a,b", ["no joint angles"])]
 )
 def test_as_many_joints_as_the_robot_has_are_needed(tmp_path, names, words):
-    (tmp_path / "t.csv").write_text(f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n")
     with refused(tmp_path / "t.csv", "header", *words):
-        read_measurement_table(tmp_path / "t.csv", PLAIN, robot_of("Rz(q1) Tx(1) Rz(q2) [A]"))
+        table(
+            tmp_path,
+            f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n",
+            PLAIN,
+            robot_of("Rz(q1) Tx(1) Rz(q2) [A]"),
+        )
 
 
 def test_topics_have_positions_orientations_and_forces(tmp_path):
@@ -213,3 +216,51 @@ def test_what_may_surprise_is_noted(tmp_path):
     assert "units as usual, as nothing states them: 'fz' in N" in found.notes
     assert any("'q1' goes to 90 rad, 14.3 turns" in note and "--angles deg" in note for note in found.notes)
     assert table(tmp_path, f"q1,x,y,z,fz [N],time [s]\n90,{ROW},4,5\n").notes == ()
+
+
+ARM = ("shoulder_pan", "shoulder_lift", "elbow")
+
+
+def three_joints():
+    return replace(robot_of("Rz(q1) Tx(1) Ry(q2) Tx(1) Ry(q3) [A]"), joint_names=ARM)
+
+
+HEADS = {
+    "rosbag": ("field.name{}", "field.position{}"),
+    "PlotJuggler": ("/joint_states/name[{}]", "/joint_states/position[{}]"),
+    "a list": ("names_{}", "positions_{}"),
+    "points": ("/joint_states/name.{}", "/joint_states/position.{}"),
+}
+
+
+@pytest.mark.parametrize("program", HEADS)
+def test_positions_are_of_the_joints_that_names_say_in_whatever_order(tmp_path, program):
+    names, positions = ([head.format(number) for number in range(4)] for head in HEADS[program])
+    velocities = [position.replace("position", "velocity") for position in positions]
+    head = ",".join(["%time", *names, *positions, *velocities, "x", "y", "z"])
+    rows = "".join(f"{row},elbow,gripper,shoulder_lift,shoulder_pan,3,9,2,1,7,7,7,7,1,2,3\n" for row in range(2))
+    found = table(tmp_path, f"{head}\n{rows}", PLAIN, three_joints())
+    assert [found.table[f"q{joint}"][0] for joint in (1, 2, 3)] == pytest.approx(np.radians([1, 2, 3]))
+    assert set(found.ignored) == {*names, positions[1], *velocities}
+    # The columns that were found out need no robot.
+    again = read_measurement_table(tmp_path / "t.csv", found.options)
+    np.testing.assert_array_equal(again.table["q2"], found.table["q2"])
+    with refused(tmp_path / "t.csv", "header", "elbow, gripper", "--robot FILE", "--column q1="):
+        table(tmp_path, f"{head}\n{rows}")
+
+
+def test_names_that_count_joints_need_no_robot(tmp_path):
+    found = table(tmp_path, "name0,name1,position0,position1,x,y,z\njoint_2,joint_1,2,1,1,2,3\n")
+    assert [found.table[f"q{joint}"][0] for joint in (1, 2)] == pytest.approx(np.radians([1, 2]))
+
+
+def test_a_name_that_changes_is_refused_with_its_line(tmp_path):
+    text = "name0,name1,name2,position0,position1,position2,x,y,z\n" + "elbow,shoulder_pan,shoulder_lift,3,1,2,1,2,3\n" * 2
+    text += "shoulder_pan,elbow,shoulder_lift,3,1,2,1,2,3\n"
+    with refused(tmp_path / "t.csv", "line 4, column name0", "'shoulder_pan'", "'elbow' in line 2"):
+        table(tmp_path, text, PLAIN, three_joints())
+
+
+def test_positions_without_names_are_a_question(tmp_path):
+    with refused(tmp_path / "t.csv", "header", "no joint angles", "position0"):
+        table(tmp_path, "position0,position1,x,y,z\n1,2,1,2,3\n")

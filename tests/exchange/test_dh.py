@@ -8,27 +8,22 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from imported_tables import UR5E
+from scipy.spatial.transform import Rotation
 from support import refused
 from synthetic import made_states
 
 from elastocal.effects.conditions import conditions_of
-from elastocal.exchange.dh import robot_from_dh
+from elastocal.exchange.dh import _lengths_of, _slid_words, robot_from_dh
 from elastocal.exchange.dh_table import DhOptions
 from elastocal.exchange.robot_text import robot_text
 from elastocal.io.documents import read_document
+from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import sites_of
 
 PLAIN = DhOptions("deg", "m")
-UR5E = """joint, theta_offset_deg, d_m,    a_m,     alpha_deg, type
-1,     0,                0.1625, 0,       90,        R
-2,     0,                0,      -0.425,  0,         R
-3,     0,                0,      -0.3922, 0,         R
-4,     0,                0.1333, 0,       90,        R
-5,     0,                0.0997, 0,       -90,       R
-6,     0,                0.0996, 0,       0,         R
-"""
 
 
 def written(folder, rows, header="theta_offset,d,a,alpha,type,lower,upper"):
@@ -190,3 +185,52 @@ def test_lengths_that_do_not_cancel_are_still_refused(tmp_path):
     rows = [(0, 300, 0, 90, "R", "", ""), (0, -300, 0, 0, "R", "", "")]
     with refused(written(tmp_path, rows), "chain", "metres"):
         robot_from_dh(tmp_path / "arm.csv", options=PLAIN)
+
+
+def homogeneous(rotation, shift):
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = rotation, shift
+    return made
+
+
+def moved(kind, amount):
+    if kind == "P":
+        return homogeneous(np.eye(3), [0, 0, amount])
+    return homogeneous(Rotation.from_euler("z", amount).as_matrix(), [0, 0, 0])
+
+
+@given(seed=st.integers(0, 10**6), kinds=st.text("RP", min_size=1, max_size=5))
+def test_poses_of_all_points_are_those_of_the_pieces(seed, kinds):
+    rng = np.random.default_rng(seed)
+
+    def piece(name):
+        return homogeneous(Rotation.random(random_state=rng).as_matrix(), rng.uniform(-3, 3, 3)), name
+
+    gaps = [[piece(""), piece("base"), piece("")], *([piece(f"p{number}"), piece("")] for number in range(len(kinds)))]
+    gaps[-1].append(piece("end"))
+    words, slides = _slid_words(gaps, kinds)
+    assert slides.shape == (len(kinds) + 1,) and slides[0] == 0.0
+    chain = parse_chain(" ".join(words), {}, "test")
+    points = {point.name: point for point in chain.points}
+    q = rng.uniform(-2, 2, len(kinds))
+    at = np.eye(4)
+    for number, gap in enumerate(gaps):
+        if number:
+            at = at @ moved(kinds[number - 1], q[number - 1])
+        for transform, name in gap:
+            at = at @ transform
+            if name:
+                position, rotation = poses(chain, q[None], points[name])
+                np.testing.assert_allclose(position[0], at[:3, 3], rtol=0, atol=1e-9)
+                np.testing.assert_allclose(rotation[0], at[:3, :3], rtol=0, atol=1e-9)
+
+
+def test_parallel_axes_come_to_one_another():
+    gaps = [
+        [(np.eye(4), "")],
+        [(homogeneous(np.eye(3), [0.4, 0, 300.0]), "")],
+        [(homogeneous(np.eye(3), [0, 0, -299.9]), "end")],
+    ]
+    words, slides = _slid_words(gaps, "RR")
+    assert words == ["Rz(q1)", "Tx(0.4)", "Rz(q2)", "Tz(0.1)", "[end]"] and slides.tolist() == [0.0, 0.0, -300.0]
+    assert _lengths_of(words) == 0.5

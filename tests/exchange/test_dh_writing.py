@@ -6,6 +6,7 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS, analysed
+from imported_tables import UR5E
 from made_calibrated import USUAL, made_calibrated
 from support import refused, robot_of
 
@@ -15,14 +16,6 @@ from elastocal.exchange.dh_writing import PARAMETERS, dh_deltas, dh_frames, dh_r
 from elastocal.mechanics.kinematics import poses
 
 NAMES = sorted(path.stem for path in ROBOTS.glob("*.yaml"))
-UR5E = """joint, theta_offset_deg, d_m, a_m, alpha_deg, type
-1, 0, 0.1625, 0, 90, R
-2, 0, 0, -0.425, 0, R
-3, 0, 0, -0.3922, 0, R
-4, 0, 0.1333, 0, 90, R
-5, 0, 0.0997, 0, -90, R
-6, 0, 0.0996, 0, 0, R
-"""
 
 
 def flange(robot, reported):

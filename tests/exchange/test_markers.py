@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from support import refused
 
+from elastocal.exchange.import_options import ImportOptions
 from elastocal.exchange.markers import markers_in
-from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+from elastocal.exchange.measurement_table import read_measurement_table
 
 PLAIN = ImportOptions(units={"angles": "deg", "lengths": "mm"})
 TWO = ("A", "B")

@@ -8,7 +8,8 @@ from durations import growth
 from imported_tables import PLAIN, table
 from support import refused
 
-from elastocal.exchange.measurement_table import SAME_POSE, ImportOptions
+from elastocal.exchange.import_options import ImportOptions
+from elastocal.exchange.measurement_table import SAME_POSE
 
 
 def test_angles_lengths_and_forces_come_in_si_units(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_calibrated import made_calibrated
-from made_urdf import Pinocchio, joint, link, segments, written
+from made_urdf import assert_same_poses, joint, link, segments, written
 from support import refused
 
 from elastocal.application.calibrated_geometry import folded
@@ -125,13 +125,11 @@ def test_it_moves_as_the_calibrated_robot_in_pinocchio_and_mujoco(cell):
     position, rotation = poses(calibrated.chain, calibrated.model_angles(angles), calibrated.chain.end_effector)
     nominal = poses(robot.chain, angles, robot.chain.end_effector)[0]
     assert np.linalg.norm(position - nominal, axis=1).min() > 1e-4
-    by_pinocchio, by_mujoco = Pinocchio(output), mujoco.MjModel.from_xml_path(str(output))
+    assert_same_poses(calibrated, output, "world_mount", "tool0")
+    by_mujoco = mujoco.MjModel.from_xml_path(str(output))
     state = mujoco.MjData(by_mujoco)
     (last,) = (joint.origin for joint in read_urdf(output).joints if joint.child == "tool0")
     for values, at, axes in zip(angles, position, rotation, strict=True):
-        there = by_pinocchio.pose("world_mount", "tool0", dict(zip(robot.joint_names, values, strict=True)))
-        np.testing.assert_allclose(there[0], at, atol=1e-9)
-        np.testing.assert_allclose(there[1], axes, atol=1e-9)
         for name, value in zip(robot.joint_names, values, strict=True):
             state.joint(name).qpos = value
         mujoco.mj_kinematics(by_mujoco, state)
@@ -172,12 +170,7 @@ def test_a_joint_that_mimics_one_of_the_chain_takes_its_offset_too(tmp_path):
     keys = ("joint_offset@1", "joint_offset@2", "link_geometry@1", "link_geometry@2")
     calibrated = folded(made_calibrated(robot, *keys, identified=False)).robot
     output, _ = exported((path, robot, calibrated))
-    angles = np.array([[0.3, -0.7], [-1.0, 0.4]])
-    position, rotation = poses(calibrated.chain, calibrated.model_angles(angles), calibrated.chain.end_effector)
-    for (one, two), at, axes in zip(angles, position, rotation, strict=True):
-        there = Pinocchio(output).pose("a", "e", {"one": one, "two": two, "three": 0.3 - one})
-        np.testing.assert_allclose(there[0], at, atol=1e-9)
-        np.testing.assert_allclose(there[1], axes, atol=1e-9)
+    assert_same_poses(calibrated, output, "a", "e", lambda values: {"three": 0.3 - values["one"]})
 
 
 def test_what_changes_nothing_gives_the_file_back_to_the_byte(cell):
@@ -251,11 +244,4 @@ def test_any_chain_moves_as_its_calibrated_robot(tmp_path_factory, parts, seed):
     known = candidates_on(sites_of(robot))
     made = made_calibrated(robot, *(key for key in keys if key in known), identified=False, seed=seed)
     calibrated = folded(made).robot
-    output, _ = exported((path, robot, calibrated))
-    angles = np.random.default_rng(seed).uniform(-1, 1, (3, robot.joints))
-    position, rotation = poses(calibrated.chain, calibrated.model_angles(angles), calibrated.chain.end_effector)
-    by_pinocchio = Pinocchio(output)
-    for values, at, axes in zip(angles, position, rotation, strict=True):
-        there = by_pinocchio.pose("l0", "tip", dict(zip(robot.joint_names, values, strict=True)))
-        np.testing.assert_allclose(there[0], at, atol=1e-8)
-        np.testing.assert_allclose(there[1], axes, atol=1e-8)
+    assert_same_poses(calibrated, exported((path, robot, calibrated))[0], "l0", "tip", count=3, within=1e-8)

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from made_urdf import Pinocchio
+from made_urdf import Pinocchio, assert_same_poses
 
 from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.exchange.urdf_writing import urdf_of
@@ -53,15 +53,8 @@ def test_mujoco_loads_it_and_no_joint_is_without_effort_or_speed(tmp_path, name)
 
 def test_pinocchio_reads_it_too(tmp_path):
     robot = analysed("fanuc_static")
-    path = written(tmp_path, robot)
     names = [f"joint_{j}" for j in range(1, 7)]
-    angles = drawn(robot)
-    position, rotation = poses(robot.chain, angles, robot.chain.end_effector)
-    by_pinocchio = Pinocchio(path)
-    for number, values in enumerate(robot.reported_angles(angles)):
-        at = by_pinocchio.pose("base", robot.chain.end_effector.name, dict(zip(names, values, strict=True)))
-        np.testing.assert_allclose(at[0], position[number], atol=1e-9)
-        np.testing.assert_allclose(at[1], rotation[number], atol=1e-9)
+    assert_same_poses(robot, written(tmp_path, robot), "base", robot.chain.end_effector.name, names=names)
 
 
 def test_a_controller_that_couples_joints_is_said_in_a_comment(tmp_path):

@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 from support import robot_of
 
 from elastocal.errors import InputError
-from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+from elastocal.exchange.import_options import ImportOptions
+from elastocal.exchange.measurement_table import read_measurement_table
 
 
 @pytest.fixture(scope="module")

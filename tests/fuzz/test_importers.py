@@ -14,8 +14,8 @@ from elastocal.campaigns.reading import read_robot
 from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS, THOUSANDS
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.dh_table import DhOptions
-from elastocal.exchange.import_options import import_options_text, read_import_options
-from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+from elastocal.exchange.import_options import ImportOptions, import_options_text, read_import_options
+from elastocal.exchange.measurement_table import read_measurement_table
 from elastocal.exchange.robot_text import write_robot
 from elastocal.exchange.target_path import read_target_path
 from elastocal.exchange.urdf import robot_from_urdf

@@ -68,6 +68,18 @@ class Cell:
         for name in names:
             del self.table[name]
 
+    def keep(self, rows):
+        """Take these rows alone, counted from 0, in this order."""
+        self.table = {name: [column[row] for row in rows] for name, column in self.table.items()}
+
+    def repeat_as_session_7(self):
+        """The same rows again as another session, with targets of its own."""
+        count, targets = len(self.table["pose"]), self.document["targets"]
+        names = self.table["target"] + [f"{name}2" for name in self.table["target"]]
+        again = {name: 2 * column for name, column in self.table.items()}
+        self.table = again | {"session": count * [0] + count * [7], "target": names}
+        self.document["targets"] = targets | {f"{name}2": target for name, target in targets.items()}
+
     def spoil(self, row, column, cell):
         """Put something into a cell; rows are counted from 1 as in messages."""
         self.table[column][row - 1] = cell

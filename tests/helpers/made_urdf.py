@@ -93,13 +93,13 @@ class Pinocchio:
         return np.array([-torque[self.model.joints[self.model.getJointId(name)].idx_v] for name in names])
 
 
-def assert_same_poses(robot, path, base, tip, set_joints=None, count=8):
-    """To a nanometre and a nanoradian. `set_joints` maps the angles of a state to values by joint name."""
+def assert_same_poses(robot, path, base, tip, set_joints=None, count=8, within=1e-9, names=None):
+    """To a nanometre and a nanoradian, at what the controller reports. `set_joints` maps a state to values by joint name."""
     by_pinocchio, rng = Pinocchio(path), np.random.default_rng(5)
     angles = rng.uniform(-np.pi, np.pi, (count, robot.joints))
-    position, rotation = poses(robot.chain, angles, robot.chain.end_effector)
+    position, rotation = poses(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
     for state, own, turned in zip(angles, position, rotation, strict=True):
-        values = dict(zip(robot.joint_names, state, strict=True))
+        values = dict(zip(names or robot.joint_names, state, strict=True))
         there, axes = by_pinocchio.pose(base, tip, values | (set_joints(values) if set_joints else {}))
-        np.testing.assert_allclose(own, there, rtol=0, atol=1e-9)
-        assert np.linalg.norm(pin.log3(axes.T @ turned)) < 1e-9
+        np.testing.assert_allclose(own, there, rtol=0, atol=within)
+        assert np.linalg.norm(pin.log3(axes.T @ turned)) < within

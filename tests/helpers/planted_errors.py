@@ -66,7 +66,7 @@ def scaled(factor, *names):
     return lambda block: block | {name: factor * block[name] for name in names}
 
 
-def copied(folder, source, file):
+def copied(folder, file, source):
     """A file in place of another one."""
     shutil.copy(folder / source, folder / file)
     forge(folder, file)
@@ -158,11 +158,11 @@ def shuffled(block):
 def of_parameter(name, step, column, change):
     """A change of one figure of one parameter in one model of a campaign."""
 
-    def planted(block):
+    def changed(block):
         chosen = (np.array(block["parameter"]) == name) & (block["step"] == step)
         return block | {column: np.where(chosen, change(block), block[column])}
 
-    return planted
+    return changed
 
 
 def rewritten_json(folder, file, change):
@@ -224,143 +224,96 @@ def typo(folder):
     forge(folder, "reports/tables/table1.md")
 
 
+def planted(file, change, *how):
+    """A file, and what plants an error into it in a folder."""
+    return file, lambda folder: change(folder, file, *how)
+
+
 # What is planted, in which file, and how. Ends of bootstrap intervals are not worked out again: tests hold how they are drawn.
 PLANTED = {
     "one byte altered": (MEASURED, flipped_byte),
     "a file deleted": ("results/weights/kuka.parquet", lambda folder: (folder / "results/weights/kuka.parquet").unlink()),
     "a unit swapped": (ACCURACY, other_unit),
-    "millimetres for metres": (
-        "results/initial/kuka.parquet",
-        lambda f: rewritten(f, "results/initial/kuka.parquet", scaled(1e3, "mean")),
-    ),
-    "degrees for radians": (EXPERIMENTS, lambda f: rewritten(f, EXPERIMENTS, scaled(180 / np.pi, "q3"))),
-    "a force turned round": (EXPERIMENTS, lambda f: rewritten(f, EXPERIMENTS, scaled(-1.0, "fy"))),
+    "millimetres for metres": planted("results/initial/kuka.parquet", rewritten, scaled(1e3, "mean")),
+    "degrees for radians": planted(EXPERIMENTS, rewritten, scaled(180 / np.pi, "q3")),
+    "a force turned round": planted(EXPERIMENTS, rewritten, scaled(-1.0, "fy")),
     "noise of another seed": (MEASURED, other_seed),
     "a file of another run": (MEASURED, of_another_run),
-    "a noise level in place of another": (MEASURED, lambda f: copied(f, "data/simulated/kuka/0um/measured.parquet", MEASURED)),
-    "a strategy in place of another": (METRICS, lambda f: copied(f, "results/metrics/kuka/200um/3+6DoF-comb.parquet", METRICS)),
-    "a data set left out": (IDEAL, lambda f: rewritten(f, IDEAL, without_first_set)),
-    "a data set twice": (IDENTIFIED, lambda f: rewritten(f, IDENTIFIED, second_set_twice)),
-    "an axis mirrored at one point": (IDEAL, lambda f: rewritten(f, IDEAL, mirrored_point)),
-    "compliances scaled": (IDENTIFIED, lambda f: rewritten(f, IDENTIFIED, scaled(1.0001, "c2"))),
-    "variances for standard deviations": (DESIGN, lambda f: rewritten(f, DESIGN, scaled(2.0, "cov_4_4"))),
-    "a score too good": (METRICS, lambda f: rewritten(f, METRICS, scaled(0.99, "deviation"))),
-    "replicates shuffled": (REPLICATES, lambda f: rewritten(f, REPLICATES, shuffled)),
-    "weights that count all alike": (
-        "results/weights/kuka.parquet",
-        lambda f: rewritten(f, "results/weights/kuka.parquet", lambda block: block | {"count": np.ones_like(block["count"])}),
+    "a noise level in place of another": planted(MEASURED, copied, "data/simulated/kuka/0um/measured.parquet"),
+    "a strategy in place of another": planted(METRICS, copied, "results/metrics/kuka/200um/3+6DoF-comb.parquet"),
+    "a data set left out": planted(IDEAL, rewritten, without_first_set),
+    "a data set twice": planted(IDENTIFIED, rewritten, second_set_twice),
+    "an axis mirrored at one point": planted(IDEAL, rewritten, mirrored_point),
+    "compliances scaled": planted(IDENTIFIED, rewritten, scaled(1.0001, "c2")),
+    "variances for standard deviations": planted(DESIGN, rewritten, scaled(2.0, "cov_4_4")),
+    "a score too good": planted(METRICS, rewritten, scaled(0.99, "deviation")),
+    "replicates shuffled": planted(REPLICATES, rewritten, shuffled),
+    "weights that count all alike": planted(
+        "results/weights/kuka.parquet", rewritten, lambda block: block | {"count": np.ones_like(block["count"])}
     ),
-    "a bound of the next length": (
-        "results/bounds/kuka.parquet",
-        lambda f: rewritten(f, "results/bounds/kuka.parquet", next_length),
+    "a bound of the next length": planted("results/bounds/kuka.parquet", rewritten, next_length),
+    "solvers swapped": planted("results/solvers/kuka.parquet", rewritten, swapped_solvers),
+    "squares of a research question scaled": planted("results/budget/kuka.parquet", rewritten, scaled(1.01, "mean_square")),
+    "a standard error too small": planted("reports/tables/table3.csv", cell, "c4_std_error", 0.7),
+    "a cell of Table 4 altered": planted("reports/tables/table4.csv", cell, "dev_20_um", 0.98, 1),
+    "random designs of another seed": planted(DESIGNS, rewritten, of_designs(random=1.001)),
+    "chosen designs better than they are": planted(DESIGNS, rewritten, of_designs(I=0.999)),
+    "a bound that no design can keep": planted(DESIGNS, rewritten, of_designs(bound=1.01)),
+    "another link first": planted(LADDER, rewritten, next_best),
+    "a model too large chosen": planted(LADDER, rewritten, one_more_link),
+    "squares of models scaled": planted(LADDER, rewritten, scaled(1.001, "mean_square")),
+    "a leak too small": planted(GEOMETRY, rewritten, scaled(0.999, "zero_leak")),
+    "an influence on a quantile scaled": planted(USES, rewritten, scaled(1.001, "pooled_p95_influence")),
+    "a p value of the comparison altered": planted(COMPARISON, cell, "p_value", 1.01, TABLE3),
+    "a corrected p value altered": planted(COMPARISON, cell, "p_holm", 0.99, TABLE3),
+    "a spread of studies altered": planted(COMPARISON, cell, "studies_std", 1.01, TABLE3),
+    "a figure of the paper altered": planted(COMPARISON, cell, "paper", 1.01, TABLE3),
+    "a figure of the paper left out": planted(COMPARISON, shortened, TABLE3),
+    "an expectation altered": planted(EXPECTATIONS, cell, "expected", 1.001),
+    "a p value of an expectation altered": planted(EXPECTATIONS, cell, "p_value", 1.01, 1),
+    "an interval of a pair too narrow": planted(PAIRS, cell, "ratio_high", 0.999),
+    "a pair said to be reversed": planted(PAIRS, said, "reversed", True),
+    "a rank altered": planted(SCORES, cell, "rank", 2),
+    "a compliance of a campaign altered": planted(
+        STEPS, rewritten, of_parameter("c4", 1, "value", lambda b: b["value"] + 0.01 * b["std_error"])
     ),
-    "solvers swapped": (
-        "results/solvers/kuka.parquet",
-        lambda f: rewritten(f, "results/solvers/kuka.parquet", swapped_solvers),
+    "an effect's parameter altered": planted(
+        STEPS, rewritten, of_parameter("torsion_1_over_GJ", 2, "value", lambda b: b["value"] + 0.01 * b["std_error"])
     ),
-    "squares of a research question scaled": (
-        "results/budget/kuka.parquet",
-        lambda f: rewritten(f, "results/budget/kuka.parquet", scaled(1.01, "mean_square")),
+    "a standard error of a campaign halved": planted(
+        STEPS, rewritten, of_parameter("c2", 2, "std_error", lambda b: 0.5 * b["std_error"])
     ),
-    "errors of few configurations scaled": (
-        "results/few/kuka.parquet",
-        lambda f: rewritten(f, "results/few/kuka.parquet", scaled(1.01, "mean_square")),
+    "errors of few configurations scaled": planted("results/few/kuka.parquet", rewritten, scaled(1.01, "mean_square")),
+    "errors by poses scaled": planted("results/kinds/kuka.parquet", rewritten, scaled(1.01, "mean_square")),
+    "a first order too good": planted("results/stiffness/kuka.parquet", rewritten, scaled(0.9, "first_order")),
+    "stiffness errors of other studies scaled": planted(
+        "results/studies/R5_positions/kuka.parquet", rewritten, scaled(1.01, "k_sigma")
     ),
-    "errors by poses scaled": (
-        "results/kinds/kuka.parquet",
-        lambda f: rewritten(f, "results/kinds/kuka.parquet", scaled(1.01, "mean_square")),
+    "chosen configurations that are worse than random ones": planted(
+        "results/simulated_designs/few/kuka.parquet", rewritten, scaled(-1.0, "rms")
     ),
-    "a first order too good": (
-        "results/stiffness/kuka.parquet",
-        lambda f: rewritten(f, "results/stiffness/kuka.parquet", scaled(0.9, "first_order")),
+    "a cell of Table 4 over studies altered": planted("reports/tables/table4_studies.csv", cell, "dev_20_um", 1.001),
+    "a rank in the joint test that cannot be": planted("reports/tables/joint_test.csv", cell, "below_p", 0.99),
+    "an error of a design in other units": planted("reports/tables/simulated_designs_few.csv", cell, "rms_um", 1e-3),
+    "a prior left out": planted(STEPS, rewritten, of_parameter("taper", 2, "prior_std", lambda b: 0.1)),
+    "a correlation with the wrong sign": planted(CORRELATIONS, rewritten, scaled(-1.0, "correlation")),
+    "a model more probable than its odds": planted(MODELS, rewritten, better_probability),
+    "a held-out measurement altered": planted(HELD_OUT, rewritten, scaled(1.00001, "z")),
+    "residuals after too small": planted(RESIDUALS, rewritten, scaled(0.99, "after_dx", "after_dy", "after_dz")),
+    "residuals of orientations too small": planted(RESIDUALS, rewritten, scaled(0.99, "before_ry")),
+    "an error after too small": planted(BEFORE_AFTER, cell, "heldout_rms_m", 0.999, 2),
+    "an error over another floor": planted(BEFORE_AFTER, cell, "heldout_rms_over_floor", 0.99, 1),
+    "a reduction of a block altered": planted(SPLITS, cell, "reduction", 1.001, 3),
+    "a probability of the verdict raised": planted(
+        VERDICT, rewritten_json, lambda d: d["effects"][0].update(probability=0.999)
     ),
-    "stiffness errors of other studies scaled": (
-        "results/studies/R5_positions/kuka.parquet",
-        lambda f: rewritten(f, "results/studies/R5_positions/kuka.parquet", scaled(1.01, "k_sigma")),
+    "a standard error of the verdict altered": planted(
+        VERDICT, rewritten_json, lambda d: d["heldout"].update(reduction_std_error=0.05)
     ),
-    "chosen configurations that are worse than random ones": (
-        "results/simulated_designs/few/kuka.parquet",
-        lambda f: rewritten(f, "results/simulated_designs/few/kuka.parquet", scaled(-1.0, "rms")),
-    ),
-    "a cell of Table 4 over studies altered": (
-        "reports/tables/table4_studies.csv",
-        lambda f: cell(f, "reports/tables/table4_studies.csv", "dev_20_um", 1.001),
-    ),
-    "a rank in the joint test that cannot be": (
-        "reports/tables/joint_test.csv",
-        lambda f: cell(f, "reports/tables/joint_test.csv", "below_p", 0.99),
-    ),
-    "an error of a design in other units": (
-        "reports/tables/simulated_designs_few.csv",
-        lambda f: cell(f, "reports/tables/simulated_designs_few.csv", "rms_um", 1e-3),
-    ),
-    "a standard error too small": (
-        "reports/tables/table3.csv",
-        lambda f: cell(f, "reports/tables/table3.csv", "c4_std_error", 0.7),
-    ),
-    "a cell of Table 4 altered": (
-        "reports/tables/table4.csv",
-        lambda f: cell(f, "reports/tables/table4.csv", "dev_20_um", 0.98, 1),
-    ),
-    "random designs of another seed": (DESIGNS, lambda f: rewritten(f, DESIGNS, of_designs(random=1.001))),
-    "chosen designs better than they are": (DESIGNS, lambda f: rewritten(f, DESIGNS, of_designs(I=0.999))),
-    "a bound that no design can keep": (DESIGNS, lambda f: rewritten(f, DESIGNS, of_designs(bound=1.01))),
-    "another link first": (LADDER, lambda f: rewritten(f, LADDER, next_best)),
-    "a model too large chosen": (LADDER, lambda f: rewritten(f, LADDER, one_more_link)),
-    "squares of models scaled": (LADDER, lambda f: rewritten(f, LADDER, scaled(1.001, "mean_square"))),
-    "a leak too small": (GEOMETRY, lambda f: rewritten(f, GEOMETRY, scaled(0.999, "zero_leak"))),
-    "an influence on a quantile scaled": (USES, lambda f: rewritten(f, USES, scaled(1.001, "pooled_p95_influence"))),
-    "a p value of the comparison altered": (COMPARISON, lambda f: cell(f, COMPARISON, "p_value", 1.01, TABLE3)),
-    "a corrected p value altered": (COMPARISON, lambda f: cell(f, COMPARISON, "p_holm", 0.99, TABLE3)),
-    "a spread of studies altered": (COMPARISON, lambda f: cell(f, COMPARISON, "studies_std", 1.01, TABLE3)),
-    "a figure of the paper altered": (COMPARISON, lambda f: cell(f, COMPARISON, "paper", 1.01, TABLE3)),
-    "a figure of the paper left out": (COMPARISON, lambda f: shortened(f, COMPARISON, TABLE3)),
-    "an expectation altered": (EXPECTATIONS, lambda f: cell(f, EXPECTATIONS, "expected", 1.001)),
-    "a p value of an expectation altered": (EXPECTATIONS, lambda f: cell(f, EXPECTATIONS, "p_value", 1.01, 1)),
-    "an interval of a pair too narrow": (PAIRS, lambda f: cell(f, PAIRS, "ratio_high", 0.999)),
-    "a pair said to be reversed": (PAIRS, lambda f: said(f, PAIRS, "reversed", True)),
-    "a rank altered": (SCORES, lambda f: cell(f, SCORES, "rank", 2)),
-    "a compliance of a campaign altered": (
-        STEPS,
-        lambda f: rewritten(f, STEPS, of_parameter("c4", 1, "value", lambda b: b["value"] + 0.01 * b["std_error"])),
-    ),
-    "an effect's parameter altered": (
-        STEPS,
-        lambda f: rewritten(
-            f, STEPS, of_parameter("torsion_1_over_GJ", 2, "value", lambda b: b["value"] + 0.01 * b["std_error"])
-        ),
-    ),
-    "a standard error of a campaign halved": (
-        STEPS,
-        lambda f: rewritten(f, STEPS, of_parameter("c2", 2, "std_error", lambda b: 0.5 * b["std_error"])),
-    ),
-    "a prior left out": (STEPS, lambda f: rewritten(f, STEPS, of_parameter("taper", 2, "prior_std", lambda b: 0.1))),
-    "a correlation with the wrong sign": (CORRELATIONS, lambda f: rewritten(f, CORRELATIONS, scaled(-1.0, "correlation"))),
-    "a model more probable than its odds": (MODELS, lambda f: rewritten(f, MODELS, better_probability)),
-    "a held-out measurement altered": (HELD_OUT, lambda f: rewritten(f, HELD_OUT, scaled(1.00001, "z"))),
-    "residuals after too small": (
-        RESIDUALS,
-        lambda f: rewritten(f, RESIDUALS, scaled(0.99, "after_dx", "after_dy", "after_dz")),
-    ),
-    "residuals of orientations too small": (RESIDUALS, lambda f: rewritten(f, RESIDUALS, scaled(0.99, "before_ry"))),
-    "an error after too small": (BEFORE_AFTER, lambda f: cell(f, BEFORE_AFTER, "heldout_rms_m", 0.999, 2)),
-    "an error over another floor": (BEFORE_AFTER, lambda f: cell(f, BEFORE_AFTER, "heldout_rms_over_floor", 0.99, 1)),
-    "a reduction of a block altered": (SPLITS, lambda f: cell(f, SPLITS, "reduction", 1.001, 3)),
-    "a probability of the verdict raised": (
-        VERDICT,
-        lambda f: rewritten_json(f, VERDICT, lambda d: d["effects"][0].update(probability=0.999)),
-    ),
-    "a standard error of the verdict altered": (
-        VERDICT,
-        lambda f: rewritten_json(f, VERDICT, lambda d: d["heldout"].update(reduction_std_error=0.05)),
-    ),
-    "a gain of an effect altered": (
-        VERDICT,
-        lambda f: rewritten_json(f, VERDICT, lambda d: d["effects"][0].update(heldout_gain=0.74)),
-    ),
-    "a cell of the overview of campaigns altered": (CAMPAIGNS, lambda f: cell(f, CAMPAIGNS, "after_rms_mm", 0.999)),
-    "a campaign left out of the overview": (CAMPAIGNS, lambda f: shortened(f, CAMPAIGNS, 0)),
-    "a verdict of the overview altered": (CAMPAIGNS, lambda f: said(f, CAMPAIGNS, "verdict", "adequate")),
+    "a gain of an effect altered": planted(VERDICT, rewritten_json, lambda d: d["effects"][0].update(heldout_gain=0.74)),
+    "a cell of the overview of campaigns altered": planted(CAMPAIGNS, cell, "after_rms_mm", 0.999),
+    "a campaign left out of the overview": planted(CAMPAIGNS, shortened, 0),
+    "a verdict of the overview altered": planted(CAMPAIGNS, said, "verdict", "adequate"),
     "a digit of a printed table": ("reports/tables/table1.md", typo),
 }
 
@@ -395,11 +348,11 @@ LEAGUE, MECHANISMS = "reports/league/small/league.csv", "reports/league/small/me
 def of_blind(name, column, factor):
     """The first cell of a column of a table of the blind proof that is not zero, multiplied."""
 
-    def planted(folder):
-        values = pd.read_csv(folder / BLIND[name])[column].fillna(0)
-        cell(folder, BLIND[name], column, factor, int(np.flatnonzero(values)[0]))
+    def first(folder, file):
+        values = pd.read_csv(folder / file)[column].fillna(0)
+        cell(folder, file, column, factor, int(np.flatnonzero(values)[0]))
 
-    return BLIND[name], planted
+    return planted(BLIND[name], first)
 
 
 # The same for what stands in reports of the blind proof, the closed loop, plans and the league.
@@ -424,24 +377,24 @@ PLANTED_IN_PROOFS = {
     "a case counted twice in the confusion matrix": of_blind("confusion", "adequate", 2),
     "a power altered": of_blind("power", "detected_low", 0.99),
     "coverage of intervals altered": of_blind("coverage", "rate", 0.9),
-    "a pose of the closed loop altered": (MOVED, lambda f: rewritten(f, MOVED, lambda b: b | {"pose": b["pose"] * 0})),
-    "an error of the closed loop altered": (CASES, lambda f: cell(f, CASES, "found", 0.999)),
-    "an error without the tracker's noise altered": (CASES, lambda f: cell(f, CASES, "true_reached", 0.999, 3)),
-    "a ratio to the floor altered": (TOGETHER, lambda f: cell(f, TOGETHER, "over_floor", 0.999, 3)),
-    "a case more within the goal": (GOALS, lambda f: cell(f, GOALS, "within", 2)),
-    "an interval of the goal by another method": (GOALS, lambda f: cell(f, GOALS, "share_low", 0.95)),
+    "a pose of the closed loop altered": planted(MOVED, rewritten, lambda b: b | {"pose": b["pose"] * 0}),
+    "an error of the closed loop altered": planted(CASES, cell, "found", 0.999),
+    "an error without the tracker's noise altered": planted(CASES, cell, "true_reached", 0.999, 3),
+    "a ratio to the floor altered": planted(TOGETHER, cell, "over_floor", 0.999, 3),
+    "a case more within the goal": planted(GOALS, cell, "within", 2),
+    "an interval of the goal by another method": planted(GOALS, cell, "share_low", 0.95),
     "a verdict that bad rows changed said to be the same": (
         SLIPS,
         lambda f: said(f, SLIPS, "damaged_same", True, int(np.flatnonzero(~pd.read_csv(f / SLIPS)["damaged_same"])[0])),
     ),
-    "a rate of bad rows altered": (RATES, lambda f: cell(f, RATES, "low", 1.01, 0)),
-    "a worth of a plan altered": (GAINS, lambda f: cell(f, GAINS, "random_mm", 1.1)),
-    "poses in each other's folds": (FOLDS, lambda f: rewritten(f, FOLDS, swapped_folds)),
-    "a pose predicted that was fitted": (ENTRIES, lambda f: rewritten(f, ENTRIES, seen_pose)),
-    "an error of the league altered": (LEAGUE, lambda f: cell(f, LEAGUE, "rms_mm", 0.999, 1)),
-    "a ratio to the best altered": (LEAGUE, lambda f: cell(f, LEAGUE, "ratio_to_best", 1.001, 2)),
-    "a share of intervals altered": (LEAGUE, lambda f: cell(f, LEAGUE, "covered", 1.01, 2)),
-    "a share of a mechanism altered": (MECHANISMS, lambda f: cell(f, MECHANISMS, "share_low", 1.01, 1)),
+    "a rate of bad rows altered": planted(RATES, cell, "low", 1.01, 0),
+    "a worth of a plan altered": planted(GAINS, cell, "random_mm", 1.1),
+    "poses in each other's folds": planted(FOLDS, rewritten, swapped_folds),
+    "a pose predicted that was fitted": planted(ENTRIES, rewritten, seen_pose),
+    "an error of the league altered": planted(LEAGUE, cell, "rms_mm", 0.999, 1),
+    "a ratio to the best altered": planted(LEAGUE, cell, "ratio_to_best", 1.001, 2),
+    "a share of intervals altered": planted(LEAGUE, cell, "covered", 1.01, 2),
+    "a share of a mechanism altered": planted(MECHANISMS, cell, "share_low", 1.01, 1),
 }
 
 

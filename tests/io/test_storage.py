@@ -37,6 +37,12 @@ def block(kind, first, rows=3, **changes):
 
 
 @pytest.fixture
+def new(tmp_path):
+    """Where no table is yet."""
+    return str(tmp_path / "new.parquet")
+
+
+@pytest.fixture
 def path(tmp_path):
     """A table of three row groups."""
     path = str(tmp_path / "things.parquet")
@@ -69,12 +75,12 @@ def test_blocks_come_back_as_they_were_written(path):
     assert [b["number"].tolist() for b in read_blocks(path, SCHEMA)] == [[0, 1, 2], [3, 4], [5, 6, 7]]
 
 
-def test_large_blocks_stay_one_row_group(tmp_path):
+def test_large_blocks_stay_one_row_group(new):
     # pyarrow cuts row groups at 2^20 rows unless told otherwise.
-    path, rows = str(tmp_path / "large.parquet"), 2**20 + 5
+    rows = 2**20 + 5
     schema = TableSchema("large", (Column("number", "int32", "", "a number"),))
-    write_table(path, schema, [{"number": np.arange(rows)}], {})
-    assert [len(b["number"]) for b in read_blocks(path, schema)] == [rows]
+    write_table(new, schema, [{"number": np.arange(rows)}], {})
+    assert [len(b["number"]) for b in read_blocks(new, schema)] == [rows]
 
 
 def test_only_the_columns_asked_for_are_read(path):
@@ -121,11 +127,10 @@ def test_the_same_table_is_the_same_file(tmp_path, path):
         ({"width": [1, 2, 3]}, "columns", ["width", "things"]),
     ],
 )
-def test_faulty_values_are_not_written(tmp_path, changes, key, words):
-    path = str(tmp_path / "faulty.parquet")
-    with refused(path, key, *words):
-        write_table(path, SCHEMA, [block("a", 0), block("a", 3, **changes)], {})
-    assert not Path(path).exists()
+def test_faulty_values_are_not_written(new, changes, key, words):
+    with refused(new, key, *words):
+        write_table(new, SCHEMA, [block("a", 0), block("a", 3, **changes)], {})
+    assert not Path(new).exists()
 
 
 def test_a_block_without_a_column_is_not_written(tmp_path):
@@ -136,10 +141,9 @@ def test_a_block_without_a_column_is_not_written(tmp_path):
     assert not Path(path).exists()
 
 
-def test_missing_values_are_written_where_the_column_allows_them(tmp_path):
-    path = str(tmp_path / "missing.parquet")
-    write_table(path, SCHEMA, [block("a", 0, share=[np.nan, np.inf, -np.inf])], {})
-    np.testing.assert_array_equal(read_table(path, SCHEMA)["share"], np.array([np.nan, np.inf, -np.inf], "f4"))
+def test_missing_values_are_written_where_the_column_allows_them(new):
+    write_table(new, SCHEMA, [block("a", 0, share=[np.nan, np.inf, -np.inf])], {})
+    np.testing.assert_array_equal(read_table(new, SCHEMA)["share"], np.array([np.nan, np.inf, -np.inf], "f4"))
 
 
 def broken_after(blocks):
@@ -165,10 +169,9 @@ def test_a_finished_file_leaves_no_other_file_behind(path):
     assert [p.name for p in Path(path).parent.iterdir()] == ["things.parquet"]
 
 
-def test_missing_file_is_refused(tmp_path):
-    path = str(tmp_path / "nothing.parquet")
-    for read in (lambda: read_table(path, SCHEMA), lambda: read_provenance(path)):
-        with refused(path, "", "Parquet"):
+def test_missing_file_is_refused(new):
+    for read in (lambda: read_table(new, SCHEMA), lambda: read_provenance(new)):
+        with refused(new, "", "Parquet"):
             read()
 
 
@@ -207,18 +210,16 @@ def test_another_table_is_refused(path):
         read_table(path, OTHER)
 
 
-def test_a_parquet_file_of_somebody_else_is_refused(tmp_path):
-    path = str(tmp_path / "else.parquet")
-    pq.write_table(pa.table({"number": [1, 2]}), path)
-    with refused(path, "metadata elastocal.table", "nothing", "things"):
-        read_table(path, SCHEMA)
+def test_a_parquet_file_of_somebody_else_is_refused(new):
+    pq.write_table(pa.table({"number": [1, 2]}), new)
+    with refused(new, "metadata elastocal.table", "nothing", "things"):
+        read_table(new, SCHEMA)
 
 
-def test_a_file_without_provenance_is_refused(tmp_path):
-    path = str(tmp_path / "else.parquet")
-    pq.write_table(pa.table({"number": [1, 2]}), path)
-    with refused(path, "elastocal.provenance"):
-        read_provenance(path)
+def test_a_file_without_provenance_is_refused(new):
+    pq.write_table(pa.table({"number": [1, 2]}), new)
+    with refused(new, "elastocal.provenance"):
+        read_provenance(new)
 
 
 TEXTS = TableSchema(
@@ -237,23 +238,21 @@ def text_block(texts, kind="k"):
     return {"owner": texts, "value": np.arange(len(texts)) / 3, "held": np.arange(len(texts)) % 2 == 1, "kind": kind}
 
 
-def test_text_columns_come_back_row_by_row(tmp_path):
-    path = str(tmp_path / "texts.parquet")
-    write_table(path, TEXTS, [text_block(ODD_TEXTS), text_block(np.array(["a", "b", "a"], dtype=object), "l")], ORIGIN)
-    back = read_table(path, TEXTS)
+def test_text_columns_come_back_row_by_row(new):
+    write_table(new, TEXTS, [text_block(ODD_TEXTS), text_block(np.array(["a", "b", "a"], dtype=object), "l")], ORIGIN)
+    back = read_table(new, TEXTS)
     assert back["owner"].tolist() == [*ODD_TEXTS, "a", "b", "a"] and back["owner"].dtype == object
     assert back["kind"].tolist() == ["k"] * 7 + ["l"] * 3
-    assert read_table(path, TEXTS, ["owner"], kind="l")["owner"].tolist() == ["a", "b", "a"]
-    assert pq.ParquetFile(path).read().column("owner").to_pylist() == [*ODD_TEXTS, "a", "b", "a"]
+    assert read_table(new, TEXTS, ["owner"], kind="l")["owner"].tolist() == ["a", "b", "a"]
+    assert pq.ParquetFile(new).read().column("owner").to_pylist() == [*ODD_TEXTS, "a", "b", "a"]
 
 
 @pytest.mark.parametrize("blocks", ["no block", "a block without rows", "only some blocks without rows"])
-def test_tables_without_rows_come_back(blocks, tmp_path):
-    path = str(tmp_path / "texts.parquet")
+def test_tables_without_rows_come_back(blocks, new):
     none, some = text_block([]), text_block(["a"])
     written = {"no block": [], "a block without rows": [none], "only some blocks without rows": [none, some, none]}[blocks]
-    write_table(path, TEXTS, written, ORIGIN)
-    back = read_table(path, TEXTS)
+    write_table(new, TEXTS, written, ORIGIN)
+    back = read_table(new, TEXTS)
     rows = 1 if "some" in blocks else 0
     assert {name: (len(values), values.dtype) for name, values in back.items()} == {
         "owner": (rows, np.dtype(object)),
@@ -261,18 +260,17 @@ def test_tables_without_rows_come_back(blocks, tmp_path):
         "held": (rows, np.dtype(bool)),
         "kind": (rows, np.dtype(object)),
     }
-    assert list(read_table(path, TEXTS, ["value"])) == ["value"]
-    assert read_provenance(path) == ORIGIN
-    assert len(list(read_blocks(path, TEXTS))) == rows
-    with refused(path, "metadata elastocal.table", "texts", "things"):
-        read_table(path, SCHEMA)
+    assert list(read_table(new, TEXTS, ["value"])) == ["value"]
+    assert read_provenance(new) == ORIGIN
+    assert len(list(read_blocks(new, TEXTS))) == rows
+    with refused(new, "metadata elastocal.table", "texts", "things"):
+        read_table(new, SCHEMA)
 
 
-def test_a_value_that_an_empty_table_cannot_have_is_refused(tmp_path):
-    path = str(tmp_path / "texts.parquet")
-    write_table(path, TEXTS, [], ORIGIN)
-    with refused(path, "kind", "'k'"):
-        read_table(path, TEXTS, kind="k")
+def test_a_value_that_an_empty_table_cannot_have_is_refused(new):
+    write_table(new, TEXTS, [], ORIGIN)
+    with refused(new, "kind", "'k'"):
+        read_table(new, TEXTS, kind="k")
 
 
 def test_texts_of_another_length_are_refused(tmp_path):

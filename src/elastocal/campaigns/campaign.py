@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
+from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.robot import Robot, with_rigid_joints
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from typing import Any
-
-    from elastocal.mechanics.chain import Chain
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
-NO_REMAINDER = "none"
+_NO_REMAINDER = "none"
 UNKNOWN = "unknown"
 NOT_TURNED = (0.0, 0.0, 0.0)
 
@@ -125,7 +121,7 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
     `document`: contents of ``campaign.yaml``. `source`: named in errors.
     """
     compliance = document.get("compliance", "nominal")
-    remainder = document.get("remainder", NO_REMAINDER)
+    remainder = document.get("remainder", _NO_REMAINDER)
     rigid = compliance == "nominal" and not robot.compliance_known
     return Campaign(
         name=document["campaign"],
@@ -138,7 +134,7 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
         noise=document.get("noise"),
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
         measurements=measurements,
-        remainder=None if remainder == NO_REMAINDER else remainder,
+        remainder=None if remainder == _NO_REMAINDER else remainder,
         table=document.get("table", ""),
         header_line=document.get("header_line"),
     )
@@ -154,9 +150,8 @@ def targets_from(described: Mapping[str, Any], chain: Chain, source: str) -> tup
     targets = []
     for name, target in described.items():
         if not isinstance(name, str):
-            raise InputError(
-                source, "targets", f"the name {name!r}, which YAML takes for no text", "a name, in quotes where need be"
-            )
+            allowed = "a name, in quotes where need be"
+            raise InputError(source, "targets", f"the name {name!r}, which YAML takes for no text", allowed)
         if target["point"] not in points:
             allowed = f"a measuring point of the chain: {closest_first(target['point'], points)}"
             raise InputError(source, f"targets.{name}.point", repr(target["point"]), allowed)

@@ -1,24 +1,19 @@
 """Measurements to columns of tables and back."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
 from elastocal.campaigns.campaign import Measurements
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
+_IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
 
 
 def columns_of(measurements: Measurements) -> dict[str, np.ndarray]:
     """Columns of the measurements table, dict of str to ndarray (N,)."""
     count, joints = measurements.joint_angles.shape
-    columns = {name: getattr(measurements, name) for name in IDENTITY}
+    columns = {name: getattr(measurements, name) for name in _IDENTITY}
     columns |= {f"q{j + 1}": measurements.joint_angles[:, j] for j in range(joints)}
     columns |= dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))
     columns |= dict(zip("xyz", measurements.position.T, strict=True))
@@ -32,7 +27,7 @@ def measurements_from(columns: Mapping[str, np.ndarray]) -> Measurements:
     """Measurements from the columns of their table, dict of str to ndarray (N,)."""
     joints = sum(name.startswith("approach") for name in columns)
     return Measurements(
-        **{name: columns[name] for name in IDENTITY},
+        **{name: columns[name] for name in _IDENTITY},
         joint_angles=np.column_stack([columns[f"q{j}"] for j in range(1, joints + 1)]),
         wrench=np.column_stack([columns[name] for name in WRENCH_NAMES]),
         position=np.column_stack([columns[axis] for axis in "xyz"]),
@@ -58,7 +53,7 @@ def residual_columns(
     `stages` (N, rows): residuals "before", of the declared model, and "after", of the found one, m and rad. Returns (N,).
     """
     count, joints = measurements.joint_angles.shape
-    columns = {name: getattr(measurements, name) for name in IDENTITY}
+    columns = {name: getattr(measurements, name) for name in _IDENTITY}
     columns |= {"held_out": np.full(count, held_out), "gross_error": np.full(count, gross_errors), "outside_range": outside}
     columns |= {"time_s": _or_missing(measurements.time_s, (count,))}
     columns |= {f"q{j + 1}": measurements.joint_angles[:, j] for j in range(joints)}

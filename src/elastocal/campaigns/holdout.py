@@ -1,25 +1,18 @@
 """Which poses of a campaign are fitted and which are held out to test the fit."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import DOCUMENT
+from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.campaigns.places import is_file_in
 from elastocal.errors import InputError
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-    from typing import Any
-
-    from elastocal.campaigns.campaign import Campaign, Measurements
-
-HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
+_HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
 # Below these a fit or a test says nothing.
 FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
 
@@ -41,7 +34,7 @@ def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[s
     `described`: ``holdout`` of ``campaign.yaml``. `folder`: folder of the campaign. `source`: named in errors. Raises
     `InputError`: no way or more than one, a seed where nothing is drawn, or as `other_folder`.
     """
-    ways = [way for way in HOLDOUTS if way in described]
+    ways = [way for way in _HOLDOUTS if way in described]
     drawn = ways in (["fraction"], ["blocks"])
     if len(ways) != 1 or ("seed" in described and not drawn):
         allowed = "one of {fraction, seed}, {blocks, seed}, {session}, {poses} or {campaign}"
@@ -111,18 +104,16 @@ def _chosen_poses(
         for entry in holdout["poses"]:
             match = (pairs == entry).all(axis=1) if isinstance(entry, list | tuple) else pairs[:, 1] == entry
             if not match.any():
-                raise InputError(
-                    source, "holdout.poses", str(entry), f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
-                )
+                allowed = f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
+                raise InputError(source, "holdout.poses", str(entry), allowed)
             chosen |= match
         return chosen
     if "session" in holdout:
         wanted, there = np.atleast_1d(holdout["session"]), np.unique(pairs[:, 0])
         for session in wanted:
             if session not in there:
-                raise InputError(
-                    source, "holdout.session", str(session), f"sessions that were measured: {', '.join(map(str, there))}"
-                )
+                allowed = f"sessions that were measured: {', '.join(map(str, there))}"
+                raise InputError(source, "holdout.session", str(session), allowed)
         return np.isin(pairs[:, 0], wanted)
     draws = np.random.Generator(np.random.PCG64(holdout["seed"]))
     if "blocks" in holdout:

@@ -1,24 +1,18 @@
 """Checks of measurements as a whole: what can be recognised as wrong in them without fitting anything."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.campaigns.campaign import Measurements, Target
 from elastocal.campaigns.column_bounds import FARTHEST_RAD
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.campaigns.joint_space import SAME_POSE_RAD
+from elastocal.campaigns.measurements import MeasurementFile
 from elastocal.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elastocal.campaigns.campaign import Measurements, Target
-    from elastocal.campaigns.measurements import MeasurementFile
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Robot
 
 # From pose to pose, in an order that has nothing to do with the time, it falls as often as not: in more than this share of at
 # least so many steps with a probability of one in 700 at most.
@@ -73,12 +67,8 @@ def check_measurements(
     _check_units(measurements, table, robot, targets)
     for index, target in enumerate(targets):
         if not (measurements.target == index).any():
-            raise InputError(
-                source,
-                f"targets.{target.name}",
-                "no measurement of it",
-                f"targets that {Path(table.path).name} has measurements of",
-            )
+            allowed = f"targets that {Path(table.path).name} has measurements of"
+            raise InputError(source, f"targets.{target.name}", "no measurement of it", allowed)
 
 
 def _check_duplicates(measurements: Measurements, table: MeasurementFile, targets: Sequence[Target]) -> None:
@@ -100,15 +90,13 @@ def _check_loads(measurements: Measurements, table: MeasurementFile) -> None:
     unloaded = measurements.load == 0
     if not table.has(table.wrench) and not unloaded.all():
         index = int(np.argmin(unloaded))
-        raise table.cell_fault(
-            index, "load", str(measurements.load[index]), f"0 where there are no columns {', '.join(table.wrench)}"
-        )
+        allowed = f"0 where there are no columns {', '.join(table.wrench)}"
+        raise table.cell_fault(index, "load", str(measurements.load[index]), allowed)
     wrong = unloaded[:, None] & (measurements.wrench != 0)
     if wrong.any():
         index, component = np.argwhere(wrong)[0]
-        raise table.cell_fault(
-            index, table.wrench[component], f"{measurements.wrench[index, component]:g} with load 0", "0 where load is 0"
-        )
+        found = f"{measurements.wrench[index, component]:g} with load 0"
+        raise table.cell_fault(index, table.wrench[component], found, "0 where load is 0")
 
 
 def _check_poses(measurements: Measurements, table: MeasurementFile) -> None:
@@ -156,16 +144,11 @@ def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robo
         if np.quantile(away.max(axis=1), 1.0 - _SINGLE_ROWS) > _FARTHEST_REACHES * reach:
             index, axis = np.unravel_index(np.argmax(away), away.shape)
             found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the measurements"
-            raise table.cell_fault(
-                members[index], "xyz"[axis], found, f"metres, not millimetres; the robot reaches {reach:.3g} m"
-            )
+            allowed = f"metres, not millimetres; the robot reaches {reach:.3g} m"
+            raise table.cell_fault(members[index], "xyz"[axis], found, allowed)
     if measurements.rotation_vector is not None:
         angle = np.linalg.norm(measurements.rotation_vector, axis=1)
         if angle.max() > FARTHEST_RAD:
             turned = int(np.argmax(angle))
-            raise table.cell_fault(
-                turned,
-                "rx, ry, rz",
-                f"a turn of {angle[turned]:.4g}",
-                f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most",
-            )
+            allowed = f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most"
+            raise table.cell_fault(turned, "rx, ry, rz", f"a turn of {angle[turned]:.4g}", allowed)

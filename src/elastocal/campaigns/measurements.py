@@ -6,9 +6,10 @@ import csv
 import difflib
 import math
 import sys
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TextIO
 
 import numpy as np
 import pyarrow as pa
@@ -21,12 +22,8 @@ from elastocal.io.storage import Column
 from elastocal.io.texts import LARGEST_NUMBER
 from elastocal.mechanics.components import WRENCH
 
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-    from typing import Any, TextIO
-
-    # Of each column the cells: numbers as an array, where all of them are numbers.
-    Columns = dict[str, Sequence[Any] | np.ndarray]
+# Of each column the cells: numbers as an array, where all of them are numbers.
+Columns = dict[str, Sequence[Any] | np.ndarray]
 
 # A diagnosis of a million measurements takes ten minutes and 2 GB (docs, benchmarks); a tracker's stream is averaged before.
 MOST_MEASUREMENTS = 2_000_000

@@ -1,7 +1,5 @@
 """Where files of a campaign may lie: in its folder, wherever links lead, for folders of other people are read too."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

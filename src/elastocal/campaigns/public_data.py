@@ -11,6 +11,8 @@ import pooch
 
 from elastocal.errors import InputError
 
+# Of the sources here the largest has four megabytes.
+LARGEST_BYTES = 200_000_000
 # Names a folder that already has the files, for machines without a network.
 FOLDER_VARIABLE = "ELASTOCAL_DATA"
 

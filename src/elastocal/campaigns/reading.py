@@ -5,31 +5,31 @@ of one target. All that is wrong on its face is refused here, in one line; a uni
 wrong is left for the diagnosis to trace.
 """
 
-from __future__ import annotations
-
 import os
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, Measurements, described_campaign, targets_from
+from elastocal.campaigns.campaign import (
+    DEFAULT_HOLDOUT,
+    DOCUMENT,
+    Campaign,
+    Measurements,
+    Target,
+    described_campaign,
+    targets_from,
+)
 from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, holdout_from, measured_poses, other_folder
 from elastocal.campaigns.measurement_checks import check_angles, check_measurements
-from elastocal.campaigns.measurements import CSV, PARQUET, closest_first, read_measurements, shown
+from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, closest_first, read_measurements, shown
 from elastocal.campaigns.places import is_file, is_file_in
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import kind_of
+from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-    from typing import Any
-
-    from elastocal.campaigns.campaign import Campaign, Target
-    from elastocal.campaigns.measurements import MeasurementFile
-    from elastocal.mechanics.robot import Robot
 
 
 def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collection[str] | None = None) -> Campaign:
@@ -144,9 +144,8 @@ def held_out_campaign(
     source, key = (Path(folder) / DOCUMENT).as_posix(), "holdout.campaign"
     other = read_campaign(other_folder(campaign.holdout["campaign"], Path(folder), source), robots_folder, effects)
     if other.robot.chain != campaign.robot.chain:
-        raise InputError(
-            source, key, f"another chain, of {other.robot.name}", f"a campaign of the same chain, {campaign.robot.name}"
-        )
+        allowed = f"a campaign of the same chain, {campaign.robot.name}"
+        raise InputError(source, key, f"another chain, of {other.robot.name}", allowed)
     poses = len(measured_poses(other.measurements)[0])
     if poses < FEWEST_HELD_OUT_POSES:
         raise InputError(source, key, f"{poses} poses there", f"{FEWEST_HELD_OUT_POSES} or more")
@@ -215,9 +214,8 @@ def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target
     labels = table.texts("target")
     for index, label in enumerate(labels):
         if label not in names:
-            raise table.cell_fault(
-                index, "target", shown(label), f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
-            )
+            allowed = f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
+            raise table.cell_fault(index, "target", shown(label), allowed)
     approach = None
     if table.has(table.approach):
         senses = table.numbers(table.approach)

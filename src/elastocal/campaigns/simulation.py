@@ -1,9 +1,6 @@
 """Campaigns of a simulated robot: ladders of loads at random poses, read with noise, as a calibrator would measure them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,10 +9,8 @@ from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.elastostatics import generalized_forces, wrench_of_offset_force
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.links import extended_chain, spring_compliance
+from elastocal.mechanics.robot import Robot
 from elastocal.random_streams import stream
-
-if TYPE_CHECKING:
-    from elastocal.mechanics.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,9 @@
 """Which campaigns a configuration names and where they come from, and the user's own: checked before any job starts."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.importers.catalogue import check_importer
@@ -12,10 +11,6 @@ from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.errors import InputError
 from elastocal.io.documents import document_path, named_document
 from elastocal.io.json_files import read_json
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from typing import Any
 
 # What Snakemake refuses as the value of a wildcard.
 _PERIODIC = re.compile(r"(.+)\1{19}$")

@@ -1,17 +1,12 @@
 """A campaign's folder to begin with: every key explained, by the descriptions of the schemas that check it."""
 
-from __future__ import annotations
-
 import textwrap
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from elastocal.campaigns.measurements import file_columns
 from elastocal.io.documents import one_line, read_schema
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Robot
 
 _WIDTH = 110
 # An arm of six joints; its name says that it is nobody's.

@@ -1,22 +1,16 @@
 """A campaign's folder, written so that it is never half a campaign."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
+import numpy as np
 import yaml
 
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.measurements import CSV, PARQUET, check_column_names, write_measurements
 from elastocal.io.atomic_writes import write_text, write_together
 from elastocal.io.documents import check_document
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from typing import Any
-
-    import numpy as np
 
 
 def write_campaign(

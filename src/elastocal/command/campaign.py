@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.console import Console
+from typer import Option
 
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import print_lines
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from elastocal.loop.calibrated_files import Diagnosed
 
 AcceptEnvironment = Annotated[
-    bool, typer.Option("--accept-environment", help="Warn of results that other libraries or pins made, and use them.")
+    bool, Option("--accept-environment", help="Warn of results that other libraries or pins made, and use them.")
 ]
 
 

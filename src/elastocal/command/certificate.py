@@ -1,13 +1,12 @@
 """`elastocal certificate`: how good a robot is, against a tolerance, as PDF and JSON."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
+from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.pipeline import pipeline, workplace
@@ -19,28 +18,28 @@ DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
 
 
 def certificate(
-    folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
-    tolerance: Annotated[str, typer.Option(help="Largest allowed RMS position error, such as 0.2mm.")],
-    risk: Annotated[float, typer.Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
+    folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
+    tolerance: Annotated[str, Option(help="Largest allowed RMS position error, such as 0.2mm.")],
+    risk: Annotated[float, Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
     measured: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Campaign that was measured at corrected targets, with the targets.csv of `elastocal correct` in its folder: "
             "pose k is row k of it. Without, the certificate states what is predicted."
         ),
     ] = None,
     use: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="CSV of the poses and loads that the robot is used at, as for `elastocal correct`: they are judged then, and "
             "must lie within what was fitted. Without, the poses of the campaign."
         ),
     ] = None,
-    compare: Annotated[Path | None, typer.Option(help="Earlier diagnosed campaign of the same robot.")] = None,
-    serial: Annotated[str | None, typer.Option(help="Serial number of the robot. Default: the campaign's.")] = None,
-    date: Annotated[str | None, typer.Option(help="Date of the certificate, such as 2026-11-20. Default: today.")] = None,
-    output: Annotated[Path | None, typer.Option(help="Folder for both files. Default: the campaign's reports.")] = None,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1,
+    compare: Annotated[Path | None, Option(help="Earlier diagnosed campaign of the same robot.")] = None,
+    serial: Annotated[str | None, Option(help="Serial number of the robot. Default: the campaign's.")] = None,
+    date: Annotated[str | None, Option(help="Date of the certificate, such as 2026-11-20. Default: today.")] = None,
+    output: Annotated[Path | None, Option(help="Folder for both files. Default: the campaign's reports.")] = None,
+    seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Certify a robot against a tolerance: pass, fail or undecided.

@@ -1,30 +1,27 @@
 """`elastocal check`: what a campaign can show, before it is diagnosed."""
 
-from __future__ import annotations
-
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.table import Table
+from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline
 from elastocal.command.printed import print_answer, print_lines
 from elastocal.errors import escaped
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 # Parameters that are not identifiable and are named; more would be too many to read.
 _NAMED = 8
 
 
 def check(
-    folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print everything that was found as JSON.")] = False,
+    folder: Annotated[Path, Argument(help="Folder of the campaign.")],
+    as_json: Annotated[bool, Option("--json", help="Print everything that was found as JSON.")] = False,
 ) -> None:
     """Show what a campaign identifies and what looks suspicious.
 

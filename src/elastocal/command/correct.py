@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.console import Console
 from rich.progress import Progress
+from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.printed import print_answer, print_lines
@@ -27,23 +27,21 @@ _NAMED = 5
 
 
 def correct(
-    folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
-    path: Annotated[Path, typer.Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..mz, q1..qn.")],
+    folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
+    path: Annotated[Path, Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..mz, q1..qn.")],
     output: Annotated[
         Path,
-        typer.Option(
+        Option(
             help="CSV of joint targets; or a program for a controller by its suffix, .src, .mod, .ls, .script, beside a CSV."
         ),
     ],
     language: Annotated[
-        str,
-        typer.Option("--format", help="Write a program beside the CSV too: krl (KUKA), rapid (ABB), tp (FANUC), urscript."),
+        str, Option("--format", help="Write a program beside the CSV too: krl (KUKA), rapid (ABB), tp (FANUC), urscript.")
     ] = "",
     axes: Annotated[
-        str,
-        typer.Option(help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6; needed where it is ambiguous."),
+        str, Option(help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6; needed where it is ambiguous.")
     ] = "",
-    partial: Annotated[bool, typer.Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
+    partial: Annotated[bool, Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.
@@ -65,7 +63,7 @@ def correct(
     from elastocal.validation.fitted_range import beyond_campaign
 
     console = Console(stderr=True)
-    controller, table, program = places_of(output, language)
+    controller, table, program = _places_of(output, language)
     if axes and controller is None:
         raise InputError("--axes", "", repr(axes), "with --format, or an --output that is a program")
     name = check_name(controller, program) if controller else ""
@@ -104,7 +102,7 @@ def correct(
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
     files = [table, program] if controller else [table]
     with write_together(output.parent, [file.name for file in files]) as folder_of_all:
-        write_csv(folder_of_all / table.name, joint_targets(wanted, found, before, errors, beyond))
+        write_csv(folder_of_all / table.name, _joint_targets(wanted, found, before, errors, beyond))
         if controller:
             targets = targets_of(found.joint_angles[good], prismatic, named)
             write_text(folder_of_all / program.name, controller.program(name, targets))
@@ -126,7 +124,7 @@ def correct(
     print_answer(not len(bad), answer, [*lines, *map(str, files)], following, console)
 
 
-def places_of(output: Path, language: str) -> tuple[Controller | None, Path, Path]:
+def _places_of(output: Path, language: str) -> tuple[Controller | None, Path, Path]:
     """The language of a program, if there shall be one, and where the CSV and the program go."""
     from elastocal.exchange.controllers.catalogue import controller_of
 
@@ -135,13 +133,12 @@ def places_of(output: Path, language: str) -> tuple[Controller | None, Path, Pat
     if controller is None:
         return None, output, output
     if by_suffix not in (None, controller):
-        raise InputError(
-            output, "--output", f"a program in another language than {controller.WORDS}", f"{controller.SUFFIX} | .csv"
-        )
+        allowed = f"{controller.SUFFIX} | .csv"
+        raise InputError(output, "--output", f"a program in another language than {controller.WORDS}", allowed)
     return controller, output.with_suffix(".csv") if by_suffix else output, output.with_suffix(controller.SUFFIX)
 
 
-def joint_targets(
+def _joint_targets(
     wanted: TargetPath, found: Correction, before: np.ndarray, errors: Prediction, beyond: np.ndarray
 ) -> pd.DataFrame:
     """The file of joint targets: wanted poses, commands q1..qn (rad, as the controller reports them), predicted errors, status.

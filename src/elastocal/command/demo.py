@@ -1,7 +1,5 @@
 """`elastocal demo`: the whole way, from a plan to a certificate, on a simulated robot."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import sys
@@ -11,6 +9,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import print_answer, print_lines
@@ -27,10 +26,10 @@ _TOLERANCE = "0.2mm"
 
 def demo(
     context: typer.Context,
-    folder: Annotated[Path, typer.Argument(help="New folder for the campaign.")] = Path("elastocal-demo"),
-    effect: Annotated[list[str] | None, typer.Option(help="Hidden effect, such as joint_tilt; may be repeated.")] = None,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the robot's errors and of the noise.")] = 1,
-    show: Annotated[bool, typer.Option("--open/--no-open", help="Open the report in a browser.")] = True,
+    folder: Annotated[Path, Argument(help="New folder for the campaign.")] = Path("elastocal-demo"),
+    effect: Annotated[list[str] | None, Option(help="Hidden effect, such as joint_tilt; may be repeated.")] = None,
+    seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Seed of the robot's errors and of the noise.")] = 1,
+    show: Annotated[bool, Option("--open/--no-open", help="Open the report in a browser.")] = True,
 ) -> None:
     """Go the whole way on a simulated KUKA, in about a minute.
 

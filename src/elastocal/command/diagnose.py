@@ -1,24 +1,21 @@
 """`elastocal diagnose`: the Snakemake target of a campaign, with its progress, verdict and report."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import print_lines
 from elastocal.command.quantities import MOST_JOBS
 from elastocal.errors import InputError, steering
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 # What `snakemake_logger_plugin_elastocal` writes when a job starts.
 _JOB = re.compile(r"(\d+) of (\d+): (.+)")
@@ -29,8 +26,8 @@ _NO_NEWS = "Using workflow specific profile"
 
 
 def diagnose(
-    folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
-    cores: Annotated[int, typer.Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs that run at a time.")] = 2,
+    folder: Annotated[Path, Argument(help="Folder of the campaign.")],
+    cores: Annotated[int, Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs that run at a time.")] = 2,
 ) -> None:
     """Find which effects the robot's model lacks; write the report.
 

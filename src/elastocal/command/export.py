@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.console import Console
+from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.printed import print_answer
@@ -30,20 +30,19 @@ _NAMES = (ROBOT, URDF, SIDECAR, DH, DELTAS, *FRAMES, TABLE)
 
 
 def export(
-    folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
-    output: Annotated[Path, typer.Option(help="Folder for the files.")],
+    folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
+    output: Annotated[Path, Option(help="Folder for the files.")],
     urdf: Annotated[
-        Path | None,
-        typer.Option(help="The URDF that the robot was imported from. Its joint origins are changed, nothing else."),
+        Path | None, Option(help="The URDF that the robot was imported from. Its joint origins are changed, nothing else.")
     ] = None,
     table: Annotated[
         int,
-        typer.Option(
+        Option(
             min=0, max=MOST_ROWS, help="Rows of a table of errors over the joint space, for programs that cannot run the model."
         ),
     ] = 0,
-    force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Hanging load of the table in N.")] = 0.0,
-    date: Annotated[str, typer.Option(help="Date that the sidecar states. Default: today.")] = "",
+    force: Annotated[float, Option(min=0.0, max=1e6, help="Hanging load of the table in N.")] = 0.0,
+    date: Annotated[str, Option(help="Date that the sidecar states. Default: today.")] = "",
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Write the calibrated robot: robot file, URDF, DH, effects.

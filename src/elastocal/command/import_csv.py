@@ -2,77 +2,59 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline
 from elastocal.command.quantities import MOST_ROWS
 from elastocal.errors import InputError, printable
 
 if TYPE_CHECKING:
-    from elastocal.exchange.measurement_table import ImportedMeasurements, ImportOptions
+    from elastocal.exchange.import_options import ImportOptions
+    from elastocal.exchange.measurement_table import ImportedMeasurements
     from elastocal.mechanics.robot import Robot
 
 
-class Separator(StrEnum):
-    """What stands between cells."""
-
-    TAB, SEMICOLON, BAR, COMMA, SPACE = "tab", "semicolon", "bar", "comma", "space"
-
-
-class Decimal(StrEnum):
-    """Decimal marks."""
-
-    POINT, COMMA = "point", "comma"
-
-
-class Thousands(StrEnum):
-    """What stands between thousands."""
-
-    POINT, COMMA, SPACE, APOSTROPHE = "point", "comma", "space", "apostrophe"
-
-
-class Wrench(StrEnum):
-    """What forces act on."""
-
-    ON_ROBOT, BY_ROBOT = "on-robot", "by-robot"
-
-
 def csv(
-    file: Annotated[Path, typer.Argument(help="The table: CSV, tabs, semicolons, spaces.")],
-    folder: Annotated[Path, typer.Option(help="Folder of the campaign; measurements.csv and import.yaml go there.")],
-    angles: Annotated[str | None, typer.Option(help="Unit of angles whose header has none: deg, rad, mrad.")] = None,
-    lengths: Annotated[str | None, typer.Option(help="Unit of lengths whose header has none: m, mm, um, in.")] = None,
+    file: Annotated[Path, Argument(help="The table: CSV, tabs, semicolons, spaces.")],
+    folder: Annotated[Path, Option(help="Folder of the campaign; measurements.csv and import.yaml go there.")],
+    angles: Annotated[str | None, Option(help="Unit of angles whose header has none: deg, rad, mrad.")] = None,
+    lengths: Annotated[str | None, Option(help="Unit of lengths whose header has none: m, mm, um, in.")] = None,
     rotation: Annotated[
         str | None,
-        typer.Option(
-            help="Orientations: none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes), euler:xyz (fixed)."
-        ),
+        Option(help="Orientations: none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes), euler:xyz (fixed)."),
     ] = None,
-    column: Annotated[list[str] | None, typer.Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed.")] = None,
-    ignore: Annotated[list[str] | None, typer.Option(help="Header of a column to leave out; as often as needed.")] = None,
-    unit: Annotated[list[str] | None, typer.Option(help="NAME=UNIT of one column, such as fx=kN.")] = None,
+    column: Annotated[list[str] | None, Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed.")] = None,
+    ignore: Annotated[list[str] | None, Option(help="Header of a column to leave out; as often as needed.")] = None,
+    unit: Annotated[list[str] | None, Option(help="NAME=UNIT of one column, such as fx=kN.")] = None,
     target: Annotated[
         list[str] | None,
-        typer.Option(help="Name of the target where no column has it; of each of several markers in a row, or NAME=MARKER."),
+        Option(help="Name of the target where no column has it; of each of several markers in a row, or NAME=MARKER."),
     ] = None,
-    wrench: Annotated[Wrench | None, typer.Option(help="Forces on the robot, or those that it exerts.")] = None,
-    skip_empty: Annotated[bool, typer.Option("--skip-empty", help="Leave out rows without a position.")] = False,
-    separator: Annotated[Separator | None, typer.Option(help="Found out where not given.")] = None,
-    decimal: Annotated[Decimal | None, typer.Option(help="Found out where not given.")] = None,
-    thousands: Annotated[Thousands | None, typer.Option(help="Mark between thousands, where there is one.")] = None,
-    encoding: Annotated[str | None, typer.Option(help="Such as utf-8, cp1252; found out where not given.")] = None,
+    wrench: Annotated[
+        Literal["on-robot", "by-robot"] | None, Option(help="Forces on the robot, or those that it exerts.")
+    ] = None,
+    skip_empty: Annotated[bool, Option("--skip-empty", help="Leave out rows without a position.")] = False,
+    separator: Annotated[
+        Literal["tab", "semicolon", "bar", "comma", "space"] | None, Option(help="Found out where not given.")
+    ] = None,
+    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Found out where not given.")] = None,
+    thousands: Annotated[
+        Literal["point", "comma", "space", "apostrophe"] | None, Option(help="Mark between thousands, where there is one.")
+    ] = None,
+    encoding: Annotated[str | None, Option(help="Such as utf-8, cp1252; found out where not given.")] = None,
     header: Annotated[
-        int | None, typer.Option(min=1, max=MOST_ROWS, help="Line of the names of columns; found out where not given.")
+        int | None, Option(min=1, max=MOST_ROWS, help="Line of the names of columns; found out where not given.")
     ] = None,
     robot: Annotated[
-        Path | None, typer.Option(help="Robot file whose joint_names the columns have. Default: that of FOLDER/campaign.yaml.")
+        Path | None, Option(help="Robot file whose joint_names the columns have. Default: that of FOLDER/campaign.yaml.")
     ] = None,
-    options: Annotated[Path | None, typer.Option(help="import.yaml of an earlier import, to repeat it.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace measurements.csv that is filled in.")] = False,
+    options: Annotated[Path | None, Option(help="import.yaml of an earlier import, to repeat it.")] = None,
+    force: Annotated[bool, Option("--force", help="Replace measurements.csv that is filled in.")] = False,
 ) -> None:
     """Make measurements.csv of another program's table.
 
@@ -82,15 +64,14 @@ def csv(
     out is printed at the end; the options, and what was found out, are written to import.yaml.
     """
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
-    from elastocal.exchange.import_options import IMPORT, import_options_text, read_import_options
-    from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+    from elastocal.exchange.import_options import IMPORT, ImportOptions, import_options_text, read_import_options
+    from elastocal.exchange.measurement_table import read_measurement_table
     from elastocal.io.atomic_writes import check_places, write_text, write_together
 
     check_places(folder / CSV, folder / PARQUET, folder / IMPORT)
     if (folder / PARQUET).exists() or ((folder / CSV).exists() and not force and _is_filled(folder / CSV)):
-        raise InputError(
-            folder, "", "measurements that are there already", "another folder, or --force to replace measurements.csv"
-        )
+        allowed = "another folder, or --force to replace measurements.csv"
+        raise InputError(folder, "", "measurements that are there already", allowed)
     earlier = read_import_options(options) if options else ImportOptions()
     units = _pairs("--unit", unit) | {
         key: value for key, value in (("angles", angles), ("lengths", lengths)) if value is not None
@@ -101,20 +82,22 @@ def csv(
     }
     if len(markers) < len(several) or "" in markers:
         raise InputError("--target", "", ", ".join(several), "a name for each marker, such as A, or A=MARKER")
-    chosen = ImportOptions(
-        separator=separator.value if separator else earlier.separator,
-        decimal=decimal.value if decimal else earlier.decimal,
-        header=header or earlier.header,
-        encoding=encoding or earlier.encoding,
-        thousands=thousands.value if thousands else earlier.thousands,
+    stated: dict[str, Any] = {
+        "separator": separator,
+        "decimal": decimal,
+        "header": header,
+        "encoding": encoding,
+        "thousands": thousands,
+    }
+    stated |= {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty}
+    chosen = replace(
+        earlier,
         ignore=[*(earlier.ignore or ()), *(ignore or ())] or None,
         columns=dict(earlier.columns or {}) | _pairs("--column", column),
         units=dict(earlier.units or {}) | units,
-        rotation=rotation or earlier.rotation,
         target=(target[0] if target else earlier.target) if not markers else None,
         targets=markers or (earlier.targets if not target else None),
-        wrench=wrench.value if wrench else earlier.wrench,
-        skip_empty=skip_empty or earlier.skip_empty,
+        **{name: value for name, value in stated.items() if value},
     )
     found = read_measurement_table(file, chosen, _robot(robot, folder))
     with write_together(folder, (CSV, IMPORT)) as partial:

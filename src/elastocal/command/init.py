@@ -1,20 +1,18 @@
 """`elastocal init`: a campaign's folder to begin with."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
-import typer
 from rich.console import Console
+from typer import Argument, Option
 
 from elastocal.command.printed import print_answer
 from elastocal.errors import InputError
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(help="New folder, or one that has measurements or a robot file already.")],
-    robot: Annotated[Path | None, typer.Option(help="Robot file to copy there; a template where there is none.")] = None,
+    folder: Annotated[Path, Argument(help="New folder, or one that has measurements or a robot file already.")],
+    robot: Annotated[Path | None, Option(help="Robot file to copy there; a template where there is none.")] = None,
 ) -> None:
     """Begin a campaign: a folder with files to fill in.
 

@@ -1,11 +1,11 @@
 """The application of all subcommands, in the order of the work; bad input ends in one line."""
 
-from __future__ import annotations
-
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
+from typer import Option
 from typer.core import TyperGroup
 
 import elastocal
@@ -20,9 +20,6 @@ from elastocal.command.init import init
 from elastocal.command.plan import plan
 from elastocal.command.printed import example
 from elastocal.errors import InputError, fault_of_machine
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 # Each subcommand with an example, in the order in which a calibration needs them; `import` is a group of its own.
 COMMANDS: dict[Callable[..., None], str] = {
@@ -70,7 +67,7 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def with_version(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+        bool, Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """From a robot and a laser tracker to a corrected robot.

@@ -1,7 +1,5 @@
 """Where the pipeline is that the command runs, with its robots, and where its results are."""
 
-from __future__ import annotations
-
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 

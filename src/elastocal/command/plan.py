@@ -8,8 +8,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.console import Console
+from typer import Argument, Option
 
 from elastocal.command.printed import print_answer
 from elastocal.command.quantities import FARTHEST_TARGET_M, LARGEST_SEED, MOST_POSES, MOST_ROWS, angle_rad, length_m, numbers
@@ -30,52 +30,39 @@ _LONGEST_NAME = 80
 
 
 def plan(
-    robot: Annotated[Path, typer.Argument(help="Robot file.")],
-    output: Annotated[Path | None, typer.Option(help="CSV of the plan; the sheet and a picture go beside it.")] = None,
-    folder: Annotated[Path | None, typer.Option(help="New campaign folder, with a sheet to fill in.")] = None,
-    poses: Annotated[int, typer.Option(min=1, max=MOST_POSES, help="Poses to fit.")] = 20,
-    held_out: Annotated[
-        int, typer.Option(min=3, max=MOST_POSES, help="Random poses that judge the result and fit nothing.")
-    ] = 9,
-    accuracy: Annotated[
-        str | None, typer.Option(help="Wanted accuracy such as 0.1mm; takes the fewest poses that reach it.")
-    ] = None,
+    robot: Annotated[Path, Argument(help="Robot file.")],
+    output: Annotated[Path | None, Option(help="CSV of the plan; the sheet and a picture go beside it.")] = None,
+    folder: Annotated[Path | None, Option(help="New campaign folder, with a sheet to fill in.")] = None,
+    poses: Annotated[int, Option(min=1, max=MOST_POSES, help="Poses to fit.")] = 20,
+    held_out: Annotated[int, Option(min=3, max=MOST_POSES, help="Random poses that judge the result and fit nothing.")] = 9,
+    accuracy: Annotated[str | None, Option(help="Wanted accuracy such as 0.1mm; takes the fewest poses that reach it.")] = None,
     number: Annotated[
-        int, typer.Option("--candidates", min=10, max=MOST_ROWS, help="Random configurations to choose from.")
+        int, Option("--candidates", min=10, max=MOST_ROWS, help="Random configurations to choose from.")
     ] = 10_000,
     criterion: Annotated[
-        str,
-        typer.Option(
-            help="D, A or I: minimize the determinant or the trace of the covariance, or the error over the workspace."
-        ),
+        str, Option(help="D, A or I: minimize the determinant or the trace of the covariance, or the error over the workspace.")
     ] = "D",
-    force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0,
-    pull: Annotated[bool, typer.Option("--pull", help="The load pulls in any direction. Default: it hangs.")] = False,
+    force: Annotated[float, Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0,
+    pull: Annotated[bool, Option("--pull", help="The load pulls in any direction. Default: it hangs.")] = False,
     sensor: Annotated[
         str | None,
-        typer.Option(
-            help="The instrument, for the assumed noise: tracker (30 µm), t-mac (30 µm, 0.005°), camera (120 µm, 0.05°)."
-        ),
+        Option(help="The instrument, for the assumed noise: tracker (30 µm), t-mac (30 µm, 0.005°), camera (120 µm, 0.05°)."),
     ] = None,
-    measured: Annotated[str | None, typer.Option(help="position or pose. Default: what the sensor usually measures.")] = None,
-    base_known: Annotated[bool, typer.Option("--base-known", help="Measurements are in the base frame.")] = False,
+    measured: Annotated[str | None, Option(help="position or pose. Default: what the sensor usually measures.")] = None,
+    base_known: Annotated[bool, Option("--base-known", help="Measurements are in the base frame.")] = False,
     target: Annotated[
         list[str] | None,
-        typer.Option(
-            help="A target and its measuring point: POINT, POINT=x,y,z in m, or with a name of its own A:POINT=x,y,z."
-        ),
+        Option(help="A target and its measuring point: POINT, POINT=x,y,z in m, or with a name of its own A:POINT=x,y,z."),
     ] = None,
-    tracker: Annotated[str | None, typer.Option(help="Position of the tracker, x,y,z in m, base axes.")] = None,
-    box: Annotated[
-        list[str] | None, typer.Option(help="Box to keep out of: xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")
-    ] = None,
+    tracker: Annotated[str | None, Option(help="Position of the tracker, x,y,z in m, base axes.")] = None,
+    box: Annotated[list[str] | None, Option(help="Box to keep out of: xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")] = None,
     noise: Annotated[
-        str | None, typer.Option(help="Standard deviation of a coordinate, such as 0.03mm. Default: the sensor's.")
+        str | None, Option(help="Standard deviation of a coordinate, such as 0.03mm. Default: the sensor's.")
     ] = None,
     orientation_noise: Annotated[
-        str | None, typer.Option(help="Standard deviation of a rotation about an axis, such as 0.01deg. Default: the sensor's.")
+        str | None, Option(help="Standard deviation of a rotation about an axis, such as 0.01deg. Default: the sensor's.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1,
+    seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1,
 ) -> None:
     """Choose where to measure; write a sheet to print.
 
@@ -122,9 +109,8 @@ def plan(
     boxes = tuple(numbers("--box", text, 6).reshape(3, 2) for text in box or ())
     for corner in boxes:
         if (corner[:, 0] >= corner[:, 1]).any():
-            raise InputError(
-                "--box", "", str(corner.ravel().tolist()), "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max"
-            )
+            allowed = "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max"
+            raise InputError("--box", "", str(corner.ravel().tolist()), allowed)
     cell = Cell(boxes, None if tracker is None else numbers("--tracker", tracker, 3), RADIUS_SHARE * reach_m(arm))
     wanted = None if accuracy is None else length_m("--accuracy", accuracy)
     with console.status("planning"):
@@ -193,9 +179,8 @@ def _targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
         place, equals, offset = (text, "", "") if text in known else text.partition("=")
         name, colon, point = (place, "", place) if place in known else map(str.strip, place.partition(":"))
         if point not in known:
-            raise InputError(
-                "--target", "", repr(point if colon else place), f"{', '.join(known)}, with a name before: A:{known[-1]}"
-            )
+            allowed = f"{', '.join(known)}, with a name before: A:{known[-1]}"
+            raise InputError("--target", "", repr(point if colon else place), allowed)
         if not name or len(name) > _LONGEST_NAME:
             raise InputError("--target", "", f"a name of {len(name)} characters", f"1 to {_LONGEST_NAME}, such as A:{point}")
         if fault := text_fault(name):
@@ -226,9 +211,8 @@ def _sensor(name: str | None, measured: str | None) -> tuple[Sensor, str]:
 def _noise(position: str | None, orientation: str | None, sensor: Sensor, measured: str) -> tuple[float, float]:
     """Standard deviations as stated, or the sensor's."""
     if orientation is not None and measured != "pose":
-        raise InputError(
-            "--orientation-noise", "", f"{orientation!r} where positions are measured", "--measured pose beside it"
-        )
+        allowed = "--measured pose beside it"
+        raise InputError("--orientation-noise", "", f"{orientation!r} where positions are measured", allowed)
     position_m = sensor.position_m if position is None else length_m("--noise", position)
     # Of positions no orientation is read: its noise is not used.
     orientation_rad = sensor.orientation_rad if orientation is None else angle_rad("--orientation-noise", orientation)

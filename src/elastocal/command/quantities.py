@@ -1,17 +1,12 @@
 """Options that state quantities: lengths and angles with their unit, and lists of numbers."""
 
-from __future__ import annotations
-
 import math
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
 from elastocal.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _METRES = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _RADIANS = {"deg": math.radians(1.0), "°": math.radians(1.0), "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6}
@@ -22,7 +17,7 @@ _LEAST_RAD, _LARGEST_RAD = 1e-8, 0.2
 # Of a mass, over the mass, as in a robot file.
 LARGEST_RELATIVE_STD = 100.0
 # Trackers stand at up to a hundred metres, targets within an arm's reach of where they are fixed, as in a campaign.
-FARTHEST_PLACE_M, FARTHEST_TARGET_M = 1e3, 10.0
+_FARTHEST_PLACE_M, FARTHEST_TARGET_M = 1e3, 10.0
 # Draws are numbered in 32 bits; more poses, rows, lines or jobs than these are slips of the keyboard.
 LARGEST_SEED, MOST_POSES, MOST_ROWS, MOST_JOBS = 2**32 - 1, 10_000, 10_000_000, 10_000
 
@@ -57,7 +52,7 @@ def _quantity(text: str, units: Mapping[str, float]) -> float:
     return float(match[1]) * units.get(match[2], 0.0) if match else 0.0
 
 
-def numbers(option: str, text: str, count: int, largest: float = FARTHEST_PLACE_M) -> np.ndarray:
+def numbers(option: str, text: str, count: int, largest: float = _FARTHEST_PLACE_M) -> np.ndarray:
     """Numbers separated by commas, metres.
 
     `option`: named in errors. `largest`: size that each may have. Returns (count,). Raises `InputError`: another count, or

@@ -1,8 +1,13 @@
-"""What the columns of a table are: each name, its unit and the notation of orientations; what is ambiguous is asked for."""
+"""What the columns of a table are: each name, its unit and the notation of orientations; what is ambiguous is asked for.
 
-from __future__ import annotations
+Messages of joint states, as rosbag and PlotJuggler write them, have joints in any order, often that of the alphabet [1]:
+``position0`` stands beside ``name0``, whose cells name the joint, and counts for that joint and not for its place.
 
-from typing import TYPE_CHECKING
+[1] Open Robotics, sensor_msgs/JointState, docs.ros.org.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -24,8 +29,9 @@ from elastocal.exchange.column_names import (
     unit_of_joint,
     unit_scale,
     units_of,
+    without_unit,
 )
-from elastocal.exchange.joint_states import joints_by_name
+from elastocal.exchange.csv_dialect import TextTable
 from elastocal.exchange.rotations import (
     ALLOWED,
     HOMOGENEOUS_MATRICES,
@@ -37,15 +43,11 @@ from elastocal.exchange.rotations import (
     is_rotation,
 )
 from elastocal.io.texts import plain_number
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from elastocal.exchange.csv_dialect import TextTable
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Robot
 
 # Columns that a table may have in two meanings: external axes E1 to E3 beside an orientation.
 _OTHER_ANGLES = (("A", "B", "C"), ("W", "P", "R"), ("O", "A", "T"))
+_COUNTED = re.compile(r"(.*?)(name|position)s?[\s_.]?[\[(]?\s*([0-9]{1,2})\s*[\])]?", re.ASCII | re.IGNORECASE)
 
 
 def columns_of(
@@ -64,7 +66,7 @@ def columns_of(
             is_joint, unit = unit_of_joint(header, called)
             if is_joint:
                 guesses[header], by_name[header] = (f"q{joint}", _unit(text, header, unit)), called
-    for header, name in joints_by_name(text, (robot and robot.joint_names) or (), {*mapped.values()}).items():
+    for header, name in _joints_by_name(text, (robot and robot.joint_names) or (), {*mapped.values()}).items():
         guesses[header], by_name[header] = (name, guesses[header][1]), name
     free = [header for header in text.columns if header not in by_name and guesses[header][0] not in mapped]
     joints, notes = _counted_joints(text, free, {*mapped.values()})
@@ -97,6 +99,40 @@ def _unit(text: TextTable, header: str, stated: str | None) -> str | None:
     return stated or below
 
 
+def _joints_by_name(text: TextTable, joint_names: Sequence[str], mapped: set[str]) -> dict[str, str]:
+    """Names of joint angles by the headers of positions beside which columns name the joints.
+
+    `joint_names`: as the robot has them; empty where nobody knows. `mapped`: headers that options state. Raises `InputError`:
+    a name that changes from row to row, or joints whose order nothing states.
+    """
+    families: dict[tuple[str, str], dict[int, str]] = {}
+    for header in text.columns:
+        if match := _COUNTED.fullmatch(without_unit(header)[0]):
+            families.setdefault((match[1], match[2].lower()), {})[int(match[3])] = header
+    found: dict[str, str] = {}
+    for (prefix, kind), names in families.items():
+        positions = families.get((prefix, "position"), {})
+        if kind != "name" or positions.keys() != names.keys() or mapped & {*positions.values()}:
+            continue
+        for number, header in names.items():
+            if other := next((cell for cell in text.columns[header] if cell != text.columns[header][0]), None):
+                line = text.lines[text.columns[header].index(other)]
+                allowed = f"one joint in each column; it is {text.columns[header][0]!r} in line {text.lines[0]}"
+                raise InputError(text.path, f"line {line}, column {header}", repr(other), allowed)
+            called = text.columns[header][0]
+            joint = next((f"q{j}" for j, name in enumerate(joint_names, 1) if unit_of_joint(called, name)[0]), None)
+            joint = joint or (None if joint_names else recognized(called)[0])
+            if joint and re.fullmatch("q[0-9]+", joint):
+                found[positions[number]] = joint
+        if not found:
+            called = ", ".join(text.columns[header][0] for header in names.values())
+            allowed = (
+                f"--robot FILE whose joint_names are these, or --column q1={next(iter(positions.values()))!r} …, each joint's"
+            )
+            raise InputError(text.path, "header", f"joints called {called}, in an order that need not be the arm's", allowed)
+    return found
+
+
 def _counted_joints(text: TextTable, headers: Sequence[str], mapped: set[str]) -> tuple[dict[str, str], list[str]]:
     """Names of joints that headers count, and notes; what may be a quaternion, or is counted in two ways, is asked for."""
     families: dict[str, dict[int, str]] = {}
@@ -118,15 +154,13 @@ def _counted_joints(text: TextTable, headers: Sequence[str], mapped: set[str]) -
                 f"--column qw={headers[0]!r} … qz={headers[3]!r} (real part first) and --column q1={first!r} …, or "
                 f"for joints --column q1={headers[0]!r} …"
             )
-            raise InputError(
-                text.path, "header", f"{', '.join(headers)}: joints, or quaternions, as they have length 1", allowed
-            )
+            found = f"{', '.join(headers)}: joints, or quaternions, as they have length 1"
+            raise InputError(text.path, "header", found, allowed)
     numbered = [set(members) - {0} for members in families.values()]
     if len(families) > 1 and not set.intersection(*numbered):
         named = " and ".join(repr(members[min(members)]) for members in families.values())
-        raise InputError(
-            text.path, "header", f"joints called {named} …", "--column q1=NAME …, or --ignore NAME for those of one kind"
-        )
+        allowed = "--column q1=NAME …, or --ignore NAME for those of one kind"
+        raise InputError(text.path, "header", f"joints called {named} …", allowed)
     for members in families.values():
         if 0 not in members:
             continue

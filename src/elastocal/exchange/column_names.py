@@ -4,18 +4,13 @@ A column is recognized by what it is usually called, such as ``J1``, ``A1``, ``J
 Its unit stands in brackets or behind the name (``x_mm``), or is stated by an option.
 """
 
-from __future__ import annotations
-
 import math
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 from scipy import constants
 
 from elastocal.mechanics.components import WRENCH_NAMES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
 
 LENGTH, ANGLE, FORCE, MOMENT, TIME, TEMPERATURE, NONE = "length", "angle", "force", "moment", "time", "temperature", "none"
 # SI value of one of each unit, by kind.
@@ -49,23 +44,15 @@ _JOINT = re.compile(
     r"(q|j|a|axis|joint|theta|jointangle|actualq|targetq|qactual|rax|jointpos|jointposition|jointpositions|joints)([0-9]{1,2})"
 )
 _APPROACH = re.compile(r"(?:approach|direction)([0-9]{1,2})")
+_PLACES = ("p{}", "pos{}", "position{}", "measured{}", "{}meas", "translation{}", "point{}")
 _ALSO = {
-    "x": ("px", "posx", "positionx", "measuredx", "xmeas", "translationx", "pointx"),
-    "y": ("py", "posy", "positiony", "measuredy", "ymeas", "translationy", "pointy"),
-    "z": ("pz", "posz", "positionz", "measuredz", "zmeas", "translationz", "pointz"),
+    **{axis: tuple(place.format(axis) for place in _PLACES) for axis in "xyz"},
+    **{f"q{part}": (f"quat{part}", f"orientation{part}", f"rotation{part}") for part in "wxyz"},
+    **{f"f{axis}": (f"force{axis}",) for axis in "xyz"},
+    **{f"m{axis}": (f"moment{axis}", f"torque{axis}") for axis in "xyz"},
     "rx": ("rotx", "roll", "rvx"),
     "ry": ("roty", "pitch", "rvy"),
     "rz": ("rotz", "yaw", "rvz"),
-    "qw": ("quatw", "orientationw", "rotationw"),
-    "qx": ("quatx", "orientationx", "rotationx"),
-    "qy": ("quaty", "orientationy", "rotationy"),
-    "qz": ("quatz", "orientationz", "rotationz"),
-    "fx": ("forcex",),
-    "fy": ("forcey",),
-    "fz": ("forcez",),
-    "mx": ("momentx", "torquex"),
-    "my": ("momenty", "torquey"),
-    "mz": ("momentz", "torquez"),
     "pose": ("poseid", "posenumber", "configuration", "config"),
     "load": ("loadid", "loadcase"),
     "repeat": ("repetition", "cycle"),

@@ -1,21 +1,16 @@
 """Tables of numbers as text, in whatever dialect: encoding, separator, decimal mark, lines before the header, comments."""
 
-from __future__ import annotations
-
 import codecs
 import csv
 import re
 from collections import Counter
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError, steering
 from elastocal.io.texts import decoded, read_bytes
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
 
 # In this order: a header that holds a semicolon is not separated by its commas.
 SEPARATORS = {"tab": "\t", "semicolon": ";", "bar": "|", "comma": ",", "space": " "}
@@ -25,7 +20,7 @@ THOUSANDS = {"point": ".", "comma": ",", "space": " \u00a0\u2009\u202f", "apostr
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 # What Western spreadsheets and instruments write beyond ASCII. Another encoding that gives these alone is not to be expected:
 # that of Windows is taken where a file is no UTF-8, and asked for where anything else comes out.
-WESTERN, _WESTERN_SIGNS = "cp1252", frozenset("°µ±²³·äöüÄÖÜßàâçèéêëîïôùûñÉ\u00a0")
+_WESTERN, _WESTERN_SIGNS = "cp1252", frozenset("°µ±²³·äöüÄÖÜßàâçèéêëîïôùûñÉ\u00a0")
 _COMMENTS = ("#", "%", "//")
 _POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
@@ -100,35 +95,33 @@ def read_text_table(
     lines, encoding = _lines(path, stated.encoding)
     filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
     kept = [(number, line) for number, line in filled if not line.lstrip().startswith(_COMMENTS)]
-    comments = [(number, _without_mark(line)) for number, line in filled if line.lstrip().startswith(_COMMENTS)]
+    comments = [(number, line.lstrip().lstrip("#%/").strip()) for number, line in filled if line.lstrip().startswith(_COMMENTS)]
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
     separator, header, line = _header(kept, comments, is_header, stated, wanted, source)
-    table = [(number, cells_of(line, separator, source, number)) for number, line in kept if number > header]
-    names, named_above = _names(cells_of(line, separator, source, header), kept, separator, header)
+    table = [(number, _cells_of(line, separator, source, number)) for number, line in kept if number > header]
+    names, named_above = _names(_cells_of(line, separator, source, header), kept, separator, header)
     rows = [row for row in table if any(row[1])]
     for number, cells in rows:
         # Separators at the end of the rows and not of the header are common.
         while len(cells) > len(names) and not cells[-1]:
             cells.pop()
         if len(cells) != len(names):
-            raise InputError(
-                source, f"line {number}", f"{len(cells)} cells", f"{len(names)}, one for each column of line {header}"
-            )
+            allowed = f"{len(names)}, one for each column of line {header}"
+            raise InputError(source, f"line {number}", f"{len(cells)} cells", allowed)
     units = dict(zip(names, (rows and units_in(rows[0][1])) or (), strict=False))
     rows = rows[1:] if units else rows
     if not rows:
         raise InputError(source, "", "a header alone", "one row for each measurement")
     for name in ignored:
         if name not in names:
-            raise InputError(
-                source, f"line {header}", f"no column {name!r} to ignore", closest_first(name, list(dict.fromkeys(names)))
-            )
+            allowed = closest_first(name, list(dict.fromkeys(names)))
+            raise InputError(source, f"line {header}", f"no column {name!r} to ignore", allowed)
     cells_by_place = list(zip(*(cells for _, cells in rows), strict=True))
     places = [
         place
         for place, name in enumerate(names)
-        if name not in ignored and (not _nameless(name, place) or any(cells_by_place[place]))
+        if name not in ignored and (name != f"column {place + 1}" or any(cells_by_place[place]))
     ]
     if twice := [name for name, times in Counter(names[place] for place in places).items() if times > 1]:
         allowed = f"each column once (import csv --ignore {twice[0]!r} leaves out those that nobody needs)"
@@ -143,21 +136,16 @@ def read_text_table(
     decimal = stated.decimal or _decimal_of(columns, numbers, separator, thousands, source)
     if decimal == "comma":
         columns = {name: tuple(map(_with_point, cells)) for name, cells in columns.items()}
-    left_out = _left_out(
-        {
-            "rows of empty cells": len(table) - len(rows) - bool(units),
-            "lines above the header": sum(number < header for number, _ in filled) - named_above,
-            "lines of comments below the header": sum(number > header for number, _ in comments),
-            "columns without name and values": len(names) - len(places) - sum(name in ignored for name in names),
-        }
-    )
+    counted = {
+        "rows of empty cells": len(table) - len(rows) - bool(units),
+        "lines above the header": sum(number < header for number, _ in filled) - named_above,
+        "lines of comments below the header": sum(number > header for number, _ in comments),
+        "columns without name and values": len(names) - len(places) - sum(name in ignored for name in names),
+    }
+    left_out = tuple(f"{number} {what}" for what, number in counted.items() if number)
     dialect = Dialect(separator, decimal, header, encoding, thousands)
     stated_units = {name: unit for name, unit in units.items() if unit and name in columns}
     return TextTable(source, dialect, columns, tuple(numbers), left_out, stated_units)
-
-
-def _left_out(counted: dict[str, int]) -> tuple[str, ...]:
-    return tuple(f"{number} {what}" for what, number in counted.items() if number)
 
 
 def _names(cells: Sequence[str], kept: Sequence[tuple[int, str]], separator: str, header: int) -> tuple[list[str], bool]:
@@ -174,14 +162,6 @@ def _names(cells: Sequence[str], kept: Sequence[tuple[int, str]], separator: str
         of = group or of
         both.append(f"{of} {name}" if name in twice and of else name)
     return (both, True) if len(set(both)) == len(both) else (names, False)
-
-
-def _nameless(name: str, place: int) -> bool:
-    return name == f"column {place + 1}"
-
-
-def _without_mark(line: str) -> str:
-    return line.lstrip().lstrip("#%/").strip()
 
 
 def lines_of(text: str, path: str | Path) -> list[str]:
@@ -226,9 +206,9 @@ def _text(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, 
     try:
         return decoded(content, path, "utf-8"), "utf-8"
     except InputError as error:
-        western = content.decode(WESTERN, errors="replace")
+        western = content.decode(_WESTERN, errors="replace")
         if all(character in _WESTERN_SIGNS for character in western if not character.isascii()):
-            return western, WESTERN
+            return western, _WESTERN
         allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
         raise InputError(path, error.key, error.found, allowed) from None
 
@@ -246,14 +226,15 @@ def _header(
         line = dict((*kept, *comments)).get(stated.header)
         if not line:
             raise InputError(source, f"line {stated.header}", "no header", "the line that names the columns")
-        return stated.separator or _separator_of(line), stated.header, line
+        usual = next((name for name, mark in SEPARATORS.items() if mark in line), "comma")
+        return stated.separator or usual, stated.header, line
 
     def separator_of(line: str, cells: Callable[[str, str], list[str]]) -> str | None:
         tried = [stated.separator] if stated.separator else [name for name, mark in SEPARATORS.items() if mark in line]
         return next((name for name in tried if is_header(cells(line, name))), None)
 
     for number, line in kept:
-        if separator := separator_of(line, lambda line, name: cells_of(line, name, source, number)):  # noqa: B023
+        if separator := separator_of(line, lambda line, name: _cells_of(line, name, source, number)):  # noqa: B023
             return separator, number, line
     found = [(separator, number, line) for number, line in comments if (separator := separator_of(line, _tried_cells))]
     if len({line for _, _, line in found}) > 1:
@@ -268,16 +249,12 @@ def _header(
 def _tried_cells(line: str, separator: str) -> list[str]:
     """Cells of a comment, in which quotes need not be in pairs."""
     try:
-        return cells_of(line, separator, "", 0)
+        return _cells_of(line, separator, "", 0)
     except InputError:
         return []
 
 
-def _separator_of(line: str) -> str:
-    return next((name for name, mark in SEPARATORS.items() if mark in line), "comma")
-
-
-def cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
+def _cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
     """Cells of one line.
 
     `separator`: a name in `SEPARATORS`, or the mark itself. `source`: named in errors. `number`: of the line. Raises
@@ -319,15 +296,13 @@ def _decimal_of(
         if len(seen) == 2:
             (one, left), (other, right) = seen["point"], seen["comma"]
             found = f"{left!r} in line {one} and {right!r} in line {other}"
-            raise InputError(
-                source, "", found, "one decimal mark: --decimal point or comma says which, --thousands that the other is none"
-            )
+            allowed = "one decimal mark: --decimal point or comma says which, --thousands that the other is none"
+            raise InputError(source, "", found, allowed)
     decimal = next(iter(seen), "comma" if thousands == "point" else "point")
     if decimal == thousands:
         number, cell = seen[decimal]
-        raise InputError(
-            source, f"line {number}", repr(cell), f"three digits behind each {decimal}, as it is between thousands"
-        )
+        allowed = f"three digits behind each {decimal}, as it is between thousands"
+        raise InputError(source, f"line {number}", repr(cell), allowed)
     if "comma" in seen and (separator == "comma" or not sure):
         number, cell = seen["comma"]
         allowed = "--decimal comma where the comma is the decimal mark, or --thousands comma"

@@ -4,35 +4,32 @@ A row of the standard notation [1] is ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, one o
 ``Rx(alpha) Tx(a) Rz(theta) Tz(d)`` with the alpha and a of its own row, which he calls alpha and a of i - 1. A joint's angle is
 added to theta, a prismatic joint's shift to d.
 
+Joint frames may be moved along their own axes, which changes no pose behind them: a turn about z and a shift along z commute,
+``Tz(s) Rz(q) Tz(-s) = Rz(q)``, and so for ``Tz(q)``. Where two axes are nearly parallel, their common normal is anywhere along
+them, and a calibrated table has lengths d of hundreds of metres that cancel [3]; the frames of a chain need not be there.
+
 [1] Denavit, J. and Hartenberg, R. S., A kinematic notation for lower-pair mechanisms based on matrices, Journal of Applied
     Mechanics 22, 1955.
 [2] Craig, J. J., Introduction to Robotics: Mechanics and Control, Addison-Wesley, 1986.
+[3] Hayati, S., Robot arm geometric link parameter estimation, 22nd IEEE Conference on Decision and Control, 1983.
 """
 
-from __future__ import annotations
-
 import math
+import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.exchange.dh_table import AS_STATED, FIXED, PRISMATIC, REVOLUTE, read_dh_table
-from elastocal.exchange.fixed_transforms import rotation_about, shift_word, turn_word
-from elastocal.exchange.robot_text import imported
+from elastocal.exchange.dh_table import AS_STATED, FIXED, PRISMATIC, REVOLUTE, DhOptions, DhRow, read_dh_table
+from elastocal.exchange.fixed_transforms import displacement_words, elementary, shift_word, turn_word
+from elastocal.exchange.robot_text import Imported, imported, mass_entries
 from elastocal.exchange.ros_kinematics import KINEMATICS, robot_from_kinematics
-from elastocal.exchange.slid_frames import lengths_of, slid_words
 from elastocal.exchange.urdf_chain import point_name
 from elastocal.io.documents import read_document
 from elastocal.mechanics.usual_values import UNLIMITED_DEG
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elastocal.exchange.dh_table import DhOptions, DhRow
-    from elastocal.exchange.robot_text import Imported
-    from elastocal.exchange.slid_frames import Piece
 
 # A table with masses is a maker's or was identified; a tenth is what such masses are known to at best.
 RELATIVE_STD = 0.1
@@ -40,6 +37,9 @@ END = "flange"
 _DECIMALS = 9
 # Calibrated tables have lengths along nearly parallel axes, by hundreds of metres, that cancel.
 _MUCH_SHORTER = 0.5
+# A displacement, ndarray (4, 4), and the measuring point at its end; empty for none.
+_Piece = tuple[np.ndarray, str]
+_SHIFT = re.compile(r"T[xyz]\((-?[0-9.]+)\)", re.ASCII)
 
 
 def robot_from_dh(
@@ -62,9 +62,8 @@ def robot_from_dh(
             if modified:
                 raise InputError("--modified", "", f"a file of {KINEMATICS}, which is no table", "the file without --modified")
             if options.ignore:
-                raise InputError(
-                    "--ignore", "", f"a file of {KINEMATICS}, of which nothing is left out", "the file without --ignore"
-                )
+                allowed = "the file without --ignore"
+                raise InputError("--ignore", "", f"a file of {KINEMATICS}, of which nothing is left out", allowed)
             return robot_from_kinematics(described, path, name)
     rows, understood = read_dh_table(path, options)
     joints = [row for row in rows if row.kind != FIXED]
@@ -74,8 +73,8 @@ def robot_from_dh(
     if names := _joint_names(joints, source):
         document["joint_names"] = names
     words, slid = _words(rows, points, modified), np.zeros(len(joints) + 1)
-    near, slides = slid_words(_gaps(rows, points, modified), [row.kind for row in joints])
-    written, short = lengths_of(words), lengths_of(near)
+    near, slides = _slid_words(_gaps(rows, points, modified), [row.kind for row in joints])
+    written, short = _lengths_of(words), _lengths_of(near)
     if short < _MUCH_SHORTER * written:
         words, slid = near, slides
     document["chain"] = " ".join(words)
@@ -137,11 +136,11 @@ def _limits(row: DhRow, source: str) -> list[float]:
     return [round(value if row.kind == PRISMATIC else math.degrees(value), _DECIMALS) for value in row.limits]
 
 
-def _gaps(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[list[Piece]]:
+def _gaps(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[list[_Piece]]:
     """What stands before, between and behind the joints: displacements, each with the point at its end."""
-    gaps: list[list[Piece]] = [[]]
+    gaps: list[list[_Piece]] = [[]]
     for row, point in zip(rows, points, strict=True):
-        before, behind = (np.vstack([np.column_stack(part), [0.0, 0.0, 0.0, 1.0]]) for part in _displacements(row, modified))
+        before, behind = _displacements(row, modified)
         if row.kind == FIXED:
             gaps[-1].append((before @ behind, point))
         else:
@@ -155,40 +154,53 @@ def _masses(rows: Sequence[DhRow], modified: bool, relative_std: float, slid: np
 
     `slid` (n + 1,) is by how much the frame of each link is moved along z from where the table has it (m).
     """
-    body, rotation, position = 0, np.eye(3), np.zeros(3)
+    body, here = 0, np.eye(4)
     moments: dict[int, np.ndarray] = {}
     for row in rows:
         before, behind = _displacements(row, modified)
         if row.kind == FIXED:
-            rotation, position = _behind(rotation, position, before)
+            here = here @ before
         else:
-            body, rotation, position = body + 1, np.eye(3), np.array([0.0, 0.0, -slid[body + 1]])
-        rotation, position = _behind(rotation, position, behind)
+            body, here = body + 1, elementary("T", 2, -slid[body + 1])
+        here = here @ behind
         if row.mass_kg is not None:
-            centre = position + rotation @ np.array(row.centre_m)
-            moments[body] = moments.get(body, np.zeros(4)) + row.mass_kg * np.append(centre, 1.0)
-    return [
-        {
-            "link": link,
-            "mass_kg": round(float(moment[3]), _DECIMALS),
-            "centre_m": (np.round(moment[:3] / moment[3], _DECIMALS) + 0.0).tolist(),
-            "relative_std": relative_std,
-        }
-        for link, moment in sorted(moments.items())
-    ]
+            moments[body] = moments.get(body, np.zeros(4)) + row.mass_kg * here @ np.append(row.centre_m, 1.0)
+    return mass_entries(moments, relative_std)
 
 
-_Displacement = tuple[np.ndarray, np.ndarray]
+def _displacements(row: DhRow, modified: bool) -> tuple[np.ndarray, np.ndarray]:
+    """What of a row stands before its joint, and what behind, ndarray (4, 4) each."""
+    across = elementary("T", 0, row.a) @ elementary("R", 0, row.alpha)
+    turn, shift = elementary("R", 2, row.theta), elementary("T", 2, row.d)
+    return (across @ turn, shift) if modified else (turn, shift @ across)
 
 
-def _displacements(row: DhRow, modified: bool) -> tuple[_Displacement, _Displacement]:
-    """What of a row stands before its joint, and what behind, as rotation and position."""
-    across = rotation_about("x", row.alpha), np.array([row.a, 0.0, 0.0])
-    turn, shift = (rotation_about("z", row.theta), np.zeros(3)), (np.eye(3), np.array([0.0, 0.0, row.d]))
-    if modified:
-        return _behind(*across, turn), shift
-    return turn, _behind(*shift, across)
+def _lengths_of(words: Sequence[str]) -> float:
+    """Sum of all fixed lengths of a chain, m."""
+    return sum(abs(float(match[1])) for word in words if (match := _SHIFT.fullmatch(word)))
 
 
-def _behind(rotation: np.ndarray, position: np.ndarray, more: _Displacement) -> _Displacement:
-    return rotation @ more[0], position + rotation @ more[1]
+def _slid_words(gaps: Sequence[Sequence[_Piece]], kinds: Sequence[str]) -> tuple[list[str], np.ndarray]:
+    """A chain in words whose joints lie as near as their axes allow to the joint before, and how far each was moved.
+
+    `gaps`: displacements before, between and behind n joints, which move about or along z. `kinds` (n,) of str: ``P`` of
+    prismatic joints. Returns `slides` (n + 1,): m along z of each joint, and 0 before for the base.
+    """
+    words: list[str] = []
+    slides = np.zeros(len(gaps))
+    for number, gap in enumerate(gaps):
+        here = elementary("T", 2, -slides[number])
+        for place, (piece, point) in enumerate(gap):
+            here = here @ piece
+            last = place == len(gap) - 1 and number < len(kinds)
+            if last:
+                # Of the points of the next axis the nearest one.
+                slides[number + 1] = -here[:3, 2] @ here[:3, 3]
+                here = here @ elementary("T", 2, slides[number + 1])
+            if point or last or place == len(gap) - 1:
+                words += displacement_words(here)
+                words += [f"[{point}]"] if point else []
+                here = np.eye(4)
+        if number < len(kinds):
+            words.append(f"{'T' if kinds[number] == 'P' else 'R'}z(q{number + 1})")
+    return words, slides

@@ -18,13 +18,12 @@ in the frame of the row), and ``point`` (name of a measuring point at the frame 
 with the same keys.
 """
 
-from __future__ import annotations
-
 import math
 import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
@@ -33,11 +32,8 @@ from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.io.documents import read_document
 from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
 
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-
-ANGLE_UNITS = {"deg": math.radians(1.0), "rad": 1.0}
-LENGTH_UNITS = {"m": 1.0, "mm": 1e-3}
+_ANGLE_UNITS = {"deg": math.radians(1.0), "rad": 1.0}
+_LENGTH_UNITS = {"m": 1.0, "mm": 1e-3}
 REVOLUTE, PRISMATIC, FIXED = "R", "P", "F"
 _ANGLES, _LENGTHS, _LIMITS = ("theta_offset", "alpha"), ("d", "a", "cx", "cy", "cz"), ("lower", "upper")
 _PLAIN = ("compliance_urad_per_Nm", "mass_kg")
@@ -183,13 +179,13 @@ def _meanings(columns: Mapping[str, str], options: DhOptions, source: str) -> di
             raise InputError(source, "header", repr(column), f"{allowed}; import dh --ignore {column!r} leaves it out")
         else:
             turns, shifts = name in (*_ANGLES, *_LIMITS), name in (*_LENGTHS, *_LIMITS)
-            if unit and not (turns and unit in ANGLE_UNITS) and not (shifts and unit in LENGTH_UNITS):
-                units = [*(ANGLE_UNITS if turns else ()), *(LENGTH_UNITS if shifts else ())]
+            if unit and not (turns and unit in _ANGLE_UNITS) and not (shifts and unit in _LENGTH_UNITS):
+                units = [*(_ANGLE_UNITS if turns else ()), *(_LENGTH_UNITS if shifts else ())]
                 raise InputError(source, "header", f"{column!r} in {unit}", ", ".join(units))
             meaning = _Meaning(
                 name,
-                (unit if unit in ANGLE_UNITS else options.angles or "") if turns else "",
-                (unit if unit in LENGTH_UNITS else options.lengths or "") if shifts else "",
+                (unit if unit in _ANGLE_UNITS else options.angles or "") if turns else "",
+                (unit if unit in _LENGTH_UNITS else options.lengths or "") if shifts else "",
             )
             if not (meaning.angle or meaning.length):
                 option = "--angles deg or rad" if turns else "--lengths m or mm"
@@ -223,9 +219,8 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
         turns = name in _ANGLES or (name in _LIMITS and kind != PRISMATIC)
         if name not in _PLAIN and not (meaning.angle if turns else meaning.length):
             option = "--angles deg or rad" if turns else "--lengths m or mm"
-            raise InputError(
-                source, f"{where}, {column}", f"a limit without a unit of {'angles' if turns else 'lengths'}", option
-            )
+            found = f"a limit without a unit of {'angles' if turns else 'lengths'}"
+            raise InputError(source, f"{where}, {column}", found, option)
         value = _number(text(name), turns and meaning.angle == "rad")
         largest = MOST_TURNS * (2.0 * math.pi if meaning.angle == "rad" else 360.0) if turns else LARGEST_NUMBER
         if value is None or abs(value) > largest:
@@ -236,8 +231,8 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
                 raise InputError(source, f"{where}, {column}", text(name), "more than 0")
             return value
         if turns:
-            return value * ANGLE_UNITS[meaning.angle]
-        return value * LENGTH_UNITS[meaning.length]
+            return value * _ANGLE_UNITS[meaning.angle]
+        return value * _LENGTH_UNITS[meaning.length]
 
     for name in _NEEDED:
         if not text(name):

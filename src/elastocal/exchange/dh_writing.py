@@ -8,22 +8,17 @@ fixed and a and b are the offset. All parameters then change as little as the ro
 [1] Hayati, S. A., Robot arm geometric link parameter estimation, IEEE Conference on Decision and Control, 1983.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import elementary, rotation_about
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elastocal.mechanics.robot import Robot
+from elastocal.exchange.fixed_transforms import elementary
+from elastocal.mechanics.robot import Robot
 
 # Axes within this angle are parallel, and lines within this distance are one: what decimals of a robot file leave.
 _PARALLEL_RAD, _TOGETHER_M = 1e-6, 1e-7
@@ -114,7 +109,7 @@ def dh_deltas(nominal: Robot, calibrated: Robot) -> pd.DataFrame:
 
 def _imported(kind: str, joint: int | None, values: Sequence[float]) -> dict[str, Any]:
     theta, d, a, alpha = values
-    head = {"joint": "" if joint is None else f"{joint}", "type": kind, "theta_offset_deg": math.degrees(theta)}
+    head = {"joint": f"{joint or ''}", "type": kind, "theta_offset_deg": math.degrees(theta)}
     return head | {"d_m": d, "a_m": a, "alpha_deg": math.degrees(alpha), "point": ""}
 
 
@@ -203,12 +198,8 @@ def _parallel(point: np.ndarray, axis: np.ndarray, kind: _Kind) -> Row:
 
 def _transform(row: Row) -> np.ndarray:
     found = np.eye(4)
-    for axis, angle, shift in (
-        ("z", row.theta, (0.0, 0.0, row.d)),
-        ("x", row.alpha, (row.a, 0.0, 0.0)),
-        ("y", row.beta, (0.0, row.b, 0.0)),
-    ):
-        step = np.eye(4)
-        step[:3, :3], step[:3, 3] = rotation_about(axis, angle), shift
+    for axis, angle, shift in ((2, row.theta, row.d), (0, row.alpha, row.a), (1, row.beta, row.b)):
+        step = elementary("R", axis, angle)
+        step[axis, 3] = shift
         found = found @ step
     return found

@@ -3,15 +3,10 @@
 A rigid displacement becomes ``Tx Ty Tz Rz Ry Rx``, the rotation by yaw, pitch and roll; what is zero is left out.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
 
 # Picometres, and as many degrees: a chain of any length keeps to far less than a nanometre, and cos(90 deg) is no length.
 _DECIMALS = 12
@@ -24,7 +19,7 @@ def displacement_words(transform: np.ndarray) -> list[str]:
     """
     yaw, pitch, roll = yaw_pitch_roll(transform[:3, :3])
     shifts = [shift_word(axis, amount) for axis, amount in zip("xyz", transform[:3, 3], strict=True)]
-    return _there([*shifts, turn_word("z", yaw), turn_word("y", pitch), turn_word("x", roll)])
+    return [word for word in (*shifts, turn_word("z", yaw), turn_word("y", pitch), turn_word("x", roll)) if word]
 
 
 def turned_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str]]:
@@ -41,7 +36,7 @@ def axis_rotation(axis: np.ndarray) -> np.ndarray:
     """The fixed rotation before a joint about an axis, as in `turned_axis`, ndarray (3, 3)."""
     turn = np.eye(3)
     for name, angle in _aligned(axis)[0]:
-        turn = turn @ rotation_about(name, math.radians(_rounded(math.degrees(angle))))
+        turn = turn @ rotation_about(name, math.radians(round(math.degrees(angle), _DECIMALS)))
     return turn
 
 
@@ -54,7 +49,7 @@ def _aligned(axis: np.ndarray) -> tuple[list[tuple[str, float]], str, str]:
 
 
 def _words_of(turns: Iterable[tuple[str, float]]) -> list[str]:
-    return _there([turn_word(name, angle) for name, angle in turns])
+    return [word for name, angle in turns if (word := turn_word(name, angle))]
 
 
 def shift_word(letter: str, amount_m: float) -> str | None:
@@ -109,16 +104,8 @@ def origin_transform(xyz: Sequence[float], rpy: Sequence[float]) -> np.ndarray:
     return found
 
 
-def _rounded(amount: float) -> float:
-    return round(amount, _DECIMALS)
-
-
 def _word(name: str, amount: float, unit: str) -> str | None:
-    amount = _rounded(amount)
+    amount = round(amount, _DECIMALS)
     if amount == 0:
         return None
     return f"{name}({'-' if amount < 0 else ''}{np.format_float_positional(abs(amount), trim='-')}{unit})"
-
-
-def _there(words: Iterable[str | None]) -> list[str]:
-    return [word for word in words if word is not None]

@@ -4,11 +4,10 @@ What such columns are called says of which marker they are, and not whether this
 the markers that are targets are stated, never guessed.
 """
 
-from __future__ import annotations
-
 import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import (
@@ -22,11 +21,7 @@ from elastocal.exchange.column_names import (
     recognized_plainly,
     without_unit,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
-
-    from elastocal.exchange.csv_dialect import TextTable
+from elastocal.exchange.csv_dialect import TextTable
 
 # What a marker has of its own; all else of a row is of the robot.
 _OWN = frozenset((*POSITION, *VECTOR, *QUATERNION, *EULER, *MATRIX, *HOMOGENEOUS, "u95_m"))
@@ -41,15 +36,15 @@ _JOINED = (
 )
 
 _Value = TypeVar("_Value")
-Markers = dict[str, dict[str, str]]
+_Markers = dict[str, dict[str, str]]
 
 
-def markers_in(headers: Iterable[str]) -> Markers:
+def markers_in(headers: Iterable[str]) -> _Markers:
     """Headers by the names of their quantities, of each marker that has a position in every row.
 
     The marker of headers without one, such as ``x``, is called "".
     """
-    found: Markers = {}
+    found: _Markers = {}
     for header in headers:
         if part := _marker_and_name(without_unit(header)[0]):
             found.setdefault(part[0], {}).setdefault(part[1], header)
@@ -96,9 +91,8 @@ def chosen_markers(
         for name, marker in targets.items():
             if marker not in markers:
                 known = ", ".join(map(_called, markers)) or "none, each with columns for x, y and z"
-                raise InputError(
-                    text.path, "header", f"no marker {marker!r}, target {name!r}", f"markers of the table: {known}"
-                )
+                allowed = f"markers of the table: {known}"
+                raise InputError(text.path, "header", f"no marker {marker!r}, target {name!r}", allowed)
         return dict(targets)
     if has_position(mapped):
         return {}
@@ -113,12 +107,9 @@ def chosen_markers(
         asked = usual if len(usual) > 1 else [*usual, *counted] if usual else [*markers]
         first = next((marker for marker in asked if marker), asked[0])
         options = " ".join(f"--target {marker if marker else f'NAME={marker}'}" for marker in asked[:3])
-        raise InputError(
-            text.path,
-            "header",
-            f"positions of {', '.join(map(_called, asked[:4]))}{' …' if len(asked) > 4 else ''} in each row",
-            f"{options} for those that are targets (NAME={first} gives one another name), or --column x=NAME … for one",
-        )
+        found = f"positions of {', '.join(map(_called, asked[:4]))}{' …' if len(asked) > 4 else ''} in each row"
+        allowed = f"{options} for those that are targets (NAME={first} gives one another name), or --column x=NAME … for one"
+        raise InputError(text.path, "header", found, allowed)
     return {}
 
 
@@ -142,9 +133,8 @@ def one_row_each(
         other = markers[targets[name]]
         for what in sorted({*named} ^ {*other}):
             header, of = (named[what], first) if what in named else (other[what], name)
-            raise InputError(
-                text.path, "header", f"{header!r} of {of} alone", f"--ignore {header!r}, or the same of each target"
-            )
+            allowed = f"--ignore {header!r}, or the same of each target"
+            raise InputError(text.path, "header", f"{header!r} of {of} alone", allowed)
         for what, header in named.items():
             units = [text.units.get(each) or recognized(each)[1] or "no unit" for each in (header, other[what])]
             if units[0] != units[1]:

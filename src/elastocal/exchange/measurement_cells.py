@@ -1,9 +1,7 @@
 """Cells of a table as numbers in SI units, with the line of what is none."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,12 +10,8 @@ from elastocal.campaigns.measurements import shown
 from elastocal.errors import InputError
 from elastocal.exchange.column_meanings import units_of_columns
 from elastocal.exchange.column_names import COVARIATES, TIME, UNITS, kind_of, unit_scale
+from elastocal.exchange.csv_dialect import TextTable
 from elastocal.io.texts import A_NUMBER, plain_number
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from elastocal.exchange.csv_dialect import TextTable
 
 # Nanoseconds since 1970 are 2e18.
 _LARGEST_TIME = 1e19
@@ -35,9 +29,8 @@ def rows_with_position(text: TextTable, columns: Mapping[str, str], position: Se
     if not filled.all() and not skip_empty:
         row = int(np.argmin(filled))
         of = f" of {text.columns[columns['target']][row]}" if "target" in columns else ""
-        raise InputError(
-            text.path, f"line {text.lines[row]}", f"no position{of}", "three numbers, or --skip-empty to leave such rows out"
-        )
+        allowed = "three numbers, or --skip-empty to leave such rows out"
+        raise InputError(text.path, f"line {text.lines[row]}", f"no position{of}", allowed)
     if not filled.any():
         raise InputError(text.path, "", "no position in any row", "at least one measurement")
     return np.flatnonzero(filled)

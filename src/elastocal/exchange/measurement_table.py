@@ -4,10 +4,10 @@ What a name, a unit or a notation leaves open is asked for, never guessed: an an
 rotation vector or Euler angles. What was found out is returned as options with which the import can be repeated.
 """
 
-from __future__ import annotations
-
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,50 +19,18 @@ from elastocal.errors import InputError, text_fault
 from elastocal.exchange.column_meanings import check_complete, columns_of, rotation_of, units_of_columns
 from elastocal.exchange.column_names import ANGLE, POSITION, UNITS, VECTOR, is_name, joints_in, recognized, units_in
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
+from elastocal.exchange.import_options import BY_ROBOT, ImportOptions, sheet_options
 from elastocal.exchange.markers import chosen_markers, has_position, markers_in, one_row_each
 from elastocal.exchange.measurement_cells import CellReader, covariates_of, rows_with_position
-from elastocal.exchange.planned_sheet import sheet_options
 from elastocal.exchange.rotations import HOMOGENEOUS_MATRICES, QUATERNIONS, columns_of_rotation, rotation_vectors
 from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.robot import Robot
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from elastocal.mechanics.robot import Robot
-
-ON_ROBOT, BY_ROBOT = "on-robot", "by-robot"
 # Angles that a controller reports twice at one standstill agree to better; poses of a plan lie degrees apart.
 SAME_POSE = 1e-3
 _TRANSLATION = ("t14", "t24", "t34")
 # Rows of one pose whose joints stand farther apart (rad or m) are not of one pose: a label says something else.
 _ONE_POSE = 0.1
-
-
-@dataclass(frozen=True)
-class ImportOptions:
-    """How a table is read; what is None or absent is found out, or refused where it is ambiguous.
-
-    `separator`, `decimal`, `header`, `encoding`, `thousands`: as in `csv_dialect.Dialect`. `ignore`: headers of columns that
-    are left out. `columns`: headers by the names of `column_names`. `units`: units by the same names; ``angles`` and
-    ``lengths`` for all that have no other. `rotation`: notation of `rotations`. `target`: name for all rows where no column has
-    it. `targets`: markers of rows that hold several, by the names of the targets that they are; see `markers`. `wrench`: what
-    the forces act on; those that the robot exerts are turned round. `skip_empty`: whether rows without a position are left out.
-    """
-
-    separator: str | None = None
-    decimal: str | None = None
-    header: int | None = None
-    columns: Mapping[str, str] | None = None
-    units: Mapping[str, str] | None = None
-    rotation: str | None = None
-    target: str | None = None
-    wrench: str = ON_ROBOT
-    skip_empty: bool = False
-    encoding: str | None = None
-    thousands: str | None = None
-    ignore: Sequence[str] | None = None
-    targets: Mapping[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -182,9 +150,8 @@ def _targets(read: CellReader, name: str | None) -> np.ndarray:
             raise InputError(read.text.path, f"column {read.columns['target']}", *fault)
         return np.array(names)
     if name is None:
-        raise InputError(
-            read.text.path, "header", "no column target", "--target NAME, the target of all rows, or --column target=NAME"
-        )
+        allowed = "--target NAME, the target of all rows, or --column target=NAME"
+        raise InputError(read.text.path, "header", "no column target", allowed)
     if fault := text_fault(name):
         raise InputError("--target", "", *fault)
     return np.full(len(read.kept), name)

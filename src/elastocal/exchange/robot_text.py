@@ -1,26 +1,25 @@
 """A robot file as text that a person reads: where it came from, keys in their usual order, a line for each joint's mass."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from elastocal.errors import InputError, reason_of
 from elastocal.io.atomic_writes import check_places, write_text
 from elastocal.io.documents import check_document, one_line
+from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elastocal.mechanics.robot import Robot
 
 _WIDTH = 128
 _INDENT = "  "
+# Kilograms and metres to the nanometre.
+_DECIMALS = 9
 _ORDER = (
     "name",
     "joint_names",
@@ -67,6 +66,22 @@ def imported(document: dict[str, Any], path: str | Path, options: str, notes: Se
     missing += [] if robot.payload_kg is not None else ["no rated load (payload_kg)"]
     origin = f"From {Path(path).name} (sha256 {digest[:16]}), {options}."
     return Imported(document, robot, origin, (*notes, *missing))
+
+
+def mass_entries(moments: Mapping[int, np.ndarray], relative_std: float) -> list[dict[str, Any]]:
+    """``masses`` of a robot file.
+
+    `moments` (4,): of what each link carries the mass times its centre, m kg, and the mass, kg; by the number of the link.
+    """
+    return [
+        {
+            "link": link,
+            "mass_kg": round(float(moment[3]), _DECIMALS),
+            "centre_m": (np.round(moment[:3] / moment[3], _DECIMALS) + 0.0).tolist(),
+            "relative_std": relative_std,
+        }
+        for link, moment in sorted(moments.items())
+    ]
 
 
 def robot_text(result: Imported) -> str:

@@ -6,23 +6,17 @@ the joint turns about z. The base frame is that of the controller (``base`` of u
 [1] Universal Robots, ur_calibration: extracts the factory calibration of a robot, github.com/UniversalRobots.
 """
 
-from __future__ import annotations
-
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.exchange.fixed_transforms import displacement_words, origin_transform
-from elastocal.exchange.robot_text import imported
+from elastocal.exchange.robot_text import Imported, imported
 from elastocal.exchange.urdf_chain import point_name
 from elastocal.io.texts import A_NUMBER, plain_number
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from elastocal.exchange.robot_text import Imported
 
 KINEMATICS = "kinematics"
 _KEYS = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -1,18 +1,13 @@
 """Orientations as people write them, to rotation vectors: quaternions, Euler angles, matrices."""
 
-from __future__ import annotations
-
 import itertools
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Collection
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.exchange.column_names import EULER, HOMOGENEOUS, MATRIX, QUATERNION, VECTOR
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
 
 NO_ROTATION, VECTORS, QUATERNIONS, MATRICES, HOMOGENEOUS_MATRICES = "none", "vector", "quaternion", "matrix", "homogeneous"
 EULER_ANGLES = "euler:"

@@ -5,31 +5,23 @@ loaded; ``q1 .. qn`` (rad, as the controller reports them) near which the robot 
 ``time_s`` and ``temperature_c`` as in a campaign.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.column_bounds import BOUNDS, FARTHEST_RAD, beyond
+from elastocal.campaigns.column_bounds import FARTHEST_RAD
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
-from elastocal.io.texts import A_NUMBER, plain_number
+from elastocal.exchange.measurement_cells import CellReader
 from elastocal.mechanics.components import WRENCH
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from elastocal.exchange.csv_dialect import TextTable
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
 _WRENCH = tuple(name for name, _, _ in WRENCH)
 # Of a corrected target, and where it is.
-OK, STATUS = "ok", "status"
-_DIALECT = Dialect("comma", "point")
+OK, _STATUS = "ok", "status"
 # A position farther from the base than any arm reaches is in other units.
 _FARTHEST_M = 10.0
 
@@ -64,8 +56,8 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
     approach = tuple(f"approach{j}" for j in range(1, joints + 1))
     known = (*_POSE, *_WRENCH, *angles, *approach, "time_s", "temperature_c")
-    read = read_text_table(path, lambda _: True, _DIALECT)
-    cells, header = read.columns, f"line {read.dialect.header}"
+    read = _cells(path)
+    cells, header = read.columns, f"line {read.text.dialect.header}"
     for name in _POSE:
         if name not in cells:
             allowed = f"{', '.join(_POSE)}: position in m and rotation vector in rad, base axes, separated by commas"
@@ -80,12 +72,12 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
             return None
         if missing := [name for name in names if name not in cells]:
             raise InputError(path, header, f"{', '.join(there)} without {', '.join(missing)}", "all of them or none")
-        return np.column_stack([_numbers(read, name) for name in names])
+        return np.column_stack([read.numbers(name) for name in names])
 
     single = [group((name,)) for name in ("time_s", "temperature_c")]
     time, temperature = (None if column is None else column[:, 0] for column in single)
     position, rotation = _poses(read)
-    return TargetPath(position, rotation, group(angles), group(_WRENCH), group(approach), time, temperature, read.lines)
+    return TargetPath(position, rotation, group(angles), group(_WRENCH), group(approach), time, temperature, read.text.lines)
 
 
 @dataclass(frozen=True)
@@ -103,40 +95,30 @@ def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
 
     Raises `InputError`: a column that is missing, or a cell that is no finite number.
     """
-    read = read_text_table(path, lambda _: True, _DIALECT)
+    read = _cells(path)
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
-    for name in (*_POSE, *angles, STATUS):
+    for name in (*_POSE, *angles, _STATUS):
         if name not in read.columns:
-            raise InputError(path, f"line {read.dialect.header}", f"no column {name!r}", "a file of elastocal correct")
-    commands = np.column_stack([_numbers(read, name) for name in angles])
-    status = np.array([cell.strip() for cell in read.columns[STATUS]])
-    return CorrectedTargets(*_poses(read), commands, status)
+            raise InputError(path, f"line {read.text.dialect.header}", f"no column {name!r}", "a file of elastocal correct")
+    commands = np.column_stack([read.numbers(name) for name in angles])
+    return CorrectedTargets(*_poses(read), commands, np.array(read.cells(_STATUS)))
 
 
-def _poses(read: TextTable) -> tuple[np.ndarray, np.ndarray]:
+def _cells(path: str | Path) -> CellReader:
+    """Cells of a file in SI units, whose header is its first line."""
+    text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
+    return CellReader(text, {name: name for name in text.columns}, {}, np.arange(len(text.lines)))
+
+
+def _poses(read: CellReader) -> tuple[np.ndarray, np.ndarray]:
     """Positions (N, 3) and rotations (N, 3, 3)."""
-    pose = np.column_stack([_numbers(read, name) for name in _POSE])
+    pose = np.column_stack([read.numbers(name) for name in _POSE])
     for size, what, largest, allowed in (
         (np.abs(pose[:, :3]).max(axis=1), "position", _FARTHEST_M, "metres"),
         (np.linalg.norm(pose[:, 3:], axis=1), "turn", FARTHEST_RAD, "a rotation vector in rad, not degrees"),
     ):
         row = int(np.argmax(size))
         if size[row] > largest:
-            raise InputError(
-                read.path, f"line {read.lines[row]}", f"a {what} of {size[row]:g}", f"{allowed}, {largest:.3g} at most"
-            )
+            where, found = f"line {read.text.lines[row]}", f"a {what} of {size[row]:g}"
+            raise InputError(read.text.path, where, found, f"{allowed}, {largest:.3g} at most")
     return pose[:, :3], Rotation.from_rotvec(pose[:, 3:]).as_matrix()
-
-
-def _numbers(read: TextTable, name: str) -> np.ndarray:
-    """A column, ndarray (N,)."""
-    values = np.zeros(len(read.lines))
-    for index, cell in enumerate(read.columns[name]):
-        value = plain_number(cell)
-        if value is None:
-            raise InputError(read.path, f"line {read.lines[index]}, column {name}", repr(cell), A_NUMBER)
-        values[index] = value
-    if (place := beyond(name, values)) is not None:
-        found = repr(read.columns[name][place])
-        raise InputError(read.path, f"line {read.lines[place]}, column {name}", found, BOUNDS[name].allowed)
-    return values

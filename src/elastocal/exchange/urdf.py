@@ -1,31 +1,24 @@
 """A URDF to the contents of a robot file."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.exchange.dh_table import MOST_TURNS
-from elastocal.exchange.robot_text import imported
+from elastocal.exchange.robot_text import Imported, imported
 from elastocal.exchange.urdf_chain import chain_between
-from elastocal.exchange.urdf_reading import read_urdf
+from elastocal.exchange.urdf_reading import Joint, Urdf, read_urdf
 from elastocal.exchange.urdf_weights import RELATIVE_STD, gravity_in_base, weights_of
 from elastocal.mechanics.usual_values import UNLIMITED_DEG
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from elastocal.exchange.robot_text import Imported
-    from elastocal.exchange.urdf_reading import Joint, Urdf
 
 # Limits to a billionth of a degree, or to a nanometre.
 _DECIMALS = 9
 # Two turns, and rounding; the limits of a joint in degrees are farther, and few joints turn so often.
-_FARTHEST_RAD, DEG = 4.0 * math.pi + 0.01, "deg"
+_FARTHEST_RAD, _DEG = 4.0 * math.pi + 0.01, "deg"
 # An angle this close to a right one, and none, is one that was written with few digits: 1.57 and 1.5708 are.
 _NEARLY_RAD, _EXACTLY_RAD = 1e-3, 1e-9
 
@@ -55,7 +48,7 @@ def robot_from_urdf(
         *weights.notes,
     ]
     limits = [_limits(joint, limits_in, notes, source) for joint in chain.joints]
-    if limits_in == DEG:
+    if limits_in == _DEG:
         notes.append("limits read in degrees, as the option says")
     document: dict[str, Any] = {
         "name": urdf.name,
@@ -94,7 +87,7 @@ def _limits(joint: Joint, limits_in: str | None, notes: list[str], source: str) 
         turns = max(-low, high) / (2.0 * math.pi)
         allowed = "radians; --limits deg where the file has degrees, or --limits rad where the joint does turn as often"
         raise InputError(source, f"joint {joint.name!r}: limit", f"{low:g} to {high:g}, {turns:.0f} turns", allowed)
-    return [round(value if prismatic or limits_in == DEG else math.degrees(value), _DECIMALS) for value in (low, high)]
+    return [round(value if prismatic or limits_in == _DEG else math.degrees(value), _DECIMALS) for value in (low, high)]
 
 
 def _few_digits(urdf: Urdf, children: Sequence[str]) -> str:

@@ -5,12 +5,10 @@ becomes ``Tx Ty Tz Rz Ry Rx``; an axis that is not x, y or z is turned into z an
 mimics another one of the chain, by +1 or -1, stands in the chain as a passive joint ``Ry(-q2)``.
 """
 
-from __future__ import annotations
-
 import math
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,11 +22,7 @@ from elastocal.exchange.fixed_transforms import (
     turn_word,
     turned_axis,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from elastocal.exchange.urdf_reading import Joint, Urdf
+from elastocal.exchange.urdf_reading import Joint, Urdf
 
 # Of a shorter one the direction is no more than rounding.
 _SHORTEST_AXIS = 1e-9
@@ -94,9 +88,8 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
             raise InputError(source, "point", repr(name), allowed)
     marked = {name: point_name(name) for name in (*points, tip)}
     if len(set(marked.values())) < len(marked):
-        raise InputError(
-            source, "point", ", ".join(map(repr, marked)), "links whose names differ by more than blanks and brackets"
-        )
+        allowed = "links whose names differ by more than blanks and brackets"
+        raise InputError(source, "point", ", ".join(map(repr, marked)), allowed)
     words = [f"[{marked[base]}]"] if base in marked else []
     numbers: dict[str, int] = {}
     place = Carried(0, np.eye(4), False)

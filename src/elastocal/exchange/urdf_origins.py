@@ -6,31 +6,22 @@ before it moves, its origin O becomes O G E R G^-1; what lies behind the last jo
 are those of the URDF, before and after.
 """
 
-from __future__ import annotations
-
 import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.exchange.fixed_transforms import axis_rotation, elementary, yaw_pitch_roll
-from elastocal.exchange.urdf_chain import chain_between, joints_above, point_name
-from elastocal.exchange.urdf_reading import LARGEST_BYTES, read_urdf
+from elastocal.exchange.urdf_chain import UrdfChain, chain_between, joints_above, point_name
+from elastocal.exchange.urdf_reading import LARGEST_BYTES, Joint, Urdf, read_urdf
 from elastocal.io.texts import read_bytes
-from elastocal.mechanics.chain import parse_chain
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from elastocal.exchange.urdf_chain import UrdfChain
-    from elastocal.exchange.urdf_reading import Joint, Urdf
-    from elastocal.mechanics.chain import Chain, Transform
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.chain import Chain, Transform, parse_chain
+from elastocal.mechanics.robot import Robot
 
 # m and rad: of rounding, in a file or in a product of transforms.
 _SAME, _DECIMALS = 1e-9, 12

@@ -6,13 +6,12 @@ file; meshes, materials and plug-ins are left out, and no other file is opened.
 [1] Open Robotics, XML Robot Description Format (URDF), wiki.ros.org/urdf/XML.
 """
 
-from __future__ import annotations
-
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 import numpy as np
@@ -21,15 +20,11 @@ from elastocal.errors import InputError
 from elastocal.exchange.fixed_transforms import origin_transform
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from xml.etree.ElementTree import Element
-
 # The longest public descriptions, of humanoids with hands, have less than a megabyte.
 LARGEST_BYTES = 20_000_000
 # Whole cells with grippers and cameras have some hundred links; each is followed to the root.
-MOST_PARTS = 2000
-LARGEST_LIMIT = 1e100
+_MOST_PARTS = 2000
+_LARGEST_LIMIT = 1e100
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _XACRO = "a URDF; this is xacro, run it first: xacro FILE > robot.urdf"
 # What is read of each, once at most.
@@ -59,7 +54,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Mimic:
+class _Mimic:
     """The joint that another one follows."""
 
     joint: str
@@ -79,7 +74,7 @@ class Joint:
     axis: np.ndarray
     lower: float
     upper: float
-    mimic: Mimic | None
+    mimic: _Mimic | None
 
 
 @dataclass(frozen=True)
@@ -123,7 +118,7 @@ def _joint(part: Element) -> Joint:
     origin = origin_transform(*(_values(part, "origin", name, "0 0 0") for name in ("xyz", "rpy")))
     (lower,), (upper,) = _values(part, "limit", "lower", "0"), _values(part, "limit", "upper", "0")
     (multiplier,), (offset,) = _values(part, "mimic", "multiplier", "1"), _values(part, "mimic", "offset", "0")
-    mimic = None if part.find("mimic") is None else Mimic(_end(part, "mimic", "joint"), multiplier, offset)
+    mimic = None if part.find("mimic") is None else _Mimic(_end(part, "mimic", "joint"), multiplier, offset)
     ends = _end(part, "parent"), _end(part, "child")
     axis = np.array(_values(part, "axis", "xyz", "1 0 0"))
     return Joint(part.attrib["name"], part.attrib["type"], *ends, origin, axis, lower, upper, mimic)
@@ -173,7 +168,7 @@ def _check_part(part: Element, called: str, source: str) -> None:
         for child in children:
             for attribute, count in _NUMBERS.get(tag, {}).items():
                 # Programs write 1e16 and more where a joint, a force or a speed has no limit.
-                largest = LARGEST_LIMIT if tag == "limit" else LARGEST_NUMBER
+                largest = _LARGEST_LIMIT if tag == "limit" else LARGEST_NUMBER
                 _check_numbers(child.get(attribute), count, f"{called}: {tag} {attribute}", source, largest)
             needed = _NEEDED.get(tag)
             if needed and not child.get(needed):
@@ -189,17 +184,16 @@ def _check_numbers(text: str | None, count: int, key: str, source: str, largest:
         return
     words = text.split(None, count)
     if len(words) != count or any(plain_number(word, largest) is None for word in words):
-        raise InputError(
-            source, key, repr(text), f"{'a number' if count == 1 else f'{count} numbers'}, up to {largest:g} in size"
-        )
+        allowed = f"{'a number' if count == 1 else f'{count} numbers'}, up to {largest:g} in size"
+        raise InputError(source, key, repr(text), allowed)
 
 
 def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str) -> None:
     for tag, parts in (("link", links), ("joint", joints)):
         if not parts:
             raise InputError(source, "", f"no <{tag}>", "a URDF with links and joints")
-        if len(parts) > MOST_PARTS:
-            raise InputError(source, "", f"{len(parts)} times <{tag}>", f"at most {MOST_PARTS}")
+        if len(parts) > _MOST_PARTS:
+            raise InputError(source, "", f"{len(parts)} times <{tag}>", f"at most {_MOST_PARTS}")
         name, times = Counter(part.attrib["name"] for part in parts).most_common(1)[0]
         if times > 1:
             raise InputError(source, f"{tag} {name!r}", f"{times} times", "each name once")

@@ -3,24 +3,20 @@
 All that a joint carries rigidly is one mass, side branches and what stands behind the tip included.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from elastocal.exchange.urdf_chain import joints_above, parent_joints
+from elastocal.exchange.robot_text import mass_entries
+from elastocal.exchange.urdf_chain import Carried, UrdfChain, joints_above, parent_joints
+from elastocal.exchange.urdf_reading import Urdf
 from elastocal.mechanics.robot import STANDARD_GRAVITY
-
-if TYPE_CHECKING:
-    from elastocal.exchange.urdf_chain import Carried, UrdfChain
-    from elastocal.exchange.urdf_reading import Urdf
 
 # A URDF does not say where its masses come from: of a drawing without cables, grease and covers, or guessed. Where dynamic
 # parameters of robots were identified, masses and centres of such models were off by a tenth to a third.
 RELATIVE_STD = 0.2
-# Kilograms and metres to the nanometre.
+# Of gravity, m/s².
 _DECIMALS = 9
 # So many links of a robot never weigh the same.
 _FEWEST_ALIKE = 3
@@ -64,8 +60,7 @@ def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD)
         notes.append(f"behind a passive joint, but weighing as if it did not turn: {_named(passive)}")
     if not moments:
         notes.append("no masses: the weight of the links is not known")
-    entries = [_entry(body, moment, relative_std) for body, moment in sorted(moments.items())]
-    return Weights(entries, tuple(notes))
+    return Weights(mass_entries(moments, relative_std), tuple(notes))
 
 
 def gravity_in_base(urdf: Urdf, base: str) -> list[float] | None:
@@ -92,13 +87,7 @@ def _carried(urdf: Urdf, link: str, chain: UrdfChain) -> tuple[Carried, list[str
             by.append(joint.name)
         at = joint.parent
     place = chain.links[at]
-    return type(place)(place.body, place.transform @ transform, place.behind_passive), by
-
-
-def _entry(body: int, moment: np.ndarray, relative_std: float) -> dict[str, Any]:
-    centre = np.round(moment[:3] / moment[3], _DECIMALS) + 0.0
-    mass = round(float(moment[3]), _DECIMALS)
-    return {"link": body, "mass_kg": mass, "centre_m": centre.tolist(), "relative_std": relative_std}
+    return replace(place, transform=place.transform @ transform), by
 
 
 def _named(names: set[str]) -> str:

@@ -8,19 +8,13 @@ from which the robot was imported comes back by `urdf_origins`.
 [1] ROS, XML Robot Description Format (URDF), https://wiki.ros.org/urdf/XML
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
 from elastocal.exchange.fixed_transforms import elementary, yaw_pitch_roll
-
-if TYPE_CHECKING:
-    from elastocal.mechanics.chain import Transform
-    from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Robot
 
 # URDF asks for them, and 0 is a joint that nothing moves; a robot file does not know them.
 _UNLIMITED = "1e9"
@@ -48,7 +42,8 @@ def urdf_of(robot: Robot, comment: str = "") -> str:
             point = places[place]
             offset = np.eye(4)
             offset[:3, 3] = point.offset_m
-            _fixed(root, parent, point.name, here @ offset)
+            _joint(root, f"to_{point.name}", "fixed", parent, point.name, here @ offset)
+            Xml.SubElement(root, "link", name=point.name)
             if not any(point.offset_m):
                 parent, here = point.name, np.eye(4)
         if place == len(robot.chain.transforms):
@@ -61,38 +56,26 @@ def urdf_of(robot: Robot, comment: str = "") -> str:
         start = here @ elementary(transform.kind, transform.axis, transform.sign * zero[joint])
         name = f"{names[joint]}_again_{place}" if passive else names[joint]
         child = f"passive_{place}" if passive else f"link_{joint + 1}"
-        _joint(root, robot, transform, name, parent, child, start, sense[joint], zero[joint], names[joint] if passive else "")
+        element = _joint(root, name, "prismatic" if transform.kind == "T" else "revolute", parent, child, start)
+        axis = transform.sign * sense[joint] * np.eye(3)[transform.axis]
+        Xml.SubElement(element, "axis", xyz=_numbers(axis + 0.0))
+        low, high = (repr(float(limit)) for limit in sorted((robot.joint_limits[joint] - zero[joint]) / sense[joint]))
+        Xml.SubElement(element, "limit", lower=low, upper=high, effort=_UNLIMITED, velocity=_UNLIMITED)
+        if passive:
+            Xml.SubElement(element, "mimic", joint=names[joint], multiplier="1", offset="0")
         _link(root, robot, None if passive else joint + 1, child)
         parent, here = child, np.eye(4)
     Xml.indent(root)
     return '<?xml version="1.0"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"
 
 
-def _joint(
-    root: Xml.Element,
-    robot: Robot,
-    transform: Transform,
-    name: str,
-    parent: str,
-    child: str,
-    start: np.ndarray,
-    sense: float,
-    zero: float,
-    master: str,
-) -> None:
-    joint = transform.coordinate
-    assert joint is not None
-    kind = "prismatic" if transform.kind == "T" else "revolute"
+def _joint(root: Xml.Element, name: str, kind: str, parent: str, child: str, at: np.ndarray) -> Xml.Element:
     element = Xml.SubElement(root, "joint", name=name, type=kind)
-    _origin(element, start)
+    yaw, pitch, roll = yaw_pitch_roll(at[:3, :3])
+    Xml.SubElement(element, "origin", xyz=_numbers(at[:3, 3]), rpy=_numbers(np.array([roll, pitch, yaw])))
     Xml.SubElement(element, "parent", link=parent)
     Xml.SubElement(element, "child", link=child)
-    axis = transform.sign * sense * np.eye(3)[transform.axis]
-    Xml.SubElement(element, "axis", xyz=_numbers(axis + 0.0))
-    low, high = sorted((limit - zero) / sense for limit in robot.joint_limits[joint])
-    Xml.SubElement(element, "limit", lower=repr(float(low)), upper=repr(float(high)), effort=_UNLIMITED, velocity=_UNLIMITED)
-    if master:
-        Xml.SubElement(element, "mimic", joint=master, multiplier="1", offset="0")
+    return element
 
 
 def _link(root: Xml.Element, robot: Robot, body: int | None, name: str) -> None:
@@ -103,19 +86,6 @@ def _link(root: Xml.Element, robot: Robot, body: int | None, name: str) -> None:
             Xml.SubElement(inertial, "origin", xyz=_numbers(np.array(mass.centre_m)), rpy="0 0 0")
             Xml.SubElement(inertial, "mass", value=repr(float(mass.mass_kg)))
             Xml.SubElement(inertial, "inertia", dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0"))
-
-
-def _fixed(root: Xml.Element, parent: str, name: str, at: np.ndarray) -> None:
-    element = Xml.SubElement(root, "joint", name=f"to_{name}", type="fixed")
-    _origin(element, at)
-    Xml.SubElement(element, "parent", link=parent)
-    Xml.SubElement(element, "child", link=name)
-    Xml.SubElement(root, "link", name=name)
-
-
-def _origin(element: Xml.Element, at: np.ndarray) -> None:
-    yaw, pitch, roll = yaw_pitch_roll(at[:3, :3])
-    Xml.SubElement(element, "origin", xyz=_numbers(at[:3, 3]), rpy=_numbers(np.array([roll, pitch, yaw])))
 
 
 def _numbers(values: np.ndarray) -> str:

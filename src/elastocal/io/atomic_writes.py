@@ -1,21 +1,16 @@
 """The one way to write: files that appear whole or not at all, and never where a link, a pipe or a device stands."""
 
-from __future__ import annotations
-
 import os
 import re
 import secrets
 import shutil
 import stat
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
 from elastocal.io.texts import kind_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 _PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 

@@ -1,20 +1,13 @@
 """Tables on disk as pandas data frames, and data frames as the tables that people read."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 
 import pandas as pd
 
 from elastocal.io.atomic_writes import write_text
-from elastocal.io.storage import read_provenance, read_table
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-    from pathlib import Path
-
-    from elastocal.io.origin import Origin
-    from elastocal.io.storage import TableSchema
+from elastocal.io.origin import Origin
+from elastocal.io.storage import TableSchema, read_provenance, read_table
 
 
 def read_frame(path: str | Path, schema: TableSchema, columns: Sequence[str] | None = None) -> pd.DataFrame:

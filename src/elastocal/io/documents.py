@@ -1,37 +1,21 @@
 """YAML documents that users write: read, and checked against a JSON schema that knows every key."""
 
-from __future__ import annotations
-
 import difflib
 import json
 import math
 import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import Any, ClassVar
 
 import jsonschema
 import yaml
 
 from elastocal.errors import InputError, text_fault
 from elastocal.io.texts import read_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-    from typing import Any, Protocol
-
-    class _Violation(Protocol):
-        """An error of jsonschema, of which a validator sets every part."""
-
-        absolute_path: Iterable[str | int]
-        validator: str
-        validator_value: Any
-        schema: dict[str, Any]
-        instance: Any
-        message: str
-
 
 # Far above what people write by hand (no schema goes deeper than 7), and read in seconds whatever it holds.
 LARGEST_BYTES, MOST_VALUES, DEEPEST = 300_000, 100_000, 20
@@ -174,9 +158,8 @@ def _check_events(text: str) -> None:
         if len(frames) + frames[-1][2] - 1 > DEEPEST:
             raise _UnclearError(event.start_mark, "lists or keys in each other", f"at most {DEEPEST} deep")
         if frames[-1][1] > MOST_VALUES:
-            raise _UnclearError(
-                event.start_mark, "more values than a document has", f"at most {MOST_VALUES}, aliases written out"
-            )
+            allowed = f"at most {MOST_VALUES}, aliases written out"
+            raise _UnclearError(event.start_mark, "more values than a document has", allowed)
 
 
 def _enlarged(frame: tuple[str | None, int, int], count: int, height: int) -> tuple[str | None, int, int]:
@@ -203,14 +186,12 @@ def check_document(document: Any, schema: str, source: str) -> None:
     names the first key at fault, what was found and what is allowed.
     """
     validator = _Validator(read_schema(schema), format_checker=_FORMATS)
-    errors = sorted(
-        islice(validator.iter_errors(document), _MOST_FAULTS), key=lambda error: [str(part) for part in error.absolute_path]
-    )
-    if errors:
-        key, found, allowed = _explained(errors[0])
-        path = [*errors[0].absolute_path]
-        if errors[0].validator == "additionalProperties":
-            path.append(next(name for name in errors[0].instance if name not in errors[0].schema.get("properties", {})))
+    errors = islice(validator.iter_errors(document), _MOST_FAULTS)
+    if error := min(errors, key=lambda error: [str(part) for part in error.absolute_path], default=None):
+        key, found, allowed = _explained(error)
+        path = [*error.absolute_path]
+        if error.validator == "additionalProperties":
+            path.append(next(name for name in error.instance if name not in error.schema.get("properties", {})))
         line = _line_of(source, path)
         raise InputError(source, ", ".join(part for part in (line, key) if part), found, allowed)
     for place, text in _texts(document):
@@ -263,7 +244,7 @@ def _key_of(path: Iterable[str | int]) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
 
 
-def _explained(error: _Violation) -> tuple[str, str, str]:
+def _explained(error: Any) -> tuple[str, str, str]:
     """Key, what was found and what is allowed, of one violation."""
     key = _key_of(error.absolute_path)
     rule, value = error.validator, error.validator_value

@@ -1,16 +1,11 @@
 """JSON files of the steps, read and written with nothing but the standard library behind it: jobs start quickly."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import Any
 
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.texts import check_file
-
-if TYPE_CHECKING:
-    from pathlib import Path
-    from typing import Any
 
 
 def read_json(path: str | Path) -> Any:

@@ -1,13 +1,8 @@
 """Modules that a catalogue finds by itself: what is added to its package is one file."""
 
-from __future__ import annotations
-
 import pkgutil
 from importlib import import_module
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from types import ModuleType
+from types import ModuleType
 
 
 def module_names(package: ModuleType) -> list[str]:

@@ -1,17 +1,11 @@
 """Which commit, configuration, seed and environment a file comes from, in words that stand in the file or beside it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from typing import Any
-
+from typing import Any
 
 # Of what a run on one machine has installed; a wheel comes without.
 _LOCK = "requirements.lock"

@@ -1,25 +1,20 @@
 """Where a table comes from: package version, settings and a digest of them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import Any, Protocol
 
 from elastocal import __version__
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from typing import Any, Protocol
-
-    class Settings(Protocol):
-        """A mapping, or a parameter list of Snakemake."""
-
-        def items(self) -> Iterable[tuple[str, Any]]: ...
-
-
 # A parameter of every rule that tells Snakemake of edited sources, and nothing of what was configured.
 SOURCES_DIGEST = "sources_sha256"
+
+
+class Settings(Protocol):
+    """A mapping, or a parameter list of Snakemake."""
+
+    def items(self) -> Iterable[tuple[str, Any]]: ...
 
 
 def provenance(settings: Settings, **more: Any) -> dict[str, Any]:

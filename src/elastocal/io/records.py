@@ -5,22 +5,17 @@ next finds a byte that was altered, in it or in anything behind it. `python -m e
 all files, with the name of one behind `records` this one.
 """
 
-from __future__ import annotations
-
 import hashlib
 import sys
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import Origin, configuration_sha256
 from elastocal.io.sources import source_digest
 from elastocal.io.texts import check_file
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
 
 RECORDS = Path("results/records")
 # What the pipeline makes, folders and a file; the rest is the user's.
@@ -185,12 +180,8 @@ def _intact(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
     for file in sorted(written.keys() | found.keys()):
         if written.get(file) != found.get(file):
             what = "other contents than were written" if file in found else "nothing"
-            raise InputError(
-                Path(within, file),
-                "",
-                what,
-                _AS_WRITTEN if file == path else _AS_WRITTEN.replace("delete it", f"delete {path}"),
-            )
+            allowed = _AS_WRITTEN if file == path else _AS_WRITTEN.replace("delete it", f"delete {path}")
+            raise InputError(Path(within, file), "", what, allowed)
     return job, _joint(written)
 
 

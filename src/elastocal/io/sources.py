@@ -3,19 +3,14 @@
 To parse all modules takes seconds, so the digests are kept by the bytes of the files that they are of.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.texts import check_file
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 _KEPT = Path(".snakemake/source_digests.json")
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)

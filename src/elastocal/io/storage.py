@@ -5,11 +5,11 @@ the schema and the provenance. Row groups are blocks of data sets, so that any n
 That a file is as it was written says its record, see `io.records`.
 """
 
-from __future__ import annotations
-
 import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -19,14 +19,8 @@ from elastocal.errors import InputError
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.texts import check_file
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-    from pathlib import Path
-    from typing import Any
-
-    # Of each column one value or an array.
-    Block = Mapping[str, np.ndarray | Sequence[str] | Sequence[float]]
-
+# Of each column one value or an array.
+Block = Mapping[str, np.ndarray | Sequence[str] | Sequence[float]]
 _TABLE, _PROVENANCE = "elastocal.table", "elastocal.provenance"
 _AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again)"
 

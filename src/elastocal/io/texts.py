@@ -1,7 +1,5 @@
 """Bytes and texts of files that people hand in, and the numbers in them: bounded, and of regular files alone."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

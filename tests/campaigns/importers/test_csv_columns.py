@@ -41,7 +41,7 @@ def test_a_separator_in_quotes_is_part_of_the_cell(file):
         (b"a,b\n1,2\n\n1\n", "row 2", ["1 cells", "2, one for each column"]),
         (b"a,b\n1,2,3\n", "row 1", ["3 cells", "2, one for each column"]),
         (b"a,c\n1,2\n", "header", ["no column 'b'", "the made source"]),
-        (b"a,b\n1,\xff\n", "", ["columns separated by ,"]),
+        (b"a,b\n1,\xff\n", "line 2", ["not UTF-8"]),
         (b'a,b\n"1,2\n', "", ["columns separated by ,"]),
     ],
 )

@@ -34,11 +34,6 @@ def test_text_of_other_rows_is_refused(tmp_path, text, key, words):
         fanuc_cpa.read(path)
 
 
-def test_missing_source_is_refused(tmp_path):
-    with refused(tmp_path / "nowhere", "", "readable file"):
-        fanuc_cpa.read(tmp_path / "nowhere")
-
-
 def test_reflectors_in_millimetres_come_first_and_the_controllers_degrees_last(tmp_path):
     path = tmp_path / "values.csv"
     path.write_text(" ".join(map(str, [*range(1000, 1009), *6 * [7], 0, 90, 180, -90, 45, 30])) + "\n\n", encoding="utf-8")
@@ -58,5 +53,5 @@ def test_poses_are_in_the_order_of_the_file(cpa, config_folder, tmp_path):
 def test_text_in_another_encoding_is_refused(tmp_path):
     path = tmp_path / "values.csv"
     path.write_bytes(b"1 2 3 \xb0\n")
-    with refused(path, "byte 6", "not UTF-8"):
+    with refused(path, "line 1", "not UTF-8 (byte 6)"):
         fanuc_cpa.read(path)

@@ -41,19 +41,6 @@ def test_mat_file_of_other_variables_is_refused(static, tmp_path, changes, key, 
     assert not (tmp_path / "campaign").exists()
 
 
-@pytest.mark.parametrize("contents", [b"", b"no MAT file at all, but long enough to be asked for its header. " * 4])
-def test_file_that_is_no_mat_file_is_refused(tmp_path, contents):
-    path = tmp_path / "other.mat"
-    path.write_bytes(contents)
-    with refused(path, "", "MAT file"):
-        fanuc_static.read(path)
-
-
-def test_missing_source_is_refused(tmp_path):
-    with refused(tmp_path / "nowhere", "", "no such file", "a MAT file"):
-        fanuc_static.read(tmp_path / "nowhere")
-
-
 def test_the_file_holds_rad_and_metres_already(static):
     path, _, positions = static
     angles, found = fanuc_static.read(path)

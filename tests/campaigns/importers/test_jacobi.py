@@ -2,31 +2,12 @@
 
 import numpy as np
 import pytest
-from support import homogeneous, refused
+from support import refused
 
 from elastocal.campaigns.importers import jacobi
 from elastocal.campaigns.reading import held_out_campaign, read_campaign, read_robot
-from elastocal.mechanics.kinematics import poses
 
 POSES = 9
-UR5 = [  # d, a, alpha of the maker
-    (0.089159, 0.0, 90.0),
-    (0.0, -0.425, 0.0),
-    (0.0, -0.39225, 0.0),
-    (0.10915, 0.0, 90.0),
-    (0.09465, 0.0, -90.0),
-    (0.0823, 0.0, 0.0),
-]
-WAM = [
-    (0.0, 0.0, -90.0),
-    (0.0, 0.0, 90.0),
-    (0.55, 0.045, -90.0),
-    (0.0, -0.045, 90.0),
-    (0.3, 0.0, -90.0),
-    (0.0, 0.0, 90.0),
-    (0.06, 0.0, 0.0),
-]
-ROBOTS = {"ur5": UR5, "wam": WAM}
 
 
 class File:
@@ -73,31 +54,12 @@ def test_file_becomes_a_campaign_of_measured_positions(tmp_path, config_folder, 
     np.testing.assert_array_equal(campaign.measurements.pose, np.arange(POSES))
 
 
-def test_rows_keep_the_order_in_which_they_were_measured(file, config_folder):
-    file.write_campaign("grid")
-    measurements = read_campaign(file.folder, config_folder / "robots").measurements
-    assert (np.diff(measurements.row) > 0).all()
-
-
 def test_random_poses_test_the_grid(tmp_path, config_folder):
     for seed, name in ((1, "grid"), (2, "random")):
         File(tmp_path, seed=seed).write_campaign(name, {"campaign": f"../campaign{3 - seed}"})
     robots = config_folder / "robots"
     campaign = read_campaign(tmp_path / "campaign1", robots)
     assert held_out_campaign(campaign, tmp_path / "campaign1", robots).name == "random"
-
-
-@pytest.mark.parametrize("robot", ROBOTS)
-def test_chain_is_the_makers_denavit_hartenberg(config_folder, robot):
-    chain = read_robot(config_folder / "robots" / f"{robot}.yaml").chain
-    for angles in np.random.default_rng(7).uniform(-np.pi, np.pi, (5, len(ROBOTS[robot]))):
-        expected = np.eye(4)
-        for angle, (d, a, alpha) in zip(angles, ROBOTS[robot], strict=True):
-            expected = expected @ homogeneous("R", 2, angle) @ homogeneous("T", 2, d)
-            expected = expected @ homogeneous("T", 0, a) @ homogeneous("R", 0, np.radians(alpha))
-        position, rotation = poses(chain, angles[None], chain.end_effector)
-        np.testing.assert_allclose(position[0], expected[:3, 3], rtol=0, atol=1e-14)
-        np.testing.assert_allclose(rotation[0], expected[:3, :3], rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["x_t", "z_dif"])
@@ -120,17 +82,4 @@ def test_joints_that_are_not_counted_from_one_are_refused(file):
     file.columns["joint_7"] = file.columns.pop("joint_1")
     file.write()
     with refused(file.path, "header", "joint_7"):
-        jacobi.read(file.path)
-
-
-@pytest.mark.parametrize("cell", ["", "1.5.2", "inf", "none"])
-def test_cell_that_is_no_number_is_refused(file, cell):
-    file.columns["y_dif"] = [cell if row == 3 else 1.5 for row in range(POSES)]
-    file.write()
-    with refused(file.path, "row 4, column y_dif", repr(cell), "a number"):
-        jacobi.read(file.path)
-
-
-def test_missing_file_is_refused(file):
-    with refused(file.path, "", "readable file"):
         jacobi.read(file.path)

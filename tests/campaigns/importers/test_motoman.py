@@ -3,23 +3,12 @@
 import numpy as np
 import pytest
 import scipy.io
-from support import homogeneous, refused
+from support import refused
 
 from elastocal.campaigns.importers import motoman
-from elastocal.campaigns.reading import read_campaign, read_robot
-from elastocal.mechanics.kinematics import poses
+from elastocal.campaigns.reading import read_campaign
 
 POSES = 9
-# a, d, alpha, offset of the source, the turntable first.
-NOMINAL = [
-    (0.0, -0.263, 15.0, -90.0),
-    (0.15, 1.4159, -90.0, 0.0),
-    (0.614, 0.0, 180.0, -90.0),
-    (0.2, 0.0, -90.0, 0.0),
-    (0.0, -0.64, 90.0, 0.0),
-    (0.03, 0.0, 90.0, -90.0),
-    (0.0, 0.2, 0.0, 0.0),
-]
 
 
 def rows(poses=POSES, images=3, seed=1):
@@ -33,17 +22,6 @@ def rows(poses=POSES, images=3, seed=1):
 def written(path, values, name="dataset"):
     scipy.io.savemat(path, {name: values})
     return path
-
-
-def test_the_robot_is_that_of_the_source(config_folder):
-    robot, angles = read_robot(config_folder / "robots" / "motoman_right_arm.yaml"), np.array([0.3, -0.4, 0.5, 1.0, -1.2, 0.7])
-    expected = np.eye(4)
-    for (a, d, alpha, offset), angle in zip(NOMINAL, [0.0, *angles], strict=True):
-        turn = homogeneous("R", 2, angle + np.radians(offset)) @ homogeneous("T", 2, d)
-        expected = expected @ turn @ homogeneous("T", 0, a) @ homogeneous("R", 0, np.radians(alpha))
-    position, rotation = poses(robot.chain, np.r_[angles, np.zeros(robot.chain.coordinates - 6)], robot.chain.point("6DoF"))
-    np.testing.assert_allclose(position, expected[:3, 3], atol=1e-12)
-    np.testing.assert_allclose(rotation, expected[:3, :3], atol=1e-12)
 
 
 def test_each_pose_counts_once_and_those_that_nobody_saw_not_at_all(tmp_path, config_folder):
@@ -87,12 +65,3 @@ def test_what_is_wrong_is_refused_in_one_line(tmp_path, values, key):
     path = written(tmp_path / "wrong.mat", values)
     with refused(path, key):
         motoman.read(path)
-
-
-def test_what_is_no_file_of_the_source_is_refused(tmp_path):
-    text = tmp_path / "text.mat"
-    text.write_text("not a matrix", encoding="utf-8")
-    with refused(text, "no readable MAT file"):
-        motoman.read(text)
-    with refused(tmp_path / "nowhere.mat", ""):
-        motoman.read(tmp_path / "nowhere.mat")

@@ -1,11 +1,12 @@
-"""Several reflectors on one flange: a row for each reflector of each measurement."""
+"""Public campaigns: a row for each reflector of each measurement, on an unloaded flange in a frame that nobody knows."""
 
 import numpy as np
 import pytest
 from support import refused
 
-from elastocal.campaigns.importers.reflectors import reflector_table, write_reflectors
+from elastocal.campaigns.importers.reflectors import reflector_table, unloaded_document, write_reflectors
 from elastocal.campaigns.reading import read_campaign
+from elastocal.effects.catalogue import effects
 
 POSITIONS = {"left": np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]), "right": -np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])}
 ANGLES = np.array([[0.1, 0.2, 0.3], [-0.1, -0.2, -0.3]])
@@ -55,3 +56,26 @@ def test_a_declaration_that_no_campaign_may_have_is_refused_and_nothing_is_writt
     with refused((tmp_path / "campaign" / "campaign.yaml").as_posix(), "noise"):
         write_reflectors(tmp_path / "campaign", "made", "kuka", np.zeros((2, 6)), POSITIONS, noise={"position_mm": 0.03})
     assert not (tmp_path / "campaign").exists()
+
+
+def test_targets_are_unknown_offsets_from_the_last_point_and_declared_effects_are_of_the_catalogue():
+    document = unloaded_document("c", "kuka", "pose", ("A", "B"))
+    assert document == {
+        "campaign": "c",
+        "robot": "kuka",
+        "measured": "pose",
+        "frame": "tracker",
+        "targets": {name: {"point": "6DoF", "offset_m": "unknown"} for name in "AB"},
+        "compliance": "nominal",
+        "declared": ["joint_offset", "link_geometry"],
+    }
+    assert set(document["declared"]) <= set(effects())
+
+
+def test_noise_and_hold_out_are_copies_of_what_was_handed_in():
+    noise, holdout = {"position_m": 5e-5}, {"fraction": 0.3, "seed": 1}
+    document = unloaded_document("c", "kuka", "position", "A", holdout, noise)
+    noise["position_m"] = 1.0
+    document["declared"].append("hysteresis")
+    assert (document["noise"], document["holdout"]) == ({"position_m": 5e-5}, holdout)
+    assert unloaded_document("c", "kuka", "position", "A")["declared"] == ["joint_offset", "link_geometry"]

@@ -5,19 +5,9 @@ import pytest
 from support import homogeneous, refused
 
 from elastocal.campaigns.importers import ur10_ipa
-from elastocal.campaigns.reading import read_campaign, read_robot
-from elastocal.mechanics.kinematics import poses
+from elastocal.campaigns.reading import read_campaign
 
 POSES = 9
-# theta, d, a, alpha of the maker.
-DENAVIT_HARTENBERG = [
-    (0.1273, 0.0, 90.0),
-    (0.0, -0.612, 0.0),
-    (0.0, -0.5723, 0.0),
-    (0.163941, 0.0, 90.0),
-    (0.1157, 0.0, -90.0),
-    (0.0922, 0.0, 0.0),
-]
 
 
 class Series:
@@ -96,18 +86,6 @@ def test_series_without_temperature_is_read_as_well(series, config_folder):
     assert series.campaign(config_folder).measurements.temperature_c is None
 
 
-def test_chain_is_the_makers_denavit_hartenberg(config_folder):
-    chain = read_robot(config_folder / "robots" / "ur10.yaml").chain
-    for angles in np.random.default_rng(7).uniform(-np.pi, np.pi, (5, 6)):
-        expected = np.eye(4)
-        for angle, (d, a, alpha) in zip(angles, DENAVIT_HARTENBERG, strict=True):
-            expected = expected @ homogeneous("R", 2, angle) @ homogeneous("T", 2, d)
-            expected = expected @ homogeneous("T", 0, a) @ homogeneous("R", 0, np.radians(alpha))
-        position, rotation = poses(chain, angles[None], chain.end_effector)
-        np.testing.assert_allclose(position[0], expected[:3, 3], rtol=0, atol=1e-14)
-        np.testing.assert_allclose(rotation[0], expected[:3, :3], rtol=0, atol=1e-14)
-
-
 @pytest.mark.parametrize("name", ["elbow_joint", "measurement_y", "measurement_rz"])
 def test_missing_column_is_refused(series, name):
     del series.columns[name]
@@ -121,19 +99,4 @@ def test_cell_that_is_no_number_is_refused(series, cell):
     series.columns["measurement_z"] = [cell if row == 3 else 1.5 for row in range(len(series.angles))]
     series.write()
     with refused(series.path, "row 4, column measurement_z", repr(cell), "decimal comma"):
-        ur10_ipa.read(series.path)
-
-
-@pytest.mark.parametrize(
-    ("text", "key", "words"),
-    [("", "", ["no row"]), ("a;b\n1;2\n1\n", "row 2", ["1 cells", "2, one for each"]), ('a;b\n"1;2\n', "", ["separated by ;"])],
-)
-def test_text_that_is_no_series_is_refused(series, text, key, words):
-    series.path.write_text(text, encoding="utf-8")
-    with refused(series.path, key, *words):
-        ur10_ipa.read(series.path)
-
-
-def test_missing_series_is_refused(series):
-    with refused(series.path, "", "readable file"):
         ur10_ipa.read(series.path)

@@ -1,18 +1,16 @@
 """Sources that are tables of text with a header: their columns by name, and the numbers in these."""
 
-from __future__ import annotations
-
 import csv
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from io import StringIO
+from pathlib import Path
 
 import numpy as np
 
-from elastocal.errors import InputError, reason_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
+from elastocal.campaigns.public_data import LARGEST_BYTES
+from elastocal.errors import InputError
+from elastocal.io.texts import read_text
 
 _DECIMAL_WORDS = {",": "a number with a decimal comma, not infinite", ".": "a number, not infinite"}
 
@@ -24,12 +22,10 @@ def read_columns(path: str | Path, separator: str, needed: Iterable[str], kind: 
     message where a column is missing. Returns by the names of the header. Raises `InputError`: no file, no row, rows of
     different lengths, a column that is missing.
     """
+    file = StringIO(read_text(path, LARGEST_BYTES), newline="")
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            lines = [line for line in csv.reader(file, delimiter=separator, strict=True) if line]
-    except OSError as error:
-        raise InputError(path, "", reason_of(error), "the path of a readable file") from None
-    except (UnicodeDecodeError, csv.Error) as error:
+        lines = [line for line in csv.reader(file, delimiter=separator, strict=True) if line]
+    except csv.Error as error:
         raise InputError(path, "", str(error), f"text with columns separated by {separator}") from None
     if len(lines) < 2:
         raise InputError(path, "", "no row of data", "a header and rows")

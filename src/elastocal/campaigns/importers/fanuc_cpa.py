@@ -1,19 +1,15 @@
 """FANUC R-2000iC/165F, one joint moved at a time (RABKKK/LaserTrackerPoseData4KinIdent): a text file as a campaign."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.importers.reflectors import write_reflectors
-from elastocal.campaigns.public_data import PublicFile
-from elastocal.errors import InputError, reason_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-    from typing import Any
+from elastocal.campaigns.public_data import LARGEST_BYTES, PublicFile
+from elastocal.errors import InputError
+from elastocal.io.texts import read_text
 
 FILES = {
     "fanuc_cpa": PublicFile(
@@ -39,16 +35,9 @@ def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     Returns `joint_angles` (N, 6): as the controller reports them, in rad; `positions` (N, 3): m, tracker frame. Raises
     `InputError`: no file, a row of another length, something that is no number.
     """
-    try:
-        with open(path, encoding="utf-8") as file:
-            lines = [line.split() for line in file]
-    except OSError as error:
-        raise InputError(path, "", reason_of(error), "the path of a readable file") from None
-    except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
     rows = []
-    for number, cells in enumerate(lines, 1):
-        if not cells:
+    for number, line in enumerate(read_text(path, LARGEST_BYTES).split("\n"), 1):
+        if not (cells := line.split()):
             continue
         try:
             rows.append([float(cell) for cell in cells])

@@ -1,22 +1,16 @@
 """Both sessions of the FANUC as one campaign: one robot, two tools, two tracker frames."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.importers import fanuc_cpa, fanuc_static
-from elastocal.campaigns.importers.reflectors import reflector_table
+from elastocal.campaigns.importers.reflectors import reflector_table, unloaded_document
 from elastocal.campaigns.importers.repeats import pose_and_repeat
-from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign as write_folder
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from typing import Any
 
 # Its file has no reported_joints: the sessions count their angles differently, so the campaign holds the chain's own.
 ROBOT = "fanuc_measured"

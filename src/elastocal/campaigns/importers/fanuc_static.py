@@ -1,8 +1,8 @@
 """FANUC R-2000iC/165F, 24 configurations with 10 repeats (Sarrasor/RoboticManipulators): a MAT file as a campaign."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,11 +10,6 @@ from elastocal.campaigns.importers.mat_files import read_mat
 from elastocal.campaigns.importers.reflectors import write_reflectors
 from elastocal.campaigns.public_data import PublicFile
 from elastocal.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-    from typing import Any
 
 FILES = {
     "fanuc_static": PublicFile(

@@ -4,55 +4,32 @@ Measured with a GTS3800 laser tracker for P. Jacobi's master's thesis (Tsinghua 
 position of the reflector, which the nominal chain and a tool along its last axis reproduce to 12 um, and a difference from it.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.importers.csv_columns import read_columns, table
-from elastocal.campaigns.importers.repeats import pose_and_repeat
-from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.importers.reflectors import write_reflectors
 from elastocal.campaigns.public_data import PublicFile
-from elastocal.campaigns.writing import write_campaign as write_folder
 from elastocal.errors import InputError
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-    from typing import Any
-
 _SOURCE = "pauljac7700/serial_robots_datasets", "759068d85a8b95183cd71ff96d9dfc5173bc57fc"
-FILES = {
-    "jacobi_ur5_grid": PublicFile(
-        *_SOURCE,
-        "UR5/3D_UR5_uncalibrated_grid_cleaned.csv",
-        "3de63c38b4338a1fb23437a9c6ecb7e0441a9e132fc055544619b8c580f767c0",
-        "jacobi_ur5/3D_UR5_uncalibrated_grid_cleaned.csv",
-        "MIT",
-    ),
-    "jacobi_ur5_random": PublicFile(
-        *_SOURCE,
-        "UR5/3D_UR5_uncalibrated_random_cleaned.csv",
-        "3cd7a4aae072f9757ce9bd156e7470cc8caa89d8af9164c07390953ae808095a",
-        "jacobi_ur5/3D_UR5_uncalibrated_random_cleaned.csv",
-        "MIT",
-    ),
-    "jacobi_wam_grid": PublicFile(
-        *_SOURCE,
-        "WAM/3D_WAM_uncalibrated_grid_cleaned.csv",
-        "f013c0ce152cffb5f529e747681457d359a9869c46fdbb4f4e1eefb8234835ad",
-        "jacobi_wam/3D_WAM_uncalibrated_grid_cleaned.csv",
-        "MIT",
-    ),
-    "jacobi_wam_random": PublicFile(
-        *_SOURCE,
-        "WAM/3D_WAM_uncalibrated_random_cleaned.csv",
-        "b9b6f5ee9f4e9fce0ed8a70d458b08b6af7f473afe98bb92ac2ff379d398e5e2",
-        "jacobi_wam/3D_WAM_uncalibrated_random_cleaned.csv",
-        "MIT",
-    ),
+_SHA256 = {
+    "ur5_grid": "3de63c38b4338a1fb23437a9c6ecb7e0441a9e132fc055544619b8c580f767c0",
+    "ur5_random": "3cd7a4aae072f9757ce9bd156e7470cc8caa89d8af9164c07390953ae808095a",
+    "wam_grid": "f013c0ce152cffb5f529e747681457d359a9869c46fdbb4f4e1eefb8234835ad",
+    "wam_random": "b9b6f5ee9f4e9fce0ed8a70d458b08b6af7f473afe98bb92ac2ff379d398e5e2",
 }
+
+
+def _file(robot: str, poses: str) -> PublicFile:
+    name = f"3D_{robot.upper()}_uncalibrated_{poses}_cleaned.csv"
+    return PublicFile(*_SOURCE, f"{robot.upper()}/{name}", _SHA256[f"{robot}_{poses}"], f"jacobi_{robot}/{name}", "MIT")
+
+
+FILES = {f"jacobi_{name}": _file(*name.split("_")) for name in _SHA256}
 TARGET = "SMR"
 # Robots of the source by their number of joints.
 ROBOT_OF_JOINTS = {6: "ur5", 7: "wam"}
@@ -82,23 +59,11 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     return np.radians(angles), 1e-3 * (commanded + difference)
 
 
-def write_campaign(
-    path: str | Path,
-    folder: str | Path,
-    name: str,
-    holdout: Mapping[str, Any] | None = None,
-    noise: Mapping[str, float] | None = NOISE,
-) -> None:
+def write_campaign(path: str | Path, folder: str | Path, name: str, holdout: Mapping[str, Any] | None = None) -> None:
     """Write one file as a campaign's folder.
 
-    `path`: ``3D_..._uncalibrated_grid_cleaned.csv`` or ``..._random_cleaned.csv``. `holdout`: as in ``campaign.yaml``. `noise`:
-    the same. Raises `InputError`: as in `read`.
+    `path`: ``3D_..._uncalibrated_grid_cleaned.csv`` or ``..._random_cleaned.csv``. `holdout`: as in ``campaign.yaml``. Raises
+    `InputError`: as in `read`.
     """
     angles, position = read(path)
-    pose, repeat = pose_and_repeat(angles)
-    table = {"pose": pose, "load": np.zeros(len(pose), int), "repeat": repeat, "target": np.full(len(pose), TARGET)}
-    table |= {f"q{j + 1}": column for j, column in enumerate(angles.T)}
-    table |= {axis: position[:, i] for i, axis in enumerate("xyz")}
-    joints = angles.shape[1]
-    document = unloaded_document(name, ROBOT_OF_JOINTS[joints], "position", [TARGET], holdout, noise, f"{joints}DoF")
-    write_folder(folder, document, table, joints)
+    write_reflectors(folder, name, ROBOT_OF_JOINTS[angles.shape[1]], angles, {TARGET: position}, holdout, NOISE)

@@ -1,23 +1,17 @@
 """Variables of MAT files; what is none, or is damaged, is one line."""
 
-from __future__ import annotations
-
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import scipy.io
 
+from elastocal.campaigns.public_data import LARGEST_BYTES
 from elastocal.errors import InputError
 from elastocal.io.texts import read_bytes
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-    from typing import Any
-
-KIND = "a MAT file of version 5"
-# Of the sources here the largest has four megabytes.
-LARGEST_BYTES = 200_000_000
+_KIND = "a MAT file of version 5"
 
 
 def read_mat(path: str | Path, names: Sequence[str]) -> dict[str, Any]:
@@ -26,12 +20,12 @@ def read_mat(path: str | Path, names: Sequence[str]) -> dict[str, Any]:
     `names`: of the variables; any that the file does not have is left out. Raises `InputError`: no file, or one that scipy
     cannot read as a whole.
     """
-    content = read_bytes(path, LARGEST_BYTES, KIND)
+    content = read_bytes(path, LARGEST_BYTES, _KIND)
     # The stubs of scipy know paths alone.
     stream: Any = io.BytesIO(content)
     try:
         found: dict[str, Any] = scipy.io.loadmat(stream, variable_names=list(names))
     except Exception:
         # The reader lets through whatever broken bytes make of its parts; its words say nothing of the file.
-        raise InputError(path, "", f"no readable MAT file, or one that is damaged ({len(content)} bytes)", KIND) from None
+        raise InputError(path, "", f"no readable MAT file, or one that is damaged ({len(content)} bytes)", _KIND) from None
     return {name: found[name] for name in names if name in found}

@@ -3,41 +3,31 @@
 A file holds a row for each camera image that was taken of a pose; rows of one pose repeat its joint angles and its reflector.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.importers.mat_files import read_mat
-from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.importers.reflectors import reflector_table, unloaded_document
 from elastocal.campaigns.public_data import PublicFile
 from elastocal.campaigns.writing import write_campaign as write_folder
 from elastocal.errors import InputError
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-    from typing import Any
-
 _SOURCE = "ctu-vras/multirobot-calibration", "a20f0454732bc36f1d980ff08c3d30536b8b1b19"
-_FOLDER = "UserData/Robots/Motoman/Dataset/leica_dataset"
 # The toolbox that holds these files says so in its sources; it has no licence file.
-_LICENCE = "LGPL-3.0-or-later"
+_FOLDER, _LICENCE = "UserData/Robots/Motoman/Dataset/leica_dataset", "LGPL-3.0-or-later"
+
+
+def _file(name: str, sha256: str) -> PublicFile:
+    return PublicFile(*_SOURCE, f"{_FOLDER}/{name}", sha256, f"motoman_leica/{name}", _LICENCE)
+
+
 FILES = {
-    "motoman_workspace": PublicFile(
-        *_SOURCE,
-        f"{_FOLDER}/updated_leica_dataset.mat",
-        "a4e62319d0d9ba35590032648ccd260ee7c8261b0d73eea97995da7f3e68f3ca",
-        "motoman_leica/updated_leica_dataset.mat",
-        _LICENCE,
-    ),
-    "motoman_grid": PublicFile(
-        *_SOURCE,
-        f"{_FOLDER}/leica_right_hand_6x6x6_dataset.mat",
-        "170ef4301d0ca949e5e1bc39d6a6c8d0f722f47c0afaf5215e4b6b36637bee4f",
-        "motoman_leica/leica_right_hand_6x6x6_dataset.mat",
-        _LICENCE,
+    "motoman_workspace": _file("updated_leica_dataset.mat", "a4e62319d0d9ba35590032648ccd260ee7c8261b0d73eea97995da7f3e68f3ca"),
+    "motoman_grid": _file(
+        "leica_right_hand_6x6x6_dataset.mat", "170ef4301d0ca949e5e1bc39d6a6c8d0f722f47c0afaf5215e4b6b36637bee4f"
     ),
 }
 ROBOT, TARGET = "motoman_right_arm", "reflector"
@@ -76,22 +66,13 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     return rows[:, _ANGLES], rows[:, _POSITION]
 
 
-def write_campaign(
-    path: str | Path,
-    folder: str | Path,
-    name: str,
-    holdout: Mapping[str, Any] | None = None,
-    noise: Mapping[str, float] | None = NOISE,
-) -> None:
-    """Write one file as a campaign's folder.
+def write_campaign(path: str | Path, folder: str | Path, name: str, holdout: Mapping[str, Any] | None = None) -> None:
+    """Write one file as a campaign's folder; no pose repeats another.
 
-    `path`: ``updated_leica_dataset.mat`` or ``leica_right_hand_6x6x6_dataset.mat``. `holdout`: as in ``campaign.yaml``.
-    `noise`: the same. Raises `InputError`: as in `read`.
+    `path`: ``updated_leica_dataset.mat`` or ``leica_right_hand_6x6x6_dataset.mat``. `holdout`: as in ``campaign.yaml``. Raises
+    `InputError`: as in `read`.
     """
     angles, position = read(path)
-    count = len(angles)
-    table = {"pose": np.arange(count), "load": np.zeros(count, int), "repeat": np.zeros(count, int)}
-    table |= {"target": np.full(count, TARGET)}
-    table |= {f"q{j + 1}": column for j, column in enumerate(angles.T)}
-    table |= {axis: position[:, i] for i, axis in enumerate("xyz")}
-    write_folder(folder, unloaded_document(name, ROBOT, "position", [TARGET], holdout, noise), table, angles.shape[1])
+    poses = np.arange(len(angles))
+    table = reflector_table(poses, 0 * poses, angles, {TARGET: position})
+    write_folder(folder, unloaded_document(name, ROBOT, "position", [TARGET], holdout, NOISE), table, angles.shape[1])

@@ -1,19 +1,41 @@
-"""Campaigns of several reflectors on one flange, unloaded: what both FANUC sources are."""
+"""Public campaigns: targets on an unloaded flange, measured by a tracker in a frame that nobody knows."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.importers.repeats import pose_and_repeat
-from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.writing import write_campaign
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-    from typing import Any
+# What such data can be fitted with at all before any physics is looked for.
+_DECLARED = ("joint_offset", "link_geometry")
+
+
+def unloaded_document(
+    name: str,
+    robot: str,
+    measured: str,
+    targets: Iterable[str],
+    holdout: Mapping[str, Any] | None = None,
+    noise: Mapping[str, float] | None = None,
+    point: str = "6DoF",
+) -> dict[str, Any]:
+    """Contents of ``campaign.yaml``: targets on the flange whose offsets nobody knows.
+
+    `measured`: one of "position", "pose". `point`: measuring point of the chain to which the targets belong: its last.
+    """
+    document = {
+        "campaign": name,
+        "robot": robot,
+        "measured": measured,
+        "frame": "tracker",
+        "targets": {target: {"point": point, "offset_m": "unknown"} for target in targets},
+        "compliance": "nominal",
+        "declared": list(_DECLARED),
+    }
+    return document | ({"noise": dict(noise)} if noise else {}) | ({"holdout": dict(holdout)} if holdout else {})
 
 
 def reflector_table(
@@ -46,11 +68,11 @@ def write_reflectors(
     holdout: Mapping[str, Any] | None = None,
     noise: Mapping[str, float] | None = None,
 ) -> None:
-    """Write measurements of one session as a campaign's folder.
+    """Write measured positions of one session as a campaign's folder; rows with the same joint angles repeat a pose.
 
-    `joint_angles` (N, n): as the controller reports them, rad. `positions` (N, 3): m, by reflector. `holdout`, `noise`: as in
-    ``campaign.yaml``.
+    `joint_angles` (N, n): as the controller reports them, rad. `positions` (N, 3): m, by reflector; all sit on the last of n
+    measuring points. `holdout`, `noise`: as in ``campaign.yaml``.
     """
-    table = reflector_table(*pose_and_repeat(joint_angles), joint_angles, positions)
-    document = unloaded_document(name, robot, "position", positions, holdout, noise)
-    write_campaign(folder, document, table, joint_angles.shape[1])
+    table, joints = reflector_table(*pose_and_repeat(joint_angles), joint_angles, positions), joint_angles.shape[1]
+    document = unloaded_document(name, robot, "position", positions, holdout, noise, f"{joints}DoF")
+    write_campaign(folder, document, table, joints)

@@ -1,39 +1,30 @@
 """Universal Robots UR10 with a T-Mac on its flange (christianlandgraf/ipa-robot-accuracy): Series A and B as campaigns."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Mapping
 from datetime import datetime
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.importers.csv_columns import numbers, read_columns, table
+from elastocal.campaigns.importers.reflectors import reflector_table, unloaded_document
 from elastocal.campaigns.importers.repeats import pose_and_repeat
-from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.public_data import PublicFile
 from elastocal.campaigns.writing import write_campaign as write_folder
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
-    from typing import Any
-
 _SOURCE = "christianlandgraf/ipa-robot-accuracy", "507fba69bdaf6c43c2faf306e70a7e37c5e39b89"
+
+
+def _file(path: str, sha256: str) -> PublicFile:
+    return PublicFile(*_SOURCE, path, sha256, f"ur10_ipa/{path}", "MIT")
+
+
 FILES = {
-    "ur10_ipa_a": PublicFile(
-        *_SOURCE,
-        "Series_A/measurements_grid.csv",
-        "84d5c81234cab58ebe88b4c73c582c26ad0e407f0de5350571c91f5ce6f28b76",
-        "ur10_ipa/Series_A/measurements_grid.csv",
-        "MIT",
-    ),
-    "ur10_ipa_b": PublicFile(
-        *_SOURCE,
-        "Series_B/measurements_joint_configurations.csv",
-        "12b69a4e6ff7be68e67d3f70245a3ab7bb6ec3a2c63bc5eae002b15a1f863d7e",
-        "ur10_ipa/Series_B/measurements_joint_configurations.csv",
-        "MIT",
+    "ur10_ipa_a": _file("Series_A/measurements_grid.csv", "84d5c81234cab58ebe88b4c73c582c26ad0e407f0de5350571c91f5ce6f28b76"),
+    "ur10_ipa_b": _file(
+        "Series_B/measurements_joint_configurations.csv", "12b69a4e6ff7be68e67d3f70245a3ab7bb6ec3a2c63bc5eae002b15a1f863d7e"
     ),
 }
 ROBOT, TARGET = "ur10", "TMac"
@@ -81,27 +72,17 @@ def read(path: str | Path) -> dict[str, np.ndarray]:
     return found if times is None else found | {"time_s": times}
 
 
-def write_campaign(
-    path: str | Path,
-    folder: str | Path,
-    name: str,
-    holdout: Mapping[str, Any] | None = None,
-    noise: Mapping[str, float] | None = NOISE,
-) -> None:
+def write_campaign(path: str | Path, folder: str | Path, name: str, holdout: Mapping[str, Any] | None = None) -> None:
     """Write one series as a campaign's folder.
 
-    `path`: ``measurements_grid.csv`` or ``measurements_joint_configurations.csv``. `holdout`: as in ``campaign.yaml``. `noise`:
-    the same. Raises `InputError`: as in `read`.
+    `path`: ``measurements_grid.csv`` or ``measurements_joint_configurations.csv``. `holdout`: as in ``campaign.yaml``. Raises
+    `InputError`: as in `read`.
     """
     measurements = read(path)
-    angles = measurements["joint_angles"]
-    pose, repeat = pose_and_repeat(angles, _SAME_POSE_RAD)
-    table = {"pose": pose, "load": np.zeros(len(pose), int), "repeat": repeat, "target": np.full(len(pose), TARGET)}
-    table |= {f"q{j + 1}": column for j, column in enumerate(angles.T)}
-    table |= {axis: measurements["position"][:, i] for i, axis in enumerate("xyz")}
-    table |= {f"r{axis}": measurements["rotation_vector"][:, i] for i, axis in enumerate("xyz")}
-    table |= {covariate: measurements[covariate] for covariate in ("time_s", "temperature_c") if covariate in measurements}
-    write_folder(folder, unloaded_document(name, ROBOT, "pose", [TARGET], holdout, noise), table, angles.shape[1])
+    angles, position, vector = (measurements.pop(part) for part in ("joint_angles", "position", "rotation_vector"))
+    table = reflector_table(*pose_and_repeat(angles, _SAME_POSE_RAD), angles, {TARGET: position})
+    table |= {f"r{axis}": vector[:, i] for i, axis in enumerate("xyz")} | measurements
+    write_folder(folder, unloaded_document(name, ROBOT, "pose", [TARGET], holdout, NOISE), table, angles.shape[1])
 
 
 def _times(cells: Iterable[str]) -> np.ndarray | None:

@@ -1,15 +1,11 @@
 """All languages that are there: each module of this package that has a NAME."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import elastocal.exchange.controllers
 from elastocal.errors import InputError
+from elastocal.exchange.controllers.protocol import Controller
 from elastocal.io.modules import modules_with
-
-if TYPE_CHECKING:
-    from elastocal.exchange.controllers.protocol import Controller
 
 
 def controllers() -> dict[str, Controller]:

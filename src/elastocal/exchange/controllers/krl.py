@@ -3,12 +3,7 @@
 After KUKA System Software 8.3, Operating and Programming Instructions for System Integrators, KUKA Roboter GmbH.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from elastocal.exchange.controllers.protocol import JointTargets
+from elastocal.exchange.controllers.protocol import JointTargets
 
 NAME, WORDS, SUFFIX = "krl", "KUKA KRL", ".src"
 AXES, EXTERNAL = tuple(f"A{axis}" for axis in range(1, 7)), tuple(f"E{axis}" for axis in range(1, 7))

@@ -4,12 +4,7 @@ After ABB, Technical reference manual: RAPID Instructions, Functions and Data ty
 RAPID Overview, 3HAC050947 (identifiers, reserved words).
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from elastocal.exchange.controllers.protocol import JointTargets
+from elastocal.exchange.controllers.protocol import JointTargets
 
 NAME, WORDS, SUFFIX = "rapid", "ABB RAPID", ".mod"
 AXES, EXTERNAL = tuple(f"rax_{axis}" for axis in range(1, 7)), tuple(f"eax_{axis}" for axis in "abcdef")

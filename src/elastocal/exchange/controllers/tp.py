@@ -3,12 +3,7 @@
 After FANUC, R-30iB Plus Operator's Manual (Basic Operation), B-83284EN (program names, joint positions, ASCII upload).
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from elastocal.exchange.controllers.protocol import JointTargets
+from elastocal.exchange.controllers.protocol import JointTargets
 
 NAME, WORDS, SUFFIX = "tp", "FANUC TP", ".ls"
 AXES, EXTERNAL = tuple(f"J{axis}" for axis in range(1, 7)), tuple(f"E{axis}" for axis in range(1, 4))

@@ -3,14 +3,9 @@
 After Universal Robots, The URScript Programming Language for e-Series (movej; identifiers, keywords).
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from elastocal.exchange.controllers.protocol import JointTargets
+from elastocal.exchange.controllers.protocol import JointTargets
 
 NAME, WORDS, SUFFIX = "urscript", "URScript", ".script"
 AXES, EXTERNAL = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3"), ()
