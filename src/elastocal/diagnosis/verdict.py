@@ -143,11 +143,18 @@ def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, .
 
 
 def _mechanisms_of(problem: Problem, model: Model, probability: float) -> set[str]:
-    """Mechanisms of a model, without a smooth error that the tolerance of the other laws allows for."""
+    """What a model says that acts: of mechanisms and a smooth error that which explains most, and what is not small beside it.
+
+    A smooth error within the tolerance of the laws counts as theirs; laws that explain less than it does fit what it leaves of
+    something unknown.
+    """
     names = {problem.units[unit].mechanism for unit in model.units}
     if OTHER in names and len(names) > 1 and probability > _TELLING:
         explained = squares_explained(problem, model)
-        if explained[OTHER] < problem.settings.law_tolerance**2 * max(explained.values()):
+        unknown, known = explained.pop(OTHER), max(explained.values())
+        if unknown > known:
+            return {OTHER}
+        if unknown < problem.settings.law_tolerance**2 * known:
             names.remove(OTHER)
     return names
 
