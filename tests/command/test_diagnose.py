@@ -17,10 +17,10 @@ LINES = ["3 jobs\n", "1 of 3: read_campaign cell7\n", "2 of 3: judge_campaign ce
 def run(tmp_path, monkeypatch):
     """Diagnose a campaign with a pipeline and in a workplace; what is called, and the exit code of that."""
 
-    def called(pipeline, code=0):
+    def called(pipeline, code=0, prints=""):
         # In place of Python: shows its arguments and where it runs.
         stand_in = tmp_path / "python"
-        stand_in.write_text(f'#!/bin/sh\necho "$PWD" "$@"\nexit {code}\n')
+        stand_in.write_text(f'#!/bin/sh\necho "$PWD" "$@"\necho "{prints}"\nexit {code}\n')
         stand_in.chmod(0o755)
         monkeypatch.setattr(diagnose.sys, "executable", str(stand_in))
         monkeypatch.setattr(diagnose, "pipeline", lambda: pipeline)
@@ -59,6 +59,14 @@ def test_on_a_terminal_jobs_move_a_bar_and_the_verdict_stays():
     assert "1 of 3" in text
     assert "3 jobs" not in text
     assert "[bold] is missing" in text
+
+
+def test_where_everything_is_up_to_date_the_outcome_is_printed_again(monkeypatch, run, tmp_path):
+    monkeypatch.setattr(diagnose, "_outcome", lambda folder, place: [f"the outcome of {folder.name}"])
+    assert "the outcome of cell7" not in run(tmp_path).stderr
+    assert run(tmp_path, prints="Nothing to be done (all requested files are present and up to date).").stderr.endswith(
+        "the outcome of cell7\n"
+    )
 
 
 @pytest.mark.parametrize("mark", ["{x}", ": ", " #", "\n", "\x1b", "\u202e"])

@@ -134,7 +134,8 @@ def test_two_headers_behind_comment_marks_are_a_question_and_a_plain_one_goes_be
         read_text_table(written(tmp_path, text), is_header)
     assert read_text_table(written(tmp_path, text), is_header, Dialect(header=2)).columns["x"] == ("3",)
     found = read_text_table(written(tmp_path, "# x;y;n\nn;x;y\n1;2;3\n#4;5;6\n"), is_header)
-    assert found.columns["x"] == ("2",) and found.left_out == ("1 lines of comments below the header",)
+    assert found.columns["x"] == ("2",)
+    assert found.left_out == ("1 lines above the header", "1 lines of comments below the header")
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,11 @@
 import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import yaml
-from durations import HUNG_S
+from snakemake_starts import started
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = ("Snakefile", "requirements.lock", "config.yaml", "config", "workflow", "profiles", "src", "README.md")
@@ -88,7 +87,7 @@ class Study:
         return {"args": [sys.executable, "-m", "snakemake", *arguments], "cwd": self.folder, "env": environment}
 
     def snakemake(self, *arguments):
-        return subprocess.run(**self.command(*arguments), capture_output=True, text=True, timeout=HUNG_S)
+        return started(**self.command(*arguments))
 
     def run(self, *arguments):
         """Run Snakemake, which must succeed."""

@@ -77,6 +77,6 @@ def test_digests_that_are_kept_are_those_that_are_found(digest):
 def test_digests_that_were_damaged_are_found_again(digest):
     found = digest(CODE)
     keep_source_digests(["module.py"])
-    Path("results/.source_digests").write_bytes(b"\xff{")
+    Path(".snakemake/source_digests.json").write_bytes(b"\xff{")
     _kept.cache_clear()
     assert source_digest("module.py") == found

@@ -63,7 +63,7 @@ def checkout(tmp_path_factory):
     certified_checkout(top)
     (top / "out").mkdir()
     shutil.copy(ROBOTS / "ur10.yaml", top / "arm.yaml")
-    (top / "arm.csv").write_text("d,a,alpha\n0.1,0.4,90\n")
+    (top / "arm.csv").write_text("d_m,a_m,alpha_deg\n0.1,0.4,90\n")
     arm = link("base"), link("arm", 2.0), link("hand"), joint("j1", "base", "arm", xyz=(0, 0, 0.5)), joint("j2", "arm", "hand")
     written(top, *arm).rename(top / "arm.urdf")
     (top / "t.csv").write_text("J1;X;Y;Z\n90;1000,5;2;3\n-90;1000;2;3\n")

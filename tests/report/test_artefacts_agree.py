@@ -19,8 +19,7 @@ from elastocal.errors import InputError
 from elastocal.io.records import check_sources, jobs_behind
 from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.loop_pages import write_loop_report
-
-from outcome import outcome
+from elastocal.report.outcome import outcome
 
 PICTURES = ["arrows", "before_after", "residuals", "candidates", "confounding"]
 DIAGNOSED = sorted(Path("reports/loop").glob("*/report.html"))

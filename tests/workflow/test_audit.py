@@ -1,10 +1,12 @@
 """An audit holds on a finished study and finds each error that is planted, with the file that has it."""
 
 import shutil
+import subprocess
 
 import pandas as pd
 import pytest
 import yaml
+from durations import HUNG_S
 from made_proofs import audited_proofs, made_proofs
 from planted_errors import BLIND, CAMPAIGN, CAMPAIGNS, PLANTED, PLANTED_IN_PROOFS
 
@@ -156,7 +158,8 @@ def test_the_command_says_which_file_is_wrong(finished):
 def test_without_pinocchio_an_audit_ends_in_a_line_before_any_job(unstarted):
     """It comes with an extra; Python imports `sitecustomize` before all else, which hides it here."""
     unstarted.path("src/sitecustomize.py").write_text("import sys\n\nsys.modules['pinocchio'] = None\n", encoding="utf-8")
-    done = unstarted.snakemake("-j1", "--quiet", "all", "--", "audit")
+    command = unstarted.command("-j1", "--quiet", "all", "--", "audit")
+    done = subprocess.run(**command, capture_output=True, text=True, timeout=HUNG_S)
     line = "audit: pinocchio: found no such package; allowed: the extra audit: make audit, or pip install pin"
     assert (done.returncode, done.stderr.strip().splitlines()[-1:]) == (1, [line]), done.stderr
     assert "Traceback" not in done.stderr and unstarted.files("data/**/*.parquet", "results/**/*.parquet") == []

@@ -249,7 +249,7 @@ def test_every_rule_watches_the_sources_of_its_own_script():
 
 # Forks before it imports anything of the package, so that every script starts without it; other people's modules may be there.
 _LOADED = """
-import ast, importlib, json, os, sys
+import ast, json, os, sys
 from pathlib import Path
 import matplotlib.figure, numpy, pandas, pyarrow.parquet
 root = Path(sys.argv[1])
@@ -261,8 +261,9 @@ for script in sys.argv[2:]:
         imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))]
         exec(compile(ast.Module(imports, []), script, "exec"), {})
         # A catalogue looks up the modules beside it when it is asked.
-        for module in [m for m in sys.modules.values() if hasattr(m, "modules_with")]:
-            module.modules_with("__name__", importlib.import_module(module.__package__))
+        for name in [name for name in sys.modules if name.startswith("elastocal.") and name.endswith(".catalogue")]:
+            package = sys.modules[name.rpartition(".")[0]]
+            sys.modules["elastocal.io.modules"].modules_with("__name__", package)
         files = [Path(m.__file__) for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
         own = sorted(f.relative_to(root).as_posix() for f in files if f.is_relative_to(root))
         os.write(write, json.dumps(own).encode())

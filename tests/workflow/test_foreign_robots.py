@@ -114,4 +114,4 @@ def test_the_command_and_snakemake_are_one_way_however_the_campaign_is_spelled(w
     for spelled in (walk.cell, f"{walk.cell}/", "../cell", "./../cell/", "link"):
         assert walk.study.planned("diagnose", "--config", f"campaign={spelled}") <= {("diagnose",)}, spelled
     walk.run("diagnose", home / "link")
-    assert "Nothing to be done" in walk.printed["diagnose"]
+    assert "Nothing to be done" in walk.printed["diagnose"] and "report: reports/loop/" in walk.printed["diagnose"]

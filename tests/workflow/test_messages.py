@@ -1,12 +1,9 @@
 """While it works Snakemake says one line a job; at the end, reports and verdicts, or last of all why a job failed."""
 
-import json
 import re
 from collections import Counter
 
 import pytest
-
-from outcome import outcome
 
 IDENTIFIED = "results/identified/kuka/200um/6DoF.parquet"
 
@@ -30,24 +27,6 @@ def test_a_dry_run_is_a_summary_and_every_job_is_listed_on_request(unstarted):
     counts = re.findall(r"(\d+)\s+(\w+)", " ".join(listed))
     assert {rule: int(count) for count, rule in counts} == Counter(rule for rule, *_ in jobs)
     assert len(listed) < 25 and max(map(len, listed)) <= 80
-
-
-def test_the_outcome_names_reports_and_verdicts(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    folder = tmp_path / "reports/loop/cell7"
-    folder.mkdir(parents=True)
-    heldout = {"uncalibrated": {"rms_m": 4e-3}, "after": {"rms_m": 1e-3}, "noise_floor_rms_m": 9e-4, "poses": 9}
-    verdict = {"verdict": "not_testable", "effects": [], "heldout": heldout, "warnings": []}
-    (folder / "verdict.json").write_text(json.dumps(verdict), encoding="utf-8")
-    monkeypatch.setattr("elastocal.report.first_page.sentences", lambda document: [document["verdict"], "more"])
-    made = ["reports/study.pdf", "reports/loop/cell7/report.pdf", "reports/tables/table1.csv"]
-    first, errors, *rest = outcome(made)
-    assert first == "! cell7: not_testable"
-    assert errors == "  4.00 → 1.00 mm (noise 0.900), RMS position error on 9 validation poses"
-    following = 'next: "What to do now" on the first page of the report'
-    assert rest == ["  report: reports/loop/cell7/report.pdf", "the study: reports/study.pdf", following]
-    (folder / "verdict.json").write_text(json.dumps(verdict | {"verdict": "named"}), encoding="utf-8")
-    assert outcome(made)[0] == "✓ cell7: named" and outcome(made)[-1] == "next: elastocal correct, elastocal certificate"
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from elastocal.io.origin import Origin, configuration_sha256, environment
 from elastocal.io.provenance import SOURCES_DIGEST
 from elastocal.io.records import checksum
 from elastocal.io.sources import keep_source_digests, source_digest
+from elastocal.report.outcome import outcome
 from elastocal.study.configuration import check_study, rows_read, with_overrides
 
 ROOT = Path(workflow.basedir)
@@ -27,7 +28,6 @@ sys.path.insert(0, str(ROOT / "workflow" / "rules"))
 from commit import commit_of
 from import_closure import closure
 from one_run import begin
-from outcome import outcome
 
 # In a checkout the package stands beside the rules; a wheel puts them apart.
 PACKAGES = ROOT / "src" if (ROOT / "src").is_dir() else Path(elastocal.__file__).parents[1]

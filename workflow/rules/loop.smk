@@ -167,7 +167,14 @@ rule draw_campaign_errors:
         sources=sources("draw_campaign_errors.py"),
     output:
         pdf="reports/loop/{kind}.pdf",
-        png="reports/loop/{kind}.png",
+        png=shown(
+            "reports/loop/{kind}.png",
+            "loop_all_errors",
+            "Campaigns",
+            campaign="all of {kind}",
+            shows="Held-out errors before and after",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_campaign_errors/{kind}.log",
     benchmark:

@@ -160,7 +160,14 @@ rule draw_hero:
         sources=sources("draw_hero.py"),
     output:
         pdf="reports/loop/{campaign}/figures/hero.pdf",
-        png="reports/loop/{campaign}/figures/hero.png",
+        png=shown(
+            "reports/loop/{campaign}/figures/hero.png",
+            "loop_hero",
+            "Campaigns",
+            campaign="{campaign}",
+            shows="Arm with its errors before and after",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_hero/{campaign}.log",
     benchmark:

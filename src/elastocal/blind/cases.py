@@ -136,7 +136,8 @@ _UNSEEN: dict[str, tuple[str, ...]] = {
 class Case:
     """One case, from which its campaign and its ground truth follow.
 
-    `key`: what it is; sealed. `group`: such as "none", "single", "pair" or "moved". `robot`: robot file in config/robots. `effects`: keys of `defects.KINDS`.
+    `key`: what it is; sealed. `group`: such as "none", "single", "pair" or "moved". `robot`: robot file in config/robots.
+    `effects`: keys of `defects.KINDS`.
     `levels`: non-centrality of each effect alone, on the poses that are not held out, after the compliances and the weights
     have absorbed theirs; of one mechanism at several joints that of all together. `setting`: key of `SETTINGS`, or of
     `SWEEP_DESIGNS` in a sweep. `alternative`: in a sweep the near relative of the effect; otherwise empty.

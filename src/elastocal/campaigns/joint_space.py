@@ -1,7 +1,13 @@
 """Where poses lie in joint space: blocks of neighbours, and what lies beyond the range of others."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.spatial import cKDTree
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 # Measurements of one pose share their joint angles up to what a controller's servo error can differ: a joint that moves less
 # does not distinguish poses.
@@ -59,7 +65,7 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     near the next, are several configurations.
     """
     mean = _means(joint_angles, pose)
-    tree = cKDTree(mean)
+    tree = _tree(mean)
     # What is farther from all others is not asked for its neighbours, and the neighbours of all are never held at once.
     beyond = np.nextafter(SAME_POSE_RAD, 1.0)
     nearest, _ = tree.query(mean, k=[2], p=np.inf, distance_upper_bound=beyond)
@@ -108,4 +114,11 @@ def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndar
 
 def repeated(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
     """Whether states (S, n) have in every joint the angle of a same one of those fitted (P, n), rad: ndarray of bool (S,)."""
-    return np.isfinite(cKDTree(fitted_angles).query(joint_angles, p=np.inf, distance_upper_bound=SAME_POSE_RAD)[0])
+    return np.isfinite(_tree(fitted_angles).query(joint_angles, p=np.inf, distance_upper_bound=SAME_POSE_RAD)[0])
+
+
+def _tree(points: np.ndarray) -> cKDTree:
+    # Its import takes a tenth of each start of Snakemake, whose rules read campaign.yaml and need no tree.
+    from scipy.spatial import cKDTree
+
+    return cKDTree(points)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 # What `snakemake_logger_plugin_elastocal` writes when a job starts.
 _JOB = re.compile(r"(\d+) of (\d+): (.+)")
 _JOBS = re.compile(r"\d+ jobs")
+_NOTHING = "Nothing to be done"
 # Snakemake prints it before its logger begins.
 _NO_NEWS = "Using workflow specific profile"
 
@@ -46,18 +47,34 @@ def diagnose(
     with subprocess.Popen(
         [sys.executable, *words], cwd=place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as run:
-        follow(run.stdout or (), Console(stderr=True))
+        current = follow(run.stdout or (), Console(stderr=True))
+    if current and not run.returncode:
+        print_lines(_outcome(folder, place), Console(stderr=True))
     raise typer.Exit(run.returncode)
 
 
-def follow(lines: Iterable[str], console: Console) -> None:
-    """Show the lines of a run as they come: a job as the state of a bar, where there is a terminal, any other as it is."""
+def follow(lines: Iterable[str], console: Console) -> bool:
+    """Show the lines of a run as they come: a job as the state of a bar, where there is a terminal, any other as it is.
+
+    Returns whether there was nothing to do, where Snakemake prints no outcome.
+    """
+    current = False
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f} of {task.total:.0f}")
     with Progress(*columns, TimeElapsedColumn(), console=console, transient=True, disable=not console.is_terminal) as progress:
         bar = progress.add_task("reading", total=1)
         for line in map(str.rstrip, lines):
+            current = current or line.startswith(_NOTHING)
             job = _JOB.fullmatch(line)
             if job and console.is_terminal:
                 progress.update(bar, completed=int(job[1]) - 1, total=int(job[2]), description=job[3])
             elif not line.startswith(_NO_NEWS) and not (_JOBS.fullmatch(line) and console.is_terminal):
                 print_lines([line], console)
+    return current
+
+
+def _outcome(folder: Path, place: Path) -> list[str]:
+    from elastocal.campaigns.reading import read_descriptions
+    from elastocal.report.outcome import outcome
+
+    document, _ = read_descriptions(folder, pipeline() / "config" / "robots")
+    return outcome([f"reports/loop/{document['campaign']}/report.pdf"], place)

@@ -17,7 +17,7 @@ from elastocal.io.texts import check_file
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-_KEPT = Path("results/.source_digests")
+_KEPT = Path(".snakemake/source_digests.json")
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 

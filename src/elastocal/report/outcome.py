@@ -1,9 +1,14 @@
 """The outcome of a finished run: where each report is that it made and, of a campaign, the verdict."""
 
+from __future__ import annotations
+
 import json
 import re
-from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 _CAMPAIGN = re.compile(r"reports/loop/([^/]+)/report\.pdf")
 # Verdicts after which the robot is corrected; after the others its report says what to do.
@@ -11,8 +16,8 @@ _OF_USE = ("adequate", "named", "class", "several")
 _REPORTS = {"reports/study.pdf": "the study", "reports/blind/blind.pdf": "the blind proof"}
 
 
-def outcome(made: Iterable[str]) -> list[str]:
-    """Lines about the reports among the files that a run has made."""
+def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
+    """Lines about the reports among the files that a run has made, which are named from the workplace."""
     # Only a run that has made a report needs what makes its sentences.
     from elastocal.report.first_page import headline, headline_sentence, sentences
 
@@ -21,7 +26,7 @@ def outcome(made: Iterable[str]) -> list[str]:
         if path in _REPORTS:
             lines.append(f"{_REPORTS[path]}: {path}")
         if match := _CAMPAIGN.fullmatch(path):
-            verdict = json.loads(Path(path).with_name("verdict.json").read_text(encoding="utf-8"))
+            verdict = json.loads(Path(workplace, path).with_name("verdict.json").read_text(encoding="utf-8"))
             of_use = verdict["verdict"] in _OF_USE and all(effect["family"] != "data" for effect in verdict["effects"])
             stated = headline(verdict)
             errors = [f"  {headline_sentence(stated)}"] if stated else []
