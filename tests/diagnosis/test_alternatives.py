@@ -1,8 +1,7 @@
 """Models that are left: by dense generalized least squares and normal densities written out."""
 
-from types import SimpleNamespace
-
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
