@@ -6,6 +6,7 @@ Data sets of few configurations and of kinds of measurements are drawn again fro
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -213,10 +214,7 @@ TABLES: Mapping[str, tuple[Callable[[Audited], _Rows], tuple[str, ...]]] = {
     "stiffness": (stiffness, ("robot", "force_N")),
     "starts": (starts, ("robot", "start")),
     **{
-        f"simulated_designs_{sizes}": (
-            lambda run, sizes=sizes: simulated_designs(run, sizes),
-            ("robot", "load", "design", "configurations"),
-        )
+        f"simulated_designs_{sizes}": (partial(simulated_designs, sizes=sizes), ("robot", "load", "design", "configurations"))
         for sizes in ("few", "every")
     },
 }
