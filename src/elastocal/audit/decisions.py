@@ -214,10 +214,7 @@ TABLES: Mapping[str, tuple[Callable[[Audited], _Rows], tuple[str, ...]]] = {
     "stiffness": (stiffness, ("robot", "force_N")),
     "starts": (starts, ("robot", "start")),
     **{
-        f"simulated_designs_{sizes}": (
-            partial(simulated_designs, sizes=sizes),
-            ("robot", "load", "design", "configurations"),
-        )
+        f"simulated_designs_{sizes}": (partial(simulated_designs, sizes=sizes), ("robot", "load", "design", "configurations"))
         for sizes in ("few", "every")
     },
 }
