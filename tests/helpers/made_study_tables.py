@@ -275,10 +275,10 @@ def few():
 def kinds():
     rows = []
     for robot in TITLES:
-        for kind, readings, lengths in (("pose", 6, (20,)), ("one reflector", 3, (20, 40))):
+        for kind, scalars, lengths in (("pose", 6, (20,)), ("one reflector", 3, (20, 40))):
             for length in lengths:
-                row = {"robot": robot, "kind": kind, "readings_per_configuration": readings, "configurations": length}
-                rows.append(row | {"readings": readings * length, "rms_um": 1600.0 / length, "rms_um_std_error": 0.5})
+                row = {"robot": robot, "kind": kind, "scalars_per_configuration": scalars, "configurations": length}
+                rows.append(row | {"scalars": scalars * length, "rms_um": 1600.0 / length, "rms_um_std_error": 0.5})
     return pd.DataFrame(rows)
 
 

@@ -86,7 +86,7 @@ def test_a_strategy_without_a_prior_has_one_row():
     ]
 
 
-def test_kinds_are_compared_at_equal_readings():
+def test_kinds_are_compared_at_equal_scalars():
     pose, one = kind_rows(kinds(), 20, TITLES)
     assert pose["kuka same"] == pose["kuka equal"] == "80.00 ± 0.50"
     assert one["equal"] == "40" and one["kuka equal"] == "40.00 ± 0.50"

@@ -97,10 +97,10 @@ def test_few_configurations_are_given_by_strategy_and_error_of_the_nominal_value
     assert table.median_um[0] == pytest.approx(20.0) and np.isnan(table.rms_um[1])
 
 
-def test_kinds_are_given_at_as_many_configurations_and_at_as_many_readings():
-    frame = pd.DataFrame({"kind": "one", "readings": 3, "length": np.arange(1, 41), "data_set": 0, "mean_square": 1e-10})
+def test_kinds_are_given_at_as_many_configurations_and_at_as_many_scalars():
+    frame = pd.DataFrame({"kind": "one", "scalars": 3, "length": np.arange(1, 41), "data_set": 0, "mean_square": 1e-10})
     table = kinds_table({"arm": pd.concat([frame, frame.assign(data_set=1)])}, 20)
-    assert table[["configurations", "readings"]].to_numpy().tolist() == [[20, 60], [40, 120]]
+    assert table[["configurations", "scalars"]].to_numpy().tolist() == [[20, 60], [40, 120]]
     assert table.rms_um.tolist() == pytest.approx([10.0, 10.0])
 
 

@@ -169,10 +169,10 @@ def few_configurations(run: Audited) -> _Rows:
 
 def measurement_kinds(run: Audited) -> _Rows:
     length = run.configuration["tables"]["length"]
-    for head, cell in find_groups(run, run.reduced, "kinds", "kind", "readings", "length"):
-        if head["length"] in (length, 6 * length // head["readings"]):
-            row = {"robot": head["robot"], "kind": head["kind"], "readings_per_configuration": head["readings"]}
-            row |= {"configurations": head["length"], "readings": head["length"] * head["readings"]}
+    for head, cell in find_groups(run, run.reduced, "kinds", "kind", "scalars", "length"):
+        if head["length"] in (length, 6 * length // head["scalars"]):
+            row = {"robot": head["robot"], "kind": head["kind"], "scalars_per_configuration": head["scalars"]}
+            row |= {"configurations": head["length"], "scalars": head["length"] * head["scalars"]}
             yield row | find_root_mean(cell["mean_square"])
 
 

@@ -175,15 +175,15 @@ def few_rows(
 
 
 def kind_rows(table: pd.DataFrame, length: int, titles: Mapping[str, str]) -> list[dict[str, str]]:
-    """Error by what is measured: in as many configurations and with as many readings, from `question_tables.kinds_table`."""
+    """Error by what is measured: in as many configurations and with as many scalars, from `question_tables.kinds_table`."""
     rows = []
     for kind in dict.fromkeys(table.kind):
         row: dict[str, str] = {"kind": str(kind)}
         for robot in titles:
             cell = table[(table.kind == kind) & (table.robot == robot)]
             same = cell[cell.configurations == length].iloc[0]
-            equal = cell.iloc[int(np.argmin(np.abs(cell.readings - 6 * length)))]
-            row |= {"readings": f"{same.readings_per_configuration}", "equal": f"{equal.configurations}"}
+            equal = cell.iloc[int(np.argmin(np.abs(cell.scalars - 6 * length)))]
+            row |= {"scalars": f"{same.scalars_per_configuration}", "equal": f"{equal.configurations}"}
             row[f"{robot} same"] = worded(same.rms_um, same.rms_um_std_error)
             row[f"{robot} equal"] = worded(equal.rms_um, equal.rms_um_std_error)
         rows.append(row)

@@ -27,7 +27,7 @@ _INDEX_NAMES = {
 
 
 def brief_names(titles: Mapping[str, str]) -> dict[str, str]:
-    """Names for cells of tables: the first words of each title that tell it apart from others.
+    """Names for cells of tables: the first words of each title that distinguish it from others.
 
     A title that continues another one, as that of a robot with elastic links, keeps what it adds.
     """

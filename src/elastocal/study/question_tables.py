@@ -168,20 +168,20 @@ def few_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 
 
 def kinds_table(frames: Mapping[str, pd.DataFrame], length: int) -> pd.DataFrame:
-    """Error of one data set by what is measured: in as many configurations, and with as many scalar readings.
+    """Error of one data set by what is measured: in as many configurations, and with as many scalar measurements.
 
-    `frames`: the kinds table of each robot. `length`: configurations; the readings are those of poses in so many. Returns
-    robot, kind, readings_per_configuration, configurations, readings, rms_um with its standard error.
+    `frames`: the kinds table of each robot. `length`: configurations; the scalars are those of poses in so many. Returns
+    robot, kind, scalars_per_configuration, configurations, scalars, rms_um with its standard error.
     """
     rows: list[dict[str, Any]] = []
     for robot, frame in frames.items():
-        for (kind, readings), cell in frame.groupby(["kind", "readings"], sort=False):
-            for configurations in sorted({length, 6 * length // int(str(readings))}):
+        for (kind, scalars), cell in frame.groupby(["kind", "scalars"], sort=False):
+            for configurations in sorted({length, 6 * length // int(str(scalars))}):
                 squares = cell.mean_square[cell.length == configurations].to_numpy()
                 if len(squares):
                     rms, error = root_mean(squares)
-                    row: dict[str, Any] = {"robot": robot, "kind": kind, "readings_per_configuration": readings}
-                    row |= {"configurations": configurations, "readings": configurations * int(str(readings))}
+                    row: dict[str, Any] = {"robot": robot, "kind": kind, "scalars_per_configuration": scalars}
+                    row |= {"configurations": configurations, "scalars": configurations * int(str(scalars))}
                     rows.append(row | {"rms_um": MICRO * rms, "rms_um_std_error": MICRO * error})
     return pd.DataFrame(rows)
 

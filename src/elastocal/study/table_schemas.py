@@ -146,7 +146,7 @@ KINDS = TableSchema(
     "kinds",
     (
         Column("kind", "string", "", "what is measured; a row group holds one"),
-        Column("readings", "int32", "", "scalar measurements of one configuration", minimum=1),
+        Column("scalars", "int32", "", "scalar measurements of one configuration", minimum=1),
         _SET,
         _LENGTH,
         Column("mean_square", "float64", "m^2", "mean square end-effector error on test configurations", missing=True),

@@ -22,12 +22,12 @@ def test_poses_are_those_of_sets_of_points(kuka, table):
     np.testing.assert_allclose(mine.mean_square, expected["mean_square"], rtol=1e-9)
 
 
-def test_more_readings_leave_less_and_too_few_leave_nothing(table):
+def test_more_scalars_leave_less_and_too_few_leave_nothing(table):
     last = table[table.length == 20].groupby("kind").mean_square.mean()
     assert last["three"] < last["one"]
     assert table[(table.kind == "one") & (table.length == 1)].mean_square.isna().all()
-    readings = table.drop_duplicates("kind").set_index("kind").readings
-    assert (readings["pose"], readings["one"], readings["three"], readings["joint encoders, 10 µrad"]) == (6, 3, 9, 6)
+    scalars = table.drop_duplicates("kind").set_index("kind").scalars
+    assert (scalars["pose"], scalars["one"], scalars["three"], scalars["joint encoders, 10 µrad"]) == (6, 3, 9, 6)
 
 
 def test_one_joint_turns_at_a_time(kuka):

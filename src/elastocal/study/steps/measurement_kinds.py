@@ -35,7 +35,7 @@ def kind_blocks(
 
     `reflectors`: from the end-effector, in its frame (m), by names of kinds. `encoders_rad`: standard deviations of encoders
     that measure how far a joint yields behind its gear. Yields columns of one block of the kinds table: one kind in one block
-    of data sets; `readings`: scalar measurements of one configuration.
+    of data sets; `scalars`: scalar measurements of one configuration.
     """
     end, n, form = study.robot.chain.end_effector.name, study.robot.joints, mean_form(study.judge())
     read = study.interpretation
@@ -58,7 +58,7 @@ def kind_blocks(
             yield {
                 **prefix_index_columns(sets, len(squares)),
                 "kind": kind,
-                "readings": np.full(squares.size, measured.deflection.shape[0]),
+                "scalars": np.full(squares.size, measured.deflection.shape[0]),
                 "mean_square": squares.T.ravel(),
             }
 
