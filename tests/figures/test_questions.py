@@ -9,6 +9,7 @@ from made_study_tables import budget as budget_frame
 from made_study_tables import costs as costs_frame
 from made_study_tables import designs as designs_frame
 from made_study_tables import ladder as ladder_frame
+from matplotlib.text import Text
 
 from elastocal.figures.questions import budget, costs, designs, ladder, metrics
 
@@ -59,6 +60,11 @@ def test_metrics_have_a_row_each_and_strategies_stand_where_their_ratio_is():
     assert one.get_xdata().tolist() == [1.0, 1.0] and other.get_xdata().tolist() == [1.2, 0.5]
     assert legend_entries(figure) == ["6DoF", "staged"]
     assert_nothing_cut_off(figure)
+
+
+def test_costs_of_an_accuracy_that_no_set_of_points_reaches_are_a_note():
+    figure = costs(costs_frame().assign(ratio=np.nan), TITLES, 60.0)
+    assert "no set of points reaches 60 µm" in " ".join(text.get_text() for text in figure.findobj(Text))
 
 
 def test_costs_have_a_line_for_each_set_of_points_over_the_first():

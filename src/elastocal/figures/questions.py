@@ -81,6 +81,8 @@ def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) ->
 
     `table`: from `costs.cost_table`. `titles`: name of each robot to draw, by its key.
     """
+    if not table.ratio.gt(0).any():
+        return note(f"no set of points reaches {accuracy_um:g} µm with the configurations of this study")
     labels = list(dict.fromkeys(table.points))
     figure, axes = panels(1, len(titles), 78, sharey=True)
     for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
