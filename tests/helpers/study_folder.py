@@ -10,7 +10,18 @@ import yaml
 from snakemake_starts import started
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SOURCES = ("Snakefile", "requirements.lock", "config.yaml", "config", "workflow", "profiles", "src", "README.md")
+SOURCES = (
+    "Snakefile",
+    "requirements.lock",
+    "config.yaml",
+    "config",
+    "workflow",
+    "profiles",
+    "src",
+    "README.md",
+    "paper.bib",
+    "CITATION.cff",
+)
 ROBOTS = ("kuka", "kuka_extended")
 NOISE = ("0", "200")
 STRATEGIES = ("6DoF", "4-6DoF-after-3DoF", "3+6DoF-comb")
