@@ -34,6 +34,8 @@ SMALL = {
     "test_configurations": 20,
     "evaluation": {"bootstrap_replicates": 10, "lengths": [5, 10, 20]},
     "tables": {"noise_um": 200, "length": 20, "classical_strategy": "6DoF"},
+    # So many configurations reach them.
+    "questions": {"accuracies_um": [120, 90]},
     # The loop has tests of its own.
     "loop": {"proposed_states": 2, "campaigns": [], "measured": []},
 }

@@ -38,6 +38,8 @@ ASKED = (
     *("tabulate_budget", "tabulate_ladder", "tabulate_designs", "tabulate_observability"),
     *("vary_assumptions", "tabulate_assumptions", "draw_budget", "draw_ladder", "draw_designs"),
     *("map_arm", "tabulate_places", "draw_arm_map", "judge_in_use", "vary_tubes", "tabulate_tubes"),
+    *("compare_few", "compare_kinds", "simulate_designs", "tabulate_simulated_designs"),
+    *("tabulate_costs", "draw_costs", "tabulate_studies", "draw_studies"),
 )
 DATA = ("draw_experiments", "simulate", "measure", "summarize_initial", "draw_weights", "judge_design", "draw_scheme")
 COMPARED_STRATEGIES = {

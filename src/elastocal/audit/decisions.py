@@ -33,6 +33,8 @@ _OF_DIGITS, _ZERO = 1e-6, 1e-7
 # Estimates of single data sets on exact deflections; models of second order against the exact kinematics.
 _CLOSE, _FIRST_ORDER = 1e-6, 1e-3
 _LEVEL = 0.05
+# Monte Carlo standard errors: one value in 30,000 is further off by chance.
+_SIGMAS = 4.0
 _VERDICTS = {"holds", "holds in part", "does not hold"}
 # Numbers of reflectors by what a table calls them.
 _COUNTED = {1: "one reflector", 3: "three reflectors"}
@@ -276,13 +278,25 @@ def start_columns(run: Audited, file: str, robot: str) -> Iterator[Finding]:
     yield require("shares lie between 0 and 1", "pandas", shares, "one outside", len(frame))
 
 
+def _exceeds(ours: pd.Series, error: pd.Series, theirs: pd.Series, their_error: pd.Series) -> pd.Series:
+    """Where a simulated value is above another by more than its Monte Carlo error."""
+    return ours - theirs > _SIGMAS * np.hypot(error, their_error)
+
+
+def _by_load(*values: pd.Series) -> Iterator[list[pd.Series]]:
+    """Series of each load by increasing size."""
+    for load in values[0].index.unique("load"):
+        yield [each.xs(load).sort_index() for each in values]
+
+
 def simulated(run: Audited, file: str, sizes: str, robot: str) -> Iterator[Finding]:
     """Chosen configurations are better than random ones where they are judged, and more are better than fewer."""
     frame = run.table(file)
-    by = frame.pivot(index=["load", "configurations"], columns="design", values="rms")
-    better = (by["I"] < by["random"]).all()
+    by = frame.pivot(index=["load", "configurations"], columns="design", values=["rms", "std_error"])
+    ours, random = ((by["rms", design], by["std_error", design]) for design in ("I", "random"))
+    better = not _exceeds(*ours, *random).any()
     yield require("I-optimal configurations leave less than random ones", "pandas", better, "some leave more", len(by))
-    falls = all((cell["I"].sort_index().diff().dropna() < 0).all() for _, cell in by.groupby("load"))
+    falls = not any(_exceeds(*each, *(values.shift() for values in each)).any() for each in _by_load(*ours))
     yield require("more I-optimal configurations leave less", "pandas", falls, "some leave more", len(by))
     wanted = run.configuration["questions"]["simulated_designs"]["sizes"][sizes]
     yield compare("sizes", "counting", sorted(frame["configurations"].unique()), sorted(wanted), 0.0)

@@ -186,7 +186,7 @@ def designs(run: Audited) -> _Rows:
 
 def observability(run: Audited) -> _Rows:
     for robot in run.reduced:
-        ranked: Any = run.table(f"results/observability/{robot}.parquet").corr("spearman")
+        ranked: Any = run.table(f"results/observability/{robot}.parquet").corr("spearman", numeric_only=True)
         for index in ("O1", "O2", "O3", "O4", "O5", "bound"):
             row: dict[str, Any] = {"robot": robot, "index": index}
             for name, column in (("bound", "bound"), ("error", "mean_square")):
@@ -358,7 +358,7 @@ def tables(run: Audited, file: str, table: str) -> Iterator[Finding]:
 def printed_tables(run: Audited, file: str, number: str) -> Iterator[Finding]:
     """Values of a table for people against those of its CSV, to the digits that are printed."""
     source = run.table(f"reports/tables/table{number}.csv")
-    columns = [column for column in source.columns if not column.endswith("_std_error")]
+    columns = [name for name in source if not name.endswith("_std_error") and name != "strategy_file"]
     lines, off = (run.folder / file).read_text("utf-8").splitlines(), []
     if file.endswith("md"):
         rows = [line.strip("|").split("|") for line in lines[2:] if line.startswith("|")]
