@@ -6,7 +6,7 @@ WORKDIR /opt/elastocal
 COPY requirements-install.lock requirements-cluster.lock ./
 RUN python -m pip install --no-cache-dir --require-hashes -r requirements-install.lock \
     && uv pip install --system --no-cache --no-deps --require-hashes -r requirements-cluster.lock
-COPY pyproject.toml README.md LICENSE Snakefile config.yaml ./
+COPY pyproject.toml README.md LICENSE CITATION.cff paper.bib Snakefile config.yaml ./
 COPY config config
 COPY profiles profiles
 COPY src src

@@ -62,7 +62,8 @@ def strategies():
     for path in sorted((CONFIG / "strategies").glob("*.yaml")):
         document = read_document(path)
         check_document(document, "strategy", path)
-        found[path.stem] = strategy_from_document(document)
+        if "prior_std" not in document:
+            found[path.stem] = strategy_from_document(document)
     return found
 
 

@@ -1,5 +1,7 @@
 """What is asked of every file."""
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from made_audits import CONFIGURATION, ROBOT, failed
 from planted_errors import forge
@@ -41,6 +43,15 @@ def test_an_altered_and_a_missing_file_are_found(run):
     assert not intact(run, FILE, digest).holds
     (run.folder / FILE).unlink()
     assert intact(run, FILE, digest).note == "it is missing"
+
+
+def test_a_column_that_names_another_robot_is_found(run):
+    write(run)
+    facts = {key: value for key, value in pq.read_metadata(run.folder / FILE).metadata.items() if key != b"ARROW:schema"}
+    table = pq.read_table(run.folder / FILE)
+    other = table.set_column(0, table.schema.field("robot"), pa.array(["other"]).dictionary_encode())
+    pq.write_table(other.replace_schema_metadata(facts), run.folder / FILE)
+    assert failed(described(run, FILE)) == ["columns of what it is of"]
 
 
 @pytest.mark.parametrize(

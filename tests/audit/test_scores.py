@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_audits import made_run
 
-from elastocal.audit.scores import average, errors_of, first_stage, moment
+from elastocal.audit.scores import average, errors_of, fixed_joints, moment
 
 
 def test_the_true_compliances_leave_no_error(tmp_path):
@@ -25,7 +25,7 @@ def test_weights_count_data_sets_so_often():
     assert average(np.array([[1.0], [3.0]]), "stiffness", np.array([1, 2])) == pytest.approx(twice)
 
 
-def test_the_first_stage_is_what_the_last_one_holds():
+def test_the_fixed_joints_are_what_the_last_one_holds():
     stages = [{"points": ["a"], "joints": [1, 2]}, {"points": ["b"], "joints": [3], "held": [1, 2]}]
-    assert first_stage({"stages": stages}).tolist() == [0, 1]
-    assert first_stage({"stages": stages[:1]}).tolist() == [0, 1]
+    assert fixed_joints({"stages": stages}).tolist() == [0, 1]
+    assert fixed_joints({"stages": stages[:1]}).tolist() == [0, 1]

@@ -6,10 +6,12 @@ import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
 from made_study_tables import TITLES, strategy_scores
 from made_study_tables import budget as budget_frame
+from made_study_tables import costs as costs_frame
 from made_study_tables import designs as designs_frame
 from made_study_tables import ladder as ladder_frame
+from matplotlib.text import Text
 
-from elastocal.figures.questions import budget, designs, ladder, metrics
+from elastocal.figures.questions import budget, costs, designs, ladder, metrics
 
 
 def test_the_ladder_has_a_line_for_each_length_in_the_panel_of_its_noise():
@@ -51,10 +53,24 @@ def test_designs_have_a_line_each_and_the_wanted_accuracy(robot):
 
 
 def test_metrics_have_a_row_each_and_strategies_stand_where_their_ratio_is():
-    figure = metrics(strategy_scores(), TITLES, {"rms_um": "RMS", "k_sigma_percent_first_stage": "first stage"})
+    figure = metrics(strategy_scores(), TITLES, {"rms_um": "RMS", "k_sigma_percent_fixed_joints": "fixed joints"})
     kuka = figure.axes[0]
-    assert row_labels(kuka) == ["RMS", "first stage"]
+    assert row_labels(kuka) == ["RMS", "fixed joints"]
     one, other = [line for line in kuka.lines if line.get_marker() == "o"]
     assert one.get_xdata().tolist() == [1.0, 1.0] and other.get_xdata().tolist() == [1.2, 0.5]
     assert legend_entries(figure) == ["6DoF", "staged"]
+    assert_nothing_cut_off(figure)
+
+
+def test_costs_of_an_accuracy_that_no_set_of_points_reaches_are_a_note():
+    figure = costs(costs_frame().assign(ratio=np.nan), TITLES, 60.0)
+    assert "no set of points reaches 60 µm" in " ".join(text.get_text() for text in figure.findobj(Text))
+
+
+def test_costs_have_a_line_for_each_set_of_points_over_the_first():
+    figure = costs(costs_frame(), TITLES, 60.0)
+    kuka = figure.axes[0]
+    assert kuka.get_title() == "Kuka" and "60 µm over that of 6DoF" in kuka.get_ylabel()
+    np.testing.assert_allclose(kuka.lines[0].get_xydata(), [[0.1, 1.0], [1.0, 1.0]])
+    assert legend_entries(figure) == ["6DoF", "3+6DoF"]
     assert_nothing_cut_off(figure)

@@ -11,6 +11,7 @@ from elastocal.figures.strategies import (
     bias_and_accuracy,
     deviations,
     noise_impact,
+    over_studies,
     stiffness_errors,
 )
 from elastocal.figures.style import PALETTE
@@ -22,13 +23,13 @@ TITLES = {"kuka": "Kuka KR 270", "fanuc": "Fanuc R-2000"}
 
 def metrics_of(robot, strategy, size, noise_um=200.0, untrusted=0):
     frame = pd.DataFrame({"robot": robot, "strategy": strategy, "noise_um": noise_um, "length": LENGTHS})
-    for name, scale in (("k_sigma", 1.0), ("k_sigma_first_stage", 0.5), ("deviation", 1e-6)):
+    for name, scale in (("k_sigma", 1.0), ("k_sigma_fixed_joints", 0.5), ("deviation", 1e-6)):
         frame[name], frame[f"{name}_std_error"] = scale * size / LENGTHS, 0.1 * scale * size / LENGTHS
     return frame.assign(trustworthy=untrusted < LENGTHS)
 
 
 METRICS = pd.concat([metrics_of(robot, name, 10.0 * n) for robot in TITLES for n, name in enumerate(ORDER, 1)])
-PAPER = "paper: score, and length at the limit"
+PAPER = "the paper's Table 4"
 PRINTED = pd.DataFrame(
     [
         ("4", "kuka", "2DoF+6DoF", "k_sigma_4", 2.2),
@@ -78,17 +79,19 @@ def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_ar
 
 
 def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
-    whole, first = stiffness_errors(METRICS, PRINTED, "Kuka KR 270", "kuka", ORDER, 3.0).axes
+    figure = stiffness_errors(METRICS, PRINTED, "Kuka KR 270", "kuka", ORDER, 3.0)
+    whole, first = figure.axes
     for axis, scale in ((whole, 1.0), (first, 0.5)):
         one, other, limit = axis.lines[:3]
         np.testing.assert_allclose(one.get_ydata(), 10 * scale / LENGTHS)
         np.testing.assert_allclose(other.get_ydata(), 20 * scale / LENGTHS)
         assert band(axis.collections[1])[2] == pytest.approx((9 * scale, 11 * scale))
         assert list(limit.get_ydata()) == [3.0, 3.0] and [text.get_text() for text in axis.texts] == ["3 %"]
-    assert "all joints" in whole.get_title() and "first stage" in first.get_title()
+    assert "all joints" in whole.get_title() and "fixed in the last stage" in first.get_title()
     assert whole.get_ylabel() == r"$k_\Sigma$ (%)"
-    assert [text.get_text() for text in first.get_legend().get_texts()] == [*ORDER, PAPER]
-    # Both counts are the first stage's in the paper: its score at 4 configurations, and where it reaches 3 %.
+    assert legend_entries(figure) == [*ORDER, PAPER]
+    assert_nothing_cut_off(figure)
+    # Both counts are those of the fixed joints in the paper: its score at 4 configurations, and where it reaches 3 %.
     marks = [line for line in first.lines if line.get_marker() == "D"]
     assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [[[4, 2.2]], [[5, 3]]]
     assert marks[0].get_color() == first.lines[1].get_color()
@@ -117,8 +120,14 @@ def test_deviations_of_one_robot_are_in_micrometres_and_each_strategy_keeps_its_
     assert band(axis.collections[0])[5] == pytest.approx((1.8, 2.2))
     assert limit.get_ydata()[0] == 2.5 and texts_in_axes(figure) == ["2.5 µm"]
     assert one.get_color() != other.get_color() and one.get_linestyle() != other.get_linestyle()
-    assert axis.get_ylabel() == "dev, equation 15 (µm)" and axis.get_xlim() == (2, 5)
+    assert axis.get_ylabel() == "dev, equation 15 (µm)" and axis.get_xlim() == (2, 5.1)
     assert_nothing_cut_off(figure)
+
+
+def test_one_estimator_under_two_names_is_one_line():
+    twice = pd.concat([METRICS, METRICS[METRICS.strategy == "6DoF"].assign(strategy="6DoF again")])
+    figure = deviations(twice, PRINTED, "Kuka", "kuka", [*ORDER, "6DoF again"], 2.5)
+    assert legend_entries(figure) == [*ORDER, PAPER]
 
 
 def test_bias_and_accuracy_puts_the_averaged_model_below_the_error_of_one_data_set():
@@ -150,4 +159,19 @@ def test_bars_of_one_data_set_stand_in_the_given_order_with_bound_error_and_effi
         assert axis.get_xlabel() == "RMS end-effector error (µm)"
     assert row_labels(figure.axes[0]) == ORDER[::-1]
     assert legend_entries(figure) == ["Cramér-Rao bound", "RMS error"] and "20 configurations" in figure.get_suptitle()
+    assert_nothing_cut_off(figure)
+
+
+def test_studies_are_drawn_as_their_mean_and_one_estimator_once():
+    parts = [
+        metrics_of(robot, name, size * (1 + 0.1 * study)).assign(study=study)
+        for robot in TITLES
+        for name, size in (("6DoF", 20.0), ("6DoF again", 20.0), ("2DoF+6DoF", 10.0))
+        for study in (0, 1, 2)
+    ]
+    figure = over_studies(pd.concat(parts), PRINTED, TITLES, ["6DoF", "6DoF again", "2DoF+6DoF"])
+    deviation = figure.axes[2]
+    lines = [line for line in deviation.lines if line.get_marker() != "D"]
+    assert len(lines) == 2 and "6DoF again" not in legend_entries(figure)
+    np.testing.assert_allclose(lines[0].get_ydata(), 22.0 / LENGTHS, rtol=1e-9)
     assert_nothing_cut_off(figure)

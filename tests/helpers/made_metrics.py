@@ -9,7 +9,7 @@ LENGTHS = np.arange(1, 101)
 def metrics_of(strategy, bias=100.0, robot="arm"):
     """Metrics whose k_sigma and deviation fall as bias / length: percent and µm."""
     frame = pd.DataFrame({"robot": robot, "noise_um": 200.0, "strategy": strategy, "length": LENGTHS})
-    for name, scale in (("k_sigma", 1.0), ("k_sigma_first_stage", 0.5), ("deviation", 1e-6)):
+    for name, scale in (("k_sigma", 1.0), ("k_sigma_fixed_joints", 0.5), ("deviation", 1e-6)):
         frame[name], frame[f"{name}_std_error"] = scale * bias / LENGTHS, scale
     frame["initial_deviation"], frame["initial_deviation_std_error"] = 1e-3, 1e-5
     return frame

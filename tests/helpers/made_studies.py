@@ -17,7 +17,7 @@ def studies_of(robot="arm", strategy="A", biases=(20.0, 22.0, 24.0)):
     parts = []
     for number, bias in enumerate(biases, 1):
         frame = pd.DataFrame({"robot": robot, "study": number, "strategy": strategy, "length": LENGTHS})
-        frame["k_sigma"], frame["k_sigma_first_stage"] = bias / LENGTHS, 0.5 * bias / LENGTHS
+        frame["k_sigma"], frame["k_sigma_fixed_joints"] = bias / LENGTHS, 0.5 * bias / LENGTHS
         frame["deviation"], frame["compliance_1"] = 1e-6 * bias / LENGTHS, 1e-6 * bias
         parts.append(frame)
     return pd.concat(parts, ignore_index=True)

@@ -59,10 +59,10 @@ def judge(robot, at="end_effector"):
     return judge_from(robot, experiments[0], deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name][0], at)
 
 
-def evaluated_in_one_block(table, scores, first_stage_joints, method, replicates, lengths):
+def evaluated_in_one_block(table, scores, fixed_joints, method, replicates, lengths):
     sets = int(table["data_set"].max()) + 1
     *counts, tests = weight_blocks("kuka", 1, sets, CONFIGURATIONS_OF_THE_TEST, replicates)
-    return evaluated([table], counts, tests, scores, first_stage_joints, method, "averaged_model", lengths)
+    return evaluated([table], counts, tests, scores, fixed_joints, method, "averaged_model", lengths)
 
 
 def pinocchio_regressors(chain, block, name, at="end_effector", rows=6):

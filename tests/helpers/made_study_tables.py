@@ -4,6 +4,19 @@ import numpy as np
 import pandas as pd
 
 from elastocal.report.answers import answers
+from elastocal.report.decision_answers import (
+    break_even_rows,
+    claim_rows,
+    cost_facts,
+    few_rows,
+    joint_rows,
+    kind_rows,
+    measured_rows,
+    simulated_design_rows,
+    smallest_designs,
+    stiffness_rows,
+    study_facts,
+)
 from elastocal.report.metric_answers import METRIC_NAMES, metric_summary, score_rows, staged_rows
 from elastocal.report.question_answers import (
     budget_rows,
@@ -77,7 +90,7 @@ def expectations():
     names = ["robot", "strategy", "quantity", "expected", "studies", "studies_mean", "studies_std", "paper", "p_value"]
     rows = [
         ("kuka", "6DoF", "k_sigma_20_percent", 1.8, 16, 1.75, 0.1, np.nan, np.nan),
-        ("kuka", "6DoF", "k_sigma_20_percent_first_stage", 1.8, 16, 1.75, 0.1, 1.5, 0.0004),
+        ("kuka", "6DoF", "k_sigma_20_percent_fixed_joints", 1.8, 16, 1.75, 0.1, 1.5, 0.0004),
         ("kuka", "6DoF", "dev_20_um", 1.22, 16, 1.2, 0.08, 1.0, 0.04),
     ]
     return pd.DataFrame(rows, columns=names)
@@ -144,11 +157,11 @@ def tubes():
 
 
 def strategy_scores():
-    """A staged strategy that is worse by every metric but the sum over the joints of its first stage."""
+    """A staged strategy that is worse by every metric but the sum over the joints that its last stage fixes."""
     rows = []
     for robot in TITLES:
         for metric in METRIC_NAMES:
-            staged = 0.5 if metric.endswith("first_stage") else 1.2
+            staged = 0.5 if metric.endswith("fixed_joints") else 1.2
             for strategy, ratio, half in (("6DoF", 1.0, 0.0), ("staged", staged, 0.05)):
                 rank = 1 + ((ratio > 1) if staged > 1 else (ratio == 1))
                 rows.append((robot, metric, strategy, 75.0 * ratio, 0.5, ratio, ratio - half, ratio + half, int(rank)))
@@ -160,7 +173,7 @@ def score_pairs():
     rows = []
     for robot in TITLES:
         for metric in METRIC_NAMES:
-            turned = metric.endswith("first_stage") and robot == "kuka"
+            turned = metric.endswith("fixed_joints") and robot == "kuka"
             ratio = (2.0, 1.5, 2.5) if turned else (0.83, 0.80, 0.86)
             rows.append((robot, metric, "6DoF", "staged", *ratio, 0.83, 0.80, 0.86, turned))
     names = ["robot", "metric", "strategy", "other", "ratio", "ratio_low", "ratio_high"]
@@ -190,11 +203,108 @@ def weighting():
     )
 
 
+def measured():
+    """Table 4 over studies: the second strategy has a quarter of dev; averages of compliances and reflectors round figures."""
+    rows = []
+    for robot in TITLES:
+        for kind, factor in (("pose", 1.0), ("one reflector", 10.0), ("three reflectors", 0.5)):
+            for average, part in (("stiffness", 1.0), ("compliance", 0.25)):
+                for strategy, share in zip(STRATEGIES, (1.0, 0.25), strict=True):
+                    row = {"robot": robot, "strategy": strategy, "measured": kind, "average": average}
+                    for name, size in (("k_sigma", 4.0), ("k_sigma_fixed_joints", 2.0)):
+                        row |= {f"{name}_20_percent": size * factor * part, f"{name}_20_percent_std": 0.4}
+                        row |= {f"n_{name}_1_percent": 80.0 * factor, f"n_{name}_1_percent_std": 20.0}
+                    row |= {"dev_20_um": 8.0 * factor * part * share, "dev_20_um_std": 0.8}
+                    row |= {"n_dev_2_um": 90.0, "n_dev_2_um_std": 9.0, "rms_20_um": 80.0 * factor, "rms_20_um_std": 1.0}
+                    rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def joint():
+    row = {"joints": "fixed joints", "cells": 60, "differ": 2, "studies": 16, "below": 9, "below_studies_median": 3.0}
+    row |= {"below_studies_largest": 7.0, "below_p": 1 / 17, "statistic": 171.0, "statistic_studies_median": 120.0}
+    row |= {"statistic_studies_largest": 218.0, "statistic_p": 2 / 17}
+    return pd.DataFrame([row, row | {"joints": "all joints", "differ": 10}])
+
+
+def claims():
+    rows = [
+        (1, "5", "one is better", "kuka in 0 of 16 studies", "in 16 of 16 studies", 1.0, "holds in part"),
+        (2, "5", "they are the same", "equal", "equal", np.nan, "holds"),
+    ]
+    return pd.DataFrame(rows, columns=["number", "place", "claim", "literal", "ours", "p", "verdict"])
+
+
+def break_even():
+    row = {"accuracy_um": 60.0, "points": "3+6DoF", "against": "6DoF", "configurations": 18.2, "configurations_against": 31.7}
+    row |= {"break_even": 0.35, "break_even_low": 0.2, "break_even_high": np.inf}
+    return pd.DataFrame([row | {"robot": robot} for robot in TITLES])
+
+
+def costs():
+    rows = [("6DoF", 0.1, True), ("3+6DoF", 0.1, False), ("6DoF", 1.0, False), ("3+6DoF", 1.0, True)]
+    frame = pd.DataFrame(rows, columns=["points", "configuration_cost", "cheapest"])
+    frame = frame.assign(cost=50.0, ratio=1.0, ratio_low=0.9, ratio_high=1.1)
+    return pd.concat([frame.assign(robot=robot) for robot in TITLES], ignore_index=True)
+
+
+def simulated():
+    rows = []
+    for robot in TITLES:
+        for load, hidden in (("random", np.nan), ("hanging", "1")):
+            for size in (6, 20):
+                for design, rms in (("random", 140.0), ("D", 66.0), ("A", 65.0), ("I", 59.0), ("test pose", 140.0)):
+                    row = {"robot": robot, "load": load, "design": design, "configurations": size, "unobservable": hidden}
+                    row |= {"rms_um": rms * 6 / size + 20, "rms_um_std_error": 0.8, "at_test_pose_um": rms, "gain": 140 / rms}
+                    rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def few():
+    rows = []
+    for robot in TITLES:
+        for strategy, errors in (("6DoF", (10.0, 100.0)), ("6DoF shrunk", (10.0, 100.0))):
+            for error in errors:
+                for length in (2, 3, 10):
+                    rms = 1000.0 / length * (error / 100 if "shrunk" in strategy else 1)
+                    row = {"robot": robot, "nominal_error_percent": error, "strategy": strategy, "configurations": length}
+                    rows.append(row | {"rms_um": rms, "rms_um_std_error": 1.0, "median_um": rms})
+    return pd.DataFrame(rows)
+
+
+def kinds():
+    rows = []
+    for robot in TITLES:
+        for kind, scalars, lengths in (("pose", 6, (20,)), ("one reflector", 3, (20, 40))):
+            for length in lengths:
+                row = {"robot": robot, "kind": kind, "scalars_per_configuration": scalars, "configurations": length}
+                rows.append(row | {"scalars": scalars * length, "rms_um": 1600.0 / length, "rms_um_std_error": 0.5})
+    return pd.DataFrame(rows)
+
+
+def stiffness():
+    row = {"force_N": 1000.0, "softest_N_per_um": 0.79, "first_order_percent": 0.05, "loaded_percent": 0.055}
+    row |= {"by_k_c_percent": 0.06, "bias_percent": 0.02, "k_sigma_percent": 0.02, "offset_rank": 5, "rank": 6}
+    return pd.DataFrame([row | {"robot": robot} for robot in TITLES])
+
+
 def question_facts():
     """Facts of the research questions from these tables."""
     robots = [*TITLES]
     strategies = [Strategy("6DoF", (Stage(("6DoF",), tuple(range(6))),))]
     return {
+        "citation": {"authors": "the developers", "date": "2026-11-25", "version": "0.1.0", "license": "MIT"},
+        "claims": claim_rows(claims(), TITLES),
+        "joint": joint_rows(joint()),
+        "table4": measured_rows(measured(), TITLES),
+        "over_studies": [{"title": title} | study_facts(measured(), robot, *STRATEGIES) for robot, title in TITLES.items()],
+        "break_even": break_even_rows(break_even(), 60.0, TITLES),
+        "costs": cost_facts(costs(), TITLES),
+        "simulated": simulated_design_rows(simulated(), 20, TITLES),
+        "smallest": smallest_designs(simulated(), 60.0, TITLES),
+        "few": few_rows(few(), TITLES),
+        "kinds": kind_rows(kinds(), 20, TITLES),
+        "stiffness": stiffness_rows(stiffness(), TITLES),
         "strategies": strategy_rows(strategies),
         "ladder": ladder_rows(ladder()),
         "budget": budget_rows(budget(), pairs(), 20, robots),
@@ -204,7 +314,7 @@ def question_facts():
         "places": place_facts(places(), TITLES),
         "scores": score_rows(strategy_scores(), robots),
         "staged": staged_rows(strategy_scores(), robots),
-        "metrics": metric_summary(score_pairs()),
+        "metrics": metric_summary(score_pairs(), TITLES),
         "metric_names": METRIC_NAMES,
         "tubes": tube_rows(tubes()),
         "observability": observability_rows(observability(), robots),
@@ -212,6 +322,8 @@ def question_facts():
         "geometry": geometry_rows(geometry(), robots),
         "weighting": weighting_rows(weighting(), robots),
         "titles": TITLES,
+        "names": TITLES,
+        "full_names": [*TITLES.values()],
         "stated": stated(STATED),
         "size": {"data_sets": "1000", "configurations": "100", "test_configurations": "500", "seed": "1"},
     }

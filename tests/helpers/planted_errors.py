@@ -283,6 +283,18 @@ PLANTED = {
     "a standard error of a campaign halved": planted(
         STEPS, rewritten, of_parameter("c2", 2, "std_error", lambda b: 0.5 * b["std_error"])
     ),
+    "errors of few configurations scaled": planted("results/few/kuka.parquet", rewritten, scaled(1.01, "mean_square")),
+    "errors by poses scaled": planted("results/kinds/kuka.parquet", rewritten, scaled(1.01, "mean_square")),
+    "a first order too good": planted("results/stiffness/kuka.parquet", rewritten, scaled(0.9, "first_order")),
+    "stiffness errors of other studies scaled": planted(
+        "results/studies/R5_positions/kuka.parquet", rewritten, scaled(1.01, "k_sigma")
+    ),
+    "chosen configurations that are worse than random ones": planted(
+        "results/simulated_designs/few/kuka.parquet", rewritten, scaled(-1.0, "rms")
+    ),
+    "a cell of Table 4 over studies altered": planted("reports/tables/table4_studies.csv", cell, "dev_20_um", 1.001),
+    "a rank in the joint test that cannot be": planted("reports/tables/joint_test.csv", cell, "below_p", 0.99),
+    "an error of a design in other units": planted("reports/tables/simulated_designs_few.csv", cell, "rms_um", 1e-3),
     "a prior left out": planted(STEPS, rewritten, of_parameter("taper", 2, "prior_std", lambda b: 0.1)),
     "a correlation with the wrong sign": planted(CORRELATIONS, rewritten, scaled(-1.0, "correlation")),
     "a model more probable than its odds": planted(MODELS, rewritten, better_probability),

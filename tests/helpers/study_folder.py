@@ -10,7 +10,18 @@ import yaml
 from snakemake_starts import started
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SOURCES = ("Snakefile", "requirements.lock", "config.yaml", "config", "workflow", "profiles", "src", "README.md")
+SOURCES = (
+    "Snakefile",
+    "requirements.lock",
+    "config.yaml",
+    "config",
+    "workflow",
+    "profiles",
+    "src",
+    "README.md",
+    "paper.bib",
+    "CITATION.cff",
+)
 ROBOTS = ("kuka", "kuka_extended")
 NOISE = ("0", "200")
 STRATEGIES = ("6DoF", "4-6DoF-after-3DoF", "3+6DoF-comb")
@@ -23,6 +34,8 @@ SMALL = {
     "test_configurations": 20,
     "evaluation": {"bootstrap_replicates": 10, "lengths": [5, 10, 20]},
     "tables": {"noise_um": 200, "length": 20, "classical_strategy": "6DoF"},
+    # So many configurations reach them.
+    "questions": {"accuracies_um": [120, 90]},
     # The loop has tests of its own.
     "loop": {"proposed_states": 2, "campaigns": [], "measured": []},
 }

@@ -276,3 +276,24 @@ def test_a_value_that_an_empty_table_cannot_have_is_refused(new):
 def test_texts_of_another_length_are_refused(tmp_path):
     with refused("t.parquet", "rows", "one length"):
         write_table("t.parquet", TEXTS, [text_block(["a", "b"]) | {"owner": ["a"]}], ORIGIN)
+
+
+def test_what_a_file_is_of_stands_in_columns_that_any_reader_finds(tmp_path):
+    path = tmp_path / "things.parquet"
+    write_table(path, SCHEMA, [block("a", 0), block("b", 3, 2)], ORIGIN | {"robot": "kuka", "noise": "200", "strategy": "6DoF"})
+    read = pq.read_table(path)
+    assert read.column_names[:3] == ["robot", "noise_um", "strategy"] and pa.types.is_dictionary(
+        read.schema.field("robot").type
+    )
+    assert set(read["robot"].to_pylist()) == {"kuka"} and set(read["noise_um"].to_pylist()) == {200.0}
+    encodings = pq.ParquetFile(path).metadata.row_group(0).column(1).encodings
+    assert any("DICTIONARY" in encoding for encoding in encodings)
+    # Those who know the schema read what they know.
+    assert list(read_table(path, SCHEMA)) == [column.name for column in SCHEMA.columns]
+
+
+def test_a_column_of_the_schema_is_not_taken_from_the_provenance(tmp_path):
+    schema = TableSchema("named", (Column("robot", "string", "", "another robot"), Column("number", "int32", "", "a number")))
+    path = tmp_path / "named.parquet"
+    write_table(path, schema, [{"robot": "mine", "number": np.arange(2)}], {"robot": "kuka"})
+    assert pq.read_table(path)["robot"].to_pylist() == ["mine", "mine"]

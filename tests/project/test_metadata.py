@@ -85,8 +85,12 @@ def test_the_paper_has_the_sections_and_the_length_that_the_journal_asks_for():
     assert FEWEST_WORDS <= len(re.sub(r"<!--.*?-->", "", body, flags=re.DOTALL).split()) <= MOST_WORDS
 
 
-def test_the_paper_cites_what_its_bibliography_has():
+def test_papers_cite_what_their_bibliography_has():
+    """That of the software, and that of the study, whose labels of figures and tables look like references."""
     cited = set(re.findall(r"@([\w:-]+)", text("paper.md").split("---\n", 2)[2]))
+    study = text("src/elastocal/report/study.typ")
+    labels = set(re.findall(r"<(\w+)>", study)) | set(re.findall(r'tag: "(\w+)"', study))
+    cited |= set(re.findall(r"(?<!\w)@(\w+)", study)) - labels
     assert cited == set(re.findall(r"^@\w+\{([\w:-]+),$", text("paper.bib"), re.MULTILINE))
 
 

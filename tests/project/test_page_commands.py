@@ -248,7 +248,7 @@ def dry_runs():
 @pytest.mark.parametrize("words", dry_runs(), ids=" ".join)
 def test_snakemake_knows_its_targets(words, tmp_path):
     """A dry run: what the targets cost is minutes to hours, and others test what their jobs do."""
-    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src"):
+    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "paper.bib", "CITATION.cff"):
         (tmp_path / name).symlink_to(ROOT / name)
     called = [sys.executable, "-m", "snakemake", "-n", "-q", "all", "-j1", *words]
     ran = subprocess.run(called, cwd=tmp_path, capture_output=True, text=True)
@@ -257,7 +257,7 @@ def test_snakemake_knows_its_targets(words, tmp_path):
 
 @pytest.mark.parametrize("page", STORIES)
 def test_a_how_to_page_works_from_top_to_bottom(page, tmp_path):
-    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src"):
+    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "paper.bib", "CITATION.cff"):
         (tmp_path / name).symlink_to(ROOT / name)
     binaries = Path(sys.executable).parent
     (tmp_path / ".venv").symlink_to(binaries.parent)

@@ -17,6 +17,7 @@ import elastocal
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "Snakefile", "config.yaml", "config", "profiles", "src", "workflow")
+SOURCES += ("paper.bib", "CITATION.cff")
 # Of the checkout alone: it checks, rehearses and explains.
 LEFT_OUT = (
     "workflow/lint.py",
@@ -76,7 +77,12 @@ def files_of(folder):
 
 def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline(wheel):
     packages = {name.removeprefix("src/") for name in files_of("src") if ".egg-info/" not in name}
-    pipeline = {"Snakefile", "config.yaml"} | files_of("config") | files_of("profiles") | files_of("workflow")
+    pipeline = (
+        {"Snakefile", "config.yaml", "paper.bib", "CITATION.cff"}
+        | files_of("config")
+        | files_of("profiles")
+        | files_of("workflow")
+    )
     pipeline = {name for name in pipeline if not name.startswith(LEFT_OUT)}
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if not name.endswith("/")}

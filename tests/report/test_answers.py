@@ -39,7 +39,7 @@ def test_expectations_are_listed_where_the_paper_prints_a_figure():
     found = facts()
     assert found["studies"] == "16"
     assert [list(row.values()) for row in found["expectations"]] == [
-        ["kuka", "6DoF", "k_Σ at 20 (%), first stage", "1.80", "1.75 ± 0.10", "1.500", "0.0004"],
+        ["kuka", "6DoF", "k_Σ at 20 (%), fixed joints", "1.80", "1.75 ± 0.10", "1.500", "0.0004"],
         ["kuka", "6DoF", "dev at 20 (µm)", "1.22", "1.20 ± 0.08", "1.000", "0.04"],
     ]
 

@@ -18,12 +18,12 @@ def test_a_strategy_that_is_the_classical_one_is_called_the_same():
 
 
 def test_reversed_pairs_are_counted_by_metric_and_the_widest_is_named():
-    found = metric_summary(score_pairs())
-    assert found["pairs"] == "2" and found["reversed_by"] == "k_Σ of the first stage (1)"
-    assert "k_Σ of all joints" in found["never"] and "first stage" not in found["never"]
-    assert "of 6DoF on kuka is 2.00 times (1.50 to 2.50) that of staged, its RMS 0.83 times" in found["example"]
+    found = metric_summary(score_pairs(), TITLES)
+    assert found["pairs"] == "2" and found["reversed_by"] == "k_Σ of the fixed joints (1)"
+    assert "k_Σ of all joints" in found["never"] and "fixed joints" not in found["never"]
+    assert "of 6DoF on Kuka is 2.00 times (1.50 to 2.50) that of staged, its RMS 0.83 times" in found["example"]
 
 
 def test_without_a_reversal_there_is_no_example():
-    found = metric_summary(score_pairs().assign(reversed=False))
+    found = metric_summary(score_pairs().assign(reversed=False), TITLES)
     assert found["reversed_by"] == "none" and found["example"] == ""

@@ -1,5 +1,7 @@
 """The pages of the study's report compile from its facts and tables, with the robots that were studied."""
 
+from pathlib import Path
+
 import pytest
 import typst
 from drawn_figures import empty_pictures
@@ -8,20 +10,21 @@ from made_study_tables import facts, question_facts
 from elastocal.report.pages import write_report
 
 FIGURES = ["fig2", "fig3", "fig4", "fig5a", "fig5c", "table2_samples", "bias_and_accuracy", "accuracy_of_one_data_set"]
-FIGURES += ["scores_against_paper", "ladder", "budget", "designs", "arm_map", "metrics"]
+FIGURES += ["scores_against_paper", "ladder", "budget", "designs", "arm_map", "metrics", "studies", "costs"]
+BIBLIOGRAPHY = Path(__file__).resolve().parents[2] / "paper.bib"
 EVERY = facts() | question_facts()
 HEAD = {
     "table1": ["robot", "c1"],
     "table2": ["robot", "mean mm"],
     "table3": ["robot", "c1"],
     "table4": [f"n {k}" for k in range(8)],
-    "interpretations": ["number", "open", "interpretation"],
+    "interpretations": ["number", "open", "interpretation", "chosen on"],
 }
 
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory):
-    return empty_pictures(tmp_path_factory.mktemp("figures"), FIGURES)
+    return [*empty_pictures(tmp_path_factory.mktemp("figures"), FIGURES), BIBLIOGRAPHY]
 
 
 def tables(figures):
@@ -42,8 +45,8 @@ def test_a_figure_that_the_study_has_must_be_given(pictures, tmp_path):
 
 
 def test_a_missing_fact_is_an_error_and_no_blank(pictures, tmp_path):
-    known = {name: value for name, value in EVERY.items() if name != "below_expected"}
-    with pytest.raises(typst.TypstError, match="below_expected"):
+    known = {name: value for name, value in EVERY.items() if name != "claims"}
+    with pytest.raises(typst.TypstError, match="claims"):
         write_report(tmp_path / "study.pdf", known, tables(FIGURES), pictures)
     assert not list(tmp_path.iterdir())
 

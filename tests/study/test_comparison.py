@@ -50,7 +50,7 @@ def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference(
     )
     assert table.ours[[1, 2, 3, 4]].tolist() == pytest.approx([1.0, 0.53, 1.0, 2.0])
     assert table.z[[1, 2, 3, 4]].tolist() == pytest.approx([2.0, -1.0, -1.0, 1.0])
-    assert table.interpretation[3] == "R7, R10: joints of the first stage"
+    assert table.interpretation[3] == "R7, R10: joints fixed in the last stage"
     # Below all 21 single data sets but none; among the studies of `studies_of`, which have half of 1.1 %.
     assert table.studies_mean[[1, 3, 4]].tolist() == pytest.approx([1.0, 0.55, 1.1])
     assert table.p_value[1] == pytest.approx(2 / 22) and table.p_value[4] > table.p_value[3]
@@ -100,10 +100,10 @@ def test_only_the_figure_that_the_tube_was_chosen_for_says_so(results, robot, qu
     assert row.z == pytest.approx(3.0 if quantity == "deviation_mean" else -1.0)
 
 
-def test_k_sigma_of_a_strategy_without_a_first_stage_is_that_of_all_joints(results):
+def test_k_sigma_of_a_strategy_without_a_fixed_joints_is_that_of_all_joints(results):
     table = results.tables["table4"].copy()
     for suffix in ("", "_std_error"):
-        table[f"k_sigma_20_percent_first_stage{suffix}"] = table[f"k_sigma_20_percent{suffix}"]
+        table[f"k_sigma_20_percent_fixed_joints{suffix}"] = table[f"k_sigma_20_percent{suffix}"]
     row = compared(replace(results, tables=results.tables | {"table4": table}), "4", "arm", "A", "k_sigma_20", "percent", 1.0)
     assert (row.ours, row.interpretation) == (pytest.approx(2.0), "R7")
 

@@ -91,6 +91,12 @@ def test_data_sets_too_short_for_a_strategy_are_refused(config, config_folder):
     check_study(short, config_folder, "study.yaml")
 
 
+def test_a_strategy_with_a_prior_belongs_to_few_configurations(config, config_folder):
+    with refused(config_folder / "strategies/6DoF-shrunk.yaml", "prior_std:", "found 0.3", "questions.few.strategies"):
+        check_study(changed(config, ("strategies", 0), "6DoF-shrunk"), config_folder, "study.yaml")
+    assert [document["name"] for document in check_study(config, config_folder, "study.yaml").few] == ["6DoF", "6DoF shrunk"]
+
+
 @pytest.fixture
 def other_folder(tmp_path):
     """A config folder with one robot and one strategy, both sound."""
@@ -107,6 +113,7 @@ def other_folder(tmp_path):
 @pytest.fixture
 def other_config(config):
     other = deepcopy(config) | {"robots": ["arm"], "strategies": ["plain"]}
+    other["questions"]["few"]["strategies"] = ["plain"]
     if "classical_strategy" in other["tables"]:
         other["tables"]["classical_strategy"] = "plain"
     other["questions"]["point_sets"] = {"B": ["B"]}

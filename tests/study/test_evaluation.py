@@ -141,7 +141,7 @@ def test_metrics_are_equations_13_and_14_of_the_averages(judge, estimates, weigh
         np.testing.assert_allclose(table[f"compliance_{joint + 1}"], 1 / stiffness[:, joint], rtol=1e-12)
         np.testing.assert_allclose(table[f"delta_k_{joint + 1}"], delta[:, joint], rtol=0, atol=1e-10)
     np.testing.assert_allclose(table["k_sigma"], delta.sum(axis=1), rtol=0, atol=1e-10)
-    np.testing.assert_allclose(table["k_sigma_first_stage"], delta[:, :2].sum(axis=1), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(table["k_sigma_fixed_joints"], delta[:, :2].sum(axis=1), rtol=0, atol=1e-10)
     np.testing.assert_array_equal(table["deviation"], averages.deviation[0])
 
 
@@ -167,13 +167,13 @@ def test_replicates_are_every_replicate_at_every_length_without_the_first(judge,
     assert table["deviation"][row] == averages.deviation[4, 1]
     delta = 100 * (judge.reference / averages.compliance[4, 1] - 1)
     np.testing.assert_allclose(table["k_sigma"][row], delta.sum(), rtol=1e-9)
-    np.testing.assert_allclose(table["k_sigma_first_stage"][row], delta[:2].sum(), rtol=1e-9)
+    np.testing.assert_allclose(table["k_sigma_fixed_joints"][row], delta[:2].sum(), rtol=1e-9)
 
 
 def test_standard_errors_are_the_spread_of_the_replicates(judge, estimates, weights, counts):
     averages = average(blocks_of(estimates, weights), judge, "stiffness", "averaged_model", counts)
     metrics, replicates = (make(averages, judge.reference, (0, 1)) for make in (metrics_table, replicates_table))
-    for name in ("k_sigma", "k_sigma_first_stage", "deviation", "initial_deviation"):
+    for name in ("k_sigma", "k_sigma_fixed_joints", "deviation", "initial_deviation"):
         spread = replicates[name].reshape(REPLICATES, LENGTHS).std(axis=0, ddof=1)
         np.testing.assert_allclose(metrics[f"{name}_std_error"], spread, rtol=1e-12)
 

@@ -13,6 +13,7 @@ from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.identification import (
     Measurements,
+    Prior,
     cholesky_triangles,
     estimate_compliance,
     first_solvable_length,
@@ -320,3 +321,14 @@ def test_stages_before_one_that_identifies_every_joint_leave_no_trace(name, kuka
     lasting = without_forgotten_stages(strategies[name], kuka.joints)
     whole, short = (estimate_compliance(s, measurements, kuka.joints)[0] for s in (strategies[name], lasting))
     np.testing.assert_array_equal(short, whole)
+
+
+def test_a_strong_prior_gives_its_values_and_a_weak_one_those_of_least_squares(data, strategies):
+    strategy, nominal = strategies["6DoF"], np.tile(np.arange(1.0, 7.0)[:, None] * 1e-6, SETS)
+    strong, weak = (
+        estimate_compliance(strategy, data.measurements(), 6, Prior(nominal, np.full_like(nominal, std)))[0]
+        for std in (1e-9, 1e9)
+    )
+    np.testing.assert_allclose(strong, np.broadcast_to(nominal, strong.shape), rtol=1e-3)
+    plain = estimate_compliance(strategy, data.measurements(), 6)[0]
+    np.testing.assert_allclose(weak[3:], plain[3:], rtol=1e-6)

@@ -40,7 +40,7 @@ def test_the_figures_of_tables_3_and_4_are_found_with_their_units():
     expected = {"c1": 22.0, "k_sigma_20": 0.55, "dev_20": 1.1}
     for quantity, mean in expected.items():
         assert predicted(frame, "arm", "A", quantity, 20).mean == pytest.approx(mean)
-    assert predicted(frame, "arm", "A", "k_sigma_20", 20, first_stage=False).mean == pytest.approx(1.1)
+    assert predicted(frame, "arm", "A", "k_sigma_20", 20, fixed_joints=False).mean == pytest.approx(1.1)
     lengths = predicted(frame, "arm", "A", "n_dev_2_um", 20)
     assert lengths.logarithmic and lengths.mean == pytest.approx((10 * 11 * 12) ** (1 / 3))
     # In configurations, as far as a logarithm is straight.

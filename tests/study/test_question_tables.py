@@ -7,10 +7,14 @@ import pytest
 from elastocal.study.question_tables import (
     CHOSEN,
     designs_table,
+    few_table,
     geometry_table,
+    kinds_table,
     ladder_table,
     observability_table,
     places_table,
+    simulated_designs_table,
+    stiffness_table,
     tubes_table,
     weighting_table,
 )
@@ -83,3 +87,31 @@ def test_tubes_show_single_data_sets_and_what_joints_leave():
     assert (row["diameter_mm"], row["mean_mm"], row["mean_mm_between"]) == pytest.approx((250, 2, np.sqrt(2)))
     assert (row["std_mm"], row["max_mm"], row["left_um"]) == pytest.approx((1, 5, 1e6 * np.sqrt(2e-8)))
     assert tubes_table({}).empty
+
+
+def test_few_configurations_are_given_by_strategy_and_error_of_the_nominal_values():
+    frame = pd.DataFrame({"nominal_error": 0.3, "strategy": "A", "length": [1, 1, 1, 2, 2, 2], "data_set": [0, 1, 2] * 2})
+    frame["mean_square"] = [1e-10, 4e-10, 13e-10, np.nan, 1e-10, 1e-10]
+    table = few_table({"arm": frame})
+    assert table.nominal_error_percent.tolist() == [30, 30] and table.rms_um[0] == pytest.approx(1e6 * np.sqrt(6e-10))
+    assert table.median_um[0] == pytest.approx(20.0) and np.isnan(table.rms_um[1])
+
+
+def test_kinds_are_given_at_as_many_configurations_and_at_as_many_scalars():
+    frame = pd.DataFrame({"kind": "one", "scalars": 3, "length": np.arange(1, 41), "data_set": 0, "mean_square": 1e-10})
+    table = kinds_table({"arm": pd.concat([frame, frame.assign(data_set=1)])}, 20)
+    assert table[["configurations", "scalars"]].to_numpy().tolist() == [[20, 60], [40, 120]]
+    assert table.rms_um.tolist() == pytest.approx([10.0, 10.0])
+
+
+def test_the_gain_of_a_design_is_over_random_ones_of_its_size_and_load():
+    rows = [("a", "random", 5, 80e-6), ("a", "I", 5, 40e-6), ("b", "random", 5, 60e-6), ("b", "I", 5, 40e-6)]
+    frame = pd.DataFrame(rows, columns=["load", "design", "configurations", "rms"])
+    frame = frame.assign(unobservable="", std_error=1e-6, there=frame.rms)
+    assert simulated_designs_table({"arm": frame}).gain.tolist() == pytest.approx([1.0, 2.0, 1.0, 1.5])
+
+
+def test_stiffness_is_given_in_newtons_per_micrometre():
+    frame = pd.DataFrame([{"force": 1000.0, "softest": 8e5, "first_order": 0.1, "loaded": 0.2, "by_k_c": 0.3, "bias": 0.4}])
+    table = stiffness_table({"arm": frame.assign(k_sigma=0.5, offset_rank=5, rank=6)})
+    assert table.softest_N_per_um[0] == pytest.approx(0.8) and table.by_k_c_percent[0] == 0.3 and table["rank"][0] == 6

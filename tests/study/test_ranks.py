@@ -31,8 +31,8 @@ def uses_of(strategy, size, seed=1, tests=50):
     )
 
 
-def averaged(strategy, k_sigma, first_stage):
-    values = {"k_sigma": k_sigma, "k_sigma_first_stage": first_stage, "deviation": 1e-6 * k_sigma}
+def averaged(strategy, k_sigma, fixed):
+    values = {"k_sigma": k_sigma, "k_sigma_fixed_joints": fixed, "deviation": 1e-6 * k_sigma}
     metrics = pd.DataFrame([{"strategy": strategy, "length": LENGTH} | values])
     drawn = [{"strategy": strategy, "length": LENGTH, "replicate": n + 1} for n in range(50)]
     wobble = 1 + 0.05 * np.random.default_rng(2).normal(size=50)
@@ -42,7 +42,7 @@ def averaged(strategy, k_sigma, first_stage):
 
 @pytest.fixture(scope="module")
 def found():
-    """Strategy B leaves 1.5 times the error of A; C is A under another name; only the first stage of B looks better."""
+    """Strategy B leaves 1.5 times the error of A; C is A under another name; only the fixed joints of B look better."""
     uses = pd.concat([uses_of("A", 50.0), uses_of("B", 75.0), uses_of("C", 50.0)])
     both = [averaged("A", 4.0, 4.0), averaged("B", 6.0, 2.0), averaged("C", 4.0, 4.0)]
     metrics, replicates = (pd.concat(parts) for parts in zip(*both, strict=True))
@@ -61,13 +61,13 @@ def test_one_estimator_under_two_names_has_one_rank_and_ratio_one(found):
     table = ranks_table(found, "A").set_index(["metric", "strategy"])
     assert table["rank"][REFERENCE].to_dict() == {"A": 1, "B": 3, "C": 1}
     assert table.loc[(REFERENCE, "C"), ["ratio", "ratio_low", "ratio_high"]].tolist() == [1.0, 1.0, 1.0]
-    assert table["rank"]["k_sigma_percent_first_stage"].to_dict() == {"A": 2, "B": 1, "C": 2}
+    assert table["rank"]["k_sigma_percent_fixed_joints"].to_dict() == {"A": 2, "B": 1, "C": 2}
 
 
 def test_only_the_metric_that_puts_them_in_the_other_order_reverses(found):
     table = pairs_table(found)
     assert set(table.strategy) == {"A"} and set(table.other) == {"B"}
-    assert table[table.reversed].metric.tolist() == ["k_sigma_percent_first_stage"]
+    assert table[table.reversed].metric.tolist() == ["k_sigma_percent_fixed_joints"]
 
 
 @pytest.mark.parametrize("metric", [REFERENCE, "mean_um", "pooled_p95_um"])

@@ -5,7 +5,7 @@ from support import chain_of, refused
 
 from elastocal.study.strategies import check_strategy, strategy_from_document, without_forgotten_stages
 
-FIRST_STAGE_JOINTS = {
+FIXED_JOINTS = {
     "6DoF": (0, 1, 2, 3, 4, 5),
     "6DoF-after-3DoF": (0, 1, 2, 3, 4, 5),
     "4-6DoF-after-3DoF": (0, 1, 2),
@@ -28,14 +28,14 @@ POINTS = {
 
 
 def test_the_repository_has_the_eight_strategies_of_the_paper(strategies):
-    assert set(strategies) == set(FIRST_STAGE_JOINTS)
+    assert set(strategies) == set(FIXED_JOINTS)
     for file, strategy in strategies.items():
         assert strategy.name.replace(" ", "-") == file
 
 
-@pytest.mark.parametrize("name", FIRST_STAGE_JOINTS)
-def test_first_stage_joints_are_those_that_the_last_stage_takes_over(strategies, name):
-    assert strategies[name].first_stage_joints == FIRST_STAGE_JOINTS[name]
+@pytest.mark.parametrize("name", FIXED_JOINTS)
+def test_fixed_joints_are_those_that_the_last_stage_takes_over(strategies, name):
+    assert strategies[name].fixed_joints == FIXED_JOINTS[name]
 
 
 @pytest.mark.parametrize("name", POINTS)

@@ -6,7 +6,7 @@ import pytest
 from made_studies import studies_of
 
 from elastocal.study.printed import predicted
-from elastocal.study.study_tables import expectations_table, interpretations_table
+from elastocal.study.study_tables import expectations_table, interpretations_table, measured_table
 
 PRINTED = pd.DataFrame(
     [
@@ -24,11 +24,11 @@ SHIFTED = {"as_configured": studies_of(), "R4_other": studies_of(biases=(40.0, 4
 def test_expectations_stand_beside_studies_and_the_paper():
     expected = studies_of(biases=(21.0,)).drop(columns="study").assign(noise_um=200.0)
     table = expectations_table(studies_of(), expected, PRINTED, 20, ["A", "B"])
-    assert table.quantity.tolist() == ["k_sigma_20_percent", "k_sigma_20_percent_first_stage", "dev_20_um"]
+    assert table.quantity.tolist() == ["k_sigma_20_percent", "k_sigma_20_percent_fixed_joints", "dev_20_um"]
     assert table.expected.tolist() == pytest.approx([1.05, 0.525, 1.05])
     assert table.studies_mean.tolist() == pytest.approx([1.1, 0.55, 1.1]) and set(table.studies) == {3}
     assert table.studies_std.tolist() == pytest.approx([0.1, 0.05, 0.1])
-    # The paper's count is taken for that of the first stage.
+    # The paper's count is taken for that of the fixed joints.
     np.testing.assert_array_equal(table.paper, [np.nan, 0.6, 1.0])
     assert table.p_value[2] == pytest.approx(predicted(studies_of(), "arm", "A", "dev_20", 20).p_value(1.0))
 
@@ -61,3 +61,20 @@ def test_the_error_of_a_likelihood_is_the_jackknife_over_studies_of():
         densities = [predicted(frame, "arm", "A", "dev_20", 20).log_density(1.0) for frame in some]
         left.append(densities[0] - densities[1])
     assert found.log_likelihood_std_error == pytest.approx(np.sqrt(2 / 3 * ((left - np.mean(left)) ** 2).sum()))
+
+
+def test_table_4_over_studies_gives_medians_by_what_is_measured_and_averaged():
+    studies = studies_of(biases=(20.0, 22.0, 60.0))
+    for name in ("k_sigma", "k_sigma_fixed_joints", "deviation"):
+        studies[f"{name}_mean_compliance"] = 0.1 * studies[name]
+    studies["mean_square"] = 4e-10
+    table = measured_table({"pose": studies, "one reflector": studies}, 20, {"k_sigma": 1.0, "deviation": 2.0})
+    assert table[["measured", "average"]].to_numpy().tolist() == [
+        [kind, average] for kind in ("pose", "one reflector") for average in ("stiffness", "compliance")
+    ]
+    row = table.iloc[0]
+    assert row.k_sigma_20_percent == pytest.approx(1.1) and row.k_sigma_fixed_joints_20_percent == pytest.approx(0.55)
+    # The third study is an outlier that a robust deviation does not see: deviations 0.1, 0 and 1.9.
+    assert row.dev_20_um == pytest.approx(1.1) and row.dev_20_um_std == pytest.approx(1.4826 * 0.1)
+    assert (row.n_k_sigma_1_percent, row.n_dev_2_um) == (22, 11) and row.rms_20_um == pytest.approx(20.0)
+    assert table.dev_20_um[1] == pytest.approx(0.11)

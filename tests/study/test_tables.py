@@ -19,8 +19,8 @@ from elastocal.study.tables import (
 
 def test_lengths_of_table4_are_those_at_which_a_bias_that_falls_as_one_over_the_length_meets_the_limits():
     table = table4(metrics_of("A", 40.0), replicates_of("A", 40.0), ["arm"], ["A"], 200.0, 20, 1.0, 2.0).iloc[0]
-    assert table.k_sigma_20_percent == pytest.approx(2.0) and table.k_sigma_20_percent_first_stage == pytest.approx(1.0)
-    assert (table.n_k_sigma_1_percent, table.n_k_sigma_1_percent_first_stage, table.n_dev_2_um) == (40, 20, 20)
+    assert table.k_sigma_20_percent == pytest.approx(2.0) and table.k_sigma_20_percent_fixed_joints == pytest.approx(1.0)
+    assert (table.n_k_sigma_1_percent, table.n_k_sigma_1_percent_fixed_joints, table.n_dev_2_um) == (40, 20, 20)
     assert table.n_k_sigma_1_percent_std_error == pytest.approx(4.0)
     assert table.dev_20_um == pytest.approx(2.0)
 
@@ -34,7 +34,7 @@ def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law
 def test_lengths_of_table4_are_those_of_its_own_limits_each_between_two_lengths():
     """Biases of 40 % and 20 % over the length fall below 3 % and 40 um below 7 um at the next whole length."""
     table = table4(metrics_of("A", 40.0), replicates_of("A", 40.0), ["arm"], ["A"], 200.0, 20, 3.0, 7.0).iloc[0]
-    assert (table.n_k_sigma_3_percent, table.n_k_sigma_3_percent_first_stage, table.n_dev_7_um) == (14, 7, 6)
+    assert (table.n_k_sigma_3_percent, table.n_k_sigma_3_percent_fixed_joints, table.n_dev_7_um) == (14, 7, 6)
     # Replicates of 36, 40 and 44 %.
     assert table.n_k_sigma_3_percent_std_error == pytest.approx(np.std([12, 14, 15], ddof=1))
     assert table.n_dev_7_um_std_error == pytest.approx(np.std([6, 6, 7], ddof=1))

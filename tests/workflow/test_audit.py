@@ -68,6 +68,8 @@ NOT_FOLLOWED = {
     "expectations": {"studies", "paper", "studies_mean", "studies_std"},
     "strategy_scores": {"value_std_error", "ratio_low", "ratio_high"},
     "strategy_pairs": {"ratio_low", "rms_ratio_low"},
+    "joint_test": {f"{name}_studies_{what}" for name in ("below", "statistic") for what in ("median", "largest")},
+    "claims": {"place", "claim", "literal", "ours"},
 }
 
 

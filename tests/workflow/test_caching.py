@@ -26,12 +26,20 @@ LOOP = {
 REPORT = {("state_answers",), ("compile_report",), ("all",)}
 PER_DATA_SET = {("tabulate_accuracy",), ("draw_bias_and_accuracy",), ("draw_accuracy",)}
 # Of the robot without links, at the noise of the tables.
-REPEATED = {("repeat_studies", "as_configured", "kuka"), ("tabulate_expectations",)}
+REPEATED = {
+    *(("repeat_studies", measured, "kuka") for measured in ("as_configured", "R5_positions", "R5_three_reflectors")),
+    ("tabulate_expectations",),
+    ("tabulate_studies",),
+    ("draw_studies",),
+    ("judge_claims",),
+}
 ASKED = (
     *("repeat_studies", "compare_point_sets", "climb_ladder", "choose_designs", "index_observability"),
     *("tabulate_budget", "tabulate_ladder", "tabulate_designs", "tabulate_observability"),
     *("vary_assumptions", "tabulate_assumptions", "draw_budget", "draw_ladder", "draw_designs"),
     *("map_arm", "tabulate_places", "draw_arm_map", "judge_in_use", "vary_tubes", "tabulate_tubes"),
+    *("compare_few", "compare_kinds", "simulate_designs", "tabulate_simulated_designs"),
+    *("tabulate_costs", "draw_costs", "tabulate_studies", "draw_studies"),
 )
 DATA = ("draw_experiments", "simulate", "measure", "summarize_initial", "draw_weights", "judge_design", "draw_scheme")
 COMPARED_STRATEGIES = {
@@ -152,6 +160,8 @@ def test_another_noise_level_runs_that_level(finished):
     expected = jobs("measure", ROBOTS, ["50"]) | identified(noise=["50"])
     # Without a level without noise the expectations leave the linearisation out.
     expected |= jobs("expect", ["kuka"], ["200"], STRATEGIES) | {("tabulate_expectations",), ("draw_scores",)}
+    # Claims on one strategy go over all levels.
+    expected |= jobs("expect", ["kuka"], ["50"], ["6DoF"]) | {("judge_claims",)}
     assert finished.planned() == expected | {("draw_noise_impact",)} | PER_DATA_SET | REPORT
 
 
@@ -166,7 +176,7 @@ def test_the_compliance_of_a_robot_reruns_that_robot(finished):
         | jobs("summarize_initial", robot)
         | jobs("draw_scheme", ["fig3"])
         | {("tabulate_initial",), ("typeset_table", "table2"), ("draw_table2_samples",)}
-        | {("tabulate_extended",), ("compare_with_paper",), ("draw_scores",)}
+        | {("tabulate_extended",), ("compare_with_paper",), ("draw_scores",), ("judge_claims",)}
         | jobs("climb_ladder", robot)
         | {("tabulate_ladder",), ("draw_ladder",), ("vary_tubes", "kuka_extended"), ("tabulate_tubes",)}
     )
@@ -189,6 +199,7 @@ def test_more_data_sets_rerun_their_draws_but_not_those_of_the_test(finished, ev
 def test_an_edit_of_the_bounds_reruns_the_bounds(finished):
     finished.edit("src/elastocal/study/bounds.py")
     asked = jobs("compare_point_sets", ["kuka"]) | {("tabulate_budget",), ("draw_budget",)}
+    asked |= {("tabulate_costs",), ("draw_costs",), ("judge_claims",)}
     asked |= jobs("index_observability", ["kuka"]) | {("tabulate_observability",)}
     assert finished.planned() == jobs("bound", ROBOTS) | PER_DATA_SET | asked | REPORT
 
@@ -208,6 +219,7 @@ def test_an_edit_of_the_strategy_figures_reruns_figures(finished):
         ("draw_deviations", "c"),
         ("draw_bias_and_accuracy",),
         ("draw_accuracy",),
+        ("draw_studies",),
     }
     assert finished.planned() == figures | {("compile_report",), ("all",)}
 

@@ -4,7 +4,19 @@ import subprocess
 
 from durations import HUNG_S
 
-TARGETS = ("study", "extended_study", "loop", "measured", "blind", "closed_loop", "bad_rows", "planning", "audit", "crate")
+TARGETS = (
+    "study",
+    "paper",
+    "extended_study",
+    "loop",
+    "measured",
+    "blind",
+    "closed_loop",
+    "bad_rows",
+    "planning",
+    "audit",
+    "crate",
+)
 
 
 def test_every_target_finds_its_sources_and_its_configuration(unstarted, tmp_path):
@@ -13,3 +25,10 @@ def test_every_target_finds_its_sources_and_its_configuration(unstarted, tmp_pat
     command = unstarted.command("-n", "--quiet", "--snakefile", str(unstarted.path("Snakefile")), "--", *TARGETS)
     done = subprocess.run(**command | {"cwd": place}, capture_output=True, text=True, timeout=HUNG_S)
     assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_the_paper_is_its_tables_and_figures_alone(unstarted):
+    rules = {job[0] for job in unstarted.planned("paper")}
+    assert {"typeset_table", "tabulate_strategies", "draw_noise_impact", "draw_deviations", "draw_scheme"} <= rules
+    beyond = {"repeat_studies", "compare_point_sets", "judge_claims", "compile_report", "diagnose_campaign", "simulate_designs"}
+    assert not rules & beyond

@@ -14,7 +14,7 @@ TARGETS = ("study", "measured", "league", "blind", "closed_loop", "bad_rows", "p
 
 @pytest.fixture
 def folder(tmp_path):
-    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src"):
+    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "paper.bib", "CITATION.cff"):
         (tmp_path / name).symlink_to(REPOSITORY / name)
     return tmp_path
 

@@ -99,7 +99,7 @@ STUDY_SIZE = {
 # Keys of config.yaml that the files of study, loop and league depend on, and so their audit.
 AUDITED = [
     *("seed", "robots", "strategies", "noise_um", "data_sets", "configurations", "test_configurations", "loading"),
-    *("interpretations", "identification", "evaluation", "tables", "questions", "loop", "league"),
+    *("interpretations", "switched", "identification", "evaluation", "tables", "questions", "loop", "league"),
 ]
 # Files that jobs make.
 MADE = re.compile("(data|results|reports)/|ro-crate-metadata.json$")
@@ -212,7 +212,7 @@ def loading_of(interpretations):
 
 def conventions_of(interpretations):
     kept = {key: interpretations[key] for key in ("wrench_at", "average", "deviation_of")}
-    return kept | {"rows": rows_read(interpretations["measured"])}
+    return kept | {"rows": rows_read(interpretations["measured"]), "reflectors_m": interpretations.get("reflectors_m", [])}
 
 
 def study_in_memory(**size):

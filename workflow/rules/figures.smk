@@ -11,10 +11,11 @@ SCHEME_ROBOTS = {"fig2": REDUCED[0], **{f"fig2_{name}": name for name in REDUCED
 STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
 DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
 BEST_TWO = [name for name in (CLASSICAL, "3+6DoF-comb") if name in config["strategies"]]
+PAPER_FIGURES = [*SCHEME_ROBOTS, "fig4", *(f"fig5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS))]
 FIGURES = [
-    *SCHEME_ROBOTS,
-    "fig4",
-    *(f"fig5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS)),
+    *PAPER_FIGURES,
+    "studies",
+    "costs",
     "bias_and_accuracy",
     "accuracy_of_one_data_set",
     "scores_against_paper",
@@ -342,3 +343,52 @@ rule draw_metrics:
         titles=REDUCED_TITLES,
     script:
         "../scripts/draw_metrics.py"
+
+
+rule draw_costs:
+    input:
+        table=rules.tabulate_costs.output.costs,
+        sources=sources("draw_costs.py"),
+    output:
+        pdf="reports/figures/costs.pdf",
+        png=shown(
+            "reports/figures/costs.png",
+            "costs",
+            "Questions beyond the paper",
+            shows="Cost of an accuracy (RQ2)",
+            kind="figure",
+        ),
+    log:
+        "results/logs/draw_costs.log",
+    benchmark:
+        "results/timings/draw_costs.tsv"
+    params:
+        titles=REDUCED_TITLES,
+        accuracy_um=QUESTIONS["accuracies_um"][0],
+    script:
+        "../scripts/draw_costs.py"
+
+
+rule draw_studies:
+    input:
+        studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
+        reference=f"{CONFIG}/paper/reference.csv",
+        sources=sources("draw_studies.py"),
+    output:
+        pdf="reports/figures/studies.pdf",
+        png=shown(
+            "reports/figures/studies.png",
+            "studies",
+            "Tables and figures of the paper",
+            shows="Strategies over studies",
+            kind="figure",
+        ),
+    log:
+        "results/logs/draw_studies.log",
+    benchmark:
+        "results/timings/draw_studies.tsv"
+    params:
+        titles=REDUCED_TITLES,
+        order=list(NAMES.values()),
+    script:
+        "../scripts/draw_studies.py"

@@ -317,3 +317,156 @@ rule tabulate_tubes:
         robots=EXTENDED,
     script:
         "../scripts/tabulate_tubes.py"
+
+
+rule compare_few:
+    input:
+        sources=sources("compare_few.py"),
+    output:
+        few="results/few/{robot}.parquet",
+    log:
+        "results/logs/compare_few/{robot}.log",
+    benchmark:
+        "results/timings/compare_few/{robot}.tsv"
+    params:
+        study=study_in_memory(configurations=QUESTIONS["few"]["configurations"]),
+        strategies=STUDY.few,
+        nominal_errors=QUESTIONS["few"]["nominal_errors"],
+    script:
+        "../scripts/compare_few.py"
+
+
+rule compare_kinds:
+    input:
+        sources=sources("compare_kinds.py"),
+    output:
+        kinds="results/kinds/{robot}.parquet",
+    log:
+        "results/logs/compare_kinds/{robot}.log",
+    benchmark:
+        "results/timings/compare_kinds/{robot}.tsv"
+    params:
+        study=study_in_memory(configurations=2 * config["tables"]["length"]),
+        reflectors=QUESTIONS["kinds"]["reflectors_m"],
+        encoders_rad=[1e-6 * noise for noise in QUESTIONS["kinds"]["encoders_urad"]],
+    script:
+        "../scripts/compare_kinds.py"
+
+
+rule simulate_designs:
+    input:
+        sources=sources("simulate_designs.py"),
+    output:
+        designs="results/simulated_designs/{sizes}/{robot}.parquet",
+    log:
+        "results/logs/simulate_designs/{sizes}/{robot}.log",
+    benchmark:
+        "results/timings/simulate_designs/{sizes}/{robot}.tsv"
+    wildcard_constraints:
+        sizes="few|every",
+    params:
+        study=study_in_memory(),
+        candidates=QUESTIONS["candidates"],
+        sizes=lambda wildcards: QUESTIONS["simulated_designs"]["sizes"][wildcards.sizes],
+        loads=QUESTIONS["simulated_designs"]["loads"],
+        uses=QUESTIONS["uses"],
+    script:
+        "../scripts/simulate_designs.py"
+
+
+rule check_claims:
+    input:
+        sources=sources("check_claims.py"),
+    output:
+        stiffness="results/stiffness/{robot}.parquet",
+        starts="results/starts/{robot}.parquet",
+    log:
+        "results/logs/check_claims/{robot}.log",
+    benchmark:
+        "results/timings/check_claims/{robot}.tsv"
+    params:
+        study=study_in_memory(configurations=config["tables"]["length"]),
+        strategy=STUDY.strategies[CLASSICAL],
+        forces_N=QUESTIONS["forces_N"],
+        starts=[1e-6 * start for start in QUESTIONS["starts_urad_per_Nm"]],
+    script:
+        "../scripts/check_claims.py"
+
+
+rule tabulate_decisions:
+    input:
+        few=expand(rules.compare_few.output.few, robot=REDUCED),
+        kinds=expand(rules.compare_kinds.output.kinds, robot=REDUCED),
+        stiffness=expand(rules.check_claims.output.stiffness, robot=REDUCED),
+        starts=expand(rules.check_claims.output.starts, robot=REDUCED),
+        sources=sources("tabulate_decisions.py"),
+    output:
+        few=shown(
+            "reports/tables/few_configurations.csv",
+            "few_configurations",
+            "Questions beyond the paper",
+            shows="Fewer than ten configurations",
+            kind="table",
+        ),
+        kinds=shown(
+            "reports/tables/measurement_kinds.csv",
+            "measurement_kinds",
+            "Questions beyond the paper",
+            shows="What to measure (RQ2)",
+            kind="table",
+        ),
+        stiffness="reports/tables/stiffness.csv",
+        starts="reports/tables/starts.csv",
+    log:
+        "results/logs/tabulate_decisions.log",
+    benchmark:
+        "results/timings/tabulate_decisions.tsv"
+    params:
+        robots=REDUCED,
+        length=config["tables"]["length"],
+    script:
+        "../scripts/tabulate_decisions.py"
+
+
+rule tabulate_simulated_designs:
+    input:
+        designs=expand(rules.simulate_designs.output.designs, robot=REDUCED, allow_missing=True),
+        sources=sources("tabulate_simulated_designs.py"),
+    output:
+        table=shown(
+            "reports/tables/simulated_designs_{sizes}.csv",
+            "simulated_designs",
+            "Questions beyond the paper",
+            shows="Designs simulated, {sizes} sizes (RQ3)",
+            kind="table",
+        ),
+    log:
+        "results/logs/tabulate_simulated_designs/{sizes}.log",
+    benchmark:
+        "results/timings/tabulate_simulated_designs/{sizes}.tsv"
+    params:
+        robots=REDUCED,
+    script:
+        "../scripts/tabulate_simulated_designs.py"
+
+
+rule tabulate_costs:
+    input:
+        budgets=expand(rules.compare_point_sets.output.budget, robot=REDUCED),
+        sources=sources("tabulate_costs.py"),
+    output:
+        costs=shown(
+            "reports/tables/costs.csv", "costs", "Questions beyond the paper", shows="Cost of an accuracy (RQ2)", kind="table"
+        ),
+        break_even="reports/tables/break_even.csv",
+    log:
+        "results/logs/tabulate_costs.log",
+    benchmark:
+        "results/timings/tabulate_costs.tsv"
+    params:
+        robots=REDUCED,
+        point_sets=QUESTIONS["point_sets"],
+        accuracies_um=QUESTIONS["accuracies_um"],
+        weights={"seed": config["seed"], "replicates": config["evaluation"]["bootstrap_replicates"]},
+    script:
+        "../scripts/tabulate_costs.py"

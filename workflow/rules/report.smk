@@ -13,6 +13,33 @@ STATED = {
 }
 
 
+rule judge_claims:
+    input:
+        studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
+        expected=cells("expected", REDUCED, NOISE, CLASSICAL),
+        comparison=rules.compare_with_paper.output.table,
+        solvers=rules.tabulate_solvers.output.table,
+        starts=rules.tabulate_decisions.output.starts,
+        stiffness=rules.tabulate_decisions.output.stiffness,
+        designs=rules.tabulate_designs.output.table,
+        pairs=rules.tabulate_budget.output.pairs,
+        score_pairs=rules.tabulate_uses.output.pairs,
+        sources=sources("judge_claims.py"),
+    output:
+        table=shown(
+            "reports/tables/claims.csv", "claims", "Tables and figures of the paper", shows="Claims of the paper", kind="table"
+        ),
+    log:
+        "results/logs/judge_claims.log",
+    benchmark:
+        "results/timings/judge_claims.tsv"
+    params:
+        length=config["tables"]["length"],
+        robots=REDUCED,
+    script:
+        "../scripts/judge_claims.py"
+
+
 rule state_answers:
     input:
         comparison=rules.compare_with_paper.output.table,
@@ -33,6 +60,16 @@ rule state_answers:
         per_dataset=rules.tabulate_accuracy.output.table,
         extended=rules.tabulate_extended.output.table,
         solvers=rules.tabulate_solvers.output.table,
+        claims=rules.judge_claims.output.table,
+        studies=rules.tabulate_studies.output.table,
+        joint=rules.tabulate_studies.output.joint,
+        costs=rules.tabulate_costs.output.costs,
+        break_even=rules.tabulate_costs.output.break_even,
+        simulated="reports/tables/simulated_designs_few.csv",
+        few=rules.tabulate_decisions.output.few,
+        kinds=rules.tabulate_decisions.output.kinds,
+        stiffness=rules.tabulate_decisions.output.stiffness,
+        citation=placed(ROOT / "CITATION.cff"),
         metrics=cells("metrics", REDUCED, TABLE_NOISE),
         replicates=cells("replicates", REDUCED, TABLE_NOISE),
         noisiest=cells("metrics", REDUCED, f"{max(config['noise_um']):g}"),
@@ -44,9 +81,11 @@ rule state_answers:
     benchmark:
         "results/timings/state_answers.tsv"
     params:
-        titles=REDUCED_TITLES,
+        robots=REDUCED,
+        names=TITLES,
         cells={key: config["tables"][key] for key in ("noise_um", "length")} | {"classical_strategy": NAMES[CLASSICAL]},
         strategies=list(STUDY.strategies.values()),
+        best=NAMES.get("3+6DoF-comb", NAMES[CLASSICAL]),
         accuracy_um=QUESTIONS["accuracies_um"][0],
         joint_range=INTERPRETATIONS["joint_range"],
         size={key: config[key] for key in ("data_sets", "configurations", "test_configurations", "seed")},
@@ -64,6 +103,7 @@ rule compile_report:
         table4=rules.tabulate_strategies.output.table,
         interpretations=f"{CONFIG}/paper/interpretations.csv",
         figures=expand("reports/figures/{figure}.pdf", figure=FIGURES),
+        bibliography=placed(ROOT / "paper.bib"),
         pages=placed(PACKAGES / "elastocal" / "report" / "study.typ"),
         sources=sources("compile_report.py"),
     output:

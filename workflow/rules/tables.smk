@@ -131,7 +131,7 @@ rule tabulate_strategies:
         "results/timings/tabulate_strategies.tsv"
     params:
         robots=REDUCED,
-        strategies=list(NAMES.values()),
+        strategies={name: key for key, name in NAMES.items()},
         cells={key: value for key, value in config["tables"].items() if key != "classical_strategy"},
     script:
         "../scripts/tabulate_strategies.py"
@@ -179,6 +179,7 @@ rule tabulate_accuracy:
     params:
         robots=config["robots"],
         points={NAMES[name]: list(points) for name, points in STUDY.points.items()},
+        slugs={name: key for key, name in NAMES.items()},
     script:
         "../scripts/tabulate_accuracy.py"
 

@@ -14,7 +14,8 @@ TABLES = ("table1", "table2", "table3", "table4", "interpretations")
 def compile_report(job: Job) -> None:
     facts = read_json(job.input.answers)
     tables = {name: headed_rows(pd.read_csv(job.input[name])) for name in TABLES}
-    write_report(job.output.report, facts, tables | {"figures": job.params.figures}, job.input.figures, origin_of(job))
+    tables["figures"] = job.params.figures
+    write_report(job.output.report, facts, tables, [*job.input.figures, job.input.bibliography], origin_of(job))
 
 
 run(compile_report, snakemake)

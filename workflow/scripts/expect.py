@@ -33,7 +33,7 @@ def expect(job: Job) -> None:
         1e-6 * float(job.wildcards.noise),
         robot,
         judge,
-        strategy_from_document(settings.strategy).first_stage_joints,
+        strategy_from_document(settings.strategy).fixed_joints,
         settings.average,
         settings.deviation_of,
     )

@@ -41,7 +41,7 @@ def identify(job: Job) -> None:
         read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS),
         read_table(job.input.weights, WEIGHTS, counts, members=TESTS),
         judge,
-        strategy.first_stage_joints,
+        strategy.fixed_joints,
         settings.average,
         settings.deviation_of,
         settings.lengths,

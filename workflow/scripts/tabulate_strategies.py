@@ -4,7 +4,7 @@ from job import Job, run
 
 from elastocal.io.data_frames import read_long, write_csv
 from elastocal.study.table_schemas import REPLICATES, metrics
-from elastocal.study.tables import table4
+from elastocal.study.tables import table4, with_slugs
 
 
 def tabulate_strategies(job: Job) -> None:
@@ -13,10 +13,10 @@ def tabulate_strategies(job: Job) -> None:
         read_long(job.input.metrics, metrics),
         read_long(job.input.replicates, lambda joints: REPLICATES),
         settings.robots,
-        settings.strategies,
+        [*settings.strategies],
         **settings.cells,
     )
-    write_csv(job.output.table, table)
+    write_csv(job.output.table, with_slugs(table, settings.strategies))
 
 
 run(tabulate_strategies, snakemake)

@@ -9,7 +9,8 @@ from elastocal.study.tables import with_errors_merged
 
 
 def typeset_table(job: Job) -> None:
-    shown = with_errors_merged(pd.read_csv(job.input.table, keep_default_na=False, na_values=[""]))
+    frame = pd.read_csv(job.input.table, keep_default_na=False, na_values=[""])
+    shown = with_errors_merged(frame.drop(columns="strategy_file", errors="ignore"))
     write_markdown(job.output.markdown, shown, origin_of(job))
     write_latex(job.output.latex, shown, origin_of(job))
 

@@ -13,16 +13,19 @@ import pyarrow.parquet as pq
 from elastocal import __version__
 from elastocal.audit.findings import Finding, require
 from elastocal.audit.schemas import SCHEMAS
+from elastocal.io.storage import head_columns
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from elastocal.audit.audited import Audited
+    from elastocal.io.storage import Column
 
 # What is asked of every file, whatever it holds; other checks work something out again.
 OF_EVERY_FILE = frozenset(
     {
-        *("the file is there", "bytes as its job wrote them", "a table that is known", "columns", "units and meanings"),
+        *("the file is there", "bytes as its job wrote them", "a table that is known", "columns", "columns of what it is of"),
+        "units and meanings",
         *("finite and within range", "digest of its configuration"),
         *("version of the package", "made for where it lies", "made by what is configured"),
     }
@@ -56,22 +59,24 @@ def described(run: Audited, file: str) -> Iterator[Finding]:
     """What a Parquet file says of itself: schema, units, provenance; nothing of tables of another format."""
     facts = run.metadata(file)
     if "elastocal.table" in facts:
-        yield from _columns(run, file, facts["elastocal.table"])
+        yield from _columns(run, file, facts["elastocal.table"], facts["elastocal.provenance"])
         yield from _provenance(run, file, facts["elastocal.provenance"])
 
 
-def _columns(run: Audited, file: str, name: str) -> Iterator[Finding]:
+def _columns(run: Audited, file: str, name: str, origin: dict[str, Any]) -> Iterator[Finding]:
     stored, by = pq.ParquetFile(run.folder / file).schema_arrow, "the schemas"
     if name not in SCHEMAS:
         yield require("a table that is known", by, False, f"table {name}")
         return
     schema = SCHEMAS[name](sum(1 for field in stored.names if _OF_JOINTS.fullmatch(field)))
-    names = [column.name for column in schema.columns]
+    heads = head_columns(schema, origin)
+    columns = (*heads.values(), *schema.columns)
+    names = [column.name for column in columns]
     yield require("columns", by, stored.names == names, f"{sorted(set(stored.names) ^ set(names))}", len(names))
     if stored.names != names:
         return
     frame, units, wrong = run.table(file), [], []
-    for column in schema.columns:
+    for column in columns:
         stated = {key.decode(): value.decode() for key, value in (stored.field(column.name).metadata or {}).items()}
         if (stated.get("unit"), stated.get("meaning")) != (column.unit, column.meaning):
             units.append(f"{column.name}: {stated.get('unit')!r}, expected {column.unit!r}")
@@ -79,8 +84,16 @@ def _columns(run: Audited, file: str, name: str) -> Iterator[Finding]:
             values = frame[column.name].to_numpy(float)
             wrong += [f"{column.name} is not finite"] * bool(not column.missing and not np.isfinite(values).all())
             wrong += [f"{column.name} too small"] * bool(column.minimum is not None and (values < column.minimum).any())
+    other = [
+        column.name for key, column in heads.items() if {*map(str, frame[column.name])} - {str(_of_type(column, origin[key]))}
+    ]
+    yield require("columns of what it is of", "its own metadata", not other, ", ".join(other), len(frame) * len(heads))
     yield require("units and meanings", by, not units, ", ".join(units[:3]), len(names))
     yield require("finite and within range", "numpy", not wrong, ", ".join(wrong[:3]), len(frame))
+
+
+def _of_type(column: Column, value: Any) -> Any:
+    return value if column.type == "string" else float(value)
 
 
 def _provenance(run: Audited, file: str, origin: dict[str, Any]) -> Iterator[Finding]:

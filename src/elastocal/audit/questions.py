@@ -193,11 +193,14 @@ def places(run: Audited, file: str, robot: str) -> Iterator[Finding]:
 
 
 def studies(run: Audited, file: str, interpretation: str, robot: str) -> Iterator[Finding]:
-    """Scores of a sampled further study at its shortest lengths, drawn, estimated and averaged again."""
+    """Sums of stiffness errors; scores of a sampled further study at its shortest lengths, drawn and estimated again."""
     frame, settings = run.table(file), run.configuration
     sizes, sets = frame.groupby("study").size(), settings["data_sets"]
     expected = np.full(len(sizes), len(run.strategies) * settings["configurations"])
     yield compare("strategies and lengths of each study", "counting", sizes, expected, 0.0)
+    known = frame[frame["k_sigma"].notna()]
+    sums = 100 * (run.arm(robot).compliance / known.filter(regex=r"compliance_\d+$") - 1).sum(axis=1)
+    yield compare("k_sigma of the averaged compliances", "numpy", known["k_sigma"], sums, _CLOSE, 1e-6, sums)
     rows = frame[(frame["length"] <= _SHORT) & frame["k_sigma"].notna() & (interpretation == "as_configured")]
     for row in run.pick_rows(file, rows, 1) if len(rows) else ():
         length, first = int(row["length"]), int(row["study"]) * sets

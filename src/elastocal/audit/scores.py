@@ -25,7 +25,7 @@ _LENGTHS = 3
 _PERCENT = 600 * ROUNDING
 # A bound is a mean over all data sets: of longer ones it would take minutes.
 _SHORT = 12
-_SCORES = ("k_sigma", "k_sigma_first_stage", "deviation", "initial_deviation")
+_SCORES = ("k_sigma", "k_sigma_fixed_joints", "deviation", "initial_deviation")
 
 
 @cache
@@ -55,7 +55,7 @@ def moment(run: Audited, robot: str) -> np.ndarray:
     return np.einsum("tki,tkj->ij", slope, slope) / len(slope)
 
 
-def first_stage(strategy: Mapping[str, Any]) -> np.ndarray:
+def fixed_joints(strategy: Mapping[str, Any]) -> np.ndarray:
     """Joints that the paper's k_sigma counts alone (interpretation R10), from 0."""
     every = sorted({joint for stage in strategy["stages"] for joint in stage["joints"]})
     return np.array(strategy["stages"][-1].get("held") or every) - 1
@@ -82,7 +82,7 @@ def _score(
         deviation = np.average(errors_of(run, robot, compliance).mean(axis=1), weights=of_sets)
     relative = 100 * (truth / mean - 1)
     size = np.average(np.linalg.norm(judge_on(run, robot)[2], axis=1), weights=of_tests)
-    return mean, relative, [relative.sum(), relative[first_stage(run.strategies[strategy])].sum(), deviation, size]
+    return mean, relative, [relative.sum(), relative[fixed_joints(run.strategies[strategy])].sum(), deviation, size]
 
 
 def metrics(run: Audited, file: str, robot: str, noise_um: str, strategy: str) -> Iterator[Finding]:

@@ -34,7 +34,7 @@ _QUANTILE = 1.96
 _DIGIT = 1e-3
 
 
-def _groups(run: Audited, robots: Iterable[str], kind: str, *by: str) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
+def find_groups(run: Audited, robots: Iterable[str], kind: str, *by: str) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
     """Rows of files of the robots that go together, with what names them."""
     for robot in robots:
         for key, cell in run.table(f"results/{kind}/{robot}.parquet").groupby([*by], sort=False, observed=True):
@@ -44,7 +44,7 @@ def _groups(run: Audited, robots: Iterable[str], kind: str, *by: str) -> Iterato
 def _cells(run: Audited, robots: list[str]) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Every robot and strategy: names of the robot and of the strategy's file, and the row's head."""
     for key, document in run.strategies.items():
-        yield from ((robot, key, {"strategy": document["name"], "robot": robot}) for robot in robots)
+        yield from ((robot, key, {"strategy": document["name"], "strategy_file": key, "robot": robot}) for robot in robots)
 
 
 def _at(run: Audited, robot: str, key: str) -> Any:
@@ -63,7 +63,7 @@ def _single_sets(frame: pd.DataFrame) -> pd.DataFrame:
     return 1e3 * pd.DataFrame({"mean_mm": frame["mean"], "std_mm": spread, "max_mm": frame["maximum"]})
 
 
-def _root_mean(squares: pd.Series, head: str = "rms_um", error: str = "rms_um_std_error") -> dict[str, float]:
+def find_root_mean(squares: pd.Series, head: str = "rms_um", error: str = "rms_um_std_error") -> dict[str, float]:
     """Root of a mean and its standard error by the delta method, µm."""
     root = np.sqrt(squares.mean())
     return {head: 1e6 * root, error: 1e6 * stats.sem(squares) / (2 * root)}
@@ -109,7 +109,7 @@ def table4(run: Audited) -> _Rows:
     length, percent, microns = (tables[name] for name in ("length", "k_sigma_limit_percent", "deviation_limit_um"))
     # Score, factor to its unit, columns of its value and of the length at which it reaches a limit.
     columns = [("deviation", 1e6, f"dev_{length}_um", f"n_dev_{microns:g}_um", microns)]
-    for end in ("", "_first_stage"):
+    for end in ("", "_fixed_joints"):
         reached = f"n_k_sigma_{percent:g}_percent{end}"
         columns.append((f"k_sigma{end}", 1.0, f"k_sigma_{length}_percent{end}", reached, percent))
     for robot, key, row in _cells(run, run.reduced):
@@ -159,32 +159,34 @@ def per_dataset(run: Audited) -> _Rows:
 
 def budget(run: Audited) -> _Rows:
     length, sets = run.configuration["tables"]["length"], run.configuration["questions"]["point_sets"]
-    for head, at in _groups(run, run.reduced, "budget", "points", "length"):
+    for head, at in find_groups(run, run.reduced, "budget", "points", "length"):
         count = len(sets[head["points"]])
         row = head | {"configurations": head["length"], "measurements_per_configuration": count}
-        row |= {"crlb_rms_um": 1e6 * np.sqrt(at["bound"].mean())} | _root_mean(at["mean_square"], error="std_error_um")
+        row |= {"crlb_rms_um": 1e6 * np.sqrt(at["bound"].mean())} | find_root_mean(at["mean_square"], error="std_error_um")
         if head["length"] in (length, 2 * length // count):
             yield row
 
 
 def ladder(run: Audited) -> _Rows:
-    for head, cell in _groups(run, run.extended, "ladder", "noise", "length"):
+    for head, cell in find_groups(run, run.extended, "ladder", "noise", "length"):
         head |= {"noise_um": round(1e6 * head["noise"], 6)}
         for springs, some in cell.groupby("link_springs"):
             row = head | {"link_springs": str(springs), "chosen_percent": 100 * some["chosen"].mean()}
-            yield row | {"usual_link": some["added_link"].mode()[0] if springs else np.nan} | _root_mean(some["mean_square"])
+            yield (
+                row | {"usual_link": some["added_link"].mode()[0] if springs else np.nan} | find_root_mean(some["mean_square"])
+            )
         row = head | {"link_springs": "by cross-validation", "usual_link": np.nan, "chosen_percent": np.nan}
-        yield row | _root_mean(cell["mean_square"][cell["chosen"]])
+        yield row | find_root_mean(cell["mean_square"][cell["chosen"]])
 
 
 def designs(run: Audited) -> _Rows:
-    for head, at in _groups(run, run.reduced, "designs", "joint_range", "design", "configurations"):
+    for head, at in find_groups(run, run.reduced, "designs", "joint_range", "design", "configurations"):
         yield head | {f"{name}_um": 1e6 * at[name].iloc[0] for name in ("rms", "low", "high")}
 
 
 def observability(run: Audited) -> _Rows:
     for robot in run.reduced:
-        ranked: Any = run.table(f"results/observability/{robot}.parquet").corr("spearman")
+        ranked: Any = run.table(f"results/observability/{robot}.parquet").corr("spearman", numeric_only=True)
         for index in ("O1", "O2", "O3", "O4", "O5", "bound"):
             row: dict[str, Any] = {"robot": robot, "index": index}
             for name, column in (("bound", "bound"), ("error", "mean_square")):
@@ -195,13 +197,13 @@ def observability(run: Audited) -> _Rows:
 
 
 def places(run: Audited) -> _Rows:
-    for head, cell in _groups(run, run.reduced, "places", "joints", "along", "side"):
+    for head, cell in find_groups(run, run.reduced, "places", "joints", "along", "side"):
         row = head | {"along_m": head["along"]} | _ratio(cell["bound"], cell["bound_end_effector"])
         yield row | {f"seen_{name}_percent": 100 * cell[name].mean() for name in ("turned", "fixed")}
 
 
 def geometry(run: Audited) -> _Rows:
-    for head, cell in _groups(run, run.reduced, "geometry", "estimator"):
+    for head, cell in find_groups(run, run.reduced, "geometry", "estimator"):
         at = cell.iloc[0]
         row = head | {"rms_um": 1e6 * np.hypot(at["noise"], at["leak"])}
         for name in ("noise", "leak"):
@@ -211,15 +213,15 @@ def geometry(run: Audited) -> _Rows:
 
 
 def weighting(run: Audited) -> _Rows:
-    for head, _ in _groups(run, run.reduced, "weighting", "orientation_ratio", "per_metre", "equal", "weighted"):
+    for head, _ in find_groups(run, run.reduced, "weighting", "orientation_ratio", "per_metre", "equal", "weighted"):
         row = head | {"ratio": head["equal"] / head["weighted"]}
         yield row | {f"{name}_um": 1e6 * head[name] for name in ("per_metre", "equal", "weighted")}
 
 
 def tubes(run: Audited) -> _Rows:
-    for head, cell in _groups(run, run.extended, "tubes", "diameter"):
+    for head, cell in find_groups(run, run.extended, "tubes", "diameter"):
         single = _single_sets(cell)
-        row = head | {"diameter_mm": 1e3 * head["diameter"]} | _root_mean(cell["left"], "left_um", "left_um_std_error")
+        row = head | {"diameter_mm": 1e3 * head["diameter"]} | find_root_mean(cell["left"], "left_um", "left_um_std_error")
         yield row | dict(single.mean()) | dict(single.std().add_suffix("_between"))
 
 
@@ -227,7 +229,7 @@ def tubes(run: Audited) -> _Rows:
 _METRICS = {
     **{f"{name}_um": ("uses", name, 1.0, 1e6) for name in ("mean", "p95", "iso_9283", "path_max", "pooled_p95")},
     **{f"{head}_um": ("uses", name, 0.5, 1e6) for head, name in (("rms", "mean_square"), ("path_rms", "path_mean_square"))},
-    **{f"k_sigma_percent{end}": ("metrics", f"k_sigma{end}", 1.0, 1.0) for end in ("", "_first_stage")},
+    **{f"k_sigma_percent{end}": ("metrics", f"k_sigma{end}", 1.0, 1.0) for end in ("", "_fixed_joints")},
     "dev_um": ("metrics", "deviation", 1.0, 1e6),
 }
 
@@ -298,7 +300,7 @@ def _ours(run: Audited, row: Mapping[Any, Any]) -> tuple[Any, Any]:
     if number == "text":
         return pd.NA, pd.NA
     column = {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}.get(column, re.sub("deviation_(.*)", r"\1_mm", column))
-    column += "_first_stage" * ("k_sigma" in column)
+    column += "_fixed_joints" * ("k_sigma" in column)
     table, names = run.table(f"reports/tables/table{number}.csv"), ["robot", "strategy"] if number == "4" else ["robot"]
     rows = table[(table[names] == [row[name] for name in names]).all(axis=1)]
     if rows.empty or column not in rows:
@@ -310,7 +312,7 @@ def _ours(run: Audited, row: Mapping[Any, Any]) -> tuple[Any, Any]:
 def expectations(run: Audited) -> _Rows:
     length = run.configuration["tables"]["length"]
     stated = run.table("reports/tables/expectations.csv").set_index(["robot", "strategy", "quantity"]).to_dict("index")
-    columns = {f"k_sigma_{length}_percent{end}": (f"k_sigma{end}", 1.0) for end in ("", "_first_stage")}
+    columns = {f"k_sigma_{length}_percent{end}": (f"k_sigma{end}", 1.0) for end in ("", "_fixed_joints")}
     columns[f"dev_{length}_um"] = ("deviation", 1e6)
     for robot, key, head in _cells(run, run.reduced):
         closed = run.cell("expected", robot, key).set_index("length").loc[length]
@@ -356,7 +358,7 @@ def tables(run: Audited, file: str, table: str) -> Iterator[Finding]:
 def printed_tables(run: Audited, file: str, number: str) -> Iterator[Finding]:
     """Values of a table for people against those of its CSV, to the digits that are printed."""
     source = run.table(f"reports/tables/table{number}.csv")
-    columns = [column for column in source.columns if not column.endswith("_std_error")]
+    columns = [name for name in source if not name.endswith("_std_error") and name != "strategy_file"]
     lines, off = (run.folder / file).read_text("utf-8").splitlines(), []
     if file.endswith("md"):
         rows = [line.strip("|").split("|") for line in lines[2:] if line.startswith("|")]

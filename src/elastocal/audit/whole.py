@@ -13,6 +13,7 @@ from elastocal.audit import (
     campaigns,
     choices,
     data,
+    decisions,
     estimates,
     fits,
     held_out,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
     from elastocal.audit.audited import Audited
 
-_ROOMS = (data, estimates, scores, questions, choices, assumptions, tables, campaigns, fits, held_out, proofs)
+_ROOMS = (data, estimates, scores, questions, choices, decisions, assumptions, tables, campaigns, fits, held_out, proofs)
 # What works a file out again, by the form of its name; what stands in braces are arguments.
 CHECKS = tuple((form, check) for room in _ROOMS for form, check in room.CHECKS.items())
 _PATTERNS = [re.compile(re.sub(r"{(\w+)}", r"(?P<\1>[^/]+)", form.replace(".", r"\."))) for form, _ in CHECKS]

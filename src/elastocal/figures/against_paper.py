@@ -72,7 +72,7 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
 
 def _expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Series:
     """Expectations of one quantity by strategy; none of lengths."""
-    names = {f"{quantity}_percent_first_stage", f"{quantity}_um"}
+    names = {f"{quantity}_percent_fixed_joints", f"{quantity}_um"}
     mine = expectations[(expectations.robot == robot) & expectations.quantity.isin(names) & expectations.paper.notna()]
     return mine.set_index("strategy").expected
 

@@ -76,6 +76,32 @@ def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figur
 
 
 @styled
+def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) -> Figure:
+    """Cost of an accuracy by each set of points over the first one, by the cost of a configuration.
+
+    `table`: from `costs.cost_table`. `titles`: name of each robot to draw, by its key.
+    """
+    if not table.ratio.gt(0).any():
+        return note(f"no set of points reaches {accuracy_um:g} µm with the configurations of this study")
+    labels = list(dict.fromkeys(table.points))
+    figure, axes = panels(1, len(titles), 78, sharey=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        for index, points in enumerate(labels):
+            cell = table[(table.robot == robot) & (table.points == points) & (table.configuration_cost > 0)]
+            cost, band = cell.configuration_cost, {"color": PALETTE[index], "alpha": 0.12, "linewidth": 0}
+            axis.plot(cost, cell.ratio, **line_style(index), label=points)
+            axis.fill_between(cost, cell.ratio_low, cell.ratio_high, **band)
+        axis.set(title=title, xlabel="cost of a configuration (measurements)", xscale="log", yscale="log")
+        axis.set_xticks([0.01, 0.1, 1, 10])
+        axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        _plain(axis.yaxis)
+    axes[0, 0].set_ylabel(f"cost of {accuracy_um:g} µm over that of {labels[0] if labels else ''}")
+    title = "points measured in each configuration; bands: 95 % intervals by bootstrap over data sets"
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=4, title_fontsize=7.5)
+    return figure
+
+
+@styled
 def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, joint_range: str) -> Figure:
     """Error that random and optimal configurations leave, by their number.
 
@@ -121,7 +147,7 @@ def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, 
         axis.set(title=title, xscale="log", yticks=range(len(names)), ylim=(len(names) - 0.5, -0.5))
         _plain(axis.xaxis)
         axis.grid(visible=False, axis="y")
-    axes[0, 0].set_yticklabels(names.values())
+    axes[0, 0].set_yticklabels([name.replace("k_Σ", r"$k_\Sigma$") for name in names.values()])
     title = "score over that of the first strategy, 95 % intervals"
     figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
     return figure

@@ -6,12 +6,12 @@ import re
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from elastocal.figures.style import PALETTE, line_style, panels, styled
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     import pandas as pd
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ MICRO = 1e6
 # Of the linear panels of the noise impact: what a reader compares with the wanted accuracy.
 _LINEAR_UM = 20.0
 _LENGTH = "configurations in the data set"
-_BANDS = "bands: ± one Monte Carlo standard error"
+_BANDS = "bands: ± one Monte Carlo standard error; one estimator under several names is drawn once"
 
 
 @styled
@@ -58,19 +58,20 @@ def stiffness_errors(
 ) -> Figure:
     """Figures 5a and 5b: summed stiffness error of all strategies against the data set length, under both counts of joints.
 
-    `metrics`: long, of one noise level. `printed`: the printed figures; those of k_sigma are taken to count the joints of the
-    first stage. `order`: strategies. `limit_percent`: marked by a line.
+    `metrics`: long, of one noise level. `printed`: the printed figures; those of k_sigma are taken to count the
+    joints fixed in the last stage. `order`: strategies. `limit_percent`: marked by a line.
     """
-    figure, axes = panels(1, 2, 92, sharey=True)
-    counts = {"k_sigma": "all joints (equation 14)", "k_sigma_first_stage": "joints of the first stage"}
+    figure, axes = panels(1, 2, 96, sharey=True)
+    counts = {"k_sigma": "all joints (equation 14)", "k_sigma_fixed_joints": "joints fixed in the last stage"}
     for axis, (quantity, count) in zip(axes[0], counts.items(), strict=True):
         _strategy_lines(axis, metrics, robot, quantity, 1.0, order)
         _limit(axis, limit_percent, "%")
         axis.set(title=count, xlabel=_LENGTH)
     _printed_marks(axes[0, 1], printed, robot, "k_sigma", order)
     figure.suptitle(title, fontsize=9)
-    axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", ylim=(0, 20))
-    axes[0, 1].legend(loc="upper right", title=_BANDS, title_fontsize=7.5)
+    axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", yscale="log", ylim=(0.3, 40))
+    _plain(axes[0, 0])
+    _legend_below(figure, axes, _BANDS)
     return figure
 
 
@@ -82,13 +83,47 @@ def deviations(
 
     `metrics`: long, of one noise level. `printed`: the printed figures. `order`: strategies. `limit_um`: marked by a line.
     """
-    figure, axes = panels(1, 1, 88)
+    figure, axes = panels(1, 1, 92)
     axis = axes[0, 0]
     _strategy_lines(axis, metrics, robot, "deviation", MICRO, order)
     _limit(axis, limit_um, "µm")
     _printed_marks(axis, printed, robot, "dev", order)
-    axis.set(title=title, xlabel=_LENGTH, ylabel="dev, equation 15 (µm)", ylim=(0, 40))
-    axis.legend(loc="upper right", ncols=2, title=_BANDS, title_fontsize=7.5)
+    axis.set(title=title, xlabel=_LENGTH, ylabel="dev, equation 15 (µm)", yscale="log", ylim=(0.5, 80))
+    _plain(axis)
+    _legend_below(figure, axes, _BANDS)
+    return figure
+
+
+@styled
+def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str]) -> Figure:
+    """k_sigma over the fixed joints and deviation against the data set length: mean over studies and how they scatter.
+
+    `studies`: robot and the columns of `table_schemas.repeated`. `printed`: the printed figures. `titles`: name of each robot
+    to draw, by its key. `order`: strategies; one estimator under several names is drawn once, under the first of them.
+    """
+    figure, axes = panels(2, len(titles), 118, sharex=True, sharey="row")
+    quantities = (("k_sigma_fixed_joints", 1.0, "k_sigma", (0.2, 20)), ("deviation", MICRO, "dev", (0.5, 40)))
+    for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
+        for axis, (quantity, scale, name, span) in zip(column, quantities, strict=True):
+            mine = studies[studies.robot == robot]
+            means = mine.pivot_table(index="length", columns="strategy", values=quantity, observed=True)
+            for index in _distinct(means, order):
+                strategy, style = order[index], line_style(index)
+                curves = scale * mine[mine.strategy == strategy].pivot(index="study", columns="length", values=quantity)
+                middle, spread = curves.mean(), curves.std()
+                axis.plot(middle.index, middle, label=strategy, **style)
+                axis.fill_between(middle.index, middle - spread, middle + spread, color=style["color"], alpha=0.12, linewidth=0)
+            _printed_marks(axis, printed, robot, name, order)
+            # A margin on the right, where diamonds at the longest length would be cut in halves.
+            axis.set(xscale="log", yscale="log", xlim=(8, 1.05 * studies.length.max()), ylim=span)
+            _plain(axis)
+        column[0].set_title(title)
+        column[1].set_xlabel(_LENGTH)
+    axes[0, 0].set_ylabel(r"$k_\Sigma$ of the fixed joints (%)")
+    axes[1, 0].set_ylabel("dev, equation 15 (µm)")
+    _legend_below(
+        figure, axes, "bands: ± one standard deviation between studies; one estimator under several names is drawn once"
+    )
     return figure
 
 
@@ -149,19 +184,44 @@ def accuracy_of_one_data_set(per_dataset: pd.DataFrame, titles: Mapping[str, str
     return figure
 
 
-def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str, scale: float, order: Iterable[str]) -> None:
-    for index, strategy in enumerate(order):
-        mine = (metrics.robot == robot) & (metrics.strategy == strategy)
-        # Where the mean of 1/c exists in practice.
-        cell, style = metrics[mine & metrics.trustworthy], line_style(index)
-        axis.plot(cell.length, scale * cell[quantity], label=strategy, **style)
+def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str, scale: float, order: Sequence[str]) -> None:
+    # Where the mean of 1/c exists in practice.
+    mine = metrics[(metrics.robot == robot) & metrics.trustworthy]
+    for index in _distinct(mine.pivot(index="length", columns="strategy", values=quantity), order):
+        cell, style = mine[mine.strategy == order[index]], line_style(index)
+        axis.plot(cell.length, scale * cell[quantity], label=order[index], **style)
         _band(axis, cell.length, scale * cell[quantity], scale * cell[f"{quantity}_std_error"], style["color"])
-    axis.set_xlim(2, metrics.length.max())
+    axis.set_xlim(2, 1.02 * metrics.length.max())
+
+
+def _distinct(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
+    """Places of the strategies whose curve (a column each) no strategy before them has, to rounding."""
+    found: list[int] = []
+    for index, name in enumerate(order):
+        same = (np.allclose(curves[name], curves[order[other]], rtol=1e-6, atol=0, equal_nan=True) for other in found)
+        if name in curves and not any(same):
+            found.append(index)
+    return found
+
+
+def _legend_below(figure: Figure, axes: np.ndarray, title: str) -> None:
+    """One legend of all panels, each entry once."""
+    handles = {label: handle for axis in axes.flat for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    figure.legend([*handles.values()], [*handles], title=title, loc="outside lower center", ncols=4, title_fontsize=7.5)
+
+
+def _plain(axis: Axes) -> None:
+    """Numbers as they are on logarithmic axes."""
+    for each in (axis.xaxis, axis.yaxis):
+        if each.get_scale() == "log":
+            each.set_major_locator(LogLocator(subs=[1.0, 2.0, 5.0]))
+            each.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            each.set_minor_formatter(NullFormatter())
 
 
 def _printed_marks(axis: Axes, printed: pd.DataFrame, robot: str, quantity: str, order: Sequence[str]) -> None:
     """Scores that the paper prints at a length, and the lengths at which it has them reach a limit."""
-    label = "paper: score, and length at the limit"
+    label = "the paper's Table 4"
     for row in printed[(printed.table == "4") & (printed.robot == robot) & printed.strategy.isin(order)].itertuples():
         score = re.fullmatch(rf"{quantity}_(\d+)", str(row.quantity))
         reached = re.fullmatch(rf"n_{quantity}_([\d.]+)_\w+", str(row.quantity))

@@ -16,7 +16,7 @@ def read_frame(path: str | Path, schema: TableSchema, columns: Sequence[str] | N
 
 
 def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
-    """Tables of many strategies in one frame, headed by what their provenance says: robot, noise_um, strategy (its name).
+    """Tables of many strategies in one frame, headed by robot, noise_um and strategy (its name, not that of its file).
 
     `schema`: number of joints to TableSchema. Returns columns of robots with fewer joints are empty for the joints that they
     lack.

@@ -8,7 +8,7 @@ from elastocal.study.ranks import REFERENCE
 from elastocal.study.tables import worded
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     import pandas as pd
 
@@ -23,7 +23,7 @@ METRIC_NAMES = {
     "path_max_um": "largest on a milling path",
     "dev_um": "dev (equation 15)",
     "k_sigma_percent": "k_Σ of all joints",
-    "k_sigma_percent_first_stage": "k_Σ of the first stage",
+    "k_sigma_percent_fixed_joints": "k_Σ of the fixed joints",
 }
 
 
@@ -66,11 +66,11 @@ def staged_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, s
     return rows
 
 
-def metric_summary(pairs: pd.DataFrame) -> dict[str, str]:
+def metric_summary(pairs: pd.DataFrame, titles: Mapping[str, str]) -> dict[str, str]:
     """How often metrics put two estimators in the other order than the RMS error of one data set does.
 
-    `pairs`: from `ranks.pairs_table`. Returns pairs: of different estimators; reversed_by: metrics that reverse some, with how
-    many; never: metrics that reverse none; example: the most reversed pair.
+    `pairs`: from `ranks.pairs_table`. `titles`: names of robots by their keys. Returns pairs: of different estimators;
+    reversed_by: metrics that reverse some, with how many; never: metrics that reverse none; example: the most reversed pair.
     """
     counts = {
         name: int(pairs.reversed[pairs.metric == name].sum()) for name in METRIC_NAMES if name in {*pairs.metric} - {REFERENCE}
@@ -80,7 +80,7 @@ def metric_summary(pairs: pd.DataFrame) -> dict[str, str]:
     if len(worst):
         row = worst.iloc[int(worst["size"].argmax())]
         example = (
-            f"{METRIC_NAMES[row.metric]} of {row.strategy} on {row.robot} is {row.ratio:.2f} times "
+            f"{METRIC_NAMES[row.metric]} of {row.strategy} on {titles[row.robot]} is {row.ratio:.2f} times "
             f"({row.ratio_low:.2f} to {row.ratio_high:.2f}) that of {row.other}, its RMS {row.rms_ratio:.2f} times "
             f"({row.rms_ratio_low:.2f} to {row.rms_ratio_high:.2f})"
         )

@@ -23,7 +23,7 @@ def write_report(
 ) -> None:
     """Compile the report; the file appears whole or not at all.
 
-    `path`: the PDF. `facts`: from `answers.answers`. `tables`: rows of each table, the header first. `figures`: PDF files; the
-    document finds them by their names. `origin`: named in the foot of each page.
+    `path`: the PDF. `facts`: from `answers.answers`. `tables`: rows of each table, the header first. `figures`: PDF files, and
+    the bibliography; the document finds them by their names. `origin`: named in the foot of each page.
     """
     compile_document(path, "study.typ", {"facts": facts, "tables": tables}, figures, origin)

@@ -26,6 +26,20 @@ _INDEX_NAMES = {
 }
 
 
+def brief_names(titles: Mapping[str, str]) -> dict[str, str]:
+    """Names for cells of tables: the first words of each title that distinguish it from others.
+
+    A title that continues another one, as that of a robot with elastic links, keeps what it adds.
+    """
+    found = {}
+    for robot, title in titles.items():
+        base = min((other for other in titles.values() if title.startswith(other)), key=len)
+        words, others = base.split(), [other.split() for other in titles.values() if not other.startswith(base)]
+        count = next((n for n in range(1, len(words)) if words[:n] not in [other[:n] for other in others]), len(words))
+        found[robot] = " ".join(words[:count]) + title.removeprefix(base)
+    return found
+
+
 def strategy_rows(strategies: Sequence[Strategy]) -> list[dict[str, str]]:
     """What each strategy does, stage by stage.
 
@@ -35,7 +49,7 @@ def strategy_rows(strategies: Sequence[Strategy]) -> list[dict[str, str]]:
     for strategy in strategies:
         stages = []
         for stage in strategy.stages:
-            held = f", {_joints(stage.held)} held" if stage.held else ""
+            held = f", {_joints(stage.held)} fixed" if stage.held else ""
             stages.append(f"{' and '.join(stage.points)} → {_joints(stage.identified)}{held}")
         rows.append({"name": strategy.name, "stages": "; then ".join(stages)})
     return rows

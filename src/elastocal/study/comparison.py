@@ -105,8 +105,8 @@ def _table4_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, flo
     column = _TABLE4.get(figure.quantity, figure.quantity)
     if "k_sigma" not in column:
         return *_pair(table, column, **key), "R8"
-    whole, first = _pair(table, column, **key), _pair(table, f"{column}_first_stage", **key)
-    return *first, "R7" if first == whole else "R7, R10: joints of the first stage"
+    whole, first = _pair(table, column, **key), _pair(table, f"{column}_fixed_joints", **key)
+    return *first, "R7" if first == whole else "R7, R10: joints fixed in the last stage"
 
 
 def _text_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:

@@ -90,7 +90,7 @@ def average(
     return Averages(averaged, deviation, initial, nonpositive / sets, spread)
 
 
-def metrics_table(averages: Averages, true_compliance: np.ndarray, first_stage_joints: Sequence[int]) -> dict[str, np.ndarray]:
+def metrics_table(averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]) -> dict[str, np.ndarray]:
     """Columns of the metrics table, one row for each length, from `average`.
 
     `true_compliance` (n,).
@@ -100,7 +100,7 @@ def metrics_table(averages: Averages, true_compliance: np.ndarray, first_stage_j
     for j in range(len(true_compliance)):
         replicated[f"compliance_{j + 1}"] = averages.compliance[..., j]
         replicated[f"delta_k_{j + 1}"] = relative[..., j]
-    replicated |= _replicated_scores(averages, true_compliance, first_stage_joints)
+    replicated |= _replicated_scores(averages, true_compliance, fixed_joints)
     table = {"length": np.arange(1, averages.deviation.shape[1] + 1)}
     for name, values in replicated.items():
         table[name], table[f"{name}_std_error"] = values[0], values[1:].std(axis=0, ddof=1)
@@ -110,19 +110,17 @@ def metrics_table(averages: Averages, true_compliance: np.ndarray, first_stage_j
     return table
 
 
-def replicates_table(
-    averages: Averages, true_compliance: np.ndarray, first_stage_joints: Sequence[int]
-) -> dict[str, np.ndarray]:
+def replicates_table(averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]) -> dict[str, np.ndarray]:
     """Columns of the replicates table: the scores of every bootstrap replicate at every length.
 
-    `averages`, `true_compliance`, `first_stage_joints`: as in `metrics_table`.
+    `averages`, `true_compliance`, `fixed_joints`: as in `metrics_table`.
     """
     replicates, lengths = averages.deviation[1:].shape
     table = {
         "replicate": np.repeat(np.arange(1, replicates + 1), lengths),
         "length": np.tile(np.arange(1, lengths + 1), replicates),
     }
-    scores = _replicated_scores(averages, true_compliance, first_stage_joints)
+    scores = _replicated_scores(averages, true_compliance, fixed_joints)
     return table | {name: values[1:].ravel() for name, values in scores.items()}
 
 
@@ -183,12 +181,10 @@ def _scores_of_one_data_set(compliance: np.ndarray, judge: Judge) -> np.ndarray:
     return np.stack([mean, square, errors[:, rank], errors[:, rank:].max(axis=1)], 1).reshape(sets, lengths, 4)
 
 
-def _replicated_scores(
-    averages: Averages, true_compliance: np.ndarray, first_stage_joints: Sequence[int]
-) -> dict[str, np.ndarray]:
+def _replicated_scores(averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]) -> dict[str, np.ndarray]:
     return {
         "k_sigma": k_sigma(averages.compliance, true_compliance),
-        "k_sigma_first_stage": k_sigma(averages.compliance, true_compliance, list(first_stage_joints)),
+        "k_sigma_fixed_joints": k_sigma(averages.compliance, true_compliance, list(fixed_joints)),
         "deviation": averages.deviation,
         "initial_deviation": averages.initial_deviation,
     }

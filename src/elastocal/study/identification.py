@@ -39,6 +39,25 @@ class Measurements:
 
 
 @dataclass(frozen=True)
+class Prior:
+    """Compliances that are known beforehand, as from a data sheet.
+
+    `nominal` (n, sets): rad/(N m). `std` (n, sets): their standard deviations over that of the measurements.
+    """
+
+    nominal: np.ndarray
+    std: np.ndarray
+
+    def triangle(self, stage: Stage) -> np.ndarray:
+        """The equations c / std = nominal / std of the joints that a stage identifies, (pivots, columns, sets)."""
+        mine, pivots = list(stage.identified), len(stage.identified)
+        found = np.zeros((pivots, pivots + len(stage.held) + 1, self.nominal.shape[1]))
+        found[range(pivots), range(pivots)] = 1.0 / self.std[mine]
+        found[:, -1] = self.nominal[mine] / self.std[mine]
+        return found
+
+
+@dataclass(frozen=True)
 class Estimates:
     """What a strategy makes of each prefix; the first axis for the prefixes 1, 2, 3 ...
 
@@ -98,20 +117,24 @@ def undetermined_prefixes(strategy: Strategy, measurements: Mapping[str, Measure
 
 
 def estimate_compliance(
-    strategy: Strategy, measurements: Mapping[str, Measurements], joints: int
+    strategy: Strategy, measurements: Mapping[str, Measurements], joints: int, prior: Prior | None = None
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Solve the stages of a strategy one after the other (equation 11).
 
-    `strategy`, `measurements`, `joints`: as in `identify`. Returns `compliance` (configurations, n, sets): rad/(N m);
-    meaningless where a prefix is too short, see `first_solvable_length`; `triangles` (configurations, pivots, columns, sets):
-    triangular factor of each stage; columns: joints identified, joints held, right-hand side.
+    `strategy`, `measurements`, `joints`: as in `identify`. `prior`: what is known beforehand, as further measurements of each
+    stage (ridge regression towards it [1]). Returns `compliance` (configurations, n, sets): rad/(N m); meaningless where a
+    prefix is too short, see `first_solvable_length`; `triangles` (configurations, pivots, columns, sets): triangular factor of
+    each stage; columns: joints identified, joints held, right-hand side.
+
+    [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
     *_, configurations, sets = next(iter(measurements.values())).regressor.shape
     compliance = np.full((configurations, joints, sets), np.nan)
     triangles = []
     for stage in strategy.stages:
         pivots = len(stage.identified)
-        triangle = prefix_triangles(_systems(stage, measurements), configurations, pivots)
+        start = None if prior is None else prior.triangle(stage)
+        triangle = prefix_triangles(_systems(stage, measurements), configurations, pivots, start)
         right = triangle[:, :, -1]
         for column, joint in enumerate(stage.held, pivots):
             right = right - triangle[:, :, column] * compliance[:, None, joint]
@@ -199,12 +222,15 @@ def condition_numbers(strategy: Strategy, triangles: Iterable[np.ndarray]) -> np
     return largest
 
 
-def prefix_triangles(systems: Iterable[np.ndarray], configurations: int, pivots: int) -> np.ndarray:
+def prefix_triangles(
+    systems: Iterable[np.ndarray], configurations: int, pivots: int, start: np.ndarray | None = None
+) -> np.ndarray:
     """Triangular factor of the first k configurations, for every k, by Householder reflections [1].
 
     `systems` (rows, columns, sets): equations of one configuration after the other: unknowns first, right-hand side last. They
     are overwritten, and each may lie in the memory of the one before. `configurations`: how many systems there are. `pivots`:
-    how many leading columns are unknowns to eliminate. Returns (configurations, pivots, columns, sets): rows of R and, in the
+    how many leading columns are unknowns to eliminate. `start` (pivots, columns, sets): the triangle before any of them; zero
+    without. Returns (configurations, pivots, columns, sets): rows of R and, in the
     remaining columns, Q^T times them.
 
     Sequential accumulation [2]: the factor of k configurations on top of the rows of the next one is again reduced to a
@@ -218,6 +244,7 @@ def prefix_triangles(systems: Iterable[np.ndarray], configurations: int, pivots:
     for index, new in enumerate(systems):
         if index == 0:
             triangles = np.zeros((configurations, pivots, *new.shape[1:]))
+            triangles[0] = 0.0 if start is None else start
             products = np.empty_like(new)
         else:
             triangles[index] = triangles[index - 1]

@@ -14,7 +14,8 @@ class Interpretation:
     """How the paper's open points are read, see ``schemas/config.yaml``.
 
     `loading`: R3, R4. `rows`: 6 where poses are measured, 3 where positions are (R5). `wrench_at`: R6. `average`,
-    `deviation_of`: R7 and R8, see `evaluation.average`.
+    `deviation_of`: R7 and R8, see `evaluation.average`. `reflectors_m`: from each measuring point, in its frame, to the
+    reflectors whose positions are measured there; without, the target of the robot itself is measured.
     """
 
     loading: Loading
@@ -22,6 +23,12 @@ class Interpretation:
     wrench_at: str
     average: str
     deviation_of: str
+    reflectors_m: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def independent_rows(self) -> int:
+        """Independent measurements of one point in one configuration: a rigid body moves in six ways."""
+        return min(6, self.rows * max(1, len(self.reflectors_m)))
 
 
 @dataclass(frozen=True)

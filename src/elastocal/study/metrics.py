@@ -26,12 +26,14 @@ class Judge:
 
     `reference` (n,): compliances about which the prediction is linear, rad/(N m). `quadratic_forms` (tests, (n + 1)(n + 2) /
     2): squared position error at each test configuration as a quadratic form in (c - reference, 1). `initial_errors` (tests,):
-    position error without any elastostatic model: the deflection itself, m.
+    position error without any elastostatic model: the deflection itself, m. `mean_rows` (3, n + 1): mean over the test
+    configurations of the position error as a linear form in (c - reference, 1).
     """
 
     reference: np.ndarray
     quadratic_forms: np.ndarray
     initial_errors: np.ndarray
+    mean_rows: np.ndarray
 
 
 def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarray, wrench_at: str = "end_effector") -> Judge:
@@ -53,7 +55,17 @@ def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarr
     rows = np.concatenate([slope, offset], axis=-1)
     first, second = np.triu_indices(robot.joints + 1)
     forms = (rows[..., first] * rows[..., second]).sum(axis=1) * np.where(first == second, 1.0, 2.0)
-    return Judge(robot.compliance, forms, np.linalg.norm(true_deflection[..., :3], axis=-1).ravel())
+    initial = np.linalg.norm(true_deflection[..., :3], axis=-1).ravel()
+    return Judge(robot.compliance, forms, initial, rows.mean(axis=0))
+
+
+def signed_deviation(judge: Judge, compliance: np.ndarray) -> np.ndarray:
+    """Equation 15 without a norm: the position error with its sign, mean over test configurations and coordinates.
+
+    `compliance` (models, n): rad/(N m). Returns (models,): m.
+    """
+    error = np.column_stack([compliance - judge.reference, np.ones(len(compliance))])
+    return error @ judge.mean_rows.mean(axis=0)
 
 
 def error_moment(judge: Judge) -> np.ndarray:

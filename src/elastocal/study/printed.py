@@ -71,19 +71,19 @@ class Predicted:
 
 
 def predicted(
-    studies: pd.DataFrame, robot: str, strategy: str, quantity: str, length: int, first_stage: bool = True
+    studies: pd.DataFrame, robot: str, strategy: str, quantity: str, length: int, fixed_joints: bool = True
 ) -> Predicted | None:
     """How one figure of Table 3 or 4 scatters between studies.
 
     `studies`: robot and the columns of `table_schemas.repeated`. `quantity`: c1.., k_sigma_20, dev_20, n_k_sigma_1_percent,
-    n_dev_2_um: with its length or its limit. `length`: data set length of figures that name none. `first_stage`: whether
-    k_sigma counts the joints of the first stage alone (interpretation R10). Returns None where the studies do not have it.
+    n_dev_2_um: with its length or its limit. `length`: data set length of figures that name none. `fixed_joints`: whether
+    k_sigma counts the joints fixed in the last stage alone (interpretation R10). Returns None where the studies do not have it.
     """
     rows = studies[(studies.robot == robot) & (studies.strategy == strategy)]
     if rows.empty or not (quantity[1:].isdigit() or quantity.startswith(("k_sigma_", "dev_", "n_"))):
         return None
     digit = next(digit for start, digit in _DIGIT.items() if quantity.startswith(start))
-    column = "deviation" if "dev" in quantity else "k_sigma_first_stage" if first_stage else "k_sigma"
+    column = "deviation" if "dev" in quantity else "k_sigma_fixed_joints" if fixed_joints else "k_sigma"
     if not quantity.startswith("n_"):
         place = int(quantity.rpartition("_")[2]) if "_" in quantity else length
         column, scale = (f"compliance_{quantity[1:]}", MICRO) if quantity[1:].isdigit() else (column, _scale(column))

@@ -1,4 +1,4 @@
-"""Tables of the research questions beyond the paper's strategies: springs that pay, designs, observability indices."""
+"""Tables of the research questions beyond the paper's strategies."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pandas as pd
 from scipy.stats import spearmanr
 
 from elastocal.study.budget_tables import MICRO, ratio_of_roots, root_mean
+from elastocal.study.designs import RANDOM
 from elastocal.study.observability import INDICES
 
 if TYPE_CHECKING:
@@ -147,3 +148,72 @@ def tubes_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
             rows.append(row | {"left_um": MICRO * left, "left_um_std_error": MICRO * error})
     names = ["robot", "diameter_mm", *(f"{name}_mm{more}" for name in ("mean", "std", "max") for more in ("", "_between"))]
     return pd.DataFrame(rows, columns=[*names, "left_um", "left_um_std_error"])
+
+
+def few_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Error of one data set of few configurations, with and without what a data sheet knows.
+
+    `frames`: the few table of each robot. Returns robot, nominal_error_percent, strategy, configurations, rms_um with its
+    standard error, median_um; empty where the configurations do not determine the compliances.
+    """
+    rows: list[dict[str, Any]] = []
+    for robot, frame in frames.items():
+        for (error, strategy, length), cell in frame.groupby(["nominal_error", "strategy", "length"], sort=False):
+            rms, spread = root_mean(cell.mean_square.to_numpy())
+            row: dict[str, Any] = {"robot": robot, "nominal_error_percent": 100 * float(str(error)), "strategy": strategy}
+            row |= {"configurations": length, "rms_um": MICRO * rms, "rms_um_std_error": MICRO * spread}
+            rows.append(row | {"median_um": MICRO * np.sqrt(cell.mean_square.median(skipna=False))})
+    names = ("robot", "nominal_error_percent", "strategy", "configurations", "rms_um", "rms_um_std_error", "median_um")
+    return pd.DataFrame(rows, columns=[*names])
+
+
+def kinds_table(frames: Mapping[str, pd.DataFrame], length: int) -> pd.DataFrame:
+    """Error of one data set by what is measured: in as many configurations, and with as many scalar measurements.
+
+    `frames`: the kinds table of each robot. `length`: configurations; the scalars are those of poses in so many. Returns
+    robot, kind, scalars_per_configuration, configurations, scalars, rms_um with its standard error.
+    """
+    rows: list[dict[str, Any]] = []
+    for robot, frame in frames.items():
+        for (kind, scalars), cell in frame.groupby(["kind", "scalars"], sort=False):
+            for configurations in sorted({length, 6 * length // int(str(scalars))}):
+                squares = cell.mean_square[cell.length == configurations].to_numpy()
+                if len(squares):
+                    rms, error = root_mean(squares)
+                    row: dict[str, Any] = {"robot": robot, "kind": kind, "scalars_per_configuration": scalars}
+                    row |= {"configurations": configurations, "scalars": configurations * int(str(scalars))}
+                    rows.append(row | {"rms_um": MICRO * rms, "rms_um_std_error": MICRO * error})
+    return pd.DataFrame(rows)
+
+
+def simulated_designs_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Simulated errors of random and chosen configurations by the kind of load.
+
+    `frames`: the simulated_designs table of each robot. Returns robot, load, design, configurations, unobservable, rms_um with
+    its standard error, at_test_pose_um, and gain: the error of random designs of the size over that of the design.
+    """
+    parts = []
+    for robot, frame in frames.items():
+        part = frame[["load", "design", "configurations", "unobservable"]].copy()
+        part.insert(0, "robot", robot)
+        names = {"rms": "rms_um", "std_error": "rms_um_std_error", "there": "at_test_pose_um"}
+        part = part.assign(**{name: MICRO * frame[column] for column, name in names.items()})
+        random = part[part.design == RANDOM].set_index(["load", "configurations"]).rms_um
+        keys = pd.MultiIndex.from_frame(part[["load", "configurations"]])
+        parts.append(part.assign(gain=random.reindex(keys).to_numpy() / part.rms_um))
+    return pd.concat(parts, ignore_index=True)
+
+
+def stiffness_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """What the Cartesian stiffness of the loaded arm (equation 6) changes.
+
+    `frames`: the stiffness table of each robot. Returns robot, force_N, softest_N_per_um, first_order_percent, loaded_percent,
+    by_k_c_percent, bias_percent, k_sigma_percent, offset_rank, rank.
+    """
+    parts = []
+    for robot, frame in frames.items():
+        part = pd.DataFrame({"robot": robot, "force_N": frame.force, "softest_N_per_um": frame.softest / MICRO})
+        for name in ("first_order", "loaded", "by_k_c", "bias", "k_sigma"):
+            part[f"{name}_percent"] = frame[name]
+        parts.append(part.assign(offset_rank=frame.offset_rank, rank=frame["rank"]))
+    return pd.concat(parts, ignore_index=True)

@@ -28,7 +28,7 @@ _QUANTILE = 1.96
 # Scores of strategies that are one estimator agree to rounding.
 _DIGITS = 6
 # Scores of averaged models, with the factor to their units.
-_AVERAGED = {"k_sigma_percent": ("k_sigma", 1.0), "k_sigma_percent_first_stage": ("k_sigma_first_stage", 1.0)}
+_AVERAGED = {"k_sigma_percent": ("k_sigma", 1.0), "k_sigma_percent_fixed_joints": ("k_sigma_fixed_joints", 1.0)}
 _AVERAGED |= {"dev_um": ("deviation", MICRO)}
 
 

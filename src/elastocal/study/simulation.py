@@ -27,15 +27,16 @@ if TYPE_CHECKING:
 class Loading:
     """How the robot is moved and loaded.
 
-    `force_N`: magnitude; the direction is uniform on the sphere. `offset_m`: from the end-effector to where the force acts.
-    `offset_frame`: axes of the offset (interpretation R4). `joint_range`: joint angles uniform in +-pi or within the robot's
-    limits (interpretation R3).
+    `force_N`: magnitude. `direction`: of the force, base axes; without one it is uniform on the sphere. `offset_m`: from the
+    end-effector to where the force acts. `offset_frame`: axes of the offset (interpretation R4). `joint_range`: joint angles
+    uniform in +-pi or within the robot's limits (interpretation R3).
     """
 
     force_N: float
     offset_m: tuple[float, ...]
     offset_frame: str
     joint_range: str
+    direction: tuple[float, ...] | None = None
 
 
 def random_experiments(
@@ -63,7 +64,10 @@ def random_experiments(
     turns = draw(seed, key, f"{purpose}/joint angles", data_sets, lambda stream: stream.random((configurations, n)))
     low, high = limits.T if loading.joint_range == "limits" else (np.full(n, -np.pi), np.full(n, np.pi))
     joint_angles = low + (high - low) * turns
-    normal = draw(seed, key, f"{purpose}/force", data_sets, lambda stream: stream.standard_normal((configurations, 3)))
+    if loading.direction is None:
+        normal = draw(seed, key, f"{purpose}/force", data_sets, lambda stream: stream.standard_normal((configurations, 3)))
+    else:
+        normal = np.broadcast_to(np.array(loading.direction, float), (*joint_angles.shape[:-1], 3))
     force = loading.force_N * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     rotation = poses(chain, joint_angles, chain.end_effector)[1] if loading.offset_frame == "tool" else None
     return Experiments(joint_angles, wrench_of_offset_force(force, loading.offset_m, rotation))

@@ -31,11 +31,13 @@ class Stage:
 class Strategy:
     """A named sequence of stages that together estimate every joint.
 
-    `name`: as printed in the paper.
+    `name`: as printed in the paper. `prior_std`: relative standard deviation of the nominal compliances, towards which the
+    estimates are shrunk; None where nothing is known beforehand.
     """
 
     name: str
     stages: tuple[Stage, ...]
+    prior_std: float | None = None
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -43,8 +45,11 @@ class Strategy:
         return tuple(dict.fromkeys(name for stage in self.stages for name in stage.points))
 
     @property
-    def first_stage_joints(self) -> tuple[int, ...]:
-        """Joints that the last stage takes over (which the paper's k_sigma counts alone, interpretation R10); else all."""
+    def fixed_joints(self) -> tuple[int, ...]:
+        """Joints that the last stage takes over (which the paper's k_sigma counts alone, interpretation R10); else all.
+
+        Not those that the first stage identifies: "4-6DoF after 6+3DoF" identifies all joints there.
+        """
         last = self.stages[-1]
         return last.held or tuple(sorted({joint for stage in self.stages for joint in stage.identified}))
 
@@ -62,7 +67,7 @@ def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
         )
         for stage in document["stages"]
     ]
-    return Strategy(document["name"], tuple(stages))
+    return Strategy(document["name"], tuple(stages), document.get("prior_std"))
 
 
 def without_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:

@@ -61,7 +61,7 @@ def metrics(joints: int) -> TableSchema:
         )
     columns += _with_error("k_sigma", "percent", "sum of delta_k over all joints (equation 14)")
     columns += _with_error(
-        "k_sigma_first_stage", "percent", "sum of delta_k over the joints of the first stage (interpretation R10)"
+        "k_sigma_fixed_joints", "percent", "sum of delta_k over the joints fixed in the last stage (interpretation R10)"
     )
     columns += _with_error(
         "deviation", "m", "mean end-effector error of the averaged model on test configurations (equation 15)"
@@ -86,7 +86,7 @@ def _scores(joints: int) -> list[Column]:
     return [
         *compliances,
         Column("k_sigma", "float64", "percent", "as in the metrics", missing=True),
-        Column("k_sigma_first_stage", "float64", "percent", "as in the metrics", missing=True),
+        Column("k_sigma_fixed_joints", "float64", "percent", "as in the metrics", missing=True),
         Column("deviation", "float64", "m", "as in the metrics", missing=True),
     ]
 
@@ -95,7 +95,23 @@ def repeated(joints: int) -> TableSchema:
     """Scores of further studies of the same size; one row for each study, strategy and length."""
     study = Column("study", "int32", "", "number of the study, from 1; that of the tables is number 0", minimum=1)
     strategy = Column("strategy", "string", "", "name of the strategy")
-    return TableSchema("repeated", (study, strategy, _LENGTH, *_scores(joints)))
+    other = "by the mean of the compliances where the metrics have that of the stiffnesses"
+    more = (
+        Column("k_sigma_mean_compliance", "float64", "percent", f"sum of delta_k over all joints, {other}", missing=True),
+        Column(
+            "k_sigma_fixed_joints_mean_compliance", "float64", "percent", f"the same of the fixed joints, {other}", missing=True
+        ),
+        Column("deviation_mean_compliance", "float64", "m", f"deviation {other}", missing=True),
+        Column(
+            "deviation_signed",
+            "float64",
+            "m",
+            "position error with its sign, mean over data sets, configurations and coordinates",
+            missing=True,
+        ),
+        Column("mean_square", "float64", "m^2", "mean square end-effector error of single data sets", missing=True),
+    )
+    return TableSchema("repeated", (study, strategy, _LENGTH, *_scores(joints), *more))
 
 
 def expected(joints: int) -> TableSchema:
@@ -114,6 +130,28 @@ BUDGET = TableSchema(
     ),
 )
 
+
+FEW = TableSchema(
+    "few",
+    (
+        Column("nominal_error", "float64", "", "standard deviation of the logarithm of nominal over true compliances"),
+        Column("strategy", "string", "", "name of the strategy; a row group holds one"),
+        _SET,
+        _LENGTH,
+        Column("mean_square", "float64", "m^2", "mean square end-effector error on test configurations", missing=True),
+    ),
+)
+
+KINDS = TableSchema(
+    "kinds",
+    (
+        Column("kind", "string", "", "what is measured; a row group holds one"),
+        Column("scalars", "int32", "", "scalar measurements of one configuration", minimum=1),
+        _SET,
+        _LENGTH,
+        Column("mean_square", "float64", "m^2", "mean square end-effector error on test configurations", missing=True),
+    ),
+)
 
 LADDER = TableSchema(
     "ladder",
@@ -137,6 +175,45 @@ DESIGNS = TableSchema(
         Column("rms", "float64", "m", "Cramér-Rao bound of the RMS end-effector error"),
         Column("low", "float64", "m", "5 % of random designs"),
         Column("high", "float64", "m", "95 % of random designs"),
+    ),
+)
+
+SIMULATED_DESIGNS = TableSchema(
+    "simulated_designs",
+    (
+        Column("load", "text", "", "kind of load: random directions, or one direction in every configuration"),
+        Column("design", "text", "", "criterion by which the configurations are chosen, or random"),
+        Column("configurations", "int32", "", "configurations of the design", minimum=1),
+        Column("unobservable", "text", "", "joints that the loads do not move, from 1, with commas between them"),
+        Column("rms", "float64", "m", "RMS end-effector error over simulated data sets on test configurations"),
+        Column("std_error", "float64", "m", "Monte Carlo standard error of the same"),
+        Column("there", "float64", "m", "RMS end-effector error at the test pose"),
+    ),
+)
+
+STIFFNESS = TableSchema(
+    "stiffness",
+    (
+        Column("force", "float64", "N", "magnitude of the load"),
+        Column("softest", "float64", "N/m", "least translational stiffness, median over test configurations"),
+        Column(
+            "first_order", "float64", "percent", "distance of the first order from the exact kinematics over the displacement"
+        ),
+        Column("loaded", "float64", "percent", "distance of the exact kinematics from the equilibrium of the loaded arm"),
+        Column("by_k_c", "float64", "percent", "distance of equation 6 from equation 8 over the displacement"),
+        Column("bias", "float64", "percent", "largest relative bias of a compliance by equation 11 from arms in equilibrium"),
+        Column("k_sigma", "float64", "percent", "sum over joints of the relative bias of the stiffness"),
+        Column("offset_rank", "int32", "", "joints that one data set identifies without the offset of the force"),
+        Column("rank", "int32", "", "the same with the offset"),
+    ),
+)
+
+STARTS = TableSchema(
+    "starts",
+    (
+        Column("start", "float64", "rad/(N m)", "where Gauss-Newton starts each joint"),
+        Column("difference", "float64", "", "largest relative difference of a compliance from that of the first start"),
+        Column("unsettled", "float64", "", "share of data sets whose steps do not settle"),
     ),
 )
 
@@ -253,7 +330,7 @@ REPLICATES = TableSchema(
         _REPLICATE,
         _LENGTH,
         Column("k_sigma", "float64", "percent", "as in the metrics", missing=True),
-        Column("k_sigma_first_stage", "float64", "percent", "as in the metrics", missing=True),
+        Column("k_sigma_fixed_joints", "float64", "percent", "as in the metrics", missing=True),
         Column("deviation", "float64", "m", "as in the metrics", missing=True),
         Column("initial_deviation", "float64", "m", "as in the metrics"),
     ),

@@ -98,7 +98,7 @@ def table4(
             drawn = _cell(replicates, robot, noise_um, strategy)
             at = _row_of(cell, length)
             row: dict[str, str | float] = {"strategy": strategy, "robot": robot}
-            for suffix in ("", "_first_stage"):
+            for suffix in ("", "_fixed_joints"):
                 name = f"k_sigma{suffix}"
                 row |= {f"k_sigma_{length}_percent{suffix}": at[name]}
                 row |= {f"k_sigma_{length}_percent{suffix}_std_error": at[f"{name}_std_error"]}
@@ -236,6 +236,16 @@ def solver_summary(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def with_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
+    """A table with the names of the strategies' files, which those of folders are, behind the names of strategies.
+
+    `slugs`: names of files by the names of strategies.
+    """
+    return frame.assign(strategy_file=frame.strategy.map(slugs))[
+        [name for column in frame.columns for name in (column, *(["strategy_file"] if column == "strategy" else []))]
+    ]
+
+
 def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
     """The same table for people: each value with its standard error behind a ± sign, an infinite length as "not reached".
 
@@ -252,7 +262,7 @@ def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
 
 def headed_rows(frame: pd.DataFrame) -> list[list[str]]:
     """The table for people as rows of words, its header first, with names of columns that break at blanks."""
-    shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set")])
+    shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set|strategy_file")])
     return [[column_head(name) for name in shown.columns], *shown.to_numpy().tolist()]
 
 
@@ -261,9 +271,9 @@ def column_head(name: str) -> str:
 
     Returns names that are not of the paper's quantities with blanks.
     """
-    stage = ", first stage" if name.endswith("_first_stage") else ""
+    stage = ", fixed joints" if name.endswith("_fixed_joints") else ""
     for pattern, words in _HEADS:
-        if found := re.fullmatch(pattern, name.removesuffix("_first_stage")):
+        if found := re.fullmatch(pattern, name.removesuffix("_fixed_joints")):
             return words.format(*found.groups()) + stage
     return name.replace("_", " ")
 

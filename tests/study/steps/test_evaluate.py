@@ -59,7 +59,7 @@ def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
     metrics, replicates, accuracy = evaluated_in_one_block(
         same_estimates(kuka, (2.0, 1.25)), judge(kuka), (0, 1), "stiffness", 10, [2]
     )
-    # k / k0 - 1 = 1 / 1.25 - 1 = -20 % in each of six joints, of which two are of the first stage; twice as soft, -50 %.
+    # k / k0 - 1 = 1 / 1.25 - 1 = -20 % in each of six joints, of which two are fixed in the last stage; twice as soft, -50 %.
     assert metrics["length"].tolist() == [1, 2]
     for joint in range(1, 7):
         np.testing.assert_allclose(metrics[f"delta_k_{joint}"], [-50.0, -20.0], rtol=1e-12)
@@ -67,7 +67,7 @@ def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
         np.testing.assert_allclose(ratio, [2.0, 1.25], rtol=1e-12)
         np.testing.assert_allclose(accuracy[f"relative_error_{joint}"], [25.0], rtol=1e-12)
     np.testing.assert_allclose(metrics["k_sigma"], [-300.0, -120.0], rtol=1e-12)
-    np.testing.assert_allclose(metrics["k_sigma_first_stage"], [-100.0, -40.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics["k_sigma_fixed_joints"], [-100.0, -40.0], rtol=1e-12)
     # All data sets are alike: which of them a replicate draws makes no difference.
     np.testing.assert_allclose(metrics["k_sigma_std_error"], 0.0, atol=1e-10)
     assert metrics["trustworthy"].all() and not metrics["nonpositive_share"].any()

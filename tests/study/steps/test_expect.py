@@ -18,7 +18,7 @@ def expected(robot, strategy, noise, sets=400, **options):
         noise,
         robot,
         judge(robot),
-        strategy.first_stage_joints,
+        strategy.fixed_joints,
         given["method"],
         given["deviation_of"],
     )
@@ -31,7 +31,7 @@ def test_they_are_what_studies_scatter_about(kuka, strategies):
     size = type(SIZE)(data_sets=400, configurations=20, tests=200, noise=noise)
     blocks = blocks_of(kuka, [strategy], USUAL, size, studies=range(1, 13))
     found = expected(kuka, strategy, noise)
-    for name in ("k_sigma", "k_sigma_first_stage", "deviation"):
+    for name in ("k_sigma", "k_sigma_fixed_joints", "deviation"):
         mean = np.mean([block[name][19] for block in blocks])
         assert found[name][19] == pytest.approx(mean, rel=0.2), name
 

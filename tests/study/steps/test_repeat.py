@@ -36,8 +36,8 @@ def test_scores_are_those_of_the_pipeline_for_the_same_data_sets(kuka, some, ave
     deflections, scores = deflections_of(kuka, experiments, 1e-5), judge(kuka)
     for strategy, block in zip(some, found, strict=True):
         table = identified(kuka, strategy, experiments, deflections)
-        metrics = evaluated_in_one_block(table, scores, strategy.first_stage_joints, average, 10, [5])[0]
-        for name in ("compliance_1", "compliance_6", "k_sigma", "k_sigma_first_stage", "deviation"):
+        metrics = evaluated_in_one_block(table, scores, strategy.fixed_joints, average, 10, [5])[0]
+        for name in ("compliance_1", "compliance_6", "k_sigma", "k_sigma_fixed_joints", "deviation"):
             np.testing.assert_allclose(block[name][1:], metrics[name][1:], rtol=1e-6, err_msg=name)
 
 
@@ -50,3 +50,25 @@ def test_lengths_that_do_not_determine_the_compliances_have_no_scores(kuka, some
         studies=[1],
     )[0]
     assert np.isnan(block["deviation"][0]) and np.isfinite(block["deviation"][-1])
+
+
+def test_averages_of_compliances_and_errors_of_single_data_sets_stand_beside_the_scores(kuka, some):
+    usual = blocks_of(kuka, some[:1], studies=[0])[0]
+    plain = blocks_of(kuka, some[:1], Interpretation(PAPER, 6, "end_effector", "compliance", "averaged_model"), studies=[0])[0]
+    for name in ("k_sigma", "k_sigma_fixed_joints", "deviation"):
+        np.testing.assert_array_equal(usual[f"{name}_mean_compliance"][1:], plain[name][1:])
+    # A sign averages out, a norm does not, and a single data set has all of its noise.
+    assert (np.abs(usual["deviation_signed"][1:]) < plain["deviation"][1:]).all()
+    assert (np.sqrt(usual["mean_square"][1:]) > usual["deviation_mean_compliance"][1:]).all()
+
+
+def test_three_reflectors_determine_what_one_does_not(kuka, some):
+    offsets = ((0.1, 0.0, 0.1), (0.1, 0.1, 0.0), (0.1, -0.1, 0.0))
+    one, three = (
+        blocks_of(
+            kuka, some[:1], Interpretation(PAPER, 3, "end_effector", "stiffness", "averaged_model", some_of), studies=[1]
+        )[0]
+        for some_of in (offsets[:1], offsets)
+    )
+    assert np.isnan(one["deviation"][0]) and np.isfinite(three["deviation"][0])
+    assert three["mean_square"][-1] < one["mean_square"][-1]

@@ -44,7 +44,7 @@ def budget_blocks(study: StudyInMemory, point_sets: Mapping[str, Sequence[str]])
             read = tuple(name + _AGAIN * (name in points[:place]) for place, name in enumerate(points))
             strategy = Strategy(label, (Stage(read, tuple(range(n))),))
             compliance = estimate_compliance(strategy, measurements, n)[0]
-            compliance[: first_solvable_length(strategy, study.interpretation.rows) - 1] = np.nan
+            compliance[: first_solvable_length(strategy, study.interpretation.independent_rows) - 1] = np.nan
             squares = mean_square_errors(form, compliance - robot.compliance[:, None])
             bounds = squared_error_bounds(sum((information[name] for name in points), np.zeros(())), form[:-1, :-1])
             columns = prefix_index_columns(sets, len(squares))

@@ -31,6 +31,6 @@ def estimates(study: StudyInMemory, strategies: Sequence[Strategy], number: int 
         for estimator in dict.fromkeys(stages.values()):
             strategy = Strategy("", estimator)
             compliance = estimate_compliance(strategy, measurements, joints)[0]
-            compliance[: first_solvable_length(strategy, study.interpretation.rows) - 1] = np.nan
+            compliance[: first_solvable_length(strategy, study.interpretation.independent_rows) - 1] = np.nan
             found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
     return {name: found[estimator] for name, estimator in stages.items()}

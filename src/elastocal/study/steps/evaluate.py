@@ -35,7 +35,7 @@ def evaluated(
     weight_blocks: Iterable[Mapping[str, np.ndarray]],
     test_weights: Mapping[str, np.ndarray],
     judge: Judge,
-    first_stage_joints: Sequence[int],
+    fixed_joints: Sequence[int],
     method: str,
     deviation_of: str,
     lengths: Sequence[int],
@@ -59,7 +59,7 @@ def evaluated(
 
     averages = average(weighted(), judge, method, deviation_of, to_weights(test_weights))
     return (
-        metrics_table(averages, judge.reference, first_stage_joints),
-        replicates_table(averages, judge.reference, first_stage_joints),
+        metrics_table(averages, judge.reference, fixed_joints),
+        replicates_table(averages, judge.reference, fixed_joints),
         accuracy_table(sum(sums, np.zeros(())), lengths),
     )

@@ -24,7 +24,7 @@ def expected_scores(
     noise: float,
     robot: Robot,
     judge: Judge,
-    first_stage_joints: Sequence[int],
+    fixed_joints: Sequence[int],
     method: str,
     deviation_of: str,
 ) -> dict[str, np.ndarray]:
@@ -47,4 +47,4 @@ def expected_scores(
     compliance = expected_compliance(start, np.diagonal(covariance, axis1=1, axis2=2), method)
     # The mean over so many data sets scatters by so much less.
     scatter = covariance / sets if deviation_of == "averaged_model" else covariance
-    return score_columns(compliance, expected_deviation(judge, compliance, scatter), robot, first_stage_joints)
+    return score_columns(compliance, expected_deviation(judge, compliance, scatter), robot, fixed_joints)

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regressor
-from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot import Robot, with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.identification import Measurements
@@ -91,19 +92,43 @@ class StudyInMemory:
         tests = self.tests(number)
         return make_judge(self.robot, tests, self.deflections(tests), self.interpretation.wrench_at)
 
-    def measured(self, sets: np.ndarray, points: Sequence[str], repeat: str = "") -> dict[str, Measurements]:
+    def measured(
+        self, sets: np.ndarray, points: Sequence[str], repeat: str = "", drawn: Experiments | None = None
+    ) -> dict[str, Measurements]:
         """What each measuring point contributes to some data sets.
 
-        `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`: tells measurements of the same
-        configurations apart: part of the name of the noise's stream.
+        `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`: part of the name of the noise's stream,
+        by which measurements of the same configurations differ. `drawn`: other configurations and loads than those of the
+        study, as many of them.
         """
-        drawn, rows = self.experiments(sets), self.interpretation.rows
-        regressors = Design(drawn, self.robot.chain, points, rows, self.interpretation.wrench_at).regressors
+        drawn, read = drawn or self.experiments(sets), self.interpretation
+        rows = 6 if read.reflectors_m else read.rows
+        regressors = Design(drawn, self.robot.chain, points, rows, read.wrench_at).regressors
         found = {}
         for name in points:
-            deflection = self.deflections(drawn, name) + self.size.noise * self.noise(sets, name + repeat)
-            found[name] = Measurements(regressors[name], np.moveaxis(configuration_first(deflection)[..., :rows], -1, 0))
+            deflection = self.deflections(drawn, name)
+            if read.reflectors_m:
+                found[name] = self._reflectors(sets, name, repeat, drawn, regressors[name], deflection)
+            else:
+                deflection = deflection + self.size.noise * self.noise(sets, name + repeat)
+                found[name] = Measurements(regressors[name], np.moveaxis(configuration_first(deflection)[..., :rows], -1, 0))
         return found
+
+    def _reflectors(
+        self, sets: np.ndarray, name: str, repeat: str, drawn: Experiments, regressor: np.ndarray, deflection: np.ndarray
+    ) -> Measurements:
+        """Positions of the reflectors at a point, whose pose they move with as a rigid body."""
+        turned = poses(self.robot.chain, drawn.joint_angles, self._point(name))[1]
+        loaded = Rotation.from_rotvec(deflection[..., 3:].reshape(-1, 3)).as_matrix().reshape(turned.shape)
+        matrices, measured = [], []
+        for number, offset in enumerate(self.interpretation.reflectors_m, 1):
+            lever = turned @ np.array(offset, float)
+            noise = self.noise(sets, f"{name}{repeat}/reflector {number}")[..., :3]
+            moved = deflection[..., :3] + (loaded @ lever[..., None])[..., 0] - lever + self.size.noise * noise
+            across = np.moveaxis(configuration_first(lever), -1, 0)[:, None]
+            matrices.append(regressor[:3] + np.cross(regressor[3:], across, axis=0))
+            measured.append(np.moveaxis(configuration_first(moved), -1, 0))
+        return Measurements(np.concatenate(matrices), np.concatenate(measured))
 
     def _point(self, name: str | None) -> MeasuringPoint:
         return self.robot.chain.point(name) if name else self.robot.chain.end_effector

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.evaluation import average
-from elastocal.study.metrics import k_sigma
+from elastocal.study.metrics import k_sigma, mean_form, mean_square_errors, signed_deviation
 from elastocal.study.steps.estimates import estimates
 
 if TYPE_CHECKING:
@@ -28,21 +28,29 @@ def repeated_blocks(
 
     `studies`: their numbers. Yields columns of one block of the repeated table: one strategy in one study.
     """
-    robot, interpretation = study.robot, study.interpretation
+    robot, read, tests = study.robot, study.interpretation, np.ones((1, study.size.tests))
     for number in studies:
         judge = study.judge(number)
-        found = estimates(study, strategies, number)
+        form, found = mean_form(judge), estimates(study, strategies, number)
         for strategy in strategies:
-            blocks = ((compliance, np.ones((1, len(compliance)))) for compliance in found[strategy.name])
-            averages = average(
-                blocks, judge, interpretation.average, interpretation.deviation_of, np.ones((1, study.size.tests))
-            )
-            scores = score_columns(averages.compliance[0], averages.deviation[0], robot, strategy.first_stage_joints)
-            yield {**scores, "study": np.full(len(scores["length"]), number), "strategy": strategy.name}
+            blocks = [(compliance, np.ones((1, len(compliance)))) for compliance in found[strategy.name]]
+            averages = average(blocks, judge, read.average, read.deviation_of, tests)
+            plain = average(blocks, judge, "compliance", "averaged_model", tests)
+            scores = score_columns(averages.compliance[0], averages.deviation[0], robot, strategy.fixed_joints)
+            others = score_columns(plain.compliance[0], plain.deviation[0], robot, strategy.fixed_joints)
+            squares = [mean_square_errors(form, np.moveaxis(each - robot.compliance, 0, -1)) for each, _ in blocks]
+            yield {
+                **scores,
+                **{f"{name}_mean_compliance": others[name] for name in ("k_sigma", "k_sigma_fixed_joints", "deviation")},
+                "deviation_signed": signed_deviation(judge, plain.compliance[0]),
+                "mean_square": np.concatenate(squares, axis=1).mean(axis=1),
+                "study": np.full(len(scores["length"]), number),
+                "strategy": strategy.name,
+            }
 
 
 def score_columns(
-    compliance: np.ndarray, deviation: np.ndarray, robot: Robot, first_stage_joints: Sequence[int]
+    compliance: np.ndarray, deviation: np.ndarray, robot: Robot, fixed_joints: Sequence[int]
 ) -> dict[str, np.ndarray]:
     """Columns of the scores of an averaged model, one row for each length.
 
@@ -52,6 +60,6 @@ def score_columns(
         "length": np.arange(1, len(compliance) + 1),
         **{f"compliance_{j + 1}": compliance[:, j] for j in range(compliance.shape[1])},
         "k_sigma": k_sigma(compliance, robot.compliance),
-        "k_sigma_first_stage": k_sigma(compliance, robot.compliance, list(first_stage_joints)),
+        "k_sigma_fixed_joints": k_sigma(compliance, robot.compliance, list(fixed_joints)),
         "deviation": deviation,
     }

@@ -1,0 +1,49 @@
+"""Equation 6 against finite differences and against the equilibrium of the loaded arm."""
+
+import numpy as np
+import pytest
+from made_study_blocks import experiments_of
+
+from elastocal.mechanics.elastostatics import generalized_forces, joint_torques
+from elastocal.mechanics.kinematics import jacobians
+from elastocal.study.cartesian_stiffness import equilibrium, loaded_compliance, torque_gradient
+from elastocal.study.steps.columns import to_experiments
+
+
+@pytest.fixture
+def loaded(kuka):
+    drawn = to_experiments(experiments_of(kuka, 1, 5)[0])
+    angles, wrench = drawn.joint_angles[0], drawn.wrench[0]
+    return angles, wrench, jacobians(kuka.chain, angles, kuka.chain.end_effector)
+
+
+def test_the_gradient_of_torques_is_that_of_finite_differences(kuka, loaded):
+    angles, wrench, jacobian = loaded
+    found, step = torque_gradient(jacobian, wrench), 1e-6
+    for joint in range(6):
+        moved = [
+            generalized_forces(jacobians(kuka.chain, angles + sign * step * np.eye(6)[joint], kuka.chain.end_effector), wrench)
+            for sign in (1, -1)
+        ]
+        np.testing.assert_allclose(found[..., joint], (moved[0] - moved[1]) / (2 * step), atol=1e-5)
+
+
+def test_without_a_gradient_the_stiffness_is_salisburys(kuka, loaded):
+    _, wrench, jacobian = loaded
+    compliance = loaded_compliance(jacobian, kuka.compliance, np.zeros((6, 6)))
+    first_order = (jacobian * generalized_forces(jacobian, wrench)[:, None]) @ kuka.compliance
+    np.testing.assert_allclose((compliance @ wrench[..., None])[..., 0], first_order, rtol=1e-9)
+    stiffness = np.linalg.inv(compliance)
+    np.testing.assert_allclose((stiffness @ first_order[..., None])[..., 0], wrench, rtol=1e-6, atol=1e-4)
+
+
+def test_torques_in_equilibrium_are_those_of_the_loaded_arm(kuka, loaded):
+    angles, wrench, jacobian = loaded
+    end = kuka.chain.end_effector
+    theta = equilibrium(kuka, angles, wrench, end)
+    np.testing.assert_allclose(theta, kuka.compliance * joint_torques(kuka.chain, angles + theta, wrench, end), rtol=1e-10)
+    # The linearised springs of the loaded arm come closer to it than those of the unloaded one.
+    plain = kuka.compliance * generalized_forces(jacobian, wrench)
+    springs = np.linalg.inv(np.diag(1 / kuka.compliance) - torque_gradient(jacobian, wrench))
+    linear = (springs @ generalized_forces(jacobian, wrench)[..., None])[..., 0]
+    assert np.abs(linear - theta).max() < 0.05 * np.abs(plain - theta).max()
