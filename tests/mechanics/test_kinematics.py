@@ -17,15 +17,19 @@ from support import (
     random_angles,
 )
 
-from elastocal.mechanics import chain_walk
+from elastocal.mechanics import kinematics
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import (
+    BLOCK,
+    blocks,
     corners,
+    cross,
     jacobians,
     joint_axes,
     poses,
     poses_and_jacobians,
     poses_of_points,
+    walk,
 )
 from elastocal.mechanics.links import extended_chain
 from elastocal.mechanics.pose_differences import pose_differences
@@ -182,7 +186,7 @@ def test_any_leading_axes_are_kept(kuka, batch):
 def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size):
     angles = random_angles(np.random.default_rng(7), fanuc.chain, size)
     whole = poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector)
-    monkeypatch.setattr(chain_walk, "BLOCK", 7)
+    monkeypatch.setattr(kinematics, "BLOCK", 7)
     for found, expected in zip(poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole, strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
     for found, expected in zip(poses(fanuc.chain, angles, fanuc.chain.end_effector), whole[:2], strict=True):
@@ -191,10 +195,10 @@ def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size)
 
 
 def test_a_batch_larger_than_the_real_block_holds_every_configuration(kuka):
-    size = chain_walk.BLOCK + 3
+    size = BLOCK + 3
     angles = random_angles(np.random.default_rng(8), kuka.chain, size)
     found = poses_and_jacobians(kuka.chain, angles, kuka.chain.end_effector)
-    picked = [0, 1, chain_walk.BLOCK - 1, chain_walk.BLOCK, size - 1]
+    picked = [0, 1, BLOCK - 1, BLOCK, size - 1]
     for array, expected in zip(found, poses_and_jacobians(kuka.chain, angles[picked], kuka.chain.end_effector), strict=True):
         np.testing.assert_allclose(array[picked], expected, rtol=0, atol=ROUNDING)
 
@@ -331,3 +335,41 @@ def test_joints_stand_at_their_places_along_their_axes():
     place, axis = joint_axes(chain, np.array([[np.pi / 2, 0.3]])).swapaxes(0, 1)
     np.testing.assert_allclose(place[:, 0], [[0, 0, 0.5], [0, 1, 0.5]], atol=1e-12)
     np.testing.assert_allclose(axis[:, 0], [[0, 0, 1], [-1, 0, 0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("offset, turns_only", [((0.3, 0.0, 0.0), True), ((0.0, 0.1, 0.0), False), ((0.1, 0.0, -0.1), False)])
+def test_a_target_along_an_axis_is_not_moved_by_it_in_any_digit(offset, turns_only):
+    chain = chain_of("Rz(q1) Tx(0.5) Rx(q2) Tx(0.3) [B]")
+    point = replace(chain.end_effector, offset_m=offset)
+    jacobian = jacobians(chain, random_angles(np.random.default_rng(6), chain, 5), point)
+    assert jacobian[:, :3, 0].any() and bool(jacobian[:, :3, 1].any()) != turns_only
+
+
+def test_frames_that_nothing_has_moved_are_one_for_all_configurations():
+    chain = chain_of("Tz(0.4) Rz(q1) Tx(0.5) Ry(q2) Tz(0.3) [hand]")
+    assert {array.shape for axes, origin in walk(chain, np.zeros((2, 4)), 5) for array in (*axes, origin)} == {(3, 1)}
+    angles = np.array([[0.0] * 4, [0.1, 0.2, 0.3, 0.4]])
+    axes, origin = walk(chain, angles, 5)[-1]
+    assert axes[1].shape == (3, 1) and origin.shape == (3, 4)
+    np.testing.assert_allclose(origin[2], 0.4 + 0.3 * np.cos(angles[1]))
+
+
+@pytest.mark.parametrize("size, lengths", [(0, []), (1, [1]), (BLOCK, [BLOCK]), (2 * BLOCK + 5, [BLOCK, BLOCK, 5])])
+def test_blocks_hold_each_configuration_once_and_in_order(size, lengths):
+    numbers = np.arange(size)
+    parts = [numbers[block] for block in blocks(size)]
+    assert [len(part) for part in parts] == lengths
+    np.testing.assert_array_equal(np.concatenate([numbers[:0], *parts]), numbers)
+
+
+def test_half_turns_and_quarter_turns_are_exact_to_rounding():
+    chain = chain_of("Rz(q1) Tx(1) [hand]")
+    position, _ = poses(chain, np.pi * np.array([[1], [-1], [0.5], [-0.5], [3]]), chain.end_effector)
+    np.testing.assert_allclose(position, [[-1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [-1, 0, 0]], atol=1e-15)
+
+
+def test_vector_products_are_numpys():
+    first, second = np.random.default_rng(10).normal(size=(2, 3, 4, 5))
+    found = np.empty_like(first)
+    cross(first, second, found)
+    np.testing.assert_allclose(found, np.cross(first, second, axis=0), atol=1e-15)

@@ -358,7 +358,7 @@ def tables(run: Audited, file: str, table: str) -> Iterator[Finding]:
 def printed_tables(run: Audited, file: str, number: str) -> Iterator[Finding]:
     """Values of a table for people against those of its CSV, to the digits that are printed."""
     source = run.table(f"reports/tables/table{number}.csv")
-    columns = [name for name in source if not name.endswith("_std_error") and name != "strategy_file"]
+    columns = [name for name in map(str, source) if not name.endswith("_std_error") and name != "strategy_file"]
     lines, off = (run.folder / file).read_text("utf-8").splitlines(), []
     if file.endswith("md"):
         rows = [line.strip("|").split("|") for line in lines[2:] if line.startswith("|")]

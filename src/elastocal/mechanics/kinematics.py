@@ -6,19 +6,84 @@ runs along the batch; slices such as ``jacobian[..., 0, 2]`` are contiguous.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.mechanics.chain import MeasuringPoint
-from elastocal.mechanics.chain_walk import blocks, store_pose, sweep
-from elastocal.mechanics.products import product, product_difference
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
-    from elastocal.mechanics.chain import Chain
-    from elastocal.mechanics.chain_walk import Screw, Vector
+    from elastocal.mechanics.chain import Chain, Transform
+
+    # The three axes of a frame and its origin in base axes: each (3, S), or (3, 1) before any coordinate has moved it.
+    Frame = tuple[list[np.ndarray], np.ndarray]
+
+# So many configurations at a time keep all intermediate arrays in a second-level cache.
+BLOCK = 4096
+
+
+def blocks(size: int) -> list[slice]:
+    """Cut so many configurations into blocks of `BLOCK`."""
+    return [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
+
+
+def walk(chain: Chain, coordinates: np.ndarray, until: int) -> list[Frame]:
+    """Frames along a chain: before each of so many transforms, and behind the last of them.
+
+    `coordinates` (C, S): rad and m. The forward recursion of the product of transforms; turns that follow one another about one
+    axis are one turn by the sum of their angles.
+    """
+    axes, origin = list(np.eye(3)[:, :, None]), np.zeros((3, 1))
+    before, about, angle = axes, None, 0.0
+    frames = [(axes, origin)]
+    coordinates = np.ascontiguousarray(coordinates)
+    # Springs that no configuration moves cost nothing.
+    rest = np.logical_not(coordinates.any(axis=1))
+    for transform in chain.transforms[:until]:
+        axis, driven = transform.axis, transform.coordinate
+        if driven is None or not rest[driven]:
+            amount = transform.constant if driven is None else coordinates[driven]
+            if transform.sign < 0:
+                amount = -amount
+            if transform.kind == "T":
+                origin = origin + amount * axes[axis]
+            else:
+                before, angle = (before, angle + amount) if axis == about else (axes, amount)
+                axes, about = _turn(before, axis, angle), axis
+        frames.append((axes, origin))
+    return frames
+
+
+def place_point(frames: Sequence[Frame], point: MeasuringPoint) -> Frame:
+    """The frame of a measuring point, by the frames of `walk` up to it at least."""
+    axes, origin = frames[point.after]
+    for axis, length in zip(axes, point.offset_m, strict=True):
+        if length:
+            origin = origin + length * axis
+    return axes, origin
+
+
+def _turn(axes: list[np.ndarray], about: int, angle: float | np.ndarray) -> list[np.ndarray]:
+    """Axes of a frame after it has turned about one of them."""
+    cosine, sine = (math.cos(angle), math.sin(angle)) if isinstance(angle, float) else _cosine_and_sine(angle)
+    second, third = axes[about - 2], axes[about - 1]
+    turned = list(axes)
+    turned[about - 2], turned[about - 1] = cosine * second + sine * third, cosine * third - sine * second
+    return turned
+
+
+def _cosine_and_sine(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """By the tangent of half the angle (Weierstrass substitution), which is faster in numpy than either of them."""
+    tangent = np.tan(0.5 * angle)
+    scale = tangent * tangent
+    scale += 1.0
+    np.divide(2.0, scale, out=scale)
+    tangent *= scale
+    scale -= 1.0
+    return scale, tangent
 
 
 def poses(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> tuple[np.ndarray, np.ndarray]:
@@ -40,9 +105,9 @@ def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[Meas
     size = components.shape[1]
     position, rotation = np.empty((len(points), 3, size)), np.empty((len(points), 3, 3, size))
     for part in blocks(size):
-        frames, _ = sweep(chain, components[:, part], points)
-        for number, frame in enumerate(frames):
-            store_pose(*frame, position[number, :, part], rotation[number, :, :, part])
+        frames = walk(chain, components[:, part], max(point.after for point in points))
+        for number, point in enumerate(points):
+            store_pose(place_point(frames, point), position[number, :, part], rotation[number, :, :, part])
     return _each_batch_first(position, batch), _each_batch_first(rotation, batch)
 
 
@@ -92,9 +157,9 @@ def poses_and_jacobians(
         results = [_component_first_view(array, len(shape)) for array, shape in zip(out, shapes, strict=True)]
     position, rotation, jacobian = results
     for part in blocks(size):
-        ((axes, origin),), screws = sweep(chain, components[:, part], [point])
-        store_pose(axes, origin, position[:, part], rotation[:, :, part])
-        _store_twists(screws, point.after, origin, jacobian[:, :, part])
+        frames = walk(chain, components[:, part], point.after)
+        store_pose(place_point(frames, point), position[:, part], rotation[:, :, part])
+        _store_twists(chain, frames, point, jacobian[:, :, part])
     return _batch_first(position, batch), _batch_first(rotation, batch), _batch_first(jacobian, batch)
 
 
@@ -107,8 +172,7 @@ def jacobians(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> n
     components, batch = _component_first(coordinates)
     jacobian = np.empty((6, chain.coordinates, components.shape[1]))
     for part in blocks(components.shape[1]):
-        ((_, origin),), screws = sweep(chain, components[:, part], [point])
-        _store_twists(screws, point.after, origin, jacobian[:, :, part])
+        _store_twists(chain, walk(chain, components[:, part], point.after), point, jacobian[:, :, part])
     return _batch_first(jacobian, batch)
 
 
@@ -137,48 +201,56 @@ def _each_batch_first(components: np.ndarray, batch: tuple[int, ...]) -> np.ndar
     return np.moveaxis(components, range(1, 1 + len(shape)), range(-len(shape), 0))
 
 
-def _store_twists(screws: Iterable[Screw], after: int, target: Vector, jacobian: np.ndarray) -> None:
+def store_pose(frame: Frame, position: np.ndarray, rotation: np.ndarray) -> None:
+    """Write a frame to arrays: `position` (3, S), and `rotation` (3, 3, S), whose columns are the axes."""
+    axes, position[:] = frame
+    for column, axis in enumerate(axes):
+        rotation[:, column] = axis
+
+
+def _store_twists(chain: Chain, frames: Sequence[Frame], point: MeasuringPoint, jacobian: np.ndarray) -> None:
     """Columns of a Jacobian; a coordinate that moves several transforms has the sum of their twists."""
-    levers: dict[int, Vector] = {}
+    _, target = place_point(frames, point)
     filled: set[int] = set()
-    for screw in screws:
-        if screw.place >= after:
-            break
-        if screw.coordinate in filled:
-            twist = np.zeros((6, jacobian.shape[2]))
-            _store_twist(screw, target, levers, twist)
-            jacobian[:, screw.coordinate] += twist
-        else:
-            _store_twist(screw, target, levers, jacobian[:, screw.coordinate])
-        filled.add(screw.coordinate)
+    transforms = chain.transforms[: point.after]
+    for number, (transform, frame) in enumerate(zip(transforms, frames, strict=False)):
+        if transform.coordinate is not None:
+            column = jacobian[:, transform.coordinate]
+            again = transform.coordinate in filled
+            twist = np.empty_like(column) if again else column
+            _store_twist(transform, frame, None if _passes(transforms[number:], point) else target, twist)
+            if again:
+                column += twist
+            filled.add(transform.coordinate)
     for coordinate in set(range(jacobian.shape[1])) - filled:
         jacobian[:, coordinate] = 0.0
 
 
-def _store_twist(screw: Screw, target: Vector, levers: dict[int, Vector], twist: np.ndarray) -> None:
-    axis, origin = screw.axis, screw.origin
-    linear, angular = twist[:3], twist[3:]
-    if screw.kind == "T":
-        _store(axis, linear)
-        angular[:] = 0.0
-    elif origin is None:
-        linear[:] = 0.0
-        _store(axis, angular)
+def _passes(transforms: Sequence[Transform], point: MeasuringPoint) -> bool:
+    """Whether a point lies on the axis of the first transform: all that lies between goes along or about this axis."""
+    axis = transforms[0].axis
+    aside = [length for direction, length in enumerate(point.offset_m) if direction != axis]
+    return not any(aside) and all(transform.axis == axis for transform in transforms)
+
+
+def _store_twist(transform: Transform, frame: Frame, target: np.ndarray | None, twist: np.ndarray) -> None:
+    """Twist (6, S) at a target, which is None where a turn leaves it in its place."""
+    (linear, angular), axis = (twist[:3], twist[3:]), frame[0][transform.axis]
+    if transform.kind == "T":
+        linear[:], angular[:] = axis, 0.0
+    elif target is None:
+        linear[:], angular[:] = 0.0, axis
     else:
-        # Joints that meet in one point, as in a spherical wrist, share their lever.
-        if id(origin) not in levers:
-            levers[id(origin)] = [product_difference(1.0, p, 1.0, o) for p, o in zip(target, origin, strict=True)]
-        _store_cross(axis, levers[id(origin)], linear)
-        _store(axis, angular)
-    if screw.sign < 0:
+        angular[:] = axis
+        cross(axis, target - frame[1], linear)
+    if transform.sign < 0:
         twist *= -1.0
 
 
-def _store(vector: Vector, out: np.ndarray) -> None:
-    for component, place in zip(vector, out, strict=True):
-        place[:] = component
-
-
-def _store_cross(a: Vector, b: Vector, out: np.ndarray) -> None:
-    for i, place in enumerate(out):
-        np.subtract(product(a[i - 2], b[i - 1]), product(a[i - 1], b[i - 2]), out=place)
+def cross(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
+    """Vector products, component first: (3, ...)."""
+    product = np.empty_like(out[0])
+    for i in range(3):
+        np.multiply(first[i - 2], second[i - 1], out=out[i])
+        np.multiply(first[i - 1], second[i - 2], out=product)
+        out[i] -= product

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.chain_walk import blocks, store_pose, sweep
+from elastocal.mechanics.kinematics import blocks, cross, place_point, store_pose, walk
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,13 +45,9 @@ class Motion:
         int: configuration of each. Returns (rows, C, S').
         """
         twist = self.twist[..., chosen]
-        angular, product = twist[3:], np.empty_like(twist[0])
-        moved = np.empty_like(twist[:rows])
-        for i in range(3):
-            np.multiply(angular[i - 2], position[i - 1], out=moved[i])
-            np.multiply(angular[i - 1], position[i - 2], out=product)
-            moved[i] -= product
-            moved[i] += twist[i]
+        angular, moved = twist[3:], np.empty_like(twist[:rows])
+        cross(angular, position, moved[:3])
+        moved[:3] += twist[:3]
         moved[3:] = angular[: rows - 3]
         return self._behind_none(moved, after)
 
@@ -94,25 +90,21 @@ def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoin
     walked = chain.transforms
     position, rotation = np.empty((len(points), 3, size)), np.empty((len(points), 3, 3, size))
     moving = sorted((t.coordinate, place) for place, t in enumerate(walked) if t.coordinate is not None)
-    order = {place: number for number, (_, place) in enumerate(moving)}
     axis, origin = np.empty((2, 3, len(moving), size))
     for part in blocks(size):
-        frames, screws = sweep(chain, components[:, part], points, lines=True)
-        for number, frame in enumerate(frames):
-            store_pose(*frame, position[number, :, part], rotation[number, :, :, part])
-        for screw in screws:
-            assert screw.origin is not None  # A walk with lines finds a point of each axis.
-            for i in range(3):
-                axis[i, order[screw.place], part], origin[i, order[screw.place], part] = screw.axis[i], screw.origin[i]
+        frames = walk(chain, components[:, part], len(walked))
+        for number, point in enumerate(points):
+            store_pose(place_point(frames, point), position[number, :, part], rotation[number, :, :, part])
+        for column, (_, place) in enumerate(moving):
+            axes, origin[:, column, part] = frames[place]
+            axis[:, column, part] = axes[walked[place].axis]
     driven, places = np.array(moving, int).T
     signs = np.array([walked[place].sign for place in places])[:, None]
     if (signs < 0).any():
         axis *= signs
     twist = np.empty((6, len(moving), size))
     twist[3:] = axis
-    for i in range(3):
-        np.multiply(origin[i - 2], axis[i - 1], out=twist[i])
-        twist[i] -= origin[i - 1] * axis[i - 2]
+    cross(origin, axis, twist[:3])
     shifts = np.array([walked[place].kind == "T" for place in places], bool)
     twist[:3, shifts], twist[3:, shifts] = axis[:, shifts], 0.0
     return Motion(position, rotation, twist, places, driven)
