@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Frame = tuple[list[np.ndarray], np.ndarray]
 
 # So many configurations at a time keep all intermediate arrays in a second-level cache.
-BLOCK = 4096
+BLOCK = 8192
 
 
 def blocks(size: int) -> list[slice]:
