@@ -294,6 +294,7 @@ def question_facts():
     strategies = [Strategy("6DoF", (Stage(("6DoF",), tuple(range(6))),))]
     return {
         "citation": {"authors": "the developers", "date": "2026-11-25", "version": "0.1.0", "license": "MIT"},
+        "accuracy_um": "60",
         "claims": claim_rows(claims(), TITLES),
         "joint": joint_rows(joint()),
         "table4": measured_rows(measured(), TITLES),

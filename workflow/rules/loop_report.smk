@@ -180,6 +180,7 @@ rule pictures:
     input:
         figures=expand("reports/figures/{figure}.png", figure=FIGURES),
         loop=expand("reports/loop/kuka_extended_end_effector/figures/{figure}.png", figure=["arrows", "candidates", "hero"]),
+        page=rules.write_study_page.output.page,
     output:
         figures=expand("docs/{figure}.png", figure=FIGURES),
         loop=expand("docs/loop_{figure}.png", figure=["arrows", "candidates", "hero"]),

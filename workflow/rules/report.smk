@@ -1,6 +1,7 @@
 """The report: numbers for its text, then its pages.
 
-Needs reports/tables/ and reports/figures/. Writes reports/answers.json and reports/study.pdf.
+Needs reports/tables/ and reports/figures/. Writes reports/answers.json and reports/study.pdf; of the documentation,
+docs/study_tables.md.
 """
 
 # What the text of the report says of loads and places.
@@ -92,6 +93,20 @@ rule state_answers:
         stated=STATED,
     script:
         "../scripts/state_answers.py"
+
+
+rule write_study_page:
+    input:
+        answers=rules.state_answers.output.answers,
+        sources=sources("write_study_page.py"),
+    output:
+        page="docs/study_tables.md",
+    log:
+        "results/logs/write_study_page.log",
+    benchmark:
+        "results/timings/write_study_page.tsv"
+    script:
+        "../scripts/write_study_page.py"
 
 
 rule compile_report:

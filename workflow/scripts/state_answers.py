@@ -68,6 +68,7 @@ def state_answers(job: Job) -> None:
     cited = {"date": str(citation["date-released"]), "version": citation["version"], "license": citation["license"]}
     facts |= {
         "citation": {"authors": ", ".join(each["name"] for each in citation["authors"])} | cited,
+        "accuracy_um": f"{accuracy:g}",
         "claims": claim_rows(pd.read_csv(job.input.claims, keep_default_na=False, na_values={"p": [""]}), titles),
         "joint": joint_rows(pd.read_csv(job.input.joint)),
         "table4": measured_rows(measured, titles),
