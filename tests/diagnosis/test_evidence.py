@@ -175,7 +175,7 @@ def test_added_evidence_is_that_of_the_model_with_each_unit_added_at_each_size()
     conditioned = condition(statistics, UNITS[0].columns, np.full(2, 0.3), LOG_POSE)
     blocks = blocks_of(conditioned.gram, UNITS, [1, 2])
     found = added_evidence(conditioned, blocks, GRID, statistics.freedom, UNITS)
-    assert found.shape == (3, 3, 5) and np.isneginf(found[:, 0]).all()
+    assert found.shape == (3, 3, 6) and np.isneginf(found[:, 0]).all()
     constant = None
     for place, tau in enumerate(TAU):
         for number in (1, 2):
