@@ -23,7 +23,7 @@ def plausible(robot):
 
 def test_documentation_prints_the_table():
     lines = [
-        f"| {s.effect}, {s.quantity} | {s.share:g} | {s.of} | {'+-'[s.sign < 0] if s.sign else ''} | {s.reason} |"
+        f"| {s.effect}, {s.quantity} | {s.share:g} | {s.of} | {'+-'[s.sign < 0] if s.sign else ''} | {s.most:g} | {s.reason} |"
         for s in SIZES
     ]
     text = METHOD.read_text(encoding="utf-8")
@@ -57,6 +57,12 @@ def test_loads_and_lengths_are_sized_by_the_rated_load_and_the_reach(fanuc):
     assert size_of("payload", "mass", sites) == pytest.approx(15.0)
     long = replace(sites, link_vectors_m=2.0 * sites.link_vectors_m)
     assert size_of("link_geometry", "length", long) == pytest.approx(2.0 * size_of("link_geometry", "length", sites))
+
+
+def test_what_gears_are_inspected_for_has_no_larger_sizes_and_what_rests_on_a_guess_has(fanuc):
+    most = {candidate.effect: {p.most for p in candidate.parameters} for candidate in candidates_on(sites_of(fanuc)).values()}
+    assert most["transmission_order"] == most["transmission_harmonic"] == {1.0}
+    assert most["joint_tilt"] == most["lost_motion"] == {3.0}
 
 
 def test_parameters_have_the_sign_of_the_table(fanuc):

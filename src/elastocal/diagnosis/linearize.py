@@ -130,7 +130,7 @@ def linearized(
         products = summed(source.blocks(source.lines(parts)), triangle[:-1, :-1], deviation, present, grid)
     statistics = statistics_of(products, grid)
     smallest = smallest_shown(statistics, units, settings)
-    shown = tuple(replace(unit, smallest=int(n)) for unit, n in zip(units, smallest, strict=True) if n < len(settings.scales))
+    shown = tuple(replace(unit, smallest=int(n)) for unit, n in zip(units, smallest, strict=True) if n <= unit.largest)
     small = {unit.candidate.key for unit in units if unit.candidate} - {u.candidate.key for u in shown if u.candidate}
     untestable |= dict.fromkeys(sorted(small), "too small to be seen at any size that such an effect has")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.

@@ -134,12 +134,18 @@ def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, .
     Returns the most probable first; "nothing" is always among them.
     """
     found: dict[tuple[str, ...], tuple[float, int]] = {(): (0.0, -1)}
-    for number, (model, probability) in enumerate(zip(posterior.models, posterior.probabilities, strict=True)):
-        names = tuple(sorted(_mechanisms_of(problem, model, probability)))
+    stated = zip(mechanisms_of_models(problem, posterior), posterior.probabilities, strict=True)
+    for number, (names, probability) in enumerate(stated):
         held, best = found.get(names, (0.0, number))
         found[names] = held + float(probability), number if best < 0 else best
     ranked = sorted(found.items(), key=lambda item: -item[1][0])
     return tuple(Hypothesis(names, probability, model) for names, (probability, model) in ranked)
+
+
+def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[str, ...]]:
+    """What each model says that acts, in the order of the names; empty for "nothing"."""
+    pairs = zip(posterior.models, posterior.probabilities, strict=True)
+    return [tuple(sorted(_mechanisms_of(problem, model, probability))) for model, probability in pairs]
 
 
 def _mechanisms_of(problem: Problem, model: Model, probability: float) -> set[str]:

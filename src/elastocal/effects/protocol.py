@@ -56,7 +56,7 @@ class Parameter:
     distinguish only in part, as in ridge regression [1]. None, as nearly everywhere, for no prior. Reported with the estimate.
     `sign`: that such an effect has by its physics; 0 where it may have either. `order`: of a harmonic, whose plausible size
     falls with it; 1 elsewhere. `sized`: whether the prior's standard deviation was estimated from the measurements, not known
-    beforehand.
+    beforehand. `most`: times its plausible size that a search allows for.
 
     [1] A. E. Hoerl and R. W. Kennard, Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
@@ -68,6 +68,7 @@ class Parameter:
     sign: int = 0
     order: int = 1
     sized: bool = False
+    most: float = np.inf
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,9 @@ class Size:
     """One line of the table.
 
     `share`: size in the unit of the arm `of`; of what is sized by itself, in the SI unit of the parameter. `sign`: that physics
-    gives, 0 for either.
+    gives, 0 for either. `most`: times the size that a bad case reaches: once where the size is one that makers inspect for,
+    since what exceeds it is not delivered; several times where it rests on a unit of the arm that is a guess itself, on
+    wear, or on what people do.
     """
 
     effect: str
@@ -51,6 +53,7 @@ class Size:
     of: str
     reason: str
     sign: int = 0
+    most: float = 3.0
 
 
 SIZES = tuple(
@@ -71,8 +74,24 @@ SIZES = tuple(
         ("link_geometry", "length", 4e-4, REACH, "tolerances of castings: a millimetre of 2.5 m"),
         ("link_geometry", "turn", 1e-3, ABSOLUTE, "a millimetre a metre"),
         ("transmission_ratio", "per turn", 1e-3, ABSOLUTE, "a parameter mistyped in its fourth digit"),
-        ("transmission_harmonic", "amplitude", 2e-4, ABSOLUTE, "gears err by up to an arc minute (their catalogues)"),
-        ("transmission_order", "amplitude", 2e-4, ABSOLUTE, "as whole orders"),
+        (
+            "transmission_harmonic",
+            "amplitude",
+            2e-4,
+            ABSOLUTE,
+            "gears are inspected for an arc minute (their catalogues)",
+            0,
+            1.0,
+        ),
+        (
+            "transmission_order",
+            "amplitude",
+            2e-4,
+            ABSOLUTE,
+            "as whole orders: larger waves are another mechanism's, as a torque's",
+            0,
+            1.0,
+        ),
         ("motor_eccentricity", "amplitude", 5e-5, ABSOLUTE, "milliradians at the motor, over a ratio of a hundred"),
         ("bearing_runout", "shift", 5e-5, ABSOLUTE, "slewing bearings run out by hundredths of a millimetre"),
         ("bearing_runout", "wobble", 5e-5, ABSOLUTE, "the same over the diameter of the bearing"),
@@ -123,8 +142,8 @@ def sized(
     effect: str, quantity: str, names: Iterable[str], unit: str, sites: Sites, *joints: int, over: float = 1.0
 ) -> tuple[Parameter, ...]:
     """Parameters of one quantity with its size, divided by `over`, and its sign; `joints` as in `size_of`."""
-    size, sign = size_of(effect, quantity, sites, *joints) / over, _BY_NAME[effect, quantity].sign
-    return tuple(Parameter(name, unit, size, sign=sign) for name in names)
+    size, line = size_of(effect, quantity, sites, *joints) / over, _BY_NAME[effect, quantity]
+    return tuple(Parameter(name, unit, size, sign=line.sign, most=line.most) for name in names)
 
 
 def reach_m(sites: Sites) -> float:

@@ -9,12 +9,13 @@ bands that are judged one by one; those of the motor's turns are `motor_eccentri
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
-from elastocal.effects.sizes import size_of
+from elastocal.effects.protocol import Candidate
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -41,10 +42,11 @@ def candidates(sites: Sites) -> list[Candidate]:
 
 
 def _candidate(sites: Sites, joint: int, low: int, high: int) -> Candidate:
-    size = size_of(NAME, "amplitude", sites)
     orders = range(low, high + 1)
     parameters = tuple(
-        Parameter(f"{wave}_{order}q", "rad", size, size, order=order) for order in orders for wave in ("cos", "sin")
+        replace(wave, prior_std=wave.plausible, order=order)
+        for order in orders
+        for wave in sized(NAME, "amplitude", (f"cos_{order}q", f"sin_{order}q"), "rad", sites)
     )
 
     def displacement(conditions: Conditions) -> Displacements:

@@ -10,12 +10,13 @@ between two integers is where a search has to try; and less than a whole wave in
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape
-from elastocal.effects.sizes import size_of
+from elastocal.effects.protocol import Candidate, Shape
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -40,8 +41,8 @@ def candidates(sites: Sites) -> list[Candidate]:
 
 def _candidate(sites: Sites, joint: int, above: int) -> Candidate:
     order = Shape("order", "1", above + 0.5, above + _MARGIN, above + 1 - _MARGIN, tried=1)
-    size = size_of(NAME, "amplitude", sites)
-    parameters = tuple(Parameter(f"{wave}_kq", "rad", size, order=above + 1) for wave in ("cos", "sin"))
+    waves = sized(NAME, "amplitude", ("cos_kq", "sin_kq"), "rad", sites)
+    parameters = tuple(replace(wave, order=above + 1) for wave in waves)
 
     def displacement(conditions: Conditions, order: float) -> Displacements:
         angle = order * conditions.joint_angles[:, joint]
