@@ -45,6 +45,11 @@ def test_only_what_was_measured_is_called_so():
     assert "is predicted to keep" in what_to_do(made_document()) and "it keeps" in what_to_do(made_document(measured=True))
 
 
+def test_errors_on_validation_poses_are_told_from_the_predicted_one():
+    found = certificate_facts(made_document(measured=True))["whose"]
+    assert "0.120 mm is measured, the tracker against the model" in found and "0.120 mm is predicted, the robot itself" in found
+
+
 def test_errors_before_and_after_are_of_one_kind():
     text = before_and_after(made_document())
     assert "off by 1.500 mm RMS" in text and "by 0.120 mm, both as predicted" in text

@@ -4,6 +4,7 @@ import pytest
 from made_loop_facts import CAMPAIGNS, plainly
 from made_loop_tables import effect_entry, experiment_rows, probabilities, step_rows, verdict_document
 
+from elastocal.application.accuracy import BASE, PREDICTED, ROBOT, Accuracy
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
 from elastocal.report.first_page import (
     TITLES,
@@ -15,6 +16,7 @@ from elastocal.report.first_page import (
     probability_sentence,
     sentences,
     what_to_do,
+    whose_errors,
     worth_sentence,
 )
 
@@ -118,3 +120,27 @@ def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities
 def test_a_robot_whose_calibration_predicts_worse_is_left_as_it_is():
     (advice,) = what_to_do(CAMPAIGNS["adequate"] | {"kept": "frames"}, [])
     assert advice.startswith("Leave the robot as its file has it")
+
+
+MOSTLY = {
+    "left_out_m": "effects that no command contains",
+    "form_m": "the form of the model",
+    "repeated_m": "each pose's own error and the repeatability of the joints",
+}
+
+
+@pytest.mark.parametrize("part", [*MOSTLY, None])
+def test_measured_and_predicted_error_have_their_frame_and_the_predicted_one_its_largest_part(part):
+    stated = Accuracy(BASE, PREDICTED, 1.74e-4, 4e-4, None, None, "", 9, "some poses", **{part: 1.57e-4} if part else {})
+    mostly = MOSTLY.get(part, "the uncertainty of the parameters")
+    assert whose_errors(5.8e-5, stated) == (
+        "Two errors: 0.058 mm is measured, the tracker against the model at validation poses, in the declared base's frame with "
+        f"its noise; 0.174 mm is predicted, the robot itself, in the same frame without noise, and comes mostly from {mostly}."
+    )
+
+
+def test_where_the_base_is_unknown_the_robot_has_a_frame_of_its_own():
+    stated = Accuracy(ROBOT, PREDICTED, 1.2e-3, 4e-3, None, None, "", 9, "some poses")
+    found = whose_errors(1.5e-3, stated)
+    assert "1.50 mm is measured" in found and "in the tracker's frame with its noise" in found
+    assert "1.20 mm is predicted, the robot itself, in its own frame without noise" in found

@@ -9,7 +9,7 @@ from elastocal.application.accuracy import MEASURED, PREDICTED, accuracy_from, a
 from elastocal.application.certificate.repeatability import ISO_CYCLES, ISO_POSES
 from elastocal.diagnosis.words import candidate_words, listed, parameter_words, physical_name
 from elastocal.effects.protocol import effect_of
-from elastocal.report.first_page import TITLES
+from elastocal.report.first_page import TITLES, whose_errors
 from elastocal.report.wording import MICRO, capital, counted, length, minus, percent, plain, scaled, span_words
 
 if TYPE_CHECKING:
@@ -85,6 +85,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
             ]
             for step in steps
         ],
+        "whose": whose_errors(steps[-1]["rms_m"], accuracy_from(document["predicted"])),
         "floor": length(document["noise_floor_rms_m"]),
         "iso": iso_rows(document["iso_9283"], document["measured"]),
         "iso_warning": iso_warning(document["iso_9283"]["repeatability"]),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.accuracy import BASE
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.words import (
     NOTHING,
@@ -37,6 +38,8 @@ from elastocal.report.wording import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
     from typing import Any
+
+    from elastocal.application.accuracy import Accuracy
 
 TITLES = {
     "adequate": "the declared model is adequate",
@@ -82,6 +85,26 @@ def headline_sentence(stated: Mapping[str, str]) -> str:
     """A headline in one line: 1.18 → 0.110 mm (noise 0.105)."""
     noise = f" (noise {stated['noise']})" if stated["noise"] else ""
     return f"{stated['before']} → {stated['after']} mm{noise}, RMS position error on {stated['poses']}"
+
+
+def whose_errors(measured_m: float, accuracy: Accuracy) -> str:
+    """Whose error is measured on validation poses and whose is predicted, in which frames, and why both differ.
+
+    `measured_m`: RMS error of the final model there, m.
+    """
+    frames = ("the declared base's frame", "the same frame") if accuracy.frame == BASE else ("the tracker's frame", "its own frame")
+    parts = {
+        "each pose's own error and the repeatability of the joints": accuracy.repeated_m,
+        "effects that no command contains": accuracy.left_out_m,
+        "the form of the model": accuracy.form_m,
+    }
+    rest = accuracy.rms_m**2 - sum(part**2 for part in parts.values())
+    parts["the uncertainty of the parameters"] = float(np.sqrt(max(rest, 0.0)))
+    return (
+        f"Two errors: {millimetres(measured_m)} mm is measured, the tracker against the model at validation poses, in {frames[0]} "
+        f"with its noise; {millimetres(accuracy.rms_m)} mm is predicted, the robot itself, in {frames[1]} without noise, and comes "
+        f"mostly from {max(parts, key=lambda name: parts[name])}."
+    )
 
 
 def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
