@@ -134,8 +134,9 @@ def test_measured_and_predicted_error_have_their_frame_and_the_predicted_one_its
     stated = Accuracy(BASE, PREDICTED, 1.74e-4, 4e-4, None, None, "", 9, "some poses", **{part: 1.57e-4} if part else {})
     mostly = MOSTLY.get(part, "the uncertainty of the parameters")
     assert whose_errors(5.8e-5, stated) == (
-        "Two errors: 0.058 mm is measured, the tracker against the model at validation poses, in the declared base's frame with "
-        f"its noise; 0.174 mm is predicted, the robot itself, in the same frame without noise, and comes mostly from {mostly}."
+        "Two errors: 0.058 mm is measured, the tracker against the model at validation poses, in the declared base's frame "
+        "with its noise; 0.174 mm is predicted, the robot itself, in the same frame without noise, and comes mostly from "
+        f"{mostly}."
     )
 
 

@@ -92,7 +92,9 @@ def whose_errors(measured_m: float, accuracy: Accuracy) -> str:
 
     `measured_m`: RMS error of the final model there, m.
     """
-    frames = ("the declared base's frame", "the same frame") if accuracy.frame == BASE else ("the tracker's frame", "its own frame")
+    frames = (
+        ("the declared base's frame", "the same frame") if accuracy.frame == BASE else ("the tracker's frame", "its own frame")
+    )
     parts = {
         "each pose's own error and the repeatability of the joints": accuracy.repeated_m,
         "effects that no command contains": accuracy.left_out_m,
@@ -101,9 +103,9 @@ def whose_errors(measured_m: float, accuracy: Accuracy) -> str:
     rest = accuracy.rms_m**2 - sum(part**2 for part in parts.values())
     parts["the uncertainty of the parameters"] = float(np.sqrt(max(rest, 0.0)))
     return (
-        f"Two errors: {millimetres(measured_m)} mm is measured, the tracker against the model at validation poses, in {frames[0]} "
-        f"with its noise; {millimetres(accuracy.rms_m)} mm is predicted, the robot itself, in {frames[1]} without noise, and comes "
-        f"mostly from {max(parts, key=lambda name: parts[name])}."
+        f"Two errors: {millimetres(measured_m)} mm is measured, the tracker against the model at validation poses, in "
+        f"{frames[0]} with its noise; {millimetres(accuracy.rms_m)} mm is predicted, the robot itself, in {frames[1]} without "
+        f"noise, and comes mostly from {max(parts, key=lambda name: parts[name])}."
     )
 
 
