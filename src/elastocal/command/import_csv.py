@@ -11,6 +11,7 @@ from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline
 from elastocal.command.quantities import MOST_ROWS
+from elastocal.counting import counted
 from elastocal.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -150,18 +151,19 @@ def _summary(found: ImportedMeasurements, options: ImportOptions) -> list[str]:
     poses = len(np.unique(np.column_stack([table.get("session", np.zeros_like(table["pose"])), table["pose"]]), axis=0))
     targets = ", ".join(sorted(set(table["target"].tolist())))
     first = [
-        f"{len(table['pose'])} measurements of {targets} at {poses} poses, {found.joints} joints",
+        f"{counted(len(table['pose']), 'measurement')} of {targets} at {counted(poses, 'pose')}, "
+        f"{counted(found.joints, 'joint')}",
         f"file: names of columns in line {options.header}, separator {options.separator}, decimal {options.decimal}, "
         f"thousands {options.thousands or 'not marked'}, encoding {options.encoding}",
     ]
     if found.skipped:
-        first.append(f"left out: {found.skipped} rows without a position")
+        first.append(f"left out: {counted(found.skipped, 'row')} without a position")
     read = [f"{name} from {header!r}" + (f" in {options.units[name]}" if options.units and name in options.units else "")
             for name, header in (options.columns or {}).items()]  # fmt: skip
-    counted = [name for name in ("pose", "load", "repeat") if name not in (options.columns or {})]
+    numbered = [name for name in ("pose", "load", "repeat") if name not in (options.columns or {})]
     lines = [*first, f"read: {'; '.join(read)}", f"orientations: {options.rotation}"]
-    if counted:
-        lines.append(f"counted, as no column has it: {', '.join(counted)}")
+    if numbered:
+        lines.append(f"counted, as no column has it: {', '.join(numbered)}")
     forces = [name for name in WRENCH_NAMES if name not in (options.columns or {})]
     if forces:
         lines.append(f"taken for zero, as no column has it: {', '.join(forces)}")

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 from elastocal.application.accuracy import MEASURED, PREDICTED, accuracy_from, accuracy_sentence, millimetres
 from elastocal.application.certificate.repeatability import ISO_CYCLES, ISO_POSES
+from elastocal.counting import counted
 from elastocal.diagnosis.words import candidate_words, listed, parameter_words, physical_name
 from elastocal.effects.protocol import effect_of
 from elastocal.report.first_page import TITLES, whose_errors
-from elastocal.report.wording import MICRO, capital, counted, length, minus, percent, plain, scaled, span_words
+from elastocal.report.wording import MICRO, capital, length, minus, percent, plain, scaled, span_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.application.accuracy import BASE
+from elastocal.counting import counted
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.words import (
     NOTHING,
@@ -25,7 +26,6 @@ from elastocal.report.wording import (
     MILLI,
     as_sentence,
     capital,
-    counted,
     length,
     millimetres,
     minus,
