@@ -47,7 +47,7 @@ def test_only_what_was_measured_is_called_so():
 
 def test_errors_on_validation_poses_are_told_from_the_predicted_one():
     found = certificate_facts(made_document(measured=True))["whose"]
-    assert "0.120 mm is measured, the tracker against the model" in found and "0.120 mm is predicted, the robot itself" in found
+    assert "0.120 mm at validation poses is the tracker against the model" in found and "0.120 mm is the robot alone" in found
 
 
 def test_errors_before_and_after_are_of_one_kind():
@@ -117,6 +117,13 @@ def test_changes_are_named_by_their_joint_and_counted():
     assert found["rows"][0][3] == "200 ± 50 µrad"
     assert (len(found["rows"]), found["more"]) == (12, 2)
     assert "not compared one by one" in comparison_facts(made_comparison(0.5, 0))["sentence"]
+
+
+def test_a_share_below_every_digit_of_a_tracker_is_said_to_be_below_them():
+    document = made_document()
+    document["budget"].append({"name": "joint_tilt", "rms_m": 4.4e-10, "low_m": 3e-10, "high_m": 5e-10})
+    _, share, limits = certificate_facts(document)["budget"][-1]
+    assert share.replace("\u00a0", " ") == "below 0.1 µm" and limits == "–"
 
 
 def test_facts_are_json_and_every_line_of_the_budget_has_a_name():

@@ -97,6 +97,7 @@ def test_the_headline_is_the_robot_as_it_was_and_as_it_is_in_mm_beside_the_noise
         ({"cost_m": 2.9e-5}, "0.029 mm"),
         ({"cost_m": 1.5e-5, "probability": 0.996}, "0.015 mm: real, negligible"),
         ({"cost_m": 1.5e-5, "probability": 0.7}, "0.015 mm: negligible"),
+        ({"cost_m": 4.4e-10, "probability": 0.996}, "below 0.001 mm: real, negligible"),
         ({"cost_m": None}, "not in the final model"),
         ({"cost_m": None, "name": "setup_step"}, "an error of the measurement, not of the robot"),
     ],
@@ -134,14 +135,15 @@ def test_measured_and_predicted_error_have_their_frame_and_the_predicted_one_its
     stated = Accuracy(BASE, PREDICTED, 1.74e-4, 4e-4, None, None, "", 9, "some poses", **{part: 1.57e-4} if part else {})
     mostly = MOSTLY.get(part, "the uncertainty of the parameters")
     assert whose_errors(5.8e-5, stated) == (
-        "Two errors: 0.058 mm is measured, the tracker against the model at validation poses, in the declared base's frame "
-        "with its noise; 0.174 mm is predicted, the robot itself, in the same frame without noise, and comes mostly from "
-        f"{mostly}."
+        "0.058 mm at validation poses is the tracker against the model, its noise included, in the declared base's frame; "
+        f"0.174 mm is the robot alone, in the same frame, mostly from {mostly}."
     )
 
 
 def test_where_the_base_is_unknown_the_robot_has_a_frame_of_its_own():
     stated = Accuracy(ROBOT, PREDICTED, 1.2e-3, 4e-3, None, None, "", 9, "some poses")
     found = whose_errors(1.5e-3, stated)
-    assert "1.50 mm is measured" in found and "in the tracker's frame with its noise" in found
-    assert "1.20 mm is predicted, the robot itself, in its own frame without noise" in found
+    assert found.startswith(
+        "1.50 mm at validation poses is the tracker against the model, its noise included, in the tracker's frame;"
+    )
+    assert "1.20 mm is the robot alone, in its own frame" in found

@@ -46,8 +46,8 @@ def test_an_effect_that_is_adopted_is_said_to_be_part_of_the_model():
 def test_a_predicted_error_says_why_it_is_not_the_measured_one():
     verdict = CAMPAIGNS["named"] | {"accuracy": made_accuracy()}
     stated = facts_of(verdict)["accuracy"]
-    assert stated.startswith("Predicted position error") and "0.120 mm is predicted" in stated
-    assert f"{facts_of(verdict)['headline']['after']} mm is measured" in stated
+    assert stated.startswith("Predicted position error") and "0.120 mm is the robot alone" in stated
+    assert f"{facts_of(verdict)['headline']['after']} mm at validation poses is the tracker" in stated
     assert facts_of(CAMPAIGNS["named"])["accuracy"] == ""
 
 

@@ -34,6 +34,8 @@ _STEPS = {
 # From here on the tracker's noise hides the robot's own repeatability.
 _HIDDEN = 0.8
 _SHOWN_CHANGES = 12
+# Below the digits of any tracker.
+_NOTHING_M = 1e-7
 # Below this probability of the observed change where nothing changed, a robot counts as changed.
 _LEVEL = 0.05
 
@@ -294,11 +296,15 @@ def _with_interval(step: Mapping[str, Any], metric: str) -> str:
 
 
 def _limits(line: Mapping[str, Any]) -> str:
-    return "–" if line["low_m"] is None else f"{length(line['low_m'])} to {length(line['high_m'])}"
+    return (
+        "–" if line["low_m"] is None or line["rms_m"] < _NOTHING_M else f"{length(line['low_m'])} to {length(line['high_m'])}"
+    )
 
 
 def _share(line: Mapping[str, Any]) -> str:
     hidden = line["name"] == "repeatability" and not line["rms_m"]
+    if 0.0 < line["rms_m"] < _NOTHING_M:
+        return f"below {length(_NOTHING_M, 1)}"
     return "hidden by the tracker's noise" if hidden else length(line["rms_m"])
 
 

@@ -62,6 +62,8 @@ _MOST_CAUSES = 6
 # components below a third of the largest need no closer look.
 NEGLIGIBLE = 1 / 3
 MOST_NAMES = 8
+# The last digit of a cost.
+_FINEST_M = 1e-6
 _COST = "the RMS error at the poses and loads of the campaign if it alone is left uncorrected"
 
 
@@ -103,9 +105,9 @@ def whose_errors(measured_m: float, accuracy: Accuracy) -> str:
     rest = accuracy.rms_m**2 - sum(part**2 for part in parts.values())
     parts["the uncertainty of the parameters"] = float(np.sqrt(max(rest, 0.0)))
     return (
-        f"Two errors: {millimetres(measured_m)} mm is measured, the tracker against the model at validation poses, in "
-        f"{frames[0]} with its noise; {millimetres(accuracy.rms_m)} mm is predicted, the robot itself, in {frames[1]} without "
-        f"noise, and comes mostly from {max(parts, key=lambda name: parts[name])}."
+        f"{millimetres(measured_m)} mm at validation poses is the tracker against the model, its noise included, in "
+        f"{frames[0]}; {millimetres(accuracy.rms_m)} mm is the robot alone, in {frames[1]}, mostly from "
+        f"{max(parts, key=lambda name: parts[name])}."
     )
 
 
@@ -118,7 +120,9 @@ def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
         return "not in the final model" if moves else "an error of the measurement, not of the robot"
     if cost > NEGLIGIBLE * heldout["after"]["rms_m"]:
         return f"{millimetres(cost)} mm"
-    return f"{millimetres(cost)} mm: {'real, ' if effect['probability'] >= _SURE else ''}negligible"
+    # No finer than a micrometre, and what was found is not nothing.
+    stated = millimetres(cost) if cost >= _FINEST_M / 2 else f"below {millimetres(_FINEST_M)}"
+    return f"{stated} mm: {'real, ' if effect['probability'] >= _SURE else ''}negligible"
 
 
 def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
