@@ -41,28 +41,28 @@ def csv(
     ] = None,
     skip_empty: Annotated[bool, Option("--skip-empty", help="Leave out rows without a position.")] = False,
     separator: Annotated[
-        Literal["tab", "semicolon", "bar", "comma", "space"] | None, Option(help="Found out where not given.")
+        Literal["tab", "semicolon", "bar", "comma", "space"] | None, Option(help="Between columns. Default: found out.")
     ] = None,
-    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Found out where not given.")] = None,
+    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of decimals. Default: found out.")] = None,
     thousands: Annotated[
         Literal["point", "comma", "space", "apostrophe"] | None, Option(help="Mark between thousands, where there is one.")
     ] = None,
-    encoding: Annotated[str | None, Option(help="Such as utf-8, cp1252; found out where not given.")] = None,
+    encoding: Annotated[str | None, Option(help="Such as utf-8 or cp1252. Default: found out.")] = None,
     header: Annotated[
-        int | None, Option(min=1, max=MOST_ROWS, help="Line of the names of columns; found out where not given.")
+        int | None, Option(min=1, max=MOST_ROWS, help="Line with the names of the columns. Default: found out.")
     ] = None,
     robot: Annotated[
         Path | None, Option(help="Robot file whose joint_names the columns have. Default: that of FOLDER/campaign.yaml.")
     ] = None,
     options: Annotated[Path | None, Option(help="import.yaml of an earlier import, to repeat it.")] = None,
-    force: Annotated[bool, Option("--force", help="Replace measurements.csv that is filled in.")] = False,
+    force: Annotated[bool, Option("--force", help="Replace a measurements.csv that is filled in.")] = False,
 ) -> None:
     """Make measurements.csv of another program's table.
 
     Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11 .. r33, t11 .. t34, fx .. mz, pose,
     load, repeat, target, time) or as the robot's file calls its joints, units by brackets or endings ("X [mm]", x_mm). What is
-    ambiguous is asked for. Poses, loads and repeats that no column numbers are counted. What was read, how, and what was left
-    out is printed at the end; the options, and what was found out, are written to import.yaml.
+    ambiguous is asked for. Poses, loads and repeats are counted where no column numbers them. The end of the output states
+    what was read, how, and what was left out; import.yaml has the options, and what was found out.
     """
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
     from elastocal.exchange.import_options import IMPORT, ImportOptions, import_options_text, read_import_options
