@@ -72,7 +72,7 @@ def repeat_warnings(fitted_states: States | Measurements, states: States | Measu
     if not again.any():
         return []
     many = counted(len(again), "validation pose")
-    count = f"{again.sum()} of {many}" if not again.all() else f"all of {many}"
+    count = f"{again.sum()} of {many}" if not again.all() else f"all {many}"
     return [f"{count} repeat configurations that were fitted: these errors say nothing of other poses"]
 
 
