@@ -101,8 +101,8 @@ def test_a_hypothesis_is_named_by_its_mechanisms(mechanisms, expected):
 def test_the_sentence_has_the_figures_after_all_poses_and_how_many_are_enough():
     sentence = sentence_of(made())
     assert sentence == (
-        "2 further poses, each measured at 0, 1 times its load, separate joint_tilt from link_elasticity with a related mechanism"
-        " by 17.5 and resolve the verdict at 19:1 with a probability of 87%; 90% needs 3 poses."
+        "2 further poses, each measured at 0, 1 times its load, separate joint_tilt from link_elasticity with a related "
+        "mechanism by 17.5 and resolve the verdict at 19:1 with a probability of 87%; 90% needs 3 poses."
     )
     assert sentence_of(made(poses_needed=None)).endswith("90% needs more than 100 poses.")
     assert "read at 0, 1, -1 times" in sentence_of(made(shares=LADDER))
