@@ -105,7 +105,7 @@ def test_the_sentence_has_the_figures_after_all_poses_and_how_many_are_enough():
         "mechanism by 17.5 and resolve the verdict at 19:1 with a probability of 87%; 90% needs 3 poses."
     )
     assert sentence_of(made(poses_needed=None)).endswith("90% needs more than 100 poses.")
-    assert "read at 0, 1, -1 times" in sentence_of(made(shares=LADDER))
+    assert "measured at 0, 1, -1 times" in sentence_of(made(shares=LADDER))
 
 
 def test_facts_are_those_after_all_poses_and_json():
