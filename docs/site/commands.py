@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from textwrap import dedent
 
 import typer.main
 
 from elastocal.command.main import app
 
+# Where a terminal must not join lines, help texts have the character \\b, which a page would show.
+_EXAMPLE = re.compile(r"^\x08\n(Examples?):\n((?:  .+\n)+)", re.MULTILINE)
 HEAD = """# Commands
 
 Made of the code; `elastocal COMMAND --help` says the same. What they do, one by one: [the commands](../docs/afternoon.md).
@@ -24,6 +27,7 @@ def page() -> str:
     """
     called = [sys.executable, "-m", "typer", "elastocal.command.main", "utils", "docs", "--name", "elastocal"]
     written = subprocess.run(called, capture_output=True, text=True, check=True).stdout
+    written = _EXAMPLE.sub(lambda match: f"{match[1]}:\n\n```console\n{dedent(match[2])}```\n", written)
     return HEAD + _with_whole_summaries(written).replace("\n# ", "\n## ").removeprefix("# `elastocal`\n")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from importlib import import_module, resources
 from inspect import isfunction, signature
+from textwrap import dedent, indent
 
 import yaml
 from jsonschema2md import Parser
@@ -33,6 +34,10 @@ JOINTS = 6
 _TRIED_ELSEWHERE = re.compile(r" \(\[Test\]\(https.*?\)\)(?=[.,;]|$)", re.MULTILINE)
 # It links references to keys by paths that are no anchors of the page.
 _TO_KEY = re.compile(r"\[([^]]+)\]\(#[^)]*\)")
+# It writes examples in ASCII, and marks the end of those that are one word.
+_EXAMPLE = re.compile(r"( *)```yaml\n(.*?)\n *```", re.DOTALL)
+# What a person would read as a riddle.
+_PRINTABLE = re.compile(r"Must match pattern: `[^`]*\\x00[^`]*`")
 
 HEAD = """# File formats
 
@@ -58,8 +63,15 @@ def _document(name: str, words: str) -> str:
     # Of keys that allow only some values the library does not say which are required.
     required = ", ".join(f"`{key}`" for key in schema.get("required", ())) or "none"
     intro = f"{words} Keys that must be there: {required}. Other keys than these are refused."
-    keys = _TO_KEY.sub(r"\1", _TRIED_ELSEWHERE.sub("", listed))
+    listed = _TO_KEY.sub(r"\1", _TRIED_ELSEWHERE.sub("", listed))
+    keys = _EXAMPLE.sub(_plain_example, _PRINTABLE.sub("Printable characters on one line", listed))
     return f"{title}\n\n{intro}\n{keys}"
+
+
+def _plain_example(match: re.Match[str]) -> str:
+    blanks = match[1]
+    text = yaml.safe_dump(yaml.safe_load(dedent(match[2])), allow_unicode=True, sort_keys=False).removesuffix("...\n")
+    return indent(f"```yaml\n{text}```", blanks)
 
 
 def _tables() -> str:

@@ -17,7 +17,7 @@ The paper leaves some points open. How each is interpreted, as in the table of t
 the printed figures, is in [the study](../docs/study.md); `snakemake -j2 extended_study` makes those figures. Where
 there is no switch another one is not possible, or both are given.
 
-| | open | interpretation | switch |
+| point | open | interpretation | switch |
 |---|---|---|---|
 """
 

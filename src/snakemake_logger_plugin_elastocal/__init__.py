@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, cast
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
+from elastocal.counting import counted
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from logging import LogRecord
@@ -78,7 +80,7 @@ class LogHandler(LogHandlerBase):
             return [self.format(record)] if record.levelno >= WARNING or _NOTHING in record.getMessage() else []
         if event == LogEvent.RUN_INFO:
             self._total = record.stats.get("total", 0)
-            return [f"{self._total} jobs"]
+            return [counted(self._total, "job")]
         if event == LogEvent.JOB_INFO:
             self._started += 1
             return [f"{self._started} of {self._total}: {' '.join([record.rule_name, *map(str, record.wildcards.values())])}"]
@@ -102,7 +104,11 @@ def _counts(stats: Mapping[str, int]) -> list[str]:
     """How many jobs a run has, and of which rules, those with the most jobs first."""
     rules = sorted((rule for rule in stats if rule != "total"), key=lambda rule: -stats[rule])
     listed = fill(", ".join(f"{stats[rule]} {rule}" for rule in rules), 80, initial_indent="  ", subsequent_indent="  ")
-    return [f"{stats['total']} jobs would run:", listed, "Nothing was run. `snakemake -n -p` lists every job with its files."]
+    return [
+        f"{counted(stats['total'], 'job')} would run:",
+        listed,
+        "Nothing was run. `snakemake -n -p` lists every job with its files.",
+    ]
 
 
 def _reason(rule: str, logs: Sequence[str]) -> str:

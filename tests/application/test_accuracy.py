@@ -91,6 +91,7 @@ def test_joints_and_poses_add_what_each_has_of_its_own(turned):
     only = predicted(replace(turned, noise=replace(noise, joint_rad=np.full(6, 5e-5), pose_rad=0.0)), angles, NEUTRAL)
     np.testing.assert_allclose(more.repeated_m, only.repeated_m, rtol=1e-12)
     assert (more.error_m > more.parameters_m).all()
+    assert more.accuracy("").repeated_m == pytest.approx(np.sqrt((more.repeated_m**2).mean()))
 
 
 def test_what_the_form_of_the_model_leaves_open_is_in_every_figure(turned):

@@ -224,7 +224,7 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
         ({"declared": ["payload", "payload"]}, "declared", ["each entry once"]),
         ({"noise": {"position_m": 0}}, "noise.position_m", ["more than 0"]),
         ({"noise": {"orientation_rad": 1e-4}}, "noise", ["no position_m", "u95_m"]),
-        ({"noise": {"position_m": 1e-4, "joint_rad": [1e-5]}}, "noise.joint_rad", ["1 numbers", "or 3"]),
+        ({"noise": {"position_m": 1e-4, "joint_rad": [1e-5]}}, "noise.joint_rad", ["1 number", "or 3"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": -1.0}}, "noise.joint_rad", ["-1"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": 2.0}}, "noise.joint_rad", ["2.0", "0 to 0.1"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": [0, 2.0, 0]}}, "noise.joint_rad[1]", ["2.0", "0 to 0.1"]),

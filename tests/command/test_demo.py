@@ -52,7 +52,8 @@ def test_what_is_printed_is_what_is_run_from_plan_to_certificate(run):
     typed = [shlex.split(line[2:])[1:] for line in result.stderr.splitlines() if line.startswith("$ elastocal")]
     assert typed == called
     assert "✓" in result.stderr and "2.00 mm RMS before, 0.100 mm after" in result.stderr
-    assert "hidden in it: transmission_harmonic of joint" in result.stderr
+    assert "hidden in it: gear transmission error of joint" in result.stderr
+    assert "gravity sag in the verdict is right too" in result.stderr
 
 
 def test_a_step_that_fails_ends_it_with_its_exit_code(run):

@@ -20,7 +20,7 @@ def words(tmp_path):
 def test_a_table_becomes_measurements_and_the_options_are_kept(elastocal, words, tmp_path):
     result = elastocal(*words(*OPTIONS))
     assert result.exit_code == 0, result.exception
-    assert "2 measurements of smr at 2 poses, 1 joints" in result.output and "counted" in result.output
+    assert "2 measurements of smr at 2 poses, 1 joint" in result.output and "counted" in result.output
     lines = (tmp_path / "cell" / "measurements.csv").read_text().splitlines()
     assert lines[0] == "pose,load,repeat,target,q1,x,y,z" and lines[1].startswith("1,0,0,smr,1.57079") and "1.0005" in lines[1]
 
@@ -76,10 +76,10 @@ def test_every_import_ends_with_what_was_read_how_and_what_was_left_out(elastoca
     assert "read: q1 from 'J1' in deg; x from 'X' in mm; y from 'Y' in mm; z from 'Z' in mm" in lines
     assert "not used: Temp, Config" in lines
     for note in (
-        "1 lines above the header",
-        "1 rows of empty cells",
+        "1 line above the header",
+        "1 row of empty cells",
         "2 columns without",
-        "1 lines of comments",
+        "1 line of comments",
         "'Temp' not read",
     ):
         assert any(line.startswith("note: ") and note in line for line in lines), note

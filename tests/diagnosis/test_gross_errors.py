@@ -116,7 +116,7 @@ def test_a_bad_held_out_row_is_judged_by_the_same_rule_and_both_errors_are_given
     assert found["after"]["rms_m"] == pytest.approx(without["after"]["rms_m"], rel=0.2)
     assert found["with_gross_errors"]["after"]["rms_m"] > 100 * found["after"]["rms_m"]
     assert all(row["heldout_rms_all_rows_m"] > 10 * row["heldout_rms_m"] for row in verdict.rows[1:])
-    assert len(verdict.left_out) == 1 and any("with them the RMS" in line for line in verdict.document["warnings"])
+    assert len(verdict.left_out) == 1 and any("with all rows the RMS" in line for line in verdict.document["warnings"])
 
 
 def test_sentences_say_what_a_row_reads(cases, clean):

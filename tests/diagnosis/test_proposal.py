@@ -49,7 +49,7 @@ def test_table_is_in_the_angles_of_the_controller(ambiguous, proposal, kuka):
     np.testing.assert_allclose(angles @ robot.reported_matrix.T + robot.reported_offset, proposal.joint_angles)
     assert (table["load"] == 1).all() and (table["point"] == "3DoF 6DoF").all() and list(table["pose"]) == list(range(10))
     assert " or " in table["effect"][0] and table["separation_without"].nunique() == 1
-    assert "10 further poses, each read at 0, 1, -1 times its load, separate" in sentence_of(proposal)
+    assert "10 further poses, each measured at 0, 1, -1 times its load, separate" in sentence_of(proposal)
 
 
 def test_a_weight_is_asked_for_in_kilograms_where_it_hangs_and_nowhere_else(kuka):
@@ -101,11 +101,11 @@ def test_a_hypothesis_is_named_by_its_mechanisms(mechanisms, expected):
 def test_the_sentence_has_the_figures_after_all_poses_and_how_many_are_enough():
     sentence = sentence_of(made())
     assert sentence == (
-        "2 further poses, each read at 0, 1 times its load, separate joint_tilt from link_elasticity with a related mechanism"
-        " by 17.5 and resolve the verdict at 19:1 with a probability of 87%; 90% needs 3 poses."
+        "2 further poses, each measured at 0, 1 times its load, separate joint_tilt from link_elasticity with a related "
+        "mechanism by 17.5 and resolve the verdict at 19:1 with a probability of 87%; 90% needs 3 poses."
     )
     assert sentence_of(made(poses_needed=None)).endswith("90% needs more than 100 poses.")
-    assert "read at 0, 1, -1 times" in sentence_of(made(shares=LADDER))
+    assert "measured at 0, 1, -1 times" in sentence_of(made(shares=LADDER))
 
 
 def test_facts_are_those_after_all_poses_and_json():

@@ -46,13 +46,13 @@ def test_a_separator_at_the_end_of_rows_and_quotes_are_read(tmp_path):
         ("a;b\n1;2\n", ["line 1", "--header"]),
         ("x;y\n", ["a header alone"]),
         ("x;y;x\n1;2;3\n", ["line 1", "'x' twice"]),
-        ("x;y\n1;2\n1\n", ["line 3", "1 cells", "2, one for each"]),
+        ("x;y\n1;2\n1\n", ["line 3", "1 cell", "2, one for each"]),
         ("x;y\n1,5;2.5\n", ["'2.5' in line 2", "'1,5' in line 2", "--decimal"]),
         ('x;y\n"1;2\n', ["line 2"]),
         ("x;y\n1;\x002\n", ["line 2", r"the character '\x00'", "UTF-16"]),
         *((f"x;y\n1{each};2\n", ["line 2", ascii(each), "printable"]) for each in "\x0c\x1b\x85\u2028\u202e\u2067"),
         # A blank that does not break.
-        ("x;y\n1\u00a0;2\n1\n", ["line 3", "1 cells"]),
+        ("x;y\n1\u00a0;2\n1\n", ["line 3", "1 cell"]),
     ],
 )
 def test_what_cannot_be_read_is_refused_with_its_line(tmp_path, text, words):
@@ -135,7 +135,7 @@ def test_two_headers_behind_comment_marks_are_a_question_and_a_plain_one_goes_be
     assert read_text_table(written(tmp_path, text), is_header, Dialect(header=2)).columns["x"] == ("3",)
     found = read_text_table(written(tmp_path, "# x;y;n\nn;x;y\n1;2;3\n#4;5;6\n"), is_header)
     assert found.columns["x"] == ("2",)
-    assert found.left_out == ("1 lines above the header", "1 lines of comments below the header")
+    assert found.left_out == ("1 line above the header", "1 line of comments below the header")
 
 
 @pytest.mark.parametrize(

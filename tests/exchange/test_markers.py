@@ -119,7 +119,7 @@ def test_markers_may_stand_in_the_line_above_the_axes(tmp_path, above):
         table(tmp_path, text, ImportOptions())
     found = table(tmp_path, text, ImportOptions(targets={"SMR1": "SMR1", "SMR2": "SMR2"}))
     assert found.table["x"].tolist() == [0.001, 0.004] and found.table["time_s"].tolist() == [5.0, 5.0]
-    assert "1 lines above the header" in found.notes
+    assert "1 line above the header" in found.notes
 
 
 def test_two_targets_of_one_marker_or_a_column_that_is_none_of_it_are_refused(tmp_path):

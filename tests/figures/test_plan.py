@@ -24,8 +24,8 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
 
 def test_every_pose_has_a_picture_with_its_number_and_pages_are_full():
     survey = made_survey()
-    plan = planned(survey, made_candidates(survey, 300), 47, 4, "D", 1)
+    plan = planned(survey, made_candidates(survey, 300), 55, 4, "D", 1)
     pages = pose_pictures(survey.robot, plan)
     titles = [axis.get_title(loc="left") for page in pages for axis in page.axes if axis.get_title(loc="left")]
-    assert titles == [*(str(pose) for pose in range(1, 48)), *(f"{pose} held out" for pose in range(48, 52))]
+    assert titles == [*(str(pose) for pose in range(1, 56)), *(f"{pose} held out" for pose in range(56, 60))]
     assert len(pages) == 2

@@ -76,11 +76,11 @@ def test_names_of_the_joints_come_and_go_with_the_file():
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [
-        ({"joint_limits_deg": [[-180, 180]]}, "joint_limits_deg", ["1 entries", "each of the 2 joints"]),
+        ({"joint_limits_deg": [[-180, 180]]}, "joint_limits_deg", ["1 entry", "each of the 2 joints"]),
         ({"compliance_urad_per_Nm": [1, 2, 3]}, "compliance_urad_per_Nm", ["3 entries", "each of the 2 joints"]),
         ({"joint_limits_deg": [[-180, 180], [45, -45]]}, "joint_limits_deg[1]", ["[45, -45]", "[lower, upper]"]),
         ({"joint_limits_deg": [[5, 5], [-45, 45]]}, "joint_limits_deg[0]", ["[5, 5]", "[lower, upper]"]),
-        ({"joint_names": ["shoulder"]}, "joint_names", ["1 entries", "each of the 2 joints"]),
+        ({"joint_names": ["shoulder"]}, "joint_names", ["1 entry", "each of the 2 joints"]),
         ({"reported_joints": {"matrix": [[1, 0]]}}, "reported_joints", ["2 rows of 2 numbers"]),
         ({"reported_joints": {"offset_deg": [1, 2, 3]}}, "reported_joints", ["and 2 offsets"]),
         ({"reported_joints": {"matrix": [[1, 0], [1]]}}, "reported_joints", ["2 rows of 2 numbers"]),
@@ -174,7 +174,7 @@ def test_robot_becomes_a_document_that_gives_it_back(more):
         ({"masses": WEIGHED["masses"][:1] * 2}, "masses", ["link 2 twice", "each link once"]),
         ({"gravity_m_s2": [0, 0, 0]}, "gravity_m_s2", ["[0, 0, 0]", "base axes"]),
         ({"gravity_m_s2": [0, 1e-300, 0]}, "gravity_m_s2", ["[0, 1e-300, 0]", "1e-06 m/s² or more"]),
-        ({"gear_ratio": [100]}, "gear_ratio", ["1 entries", "2 joints"]),
+        ({"gear_ratio": [100]}, "gear_ratio", ["1 entry", "2 joints"]),
         ({"compensator": {"joint": 3, "kind": "gas"}}, "compensator.joint", ["3", "1 to 2"]),
     ],
 )

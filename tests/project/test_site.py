@@ -95,6 +95,16 @@ def test_headings_of_the_contents_have_a_level_and_code_can_be_reached_by_keyboa
     assert [path.name for path in pages if wrong.search(path.read_text(encoding="utf-8"))] == []
 
 
+def test_landmarks_and_columns_have_names_and_every_figure_leads_to_itself(pages):
+    wrong = re.compile(r'<aside class="[\w-]+">|<th class="head"><p></p></th>|<p><img ')
+    assert [(path.name, found) for path in pages for found in wrong.findall(path.read_text(encoding="utf-8"))] == []
+
+
+def test_no_page_shows_a_control_character_or_a_figure_that_was_to_be_filled_in(pages):
+    wrong = re.compile(r"[\x00-\x08\x0b-\x1f]|@[A-Z]+@")
+    assert [(path.name, found) for path in pages for found in wrong.findall(path.read_text(encoding="utf-8"))] == []
+
+
 def test_no_command_is_described_by_half_a_sentence():
     """As a terminal shows them, and typer in its pages."""
     page = (SITE / "reference" / "commands.html").read_text(encoding="utf-8")

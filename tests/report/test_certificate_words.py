@@ -45,6 +45,11 @@ def test_only_what_was_measured_is_called_so():
     assert "is predicted to keep" in what_to_do(made_document()) and "it keeps" in what_to_do(made_document(measured=True))
 
 
+def test_errors_on_validation_poses_are_told_from_the_predicted_one():
+    found = certificate_facts(made_document(measured=True))["whose"]
+    assert "0.120 mm at validation poses is the tracker against the model" in found and "0.120 mm is the robot alone" in found
+
+
 def test_errors_before_and_after_are_of_one_kind():
     text = before_and_after(made_document())
     assert "off by 1.500 mm RMS" in text and "by 0.120 mm, both as predicted" in text
@@ -112,6 +117,13 @@ def test_changes_are_named_by_their_joint_and_counted():
     assert found["rows"][0][3] == "200 ± 50 µrad"
     assert (len(found["rows"]), found["more"]) == (12, 2)
     assert "not compared one by one" in comparison_facts(made_comparison(0.5, 0))["sentence"]
+
+
+def test_a_share_below_every_digit_of_a_tracker_is_said_to_be_below_them():
+    document = made_document()
+    document["budget"].append({"name": "joint_tilt", "rms_m": 4.4e-10, "low_m": 3e-10, "high_m": 5e-10})
+    _, share, limits = certificate_facts(document)["budget"][-1]
+    assert share.replace("\u00a0", " ") == "below 0.1 µm" and limits == "–"
 
 
 def test_facts_are_json_and_every_line_of_the_budget_has_a_name():

@@ -4,6 +4,7 @@ import pytest
 from made_loop_facts import CAMPAIGNS, plainly
 from made_loop_tables import effect_entry, experiment_rows, probabilities, step_rows, verdict_document
 
+from elastocal.application.accuracy import BASE, PREDICTED, ROBOT, Accuracy
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
 from elastocal.report.first_page import (
     TITLES,
@@ -15,6 +16,7 @@ from elastocal.report.first_page import (
     probability_sentence,
     sentences,
     what_to_do,
+    whose_errors,
     worth_sentence,
 )
 
@@ -95,6 +97,7 @@ def test_the_headline_is_the_robot_as_it_was_and_as_it_is_in_mm_beside_the_noise
         ({"cost_m": 2.9e-5}, "0.029 mm"),
         ({"cost_m": 1.5e-5, "probability": 0.996}, "0.015 mm: real, negligible"),
         ({"cost_m": 1.5e-5, "probability": 0.7}, "0.015 mm: negligible"),
+        ({"cost_m": 4.4e-10, "probability": 0.996}, "below 0.001 mm: real, negligible"),
         ({"cost_m": None}, "not in the final model"),
         ({"cost_m": None, "name": "setup_step"}, "an error of the measurement, not of the robot"),
     ],
@@ -118,3 +121,29 @@ def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities
 def test_a_robot_whose_calibration_predicts_worse_is_left_as_it_is():
     (advice,) = what_to_do(CAMPAIGNS["adequate"] | {"kept": "frames"}, [])
     assert advice.startswith("Leave the robot as its file has it")
+
+
+MOSTLY = {
+    "left_out_m": "effects that no command contains",
+    "form_m": "the form of the model",
+    "repeated_m": "each pose's own error and the repeatability of the joints",
+}
+
+
+@pytest.mark.parametrize("part", [*MOSTLY, None])
+def test_measured_and_predicted_error_have_their_frame_and_the_predicted_one_its_largest_part(part):
+    stated = Accuracy(BASE, PREDICTED, 1.74e-4, 4e-4, None, None, "", 9, "some poses", **{part: 1.57e-4} if part else {})
+    mostly = MOSTLY.get(part, "the uncertainty of the parameters")
+    assert whose_errors(5.8e-5, stated) == (
+        "0.058 mm at validation poses is the tracker against the model, its noise included, in the declared base's frame; "
+        f"0.174 mm is the robot alone, in the same frame, mostly from {mostly}."
+    )
+
+
+def test_where_the_base_is_unknown_the_robot_has_a_frame_of_its_own():
+    stated = Accuracy(ROBOT, PREDICTED, 1.2e-3, 4e-3, None, None, "", 9, "some poses")
+    found = whose_errors(1.5e-3, stated)
+    assert found.startswith(
+        "1.50 mm at validation poses is the tracker against the model, its noise included, in the tracker's frame;"
+    )
+    assert "1.20 mm is the robot alone, in its own frame" in found

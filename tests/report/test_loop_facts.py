@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from made_certificates import made_accuracy
 from made_loop_facts import CAMPAIGNS, DIALECT, facts_of, plainly
 from made_loop_tables import experiment_rows
 
@@ -40,6 +41,14 @@ def test_an_effect_that_is_not_adopted_is_named_and_no_correction_is_spoken_of(c
 
 def test_an_effect_that_is_adopted_is_said_to_be_part_of_the_model():
     assert [effect["adopted"] for effect in facts_of(CAMPAIGNS["named"])["effects"]] == [True]
+
+
+def test_a_predicted_error_says_why_it_is_not_the_measured_one():
+    verdict = CAMPAIGNS["named"] | {"accuracy": made_accuracy()}
+    stated = facts_of(verdict)["accuracy"]
+    assert stated.startswith("Predicted position error") and "0.120 mm is the robot alone" in stated
+    assert f"{facts_of(verdict)['headline']['after']} mm at validation poses is the tracker" in stated
+    assert facts_of(CAMPAIGNS["named"])["accuracy"] == ""
 
 
 def test_a_fault_of_the_data_is_no_effect():

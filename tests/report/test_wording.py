@@ -4,7 +4,6 @@ import pytest
 
 from elastocal.diagnosis.words import listed
 from elastocal.report.wording import (
-    counted,
     length,
     members_words,
     millimetres,
@@ -52,7 +51,7 @@ def test_no_probability_is_zero_or_one():
     assert said == ["< 1 %", "< 1 %", "2 %", "94 %", "> 99 %", "> 99 %"]
 
 
-def test_lengths_and_counts():
+def test_lengths():
     assert [length(value).replace("\u00a0", " ") for value in (1.2345e-4, 0.9999e-3, 0.0213)] == [
         "123 µm",
         "1.00 mm",
@@ -60,7 +59,6 @@ def test_lengths_and_counts():
     ]
     assert length(None) == "unknown"
     assert [millimetres(value) for value in (1.5e-5, 0.9999e-3, 1.184e-3, 0.0213)] == ["0.015", "1.00", "1.18", "21.3"]
-    assert counted(1, "pose") == "1 pose" and counted(12000, "pose") == "12\u2009000 poses"
     assert plain(0.000123) == "0.000123" and plain(1234.5) == "1234"
 
 

@@ -40,7 +40,7 @@ def test_poses_over_the_workspace_fall_short_of_nothing(kuka, states):
 
 def test_fewer_configurations_than_a_judgement_needs_are_too_few(kuka, states):
     (sentence,) = shortfalls(FEWEST_CONFIGURATIONS - 1, states, kuka, None)
-    assert sentence == "too few: 7 configurations judge, and 8 are needed"
+    assert sentence == "too few: 7 configurations, where at least 8 must judge"
 
 
 @pytest.mark.parametrize(("share", "count"), [(0.9, 1), (1.1, 0)])

@@ -11,7 +11,7 @@ IDENTIFIED = "results/identified/kuka/200um/6DoF.parquet"
 def test_a_job_is_one_line_without_lists_of_files(finished):
     finished.path(IDENTIFIED).unlink()
     said = finished.run(IDENTIFIED).stderr.splitlines()
-    assert "1 jobs" in said
+    assert "1 job" in said
     assert [line for line in said if line.startswith("1 of 1: identify")] == ["1 of 1: identify kuka 200 6DoF"]
     assert max(map(len, said)) < 200
 

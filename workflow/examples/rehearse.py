@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.blind.rehearsal import hidden_robot, with_misplaced_base
+from elastocal.blind.rehearsal import hidden_robot, hidden_words, with_misplaced_base
 from elastocal.blind.rehearsal_files import fill_sheet, lose_beam, measured_errors, write_milling_path
 from elastocal.campaigns.measurements import CSV
 from elastocal.campaigns.reading import read_descriptions, read_robot
@@ -72,4 +72,4 @@ if __name__ == "__main__":
     except InputError as error:
         sys.exit(str(error))
     if given.reveal:
-        print("hidden:", *(f"{defect.effect} {defect.joints or ''}" for defect in defects[-max(len(given.effect), 1) :]))
+        print(f"hidden: {hidden_words(defects, given.effect)}")

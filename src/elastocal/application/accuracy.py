@@ -52,7 +52,8 @@ class Accuracy:
     nothing says so. `noise`: what became of the tracker's noise. `region`: which poses these are. `offset_removed`: whether a
     constant offset at the end effector counts as no error. `left_out`: effects of the fit that no command contains: what they
     were fitted to counts as error. `left_out_m`, `form_m`: of `rms_m`, by those, and by what the form of the model leaves open.
-    `contradicted`: whether held-out poses showed that the form leaves more open than the fitted poses say.
+    `contradicted`: whether held-out poses showed that the form leaves more open than the fitted poses say. `repeated_m`: of
+    `rms_m`, by the repeatability of the joints and the error that each pose has of its own.
     """
 
     frame: str
@@ -69,6 +70,7 @@ class Accuracy:
     left_out_m: float = 0.0
     form_m: float = 0.0
     contradicted: bool = False
+    repeated_m: float = 0.0
     confidence: float = CONFIDENCE
 
     def document(self) -> dict[str, Any]:
@@ -159,6 +161,7 @@ class Prediction:
             scope.left_out_m,
             scope.form_m,
             scope.contradicted,
+            float(np.sqrt((self.repeated_m**2).mean())),
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from elastocal.application.accuracy import scope_from
 from elastocal.application.calibrated import NEUTRAL, CalibratedRobot, calibrated_of, forward
 from elastocal.application.compensation import corrected
+from elastocal.counting import counted
 from elastocal.effects import declared_weight, joint_compliance
 from elastocal.effects.catalogue import candidates_on
 from elastocal.errors import InputError
@@ -135,7 +136,7 @@ def calibrated_in(document: Mapping[str, Any], source: str) -> CalibratedRobot:
             raise InputError(source, where, repr(key), f"an effect of the catalogue on {robot.name}")
         found, wanted = len(entry["values"]), len(known[key].parameters)
         if found != wanted:
-            raise InputError(source, where, f"{found} values", f"{wanted}, as {key} has in this version")
+            raise InputError(source, where, counted(found, "value"), f"{wanted}, as {key} has in this version")
     effects = tuple(known[entry["key"]] for entry in document["effects"])
     zero = float(document["time_zero_s"])
     model = Model(sites, (), False, 6, robot.compliance, effects, zero, None, robot.compliance_known)

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from elastocal.diagnosis.words import at_joints, listed, physical_name
 from elastocal.errors import InputError
 from elastocal.mechanics.components import WRENCH
 from elastocal.plant.arm import arm_from_file
@@ -63,6 +64,14 @@ def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ())
     robot = specimen(arm, seed)
     robot = replace(robot, drives=(*robot.drives, Repeatability((_JOINT_REPEATABILITY_RAD,) * arm.joints)))
     return with_defects(robot, defects), defects
+
+
+def hidden_words(defects: Sequence[Defect], effects: Sequence[str]) -> str:
+    """What `hidden_robot` hid of effects that were asked for, or drew; the small errors that every robot has stand before."""
+    return listed(
+        f"{physical_name(defect.effect)}{at_joints(defect.effect, defect.joints)}"
+        for defect in defects[-max(len(effects), 1) :]
+    )
 
 
 def filled_sheet(

@@ -10,6 +10,7 @@ from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.campaigns.places import is_file_in
+from elastocal.counting import counted
 from elastocal.errors import InputError
 
 _HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
@@ -73,7 +74,7 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, source
     fitted, tested = (len(np.unique(configuration[part])) for part in (~chosen, chosen))
     fewest = 0 if "campaign" in holdout else FEWEST_HELD_OUT_POSES
     if fitted < FEWEST_TRAINING_POSES or tested < fewest:
-        found = f"{fitted} configurations to fit and {tested} held out"
+        found = f"{counted(fitted, 'configuration')} to fit and {tested} held out"
         least = f"at least {FEWEST_TRAINING_POSES} to fit" + (f" and {fewest} held out" if fewest else "")
         allowed = f"{least}; poses with the same joint angles are one"
         raise InputError(source, "holdout", found, allowed)

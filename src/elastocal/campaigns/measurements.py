@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from elastocal.campaigns.column_bounds import BOUNDS, beyond
+from elastocal.counting import counted
 from elastocal.errors import InputError, steering
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
@@ -80,7 +81,7 @@ def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFi
         raise InputError(folder.as_posix(), "", f"{found} {CSV} {'and' if there else 'nor'} {PARQUET}", "one of them")
     path = there[0].as_posix()
     if (size := there[0].stat().st_size) > _MOST_BYTES:
-        raise InputError(path, "", f"{size} bytes", f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements")
+        raise InputError(path, "", counted(size, "byte"), f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements")
     columns, rows, lines = (_read_csv if there[0].name == CSV else _read_parquet)(path, joints)
     if len(rows) == 0:
         raise InputError(path, "", "no row of data", "one row for each measurement of one target")
@@ -134,7 +135,7 @@ def _read_csv(path: str, joints: int) -> tuple[Columns, np.ndarray, np.ndarray]:
             for row, line, cells in kept:
                 if len(cells) != len(header):
                     allowed = f"{len(header)}, one for each column of the header"
-                    raise InputError(path, f"row {row} (line {line})", f"{len(cells)} cells", allowed)
+                    raise InputError(path, f"row {row} (line {line})", counted(len(cells), "cell"), allowed)
             rows += [row for row, _, _ in kept]
             lines += [line for _, line, _ in kept]
             if len(rows) > MOST_MEASUREMENTS:

@@ -25,6 +25,7 @@ from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, ho
 from elastocal.campaigns.measurement_checks import check_angles, check_measurements
 from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, closest_first, read_measurements, shown
 from elastocal.campaigns.places import is_file, is_file_in
+from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import kind_of
@@ -148,7 +149,7 @@ def held_out_campaign(
         raise InputError(source, key, f"another chain, of {other.robot.name}", allowed)
     poses = len(measured_poses(other.measurements)[0])
     if poses < FEWEST_HELD_OUT_POSES:
-        raise InputError(source, key, f"{poses} poses there", f"{FEWEST_HELD_OUT_POSES} or more")
+        raise InputError(source, key, f"{counted(poses, 'pose')} there", f"{FEWEST_HELD_OUT_POSES} or more")
     return other
 
 
@@ -187,7 +188,7 @@ def _check_noise(document: Mapping[str, Any], measurements: Measurements, joints
         raise InputError(source, "noise", "no position_m", "position_m, or a column u95_m of the measurements")
     each = declared.get("joint_rad", 0.0)
     if isinstance(each, list) and len(each) != joints:
-        raise InputError(source, "noise.joint_rad", f"{len(each)} numbers", f"one for all joints, or {joints}")
+        raise InputError(source, "noise.joint_rad", counted(len(each), "number"), f"one for all joints, or {joints}")
 
 
 def _robot_path(name: str, folder: Path, robots_folder: str | Path, source: str) -> Path:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from elastocal.loop.calibrated_files import Diagnosed
 
 AcceptEnvironment = Annotated[
-    bool, Option("--accept-environment", help="Warn of results that other libraries or pins made, and use them.")
+    bool, Option("--accept-environment", help="Use results of other library versions, with a warning.")
 ]
 
 

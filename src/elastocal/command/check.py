@@ -13,6 +13,7 @@ from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline
 from elastocal.command.printed import print_answer, print_lines
+from elastocal.counting import counted
 from elastocal.errors import escaped
 
 # Parameters that are not identifiable and are named; more would be too many to read.
@@ -58,8 +59,8 @@ def answer(facts: Mapping[str, Any]) -> str:
     name, count = facts["campaign"], len(attention(facts))
     if not facts["diagnosable"]:
         return f"{name} cannot be diagnosed: the data are at fault"
-    more = f"; {count} remark{'s' if count > 1 else ''} below" if count else ""
-    return f"{name} can be diagnosed: {facts['testable']} candidate effects can be tested{more}"
+    more = f"; {counted(count, 'remark')} below" if count else ""
+    return f"{name} can be diagnosed: {counted(facts['testable'], 'candidate effect')} can be tested{more}"
 
 
 def attention(facts: Mapping[str, Any]) -> list[str]:
@@ -74,8 +75,8 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     noise = facts["noise"]
     left = f"; not identifiable: {_listed(facts['held'])}" if facts["held"] else ""
     sessions = f", {facts['sessions']} sessions" if facts["sessions"] > 1 else ""
-    robot = f"{facts['campaign']}: {facts['robot']}, {facts['joints']} joints"
-    poses = f"{facts['training']['poses']} poses to fit and {facts['held_out']['poses']} validation poses"
+    robot = f"{facts['campaign']}: {facts['robot']}, {counted(facts['joints'], 'joint')}"
+    poses = f"{counted(facts['training']['poses'], 'pose')} to fit and {counted(facts['held_out']['poses'], 'validation pose')}"
     # Numbers of loads are labels; 0 is none.
     loaded = len(facts["loads"]) - (0 in facts["loads"])
     parts = [*(["unloaded"] if 0 in facts["loads"] else []), *([f"{loaded} load{'s' * (loaded > 1)}"] if loaded else [])]
@@ -83,11 +84,11 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     repeats = "each state measured once" if facts["repeats"] == 1 else f"a state measured up to {facts['repeats']} times"
     found = [
         ("read", f"{robot}, {facts['measured']} in the {facts['frame']} frame"),
-        ("", f"{poses}; {facts['measurements']} measurements of {', '.join(facts['targets'])}{sessions}"),
+        ("", f"{poses}; {counted(facts['measurements'], 'measurement')} of {', '.join(facts['targets'])}{sessions}"),
         ("", f"{loads}; {repeats}"),
         ("noise", f"{1e6 * noise['position_m']:.0f} µm a coordinate, from {_SOURCES[noise['source']]}"),
         ("declared model", f"residual of {1e3 * facts['residual_rms_m']:.3f} mm RMS on the fitted poses"),
-        ("identified", f"{facts['parameters']} parameters, effectively {facts['effective_parameters']:.0f}{left}"),
+        ("identified", f"{counted(facts['parameters'], 'parameter')}, effectively {facts['effective_parameters']:.0f}{left}"),
     ]
     for mount in facts.get("mounts", []):
         rotation = ", ".join(f"{value:.4f}" for value in mount["rotation_rad"])
@@ -101,7 +102,7 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     if facts["accuracy"]:
         sentence = accuracy_sentence(accuracy_from(facts["accuracy"]))
         found.append(("accuracy", f"if the declared model is complete: {sentence}"))
-    found.append(("testable", f"{facts['testable']} candidate effects"))
+    found.append(("testable", counted(facts["testable"], "candidate effect")))
     found += [("", f"{count} not testable: {reason}") for reason, count in facts["untestable"].items()]
     return found
 

@@ -11,6 +11,7 @@ from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.printed import print_answer, print_lines
+from elastocal.counting import counted, grouped
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def correct(
         if controller:
             targets = targets_of(found.joint_angles[good], prismatic, named)
             write_text(folder_of_all / program.name, controller.program(name, targets))
-    lines, answer = [], f"{good.sum():,} of {len(good):,} targets corrected"
+    lines, answer = [], f"{grouped(good.sum())} of {counted(len(good), 'target')} corrected"
     if good.any():
         rms = np.sqrt((before[good] ** 2).mean())
         reachable = predicted(calibrated, found.joint_angles[good], operating.part(good)) if len(bad) else errors
@@ -115,9 +116,11 @@ def correct(
         lines.append(accuracy_sentence(campaign_accuracy(calibrated, campaign.case.observations.states)))
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
-        lines.append(f"{program.name} goes to {good.sum():,} of {len(good):,} targets: {controller.WORDS}, {called}")
+        lines.append(
+            f"{program.name} goes to {grouped(good.sum())} of {counted(len(good), 'target')}: {controller.WORDS}, {called}"
+        )
     if beyond.any():
-        share = f"{beyond.sum():,} of {len(beyond):,} targets"
+        share = f"{grouped(beyond.sum())} of {counted(len(beyond), 'target')}"
         lines.append(f"! {share} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
     certify = f"elastocal certificate {folder} --tolerance 0.2mm"
     following = f"{certify}; or command 12 targets or more, measure them, and add --measured AFTER"

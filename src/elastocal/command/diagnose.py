@@ -19,7 +19,7 @@ from elastocal.errors import InputError, steering
 
 # What `snakemake_logger_plugin_elastocal` writes when a job starts.
 _JOB = re.compile(r"(\d+) of (\d+): (.+)")
-_JOBS = re.compile(r"\d+ jobs")
+_JOBS = re.compile(r"[\d\u2009]+ jobs?")
 _NOTHING = "Nothing to be done"
 # Snakemake prints it before its logger begins.
 _NO_NEWS = "Using workflow specific profile"

@@ -11,6 +11,7 @@ from typer import Argument, Option
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.printed import print_answer
 from elastocal.command.quantities import MOST_ROWS
+from elastocal.counting import counted
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -114,7 +115,10 @@ def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, a
     theirs, _ = poses(chain, angles, chain.end_effector)
     mine, _ = poses(robot.chain, robot.model_angles(nominal.reported_angles(angles)), robot.chain.end_effector)
     off = 1e3 * float(np.linalg.norm(theirs - mine, axis=1).max())
-    lines = [f"{URDF}: {drop_in.changed} joint origins changed, nothing else; put it where the old one is, beside its meshes"]
+    lines = [
+        f"{URDF}: {counted(drop_in.changed, 'joint origin')} changed, nothing else; put it where the old one is, beside its "
+        "meshes"
+    ]
     if off > _ROUNDING_MM:
         what = "ratios of joints, and errors behind a last joint that has no fixed one after it"
         lines.append(f"{URDF} cannot hold {what}: up to {off:.3f} mm at the measured poses")
@@ -133,7 +137,7 @@ def _table(calibrated: CalibratedRobot, rows: int, force: float, partial: Path, 
     found = forward_table(calibrated, rows, hanging, _SEED)
     left, whole = interpolation_error_m(calibrated, found, hanging, _SEED + 1)
     write_csv(partial / TABLE, found)
-    line = f"{output / TABLE}: {len(found)} rows; interpolation leaves {1e3 * left:.3f} of {1e3 * whole:.3f} mm RMS"
+    line = f"{output / TABLE}: {counted(len(found), 'row')}; interpolation leaves {1e3 * left:.3f} of {1e3 * whole:.3f} mm RMS"
     return [line]
 
 

@@ -11,6 +11,7 @@ from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline
 from elastocal.command.quantities import MOST_ROWS
+from elastocal.counting import counted
 from elastocal.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -40,28 +41,28 @@ def csv(
     ] = None,
     skip_empty: Annotated[bool, Option("--skip-empty", help="Leave out rows without a position.")] = False,
     separator: Annotated[
-        Literal["tab", "semicolon", "bar", "comma", "space"] | None, Option(help="Found out where not given.")
+        Literal["tab", "semicolon", "bar", "comma", "space"] | None, Option(help="Between columns. Default: found out.")
     ] = None,
-    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Found out where not given.")] = None,
+    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of decimals. Default: found out.")] = None,
     thousands: Annotated[
         Literal["point", "comma", "space", "apostrophe"] | None, Option(help="Mark between thousands, where there is one.")
     ] = None,
-    encoding: Annotated[str | None, Option(help="Such as utf-8, cp1252; found out where not given.")] = None,
+    encoding: Annotated[str | None, Option(help="Such as utf-8 or cp1252. Default: found out.")] = None,
     header: Annotated[
-        int | None, Option(min=1, max=MOST_ROWS, help="Line of the names of columns; found out where not given.")
+        int | None, Option(min=1, max=MOST_ROWS, help="Line with the names of the columns. Default: found out.")
     ] = None,
     robot: Annotated[
         Path | None, Option(help="Robot file whose joint_names the columns have. Default: that of FOLDER/campaign.yaml.")
     ] = None,
     options: Annotated[Path | None, Option(help="import.yaml of an earlier import, to repeat it.")] = None,
-    force: Annotated[bool, Option("--force", help="Replace measurements.csv that is filled in.")] = False,
+    force: Annotated[bool, Option("--force", help="Replace a measurements.csv that is filled in.")] = False,
 ) -> None:
     """Make measurements.csv of another program's table.
 
     Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11 .. r33, t11 .. t34, fx .. mz, pose,
     load, repeat, target, time) or as the robot's file calls its joints, units by brackets or endings ("X [mm]", x_mm). What is
-    ambiguous is asked for. Poses, loads and repeats that no column numbers are counted. What was read, how, and what was left
-    out is printed at the end; the options, and what was found out, are written to import.yaml.
+    ambiguous is asked for. Poses, loads and repeats are counted where no column numbers them. The end of the output states
+    what was read, how, and what was left out; import.yaml has the options, and what was found out.
     """
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
     from elastocal.exchange.import_options import IMPORT, ImportOptions, import_options_text, read_import_options
@@ -150,18 +151,19 @@ def _summary(found: ImportedMeasurements, options: ImportOptions) -> list[str]:
     poses = len(np.unique(np.column_stack([table.get("session", np.zeros_like(table["pose"])), table["pose"]]), axis=0))
     targets = ", ".join(sorted(set(table["target"].tolist())))
     first = [
-        f"{len(table['pose'])} measurements of {targets} at {poses} poses, {found.joints} joints",
+        f"{counted(len(table['pose']), 'measurement')} of {targets} at {counted(poses, 'pose')}, "
+        f"{counted(found.joints, 'joint')}",
         f"file: names of columns in line {options.header}, separator {options.separator}, decimal {options.decimal}, "
         f"thousands {options.thousands or 'not marked'}, encoding {options.encoding}",
     ]
     if found.skipped:
-        first.append(f"left out: {found.skipped} rows without a position")
+        first.append(f"left out: {counted(found.skipped, 'row')} without a position")
     read = [f"{name} from {header!r}" + (f" in {options.units[name]}" if options.units and name in options.units else "")
             for name, header in (options.columns or {}).items()]  # fmt: skip
-    counted = [name for name in ("pose", "load", "repeat") if name not in (options.columns or {})]
+    numbered = [name for name in ("pose", "load", "repeat") if name not in (options.columns or {})]
     lines = [*first, f"read: {'; '.join(read)}", f"orientations: {options.rotation}"]
-    if counted:
-        lines.append(f"counted, as no column has it: {', '.join(counted)}")
+    if numbered:
+        lines.append(f"counted, as no column has it: {', '.join(numbered)}")
     forces = [name for name in WRENCH_NAMES if name not in (options.columns or {})]
     if forces:
         lines.append(f"taken for zero, as no column has it: {', '.join(forces)}")

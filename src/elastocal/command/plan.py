@@ -13,6 +13,7 @@ from typer import Argument, Option
 
 from elastocal.command.printed import print_answer
 from elastocal.command.quantities import FARTHEST_TARGET_M, LARGEST_SEED, MOST_POSES, MOST_ROWS, angle_rad, length_m, numbers
+from elastocal.counting import counted
 from elastocal.errors import InputError, text_fault
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ def plan(
         if wanted is not None:
             enough = poses_needed(found.accuracy_m, wanted)
             if enough is None:
-                best = f"{1e3 * found.accuracy_m[-1]:.3f} mm with {poses} poses"
+                best = f"{1e3 * found.accuracy_m[-1]:.3f} mm with {counted(poses, 'pose')}"
                 raise InputError("--accuracy", "", best, "more poses, or an accuracy that they reach")
             found = planned(survey, some, max(enough, fewest_poses(survey)), held_out, criterion, seed)
     table = sheet(survey, found)
@@ -159,8 +160,8 @@ def plan(
             write_plan(partial)
     output = output or Path(str(folder), names[0])
     answer = (
-        f"{len(found.fitted.joint_angles)} poses to fit and {held_out} held out, of {len(some.joint_angles):,} that the cell "
-        f"allows: {len(table)} measurements"
+        f"{counted(len(found.fitted.joint_angles), 'pose')} to fit and {held_out} held out, of {len(some.joint_angles):,} "
+        f"that the cell allows: {counted(len(table), 'measurement')}"
     )
     sheets = [f"sheet to print: {output.with_suffix('.pdf')}", f"table: {output}"]
     following = "measure" + (

@@ -19,6 +19,7 @@ from urllib.parse import quote
 from rocrate.model.contextentity import ContextEntity
 from rocrate.rocrate import ROCrate
 
+from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.io.records import checksum, files_of
 
@@ -180,7 +181,7 @@ def _run_action(crate: ROCrate, run: FinishedRun, workflow: Entity, read: Sequen
         crate,
         "#run",
         name="run of the workflow",
-        description=f"{len(run.jobs)} jobs; {run.origin.words}",
+        description=f"{counted(len(run.jobs), 'job')}; {run.origin.words}",
         started=min(job.started for job in run.jobs),
         ended=max(job.ended for job in run.jobs),
         tool=workflow.id,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.counting import counted
 from elastocal.data_checks.catalogue import faults
 from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
@@ -121,7 +122,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     if decisive:
         # Where all measurements mean something else, no single row is wrong.
         part = fitted_to(case, np.ones(len(case.campaign.measurements), bool))
-    tell(f"declared model fitted to {len(part.case.observations)} measurements")
+    tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
     found, final, near = None, part.declared, None
     errors = Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
@@ -141,7 +142,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         last, part = part, fitted_to(case, ~errors.gross | good, part)
         if part is last:
             break
-        tell(f"{(~part.kept).sum()} of {len(good)} rows are gross errors: once more without them")
+        tell(f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without")
         # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
         near = (about, found.conclusion.best.named) if relinearized else None

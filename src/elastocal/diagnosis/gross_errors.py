@@ -23,6 +23,7 @@ from scipy.linalg import lapack, solve_triangular
 from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
+from elastocal.counting import counted
 from elastocal.diagnosis.evidence import scale_weights
 from elastocal.diagnosis.linearize import prior_deviations
 from elastocal.diagnosis.statistics import Products
@@ -377,7 +378,9 @@ def entries_of(found: Deviations, campaign: Campaign, held_out: bool) -> list[di
 def warnings_of(entries: list[dict[str, Any]]) -> list[str]:
     """A sentence for each of the first gross errors, and how many more there are."""
     more = len(entries) - _MOST_NAMED
-    return [entry["detail"] for entry in entries[:_MOST_NAMED]] + ([f"{more} further rows left out"] if more > 0 else [])
+    return [entry["detail"] for entry in entries[:_MOST_NAMED]] + (
+        [f"{counted(more, 'further row')} left out"] if more > 0 else []
+    )
 
 
 def _sentence(found: Deviations, campaign: Campaign, place: int) -> str:

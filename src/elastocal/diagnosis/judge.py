@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.campaigns.columns import residual_columns
+from elastocal.counting import counted
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import noise_from
@@ -228,14 +229,16 @@ def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str
 
 def _with_gross_errors(heldout: Mapping[str, Any], count: int) -> str:
     without, whole = (1e3 * part["after"]["rms_m"] for part in (heldout, heldout["with_gross_errors"]))
-    return f"held-out errors are without {count} gross errors: with them the RMS is {whole:.3g} mm instead of {without:.3g} mm"
+    left_out = counted(count, "gross error")
+    return f"held-out errors are without {left_out}: with all rows the RMS is {whole:.3g} mm instead of {without:.3g} mm"
 
 
 def _range_warnings(by_range: Mapping[str, Any], poses: int) -> list[str]:
     count = by_range["poses"]
     if not count:
         return []
-    return [f"{count} of {poses} validation poses lie outside the range of the fitted poses: errors there are extrapolated"]
+    lie = f"{count} of {counted(poses, 'validation pose')} {'lies' if count == 1 else 'lie'}"
+    return [f"{lie} outside the range of the fitted poses: errors there are extrapolated"]
 
 
 def _warnings(

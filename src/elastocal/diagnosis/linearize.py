@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
+from elastocal.counting import counted
 from elastocal.diagnosis import other
 from elastocal.diagnosis.hypotheses import prior_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
@@ -339,5 +340,5 @@ def lacking(candidate: Candidate, model: FittedModel, states: States) -> str:
     for joint in (candidate.joints or candidate.turning) if candidate.distinct_angles else ():
         angles = len(np.unique(np.round(np.mod(states.joint_angles[:, joint - 1], 2 * np.pi), 3)))
         if angles < candidate.distinct_angles:
-            return f"{angles} angles of joint {joint} where {candidate.distinct_angles} are needed"
+            return f"{counted(angles, 'angle')} of joint {joint} where {candidate.distinct_angles} are needed"
     return ""

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.constants import g as standard_gravity
 
+from elastocal.counting import counted
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.mechanics.components import WRENCH_NAMES
 
@@ -137,10 +138,10 @@ def sentence_of(proposal: Proposal) -> str:
         return f"No further measurement is proposed.{aside}"
     if proposal.reason:
         return f"No further measurement is proposed: {proposal.reason}."
-    needed = f"{proposal.poses_needed} poses" if proposal.poses_needed else f"more than {MOST_POSES} poses"
+    needed = counted(proposal.poses_needed, "pose") if proposal.poses_needed else f"more than {MOST_POSES} poses"
     shares = ", ".join(f"{share:g}" for share in proposal.shares)
     return (
-        f"{len(proposal)} further poses, each read at {shares} times its load, separate "
+        f"{counted(len(proposal), 'further pose')}, each measured at {shares} times its load, separate "
         f"{words(proposal.best)} from {words(proposal.nearest)} by "
         f"{proposal.separation[-1]:.1f} and resolve the verdict at 19:1 with a probability of {proposal.resolved[-1]:.0%}; "
         f"{WANTED_PROBABILITY:.0%} needs {needed}.{aside}"

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from elastocal.campaigns.measurements import closest_first
+from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import (
     ANGLE,
@@ -237,7 +238,7 @@ def check_complete(
         )
         raise InputError(text.path, "header", "no joint angles", allowed)
     if robot and len(angles) > robot.joints:
-        found = f"{len(angles)} joints: {', '.join(columns[name] for name in angles)}"
+        found = f"{counted(len(angles), 'joint')}: {', '.join(columns[name] for name in angles)}"
         raise InputError(text.path, "header", found, f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out")
     last = robot.joints if robot else int(angles[-1][1:])
     groups = [[f"q{j}" for j in range(1, last + 1)], needed]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from elastocal.campaigns.measurements import closest_first
+from elastocal.counting import counted
 from elastocal.errors import InputError, steering
 from elastocal.io.texts import decoded, read_bytes
 
@@ -108,7 +109,7 @@ def read_text_table(
             cells.pop()
         if len(cells) != len(names):
             allowed = f"{len(names)}, one for each column of line {header}"
-            raise InputError(source, f"line {number}", f"{len(cells)} cells", allowed)
+            raise InputError(source, f"line {number}", counted(len(cells), "cell"), allowed)
     units = dict(zip(names, (rows and units_in(rows[0][1])) or (), strict=False))
     rows = rows[1:] if units else rows
     if not rows:
@@ -136,13 +137,13 @@ def read_text_table(
     decimal = stated.decimal or _decimal_of(columns, numbers, separator, thousands, source)
     if decimal == "comma":
         columns = {name: tuple(map(_with_point, cells)) for name, cells in columns.items()}
-    counted = {
-        "rows of empty cells": len(table) - len(rows) - bool(units),
-        "lines above the header": sum(number < header for number, _ in filled) - named_above,
-        "lines of comments below the header": sum(number > header for number, _ in comments),
-        "columns without name and values": len(names) - len(places) - sum(name in ignored for name in names),
-    }
-    left_out = tuple(f"{number} {what}" for what, number in counted.items() if number)
+    unread = (
+        (len(table) - len(rows) - bool(units), "row", "of empty cells"),
+        (sum(number < header for number, _ in filled) - named_above, "line", "above the header"),
+        (sum(number > header for number, _ in comments), "line", "of comments below the header"),
+        (len(names) - len(places) - sum(name in ignored for name in names), "column", "without name and values"),
+    )
+    left_out = tuple(f"{counted(number, noun)} {where}" for number, noun, where in unread if number)
     dialect = Dialect(separator, decimal, header, encoding, thousands)
     stated_units = {name: unit for name, unit in units.items() if unit and name in columns}
     return TextTable(source, dialect, columns, tuple(numbers), left_out, stated_units)
@@ -180,7 +181,7 @@ def _lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]:
     lines = lines_of(text, path)
     if len(lines) > MOST_LINES:
         allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
-        raise InputError(path, "", f"{len(lines)} lines", allowed)
+        raise InputError(path, "", counted(len(lines), "line"), allowed)
     return lines, encoding
 
 

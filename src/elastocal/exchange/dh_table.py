@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.campaigns.measurements import closest_first
+from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import units_in, without_unit
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
@@ -101,7 +102,7 @@ def read_dh_table(path: str | Path, options: DhOptions = AS_STATED) -> tuple[lis
     columns, table, left_out = (_csv_rows if suffix == ".csv" else _yaml_rows)(path, source, options)
     meanings = _meanings(columns, options, source)
     if len(table) > MOST_ROWS:
-        raise InputError(source, "", f"{len(table)} rows", f"at most {MOST_ROWS}, one for each joint")
+        raise InputError(source, "", counted(len(table), "row"), f"at most {MOST_ROWS}, one for each joint")
     rows = [_row(where, cells, meanings, source) for where, cells in table]
     if not any(row.kind != FIXED for row in rows):
         raise InputError(source, "", "no joint", "a row of type R or P for each joint")

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from elastocal.counting import counted
 from elastocal.errors import InputError, reason_of
 from elastocal.io.atomic_writes import check_places, write_text
 from elastocal.io.documents import check_document, one_line
@@ -106,7 +107,7 @@ def summary(result: Imported) -> list[str]:
     """What was read, and what is to be known of it, in a few lines."""
     robot = result.robot
     shifts = sum(robot.chain.prismatic)
-    kinds = f"{robot.joints} joint{'s' if robot.joints > 1 else ''}" + (f", {shifts} of them prismatic" if shifts else "")
+    kinds = counted(robot.joints, "joint") + (f", {shifts} of them prismatic" if shifts else "")
     reach = math.fsum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T")
     weight = math.fsum(mass.mass_kg for mass in robot.masses)
     return [

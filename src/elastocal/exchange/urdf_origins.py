@@ -15,6 +15,7 @@ from xml.parsers import expat
 
 import numpy as np
 
+from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.exchange.fixed_transforms import axis_rotation, elementary, yaw_pitch_roll
 from elastocal.exchange.urdf_chain import UrdfChain, chain_between, joints_above, point_name
@@ -82,7 +83,7 @@ def _ends_of(urdf: Urdf, robot: Robot, source: str) -> tuple[str, str]:
                 return joint.parent, tip
             faults.append(fault)
     if not faults:
-        listed = ", ".join(names or ()) or f"{robot.joints} joints"
+        listed = ", ".join(names or ()) or counted(robot.joints, "joint")
         raise InputError(source, "", f"no chain to {wanted!r} by {listed}", _THE_SAME)
     # Of another base all is the same behind the first joint.
     raise InputError(source, *max(faults)[1:], _THE_SAME)
@@ -92,7 +93,7 @@ def _difference(chain: Chain, other: Chain, names: list[str]) -> tuple[int, str,
     """The first joint (or the tip) that two chains have differently: its number, name and how; None where they are the same."""
     (fixed, moving), (theirs, their_moving) = _stretches(chain), _stretches(other)
     if len(moving) != len(their_moving):
-        return 0, "", f"{len(moving)} joints that move, not {len(their_moving)}"
+        return 0, "", f"{counted(len(moving), 'joint that moves', 'joints that move')}, not {len(their_moving)}"
     for number, (mine, wanted) in enumerate(zip(fixed, theirs, strict=True)):
         last = number == len(moving)
         key = "the tip" if last else f"joint {names[moving[number].coordinate or 0]!r}"

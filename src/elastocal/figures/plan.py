@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _SHOWN_TIMES = 30.0
 _VIEWS = (("from above", 0, 1), ("from the side", 0, 2))
 # Of the pictures of single poses: how many stand in a row and on a page.
-_ACROSS, _MOST_ON_PAGE = 6, 48
+_ACROSS, _MOST_ON_PAGE = 7, 56
 # A force is drawn as long as this share of the reach.
 _PULL = 0.35
 
@@ -106,7 +106,7 @@ def pose_pictures(robot: Robot, plan: Plan) -> list[Figure]:
     for first in range(0, len(arms), _MOST_ON_PAGE):
         page = range(first, min(first + _MOST_ON_PAGE, len(arms)))
         rows = -(-len(page) // _ACROSS)
-        figure, axes = panels(rows, _ACROSS, 29 * rows)
+        figure, axes = panels(rows, _ACROSS, 27 * rows)
         for axis in axes.flat:
             axis.set_axis_off()
         for axis, pose in zip(axes.flat, page, strict=False):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from elastocal.counting import counted
 from elastocal.league.folds import BLOCKS, RANDOM, SESSION
 
 if TYPE_CHECKING:
@@ -63,7 +64,8 @@ def _winners(table: pd.DataFrame, words: Mapping[str, str]) -> str:
     """How often each method has the smallest RMS error on one split."""
     best = table.loc[table.groupby("data")["rms_mm"].idxmin(), "method"].map(words)
     counts = best.value_counts()
-    return f"Smallest RMS error of {len(best)} data sets: {', '.join(f'{name} {count}' for name, count in counts.items())}."
+    each = ", ".join(f"{name} {count}" for name, count in counts.items())
+    return f"Smallest RMS error of {counted(len(best), 'data set')}: {each}."
 
 
 def _coverage_sentence(table: pd.DataFrame, words: Mapping[str, str]) -> str:

@@ -14,6 +14,7 @@ from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.measurements import CSV
 from elastocal.campaigns.reading import campaign_files, read_campaign
+from elastocal.counting import counted
 from elastocal.effects.catalogue import effects
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import OK, read_corrected_targets
@@ -81,7 +82,7 @@ def measured_errors(folder: str | Path, robots_folder: str | Path, found: Diagno
         raise InputError(source, "robot", f"another robot, {campaign.robot.name}", f"that of {found.name}, {robot.name}")
     mine = [number for number, target in enumerate(campaign.targets) if target.point == end]
     if len(mine) != 1:
-        raise InputError(source, "targets", f"{len(mine)} targets on {end}", "one")
+        raise InputError(source, "targets", f"{counted(len(mine), 'target')} on {end}", "one")
     seen = campaign.measurements.select(campaign.measurements.target == mine[0])
     _require_commanded(folder / CSV, seen, campaign, wanted)
     row = seen.pose - 1
@@ -92,7 +93,7 @@ def measured_errors(folder: str | Path, robots_folder: str | Path, found: Diagno
     position = np.stack([np.bincount(group, axis) / count for axis in seen.position.T], axis=1)
     poses = len(np.unique(row))
     if poses < FEWEST_POSES:
-        raise InputError(folder / CSV, "pose", f"{poses} corrected poses", f"{FEWEST_POSES} or more")
+        raise InputError(folder / CSV, "pose", counted(poses, "corrected pose"), f"{FEWEST_POSES} or more")
     off, freedoms = np.empty((len(first), 3)), 0
     for session in np.unique(seen.session[first]):
         some = seen.session[first] == session

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.mechanics.chain import notation, parse_chain, stretches
 from elastocal.mechanics.robot import STANDING, Compensator, Link, Mass, Robot, Tube
@@ -58,7 +59,7 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
     matrix = reported.get("matrix", np.eye(n).tolist())
     offset = reported.get("offset_deg", [0.0] * n)
     if [len(row) for row in matrix] != [n] * n or len(offset) != n:
-        found = f"rows of {[len(row) for row in matrix]} and {len(offset)} offsets"
+        found = f"rows of {[len(row) for row in matrix]} and {counted(len(offset), 'offset')}"
         raise InputError(source, "reported_joints", found, f"{n} rows of {n} numbers and {n} offsets")
     return Robot(
         name=document["name"],
@@ -131,7 +132,9 @@ def joint_limits(limits_deg: Sequence[Sequence[float]] | None, chain: Chain, sou
             raise InputError(source, "joint_limits_deg", f"nothing, but T.(q{joint})", "[lower, upper], for a track in metres")
         limits_deg = [UNLIMITED_DEG] * joints
     if len(limits_deg) != joints:
-        raise InputError(source, "joint_limits_deg", f"{len(limits_deg)} entries", f"one for each of the {joints} joints")
+        raise InputError(
+            source, "joint_limits_deg", counted(len(limits_deg), "entry", "entries"), f"one for each of the {joints} joints"
+        )
     for joint, (low, high) in enumerate(limits_deg):
         if low >= high:
             raise InputError(source, f"joint_limits_deg[{joint}]", str([low, high]), "[lower, upper]")
@@ -142,7 +145,7 @@ def _compliance(document: Mapping[str, Any], chain: Chain, source: str) -> np.nd
     if "compliance_urad_per_Nm" not in document:
         return usual_compliance(chain, document.get("payload_kg"))
     if len(document["compliance_urad_per_Nm"]) != chain.coordinates:
-        found = f"{len(document['compliance_urad_per_Nm'])} entries"
+        found = counted(len(document["compliance_urad_per_Nm"]), "entry", "entries")
         raise InputError(source, "compliance_urad_per_Nm", found, f"one for each of the {chain.coordinates} joints")
     return 1e-6 * np.array(document["compliance_urad_per_Nm"], float)
 
@@ -179,7 +182,9 @@ def _gear_ratio(ratios: Sequence[float | None] | None, joints: int, source: str)
     if ratios is None:
         return None
     if len(ratios) != joints:
-        raise InputError(source, "gear_ratio", f"{len(ratios)} entries", f"one or null for each of the {joints} joints")
+        raise InputError(
+            source, "gear_ratio", counted(len(ratios), "entry", "entries"), f"one or null for each of the {joints} joints"
+        )
     return tuple(ratios)
 
 
@@ -187,7 +192,7 @@ def _joint_names(names: Sequence[str] | None, joints: int, source: str) -> tuple
     if names is None:
         return None
     if len(names) != joints:
-        raise InputError(source, "joint_names", f"{len(names)} entries", f"one for each of the {joints} joints")
+        raise InputError(source, "joint_names", counted(len(names), "entry", "entries"), f"one for each of the {joints} joints")
     return tuple(names)
 
 
@@ -219,7 +224,9 @@ def _links(chain: Chain, described: Mapping[str, Any] | None, source: str) -> tu
     rigid = stretches(chain)
     tubes = described["tubes"]
     if len(tubes) not in (1, len(rigid)):
-        raise InputError(source, "links.tubes", f"{len(tubes)} tubes", f"one for all links or one for each of the {len(rigid)}")
+        raise InputError(
+            source, "links.tubes", counted(len(tubes), "tube"), f"one for all links or one for each of the {len(rigid)}"
+        )
     links = []
     for number, (after, vector) in enumerate(rigid):
         size = tubes[number if len(tubes) > 1 else 0]

@@ -12,8 +12,9 @@ from elastocal.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARE
 from elastocal.blind.confusion import CLASS_WITH, CLASS_WITHOUT
 from elastocal.blind.robots import PROOF, TUNED, leading
 from elastocal.blind.scores import NONE
+from elastocal.counting import counted, grouped
 from elastocal.diagnosis.words import at_joints, listed
-from elastocal.report.wording import counted, grouped, plain, words
+from elastocal.report.wording import plain, words
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping

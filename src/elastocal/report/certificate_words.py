@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 from elastocal.application.accuracy import MEASURED, PREDICTED, accuracy_from, accuracy_sentence, millimetres
 from elastocal.application.certificate.repeatability import ISO_CYCLES, ISO_POSES
+from elastocal.counting import counted
 from elastocal.diagnosis.words import candidate_words, listed, parameter_words, physical_name
 from elastocal.effects.protocol import effect_of
-from elastocal.report.first_page import TITLES
-from elastocal.report.wording import MICRO, capital, counted, length, minus, percent, plain, scaled, span_words
+from elastocal.report.first_page import TITLES, whose_errors
+from elastocal.report.wording import MICRO, capital, length, minus, percent, plain, scaled, span_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,6 +34,8 @@ _STEPS = {
 # From here on the tracker's noise hides the robot's own repeatability.
 _HIDDEN = 0.8
 _SHOWN_CHANGES = 12
+# Below the digits of any tracker.
+_NOTHING_M = 1e-7
 # Below this probability of the observed change where nothing changed, a robot counts as changed.
 _LEVEL = 0.05
 
@@ -85,6 +88,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
             ]
             for step in steps
         ],
+        "whose": whose_errors(steps[-1]["rms_m"], accuracy_from(document["predicted"])),
         "floor": length(document["noise_floor_rms_m"]),
         "iso": iso_rows(document["iso_9283"], document["measured"]),
         "iso_warning": iso_warning(document["iso_9283"]["repeatability"]),
@@ -292,11 +296,15 @@ def _with_interval(step: Mapping[str, Any], metric: str) -> str:
 
 
 def _limits(line: Mapping[str, Any]) -> str:
-    return "–" if line["low_m"] is None else f"{length(line['low_m'])} to {length(line['high_m'])}"
+    return (
+        "–" if line["low_m"] is None or line["rms_m"] < _NOTHING_M else f"{length(line['low_m'])} to {length(line['high_m'])}"
+    )
 
 
 def _share(line: Mapping[str, Any]) -> str:
     hidden = line["name"] == "repeatability" and not line["rms_m"]
+    if 0.0 < line["rms_m"] < _NOTHING_M:
+        return f"below {length(_NOTHING_M, 1)}"
     return "hidden by the tracker's noise" if hidden else length(line["rms_m"])
 
 

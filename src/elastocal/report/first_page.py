@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.accuracy import BASE
+from elastocal.counting import counted
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.words import (
     NOTHING,
@@ -25,7 +27,6 @@ from elastocal.report.wording import (
     MILLI,
     as_sentence,
     capital,
-    counted,
     length,
     millimetres,
     minus,
@@ -38,6 +39,8 @@ from elastocal.report.wording import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
     from typing import Any
+
+    from elastocal.application.accuracy import Accuracy
 
 TITLES = {
     "adequate": "the declared model is adequate",
@@ -60,6 +63,8 @@ _MOST_CAUSES = 6
 # components below a third of the largest need no closer look.
 NEGLIGIBLE = 1 / 3
 MOST_NAMES = 8
+# The last digit of a cost.
+_FINEST_M = 1e-6
 _COST = "the RMS error at the poses and loads of the campaign if it alone is left uncorrected"
 
 
@@ -85,6 +90,28 @@ def headline_sentence(stated: Mapping[str, str]) -> str:
     return f"{stated['before']} → {stated['after']} mm{noise}, RMS position error on {stated['poses']}"
 
 
+def whose_errors(measured_m: float, accuracy: Accuracy) -> str:
+    """Whose error is measured on validation poses and whose is predicted, in which frames, and why both differ.
+
+    `measured_m`: RMS error of the final model there, m.
+    """
+    frames = (
+        ("the declared base's frame", "the same frame") if accuracy.frame == BASE else ("the tracker's frame", "its own frame")
+    )
+    parts = {
+        "each pose's own error and the repeatability of the joints": accuracy.repeated_m,
+        "effects that no command contains": accuracy.left_out_m,
+        "the form of the model": accuracy.form_m,
+    }
+    rest = accuracy.rms_m**2 - sum(part**2 for part in parts.values())
+    parts["the uncertainty of the parameters"] = float(np.sqrt(max(rest, 0.0)))
+    return (
+        f"{millimetres(measured_m)} mm at validation poses is the tracker against the model, its noise included, in "
+        f"{frames[0]}; {millimetres(accuracy.rms_m)} mm is the robot alone, in {frames[1]}, mostly from "
+        f"{max(parts, key=lambda name: parts[name])}."
+    )
+
+
 def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
     """What an effect costs at the campaign's poses and loads: the RMS error if it alone were left out of the correction."""
     cost = effect["cost_m"]
@@ -94,7 +121,9 @@ def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
         return "not in the final model" if moves else "an error of the measurement, not of the robot"
     if cost > NEGLIGIBLE * heldout["after"]["rms_m"]:
         return f"{millimetres(cost)} mm"
-    return f"{millimetres(cost)} mm: {'real, ' if effect['probability'] >= _SURE else ''}negligible"
+    # No finer than a micrometre, and what was found is not nothing.
+    stated = millimetres(cost) if cost >= _FINEST_M / 2 else f"below {millimetres(_FINEST_M)}"
+    return f"{stated} mm: {'real, ' if effect['probability'] >= _SURE else ''}negligible"
 
 
 def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:

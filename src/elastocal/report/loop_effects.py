@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from elastocal.counting import counted, grouped
 from elastocal.diagnosis.words import alternative_words, listed, parameter_words, physical_name
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
@@ -13,8 +14,6 @@ from elastocal.report.loop_parameters import mostly_prior
 from elastocal.report.wording import (
     as_sentence,
     capital,
-    counted,
-    grouped,
     length,
     members_words,
     probability_words,

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.counting import counted
 from elastocal.diagnosis.words import in_words, listed
-from elastocal.report.wording import MICRO, MILLI, counted, length, minus, percent, span_words
+from elastocal.report.wording import MICRO, MILLI, length, minus, percent, span_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -17,6 +17,7 @@ from elastocal.report.first_page import (
     probability_sentence,
     sentences,
     what_to_do,
+    whose_errors,
 )
 from elastocal.report.loop_effects import NONE_FOUND, effect_facts
 from elastocal.report.loop_errors import as_judged, range_sentence, remainder_sentence, split_rows, step_rows
@@ -66,7 +67,7 @@ def loop_facts(
         "now": what_to_do(verdict, experiment),
         "warnings": [] if faulty else [_with_minus(as_sentence(in_words(warning))) for warning in verdict["warnings"]],
         "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),
-        "accuracy": accuracy_sentence(accuracy_from(stated)) if (stated := verdict.get("accuracy")) else "",
+        "accuracy": _accuracy(verdict),
         "measured": measured(table, descriptions),
         "noise": noise_rows(verdict["noise"], descriptions["campaign"]["measured"] == "pose"),
         "noise_source": NOISE_SOURCES[verdict["noise"]["source"]],
@@ -88,6 +89,13 @@ def loop_facts(
         "settings": setting_rows(verdict["settings"]),
         "found": [effect["name"] for effect in verdict["effects"]],
     }
+
+
+def _accuracy(verdict: Mapping[str, Any]) -> str:
+    if not verdict.get("accuracy"):
+        return ""
+    stated = accuracy_from(verdict["accuracy"])
+    return f"{accuracy_sentence(stated)} {whose_errors(verdict['heldout']['after']['rms_m'], stated)}"
 
 
 def _with_minus(text: str) -> str:

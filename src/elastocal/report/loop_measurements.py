@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal import __version__
+from elastocal.counting import counted, grouped
 from elastocal.diagnosis.words import listed
-from elastocal.report.wording import MICRO, capital, counted, grouped, length, percent, plain
+from elastocal.report.wording import MICRO, capital, length, percent, plain
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

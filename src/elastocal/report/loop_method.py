@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from elastocal.counting import counted, grouped
 from elastocal.diagnosis.words import listed, physical_name
-from elastocal.report.wording import as_sentence, capital, counted, grouped, members_words, percent, words
+from elastocal.report.wording import as_sentence, capital, members_words, percent, words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

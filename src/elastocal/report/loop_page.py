@@ -10,11 +10,12 @@ import numpy as np
 from jinja2 import Environment
 from markupsafe import Markup
 
+from elastocal.counting import grouped
 from elastocal.diagnosis.words import candidate_words
 from elastocal.io.atomic_writes import write_text
 from elastocal.loop.residual_tables import angles_of, worst_measurement
 from elastocal.mechanics.kinematics import corners, joint_axes
-from elastocal.report.wording import MICRO, capital, grouped, minus, probability_words
+from elastocal.report.wording import MICRO, capital, minus, probability_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.campaigns.measurements import SHOWN
+from elastocal.counting import counted
 from elastocal.report.typesetting import compile_document
 
 if TYPE_CHECKING:
@@ -54,7 +55,10 @@ def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[s
     fitted = len(plan.fitted.joint_angles)
     return {
         "robot": survey.robot.name,
-        "lines": [f"{fitted} poses to fit and {len(poses) - fitted} held out: {len(rows)} measurements.", many],
+        "lines": [
+            f"{counted(fitted, 'pose')} to fit and {len(poses) - fitted} held out: {counted(len(rows), 'measurement')}.",
+            many,
+        ],
         "how": (
             "Tick a box for each measurement. Several boxes behind one load: move away and approach the pose afresh each time."
             + (" F is the load marked +F; −F is the opposite pull, 0 none." if survey.loaded else "")

@@ -49,16 +49,6 @@ def span_words(joint_ranges: Sequence[Mapping[str, Any]]) -> str:
     return ", ".join(each)
 
 
-def counted(number: int, one: str, many: str | None = None) -> str:
-    """A number with its noun, with thin spaces in large numbers."""
-    return f"{grouped(number)} {one if number == 1 else many or one + 's'}"
-
-
-def grouped(number: int) -> str:
-    """A whole number with a thin space between thousands."""
-    return f"{number:,}".replace(",", "\u2009")
-
-
 def members_words(keys: Iterable[str], most: int = 12) -> str:
     """What an effect was found as: its joints or links and variants, those of one joint together.
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import blas
 
 from elastocal.campaigns.joint_space import beyond_range, repeated
+from elastocal.counting import counted
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once
@@ -70,8 +71,9 @@ def repeat_warnings(fitted_states: States | Measurements, states: States | Measu
     again = repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
     if not again.any():
         return []
-    count = f"{again.sum()} of {len(again)}" if not again.all() else f"all {len(again)}"
-    return [f"{count} validation poses repeat configurations that were fitted: these errors say nothing of other poses"]
+    many = counted(len(again), "validation pose")
+    count = f"{again.sum()} of {many}" if not again.all() else f"all {many}"
+    return [f"{count} repeat configurations that were fitted: these errors say nothing of other poses"]
 
 
 def beyond_campaign(fitted_states: States, joint_angles: np.ndarray, wrench: np.ndarray | None) -> np.ndarray:

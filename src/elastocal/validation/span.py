@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.campaigns.joint_space import configurations
+from elastocal.counting import counted, grouped
 from elastocal.fitting.observations import state_clusters
 
 if TYPE_CHECKING:
@@ -43,10 +44,11 @@ def shortfalls(judged: int, fitted: States, robot: Robot, outside_use: np.ndarra
     """
     found = []
     if judged < FEWEST_CONFIGURATIONS:
-        found.append(f"too few: {judged} configurations judge, and {FEWEST_CONFIGURATIONS} are needed")
+        found.append(f"too few: {counted(judged, 'configuration')}, where at least {FEWEST_CONFIGURATIONS} must judge")
     if outside_use is not None:
         if outside_use.any():
-            found.append(f"outside: {outside_use.sum():,} of {len(outside_use):,} poses of the use lie beyond what was fitted")
+            share = f"{grouped(outside_use.sum())} of {counted(len(outside_use), 'pose')} of the use"
+            found.append(f"outside: {share} lie beyond what was fitted")
         return found
     moved = np.ptp(fitted.joint_angles, axis=0)
     rails = np.array(robot.chain.prismatic)

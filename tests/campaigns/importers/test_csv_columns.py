@@ -38,7 +38,7 @@ def test_a_separator_in_quotes_is_part_of_the_cell(file):
     [
         (b"", "", ["no row of data", "a header and rows"]),
         (b"a,b\n", "", ["no row of data"]),
-        (b"a,b\n1,2\n\n1\n", "row 2", ["1 cells", "2, one for each column"]),
+        (b"a,b\n1,2\n\n1\n", "row 2", ["1 cell", "2, one for each column"]),
         (b"a,b\n1,2,3\n", "row 1", ["3 cells", "2, one for each column"]),
         (b"a,c\n1,2\n", "header", ["no column 'b'", "the made source"]),
         (b"a,b\n1,\xff\n", "line 2", ["not UTF-8"]),

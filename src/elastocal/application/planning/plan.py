@@ -14,6 +14,7 @@ from elastocal.application.planning.criteria import Criterion, criterion, mean_s
 from elastocal.application.planning.exchange import exchanged, greedy, matrix_of, with_prior
 from elastocal.application.planning.survey import accuracy_rows, count_parameters, information
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
+from elastocal.counting import counted
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int, see
     if not len(good):
         least = min(fine, key=lambda name: fine[name].mean())
         words = {"boxes": "the boxes leave the arm no room", "sight": "the tracker sees the targets in none"}[least]
-        found = f"none of {len(reported)} configurations allowed: {words}"
+        found = f"none of {counted(len(reported), 'configuration')} allowed: {words}"
         raise InputError("plan", least, found, "room for the arm and its targets")
     down = np.array(robot.gravity_m_s2) / np.linalg.norm(robot.gravity_m_s2)
     return Candidates(reported[good], loads.forces(len(good), down, np.random.default_rng(seed)))
@@ -117,11 +118,11 @@ def planned(survey: Survey, some: Candidates, poses: int, held_out: int, kind: s
     """
     count, draws = len(some.joint_angles), np.random.default_rng(seed)
     if count < poses + held_out:
-        found = f"{poses + held_out} of {count} allowed configurations"
+        found = f"{poses + held_out} of {counted(count, 'allowed configuration')}"
         raise InputError("plan", "poses", found, f"at most {count}, or more candidates")
     if poses < fewest_poses(survey):
         numbers = poses * survey.numbers
-        found = f"{poses}, which measure {numbers} numbers for {count_parameters(survey)} parameters"
+        found = f"{poses}, which measure {counted(numbers, 'number')} for {counted(count_parameters(survey), 'parameter')}"
         raise InputError("plan", "poses", found, f"at least {fewest_poses(survey)}")
     seen = information(survey, some.joint_angles, some.force)
     rows = seen.rows

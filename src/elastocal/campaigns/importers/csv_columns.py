@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.campaigns.public_data import LARGEST_BYTES
+from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.io.texts import read_text
 
@@ -32,7 +33,9 @@ def read_columns(path: str | Path, separator: str, needed: Iterable[str], kind: 
     header, rows = lines[0], lines[1:]
     for number, line in enumerate(rows, 1):
         if len(line) != len(header):
-            raise InputError(path, f"row {number}", f"{len(line)} cells", f"{len(header)}, one for each column of the header")
+            raise InputError(
+                path, f"row {number}", counted(len(line), "cell"), f"{len(header)}, one for each column of the header"
+            )
     for name in needed:
         if name not in header:
             raise InputError(path, "header", f"no column {name!r}", kind)

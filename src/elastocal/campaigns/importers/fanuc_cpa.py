@@ -8,6 +8,7 @@ import numpy as np
 
 from elastocal.campaigns.importers.reflectors import write_reflectors
 from elastocal.campaigns.public_data import LARGEST_BYTES, PublicFile
+from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.io.texts import read_text
 
@@ -44,7 +45,7 @@ def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         except ValueError:
             raise InputError(path, f"line {number}", "a cell that is no number", "numbers separated by blanks") from None
         if len(cells) != _COLUMNS or not np.isfinite(rows[-1]).all():
-            raise InputError(path, f"line {number}", f"{len(cells)} numbers", f"{_COLUMNS} finite numbers")
+            raise InputError(path, f"line {number}", counted(len(cells), "number"), f"{_COLUMNS} finite numbers")
     if not rows:
         raise InputError(path, "", "no row of data", f"rows of {_COLUMNS} numbers")
     values = np.array(rows)

@@ -8,6 +8,7 @@ from typing import Any
 import scipy.io
 
 from elastocal.campaigns.public_data import LARGEST_BYTES
+from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.io.texts import read_bytes
 
@@ -27,5 +28,7 @@ def read_mat(path: str | Path, names: Sequence[str]) -> dict[str, Any]:
         found: dict[str, Any] = scipy.io.loadmat(stream, variable_names=list(names))
     except Exception:
         # The reader lets through whatever broken bytes make of its parts; its words say nothing of the file.
-        raise InputError(path, "", f"no readable MAT file, or one that is damaged ({len(content)} bytes)", _KIND) from None
+        raise InputError(
+            path, "", f"no readable MAT file, or one that is damaged ({counted(len(content), 'byte')})", _KIND
+        ) from None
     return {name: found[name] for name in names if name in found}

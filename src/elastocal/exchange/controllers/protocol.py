@@ -14,6 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
+from elastocal.counting import counted
 from elastocal.errors import InputError
 
 
@@ -64,12 +65,12 @@ def axes_of(controller: Controller, prismatic: Sequence[bool], stated: str) -> t
     if stated:
         names = tuple(name.strip() for name in stated.split(","))
         if len(names) != len(prismatic) or len(set(names)) < len(names) or not set(names) <= set(known):
-            allowed = f"{len(prismatic)} different names, of q1 to q{len(prismatic)}, of {', '.join(known)}"
+            allowed = f"{counted(len(prismatic), 'different name')}, of q1 to q{len(prismatic)}, of {', '.join(known)}"
             raise InputError("--axes", "", repr(stated), allowed)
         return names
     shifts = sum(prismatic)
     if len(prismatic) - shifts != len(controller.AXES) or shifts > len(controller.EXTERNAL):
-        found = f"{len(prismatic) - shifts} joints that turn and {shifts} that shift"
+        found = f"{counted(len(prismatic) - shifts, 'joint that turns', 'joints that turn')} and {shifts} that shift"
         if set(known) == set(controller.AXES):
             allowed = f"{len(controller.AXES)} joints that turn, which is all that {controller.WORDS} has"
             raise InputError("--format", controller.NAME, found, allowed)
