@@ -23,7 +23,7 @@ def test_each_table_has_the_rows_and_figures_of_the_report():
     by_length = {title: len(rows) - 1 for title, rows in tables.items()}
     table4, claims, simulated = (len(stated[name]) for name in ("table4", "claims", "simulated"))
     assert [*by_length.values()] == [claims, table4, table4, table4, len(stated["break_even"]), simulated]
-    assert tables["Claims of the paper"][1] == [*stated["claims"][0].values()]
+    assert sorted(tables["Claims of the paper"][1]) == sorted(stated["claims"][0].values())
     assert stated["table4"][0]["one reflector stiffness 1"] in tables["Table 4, positions of one reflector"][1]
     assert stated["simulated"][0]["gain"] == tables["Designs of 20 configurations, simulated"][1][-1]
 

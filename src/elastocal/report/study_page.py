@@ -28,7 +28,7 @@ def study_page(facts: Mapping[str, Any]) -> str:
             "Claims of the paper",
             'What studies of its size find. "All joints" and "fixed joints" are the two counts of joints in k_Σ (R10).',
             "claims",
-            {"number": "", "place": "place", "claim": "claim of the paper", "found": "found", "p": "p", "verdict": "verdict"},
+            {"number": "no.", "claim": "claim of the paper"} | {name: name for name in ("place", "found", "p", "verdict")},
         ),
         (
             f"Table 4 over {facts['studies']} studies, poses measured",
