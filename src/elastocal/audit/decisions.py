@@ -15,10 +15,10 @@ import statsmodels.api as sm
 from scipy.stats import median_abs_deviation
 from statsmodels.stats.multitest import multipletests
 
-from elastocal.audit.findings import NINE_DIGITS, Finding, compare, compare_columns, require
+from elastocal.audit.findings import Finding, compare, require
 from elastocal.audit.questions import estimate, simulate
 from elastocal.audit.scores import errors_of, judge_on, weights_of
-from elastocal.audit.tables import find_groups, find_root_mean, reach
+from elastocal.audit.tables import find_groups, find_root_mean, follow_cells, reach
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     _Rows = Iterator[dict[Any, Any]]
 
 _USUAL = "as_configured"
-# Of cells with nine digits, from which others follow.
-_OF_DIGITS, _ZERO = 1e-6, 1e-7
 # Estimates of single data sets on exact deflections; models of second order against the exact kinematics.
 _CLOSE, _FIRST_ORDER = 1e-6, 1e-3
 _LEVEL = 0.05
@@ -225,11 +223,7 @@ TABLES: Mapping[str, tuple[Callable[[Audited], _Rows], tuple[str, ...]]] = {
 def tables(run: Audited, file: str, table: str) -> Iterator[Finding]:
     """Every cell of a table on studies and decisions that follows from files."""
     if table in TABLES:
-        make, keys = TABLES[table]
-        digits = (_OF_DIGITS, _OF_DIGITS) if make in (joint_test, claims) else (NINE_DIGITS, _ZERO)
-        rows = [*make(run)]
-        again = pd.DataFrame(rows) if rows else pd.DataFrame(columns=[*keys])
-        yield from compare_columns(run.table(file), again, keys, "pandas and scipy", *digits)
+        yield from follow_cells(run, file, *TABLES[table], of_cells=(joint_test, claims))
 
 
 def few(run: Audited, file: str, robot: str) -> Iterator[Finding]:

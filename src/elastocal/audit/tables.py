@@ -17,7 +17,7 @@ from elastocal.audit.findings import NINE_DIGITS, Finding, compare_columns, requ
 from elastocal.audit.scores import weights_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 
     from elastocal.audit.audited import Audited
 
@@ -348,11 +348,21 @@ _OF_CELLS = (strategy_pairs, comparison, expectations)
 def tables(run: Audited, file: str, table: str) -> Iterator[Finding]:
     """Every cell of a table of the study that follows from files."""
     if table in TABLES:
-        make, keys = TABLES[table]
-        rows = [*make(run)]
-        again = pd.DataFrame(rows) if rows else pd.DataFrame(columns=[*keys])
-        digits = (_OF_DIGITS, _OF_DIGITS) if make in _OF_CELLS else (NINE_DIGITS, _ZERO)
-        yield from compare_columns(run.table(file), again, keys, "pandas and scipy", *digits)
+        yield from follow_cells(run, file, *TABLES[table], of_cells=_OF_CELLS)
+
+
+def follow_cells(
+    run: Audited,
+    file: str,
+    make: Callable[[Audited], _Rows],
+    keys: Iterable[str],
+    of_cells: Container[Callable[[Audited], _Rows]],
+) -> Iterator[Finding]:
+    """A table beside its rows made again; those in `of_cells` are made of cells with nine digits."""
+    rows = [*make(run)]
+    again = pd.DataFrame(rows) if rows else pd.DataFrame(columns=[*keys])
+    digits = (_OF_DIGITS, _OF_DIGITS) if make in of_cells else (NINE_DIGITS, _ZERO)
+    yield from compare_columns(run.table(file), again, keys, "pandas and scipy", *digits)
 
 
 def printed_tables(run: Audited, file: str, number: str) -> Iterator[Finding]:

@@ -79,7 +79,7 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     poses = f"{counted(facts['training']['poses'], 'pose')} to fit and {counted(facts['held_out']['poses'], 'validation pose')}"
     # Numbers of loads are labels; 0 is none.
     loaded = len(facts["loads"]) - (0 in facts["loads"])
-    parts = [*(["unloaded"] if 0 in facts["loads"] else []), *([f"{loaded} load{'s' * (loaded > 1)}"] if loaded else [])]
+    parts = [*(["unloaded"] if 0 in facts["loads"] else []), *([counted(loaded, "load")] if loaded else [])]
     loads = " and ".join(parts) + (f" of up to {facts['largest_force_N']:,.0f} N" if loaded else "")
     repeats = "each state measured once" if facts["repeats"] == 1 else f"a state measured up to {facts['repeats']} times"
     found = [

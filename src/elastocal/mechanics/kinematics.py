@@ -158,8 +158,9 @@ def poses_and_jacobians(
     position, rotation, jacobian = results
     for part in blocks(size):
         frames = walk(chain, components[:, part], point.after)
-        store_pose(place_point(frames, point), position[:, part], rotation[:, :, part])
-        _store_twists(chain, frames, point, jacobian[:, :, part])
+        placed = place_point(frames, point)
+        store_pose(placed, position[:, part], rotation[:, :, part])
+        _store_twists(chain, frames, point, placed[1], jacobian[:, :, part])
     return _batch_first(position, batch), _batch_first(rotation, batch), _batch_first(jacobian, batch)
 
 
@@ -172,7 +173,8 @@ def jacobians(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> n
     components, batch = _component_first(coordinates)
     jacobian = np.empty((6, chain.coordinates, components.shape[1]))
     for part in blocks(components.shape[1]):
-        _store_twists(chain, walk(chain, components[:, part], point.after), point, jacobian[:, :, part])
+        frames = walk(chain, components[:, part], point.after)
+        _store_twists(chain, frames, point, place_point(frames, point)[1], jacobian[:, :, part])
     return _batch_first(jacobian, batch)
 
 
@@ -208,9 +210,10 @@ def store_pose(frame: Frame, position: np.ndarray, rotation: np.ndarray) -> None
         rotation[:, column] = axis
 
 
-def _store_twists(chain: Chain, frames: Sequence[Frame], point: MeasuringPoint, jacobian: np.ndarray) -> None:
-    """Columns of a Jacobian; a coordinate that moves several transforms has the sum of their twists."""
-    _, target = place_point(frames, point)
+def _store_twists(
+    chain: Chain, frames: Sequence[Frame], point: MeasuringPoint, target: np.ndarray, jacobian: np.ndarray
+) -> None:
+    """Columns of the Jacobian of a point, which is at `target`; those of a coordinate that moves several transforms add up."""
     filled: set[int] = set()
     transforms = chain.transforms[: point.after]
     for number, (transform, frame) in enumerate(zip(transforms, frames, strict=False)):

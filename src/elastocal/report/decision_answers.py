@@ -114,10 +114,9 @@ def cost_facts(table: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[str,
     facts = []
     for robot, title in titles.items():
         mine = table[(table.robot == robot) & table.cheapest].sort_values("configuration_cost")
-        spans = []
-        for points, cell in mine.groupby((mine.points != mine.points.shift()).cumsum()):
-            spans.append((str(cell.points.iloc[0]), float(cell.configuration_cost.iloc[0]), points))
-        words = [f"{name} from {start:.2g} on" if start else name for name, start, _ in spans]
+        changes = mine[mine.points != mine.points.shift()]
+        spans = zip(changes.points, changes.configuration_cost, strict=True)
+        words = [f"{name} from {start:.2g} on" if start else f"{name}" for name, start in spans]
         facts.append({"title": title, "cheapest": ", ".join(words)})
     return facts
 

@@ -80,10 +80,9 @@ def break_even_table(
                 with np.errstate(divide="ignore", invalid="ignore"):
                     even = (ours * len(point_sets[points]) - theirs * m) / (theirs - ours)
                 even = np.where(ours < theirs, np.maximum(even, 0.0), np.inf)
-                low, high = np.quantile(even[1:], [0.025, 0.975], method="nearest")
                 row: dict[str, Any] = {"robot": robot, "accuracy_um": accuracy, "points": points, "against": against}
                 row |= {"configurations": ours[0], "configurations_against": theirs[0]}
-                rows.append(row | {"break_even": even[0], "break_even_low": low, "break_even_high": high})
+                rows.append(row | _interval("break_even", even))
     names = ("robot", "accuracy_um", "points", "against", "configurations", "configurations_against")
     return pd.DataFrame(rows, columns=[*names, "break_even", "break_even_low", "break_even_high"])
 
@@ -108,9 +107,13 @@ def cost_table(
             cheapest = min(costs, key=lambda points: costs[points][0], default="")
             for points, cost in costs.items():
                 ratio = cost / costs[against] if against in costs else np.full_like(cost, np.nan)
-                low, high = np.quantile(ratio[1:], [0.025, 0.975], method="nearest")
                 row: dict[str, Any] = {"robot": robot, "points": points, "configuration_cost": each, "cost": cost[0]}
-                row |= {"ratio": ratio[0], "ratio_low": low, "ratio_high": high}
-                rows.append(row | {"cheapest": points == cheapest})
+                rows.append(row | _interval("ratio", ratio) | {"cheapest": points == cheapest})
     names = ("robot", "points", "configuration_cost", "cost", "ratio", "ratio_low", "ratio_high", "cheapest")
     return pd.DataFrame(rows, columns=[*names])
+
+
+def _interval(name: str, values: np.ndarray) -> dict[str, float]:
+    """A value, the first, with its 95 % interval over replicates."""
+    low, high = np.quantile(values[1:], [0.025, 0.975], method="nearest")
+    return {name: values[0], f"{name}_low": low, f"{name}_high": high}
