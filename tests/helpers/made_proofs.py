@@ -10,7 +10,6 @@ from made_leagues import made_entries
 from planted_errors import forge
 
 from elastocal import __version__
-from elastocal.audit.audited import Audited
 from elastocal.blind import schemas as of_blind
 from elastocal.blind.bad_rows_summary import judge_cases, summarize
 from elastocal.blind.calibration import reliability, statements
@@ -27,6 +26,7 @@ from elastocal.league.folds import dealt
 from elastocal.league.schemas import ENTRIES, FOLDS, MECHANISMS
 from elastocal.league.table import Result, league_table, mechanism_table
 from elastocal.random_streams import stream
+from elastocal_proof.audit.audited import Audited
 
 SEED = 1
 LEAGUE = {

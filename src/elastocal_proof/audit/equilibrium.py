@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.audit.arm import Arm
-from elastocal.audit.audited import WRENCH
+from elastocal_proof.audit.arm import Arm
+from elastocal_proof.audit.audited import WRENCH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import pandas as pd
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 _STANDING = (0.0, 0.0, -9.80665)
 _SPRINGS, _WEIGHT = "joint_compliance", "declared_weight"

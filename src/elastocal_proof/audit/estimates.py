@@ -8,14 +8,14 @@ import numpy as np
 import statsmodels.api as sm
 from scipy.optimize import least_squares
 
-from elastocal.audit.findings import ROUNDING, SINGLE, Finding, compare, require_each_once
+from elastocal_proof.audit.findings import ROUNDING, SINGLE, Finding, compare, require_each_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     import pandas as pd
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 # Beyond this a design counts as one that does not determine the compliances (equation 11 in double precision).
 _LARGEST_CONDITION = 1e7

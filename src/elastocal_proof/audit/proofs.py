@@ -16,14 +16,14 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from elastocal.audit.elastic import find_configurations
-from elastocal.audit.findings import Finding, compare, compare_columns, require
-from elastocal.audit.streams import numbers
+from elastocal_proof.audit.elastic import find_configurations
+from elastocal_proof.audit.findings import Finding, compare, compare_columns, require
+from elastocal_proof.audit.streams import numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
     _Document = Mapping[str, Any]
 

@@ -12,14 +12,14 @@ import pandas as pd
 from scipy import special, stats
 from statsmodels.stats.multitest import multipletests
 
-from elastocal.audit.estimates import points_of
-from elastocal.audit.findings import NINE_DIGITS, Finding, compare_columns, require
-from elastocal.audit.scores import weights_of
+from elastocal_proof.audit.estimates import points_of
+from elastocal_proof.audit.findings import NINE_DIGITS, Finding, compare_columns, require
+from elastocal_proof.audit.scores import weights_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
     _Rows = Iterator[dict[Any, Any]]
 

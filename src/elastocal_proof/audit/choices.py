@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.audit.findings import Finding, compare, require
-from elastocal.audit.streams import draw, numbers
+from elastocal_proof.audit.findings import Finding, compare, require
+from elastocal_proof.audit.streams import draw, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     import pandas as pd
 
-    from elastocal.audit.arm import Arm
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.arm import Arm
+    from elastocal_proof.audit.audited import Audited
 
 _RANDOM_DESIGNS = 400
 # One in so many of the rows of other files: sizes of designs, and data sets of a ladder, that are worked out again.

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from elastocal.audit.elastic import STATE, Averages, averages, far_off, good_rows
-from elastocal.audit.findings import Finding, compare, require
-from elastocal.audit.fits import Campaign, Step, campaign_of, unsettled
+from elastocal_proof.audit.elastic import STATE, Averages, averages, far_off, good_rows
+from elastocal_proof.audit.findings import Finding, compare, require
+from elastocal_proof.audit.fits import Campaign, Step, campaign_of, unsettled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 _METRICS = ("mean", "rms", "p95", "max")
 # Nine digits of a table.

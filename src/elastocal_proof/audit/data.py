@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import stats
 
-from elastocal.audit.audited import COMPONENTS
-from elastocal.audit.findings import Finding, compare, require, require_each_once
-from elastocal.audit.streams import draw, numbers
+from elastocal_proof.audit.audited import COMPONENTS
+from elastocal_proof.audit.findings import Finding, compare, require, require_each_once
+from elastocal_proof.audit.streams import draw, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 # A right file fails a test of its noise by chance in one of a million audits.
 _BY_CHANCE = 1e-6

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 
 def numbers(seed: int, robot: str, purpose: str, data_set: int = 0) -> np.random.Generator:

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import statsmodels.api as sm
 
-from elastocal.audit.estimates import of_length, points_of, solve_staged
-from elastocal.audit.findings import Finding, compare, require, require_each_once
-from elastocal.audit.scores import average, errors_of, moment
-from elastocal.audit.streams import draw, numbers
+from elastocal_proof.audit.estimates import of_length, points_of, solve_staged
+from elastocal_proof.audit.findings import Finding, compare, require, require_each_once
+from elastocal_proof.audit.scores import average, errors_of, moment
+from elastocal_proof.audit.streams import draw, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import pandas as pd
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 # Estimates of single data sets on exact deflections, whose least squares lose digits.
 _CLOSE = 1e-6

@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 import pinocchio as pin
 
-from elastocal.audit.arm import Arm
-from elastocal.audit.audited import WRENCH
+from elastocal_proof.audit.arm import Arm
+from elastocal_proof.audit.audited import WRENCH
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 STATE = ("session", "pose", "load")
 # Each pass leaves some 1/500 of the pass before of the load's change by the deflection: metres by deflections of 4 mm.

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import gammaln
 
-from elastocal.audit.estimates import of_length, points_of
-from elastocal.audit.findings import ROUNDING, SINGLE, Finding, compare, require, require_each_once
+from elastocal_proof.audit.estimates import of_length, points_of
+from elastocal_proof.audit.findings import ROUNDING, SINGLE, Finding, compare, require, require_each_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from typing import Any
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 # From when on the mean of 1/c does not exist in practice (docs/study.md).
 _TRUSTED_SPREAD = 0.25

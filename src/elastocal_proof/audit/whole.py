@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from elastocal.audit import (
+from elastocal.errors import InputError
+from elastocal.io.records import RECORDS, recorded
+from elastocal_proof.audit import (
     assumptions,
     campaigns,
     choices,
@@ -22,15 +24,13 @@ from elastocal.audit import (
     scores,
     tables,
 )
-from elastocal.audit.files import described, intact
-from elastocal.audit.findings import Finding, require
-from elastocal.errors import InputError
-from elastocal.io.records import RECORDS, recorded
+from elastocal_proof.audit.files import described, intact
+from elastocal_proof.audit.findings import Finding, require
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 _ROOMS = (data, estimates, scores, questions, choices, decisions, assumptions, tables, campaigns, fits, held_out, proofs)
 # What works a file out again, by the form of its name; what stands in braces are arguments.

@@ -17,14 +17,14 @@ import statsmodels.api as sm
 from scipy import stats
 from statsmodels.robust.norms import HuberT
 
-from elastocal.audit.audited import COMPONENTS
-from elastocal.audit.elastic import STATE, Averages, Robot, Springs, averages, far_off, good_rows
-from elastocal.audit.findings import Finding, compare, require
+from elastocal_proof.audit.audited import COMPONENTS
+from elastocal_proof.audit.elastic import STATE, Averages, Robot, Springs, averages, far_off, good_rows
+from elastocal_proof.audit.findings import Finding, compare, require
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 # Effects whose formulas are written down here a second time.
 _SPRINGS, _LINKS = "joint_compliance", "link_elasticity"

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.audit.arm import Arm
-from elastocal.audit.findings import Finding, compare, require
-from elastocal.audit.streams import draw
+from elastocal_proof.audit.arm import Arm
+from elastocal_proof.audit.findings import Finding, compare, require
+from elastocal_proof.audit.streams import draw
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 # Estimates through two pseudo-inverses; a leak is a difference that may be all rounding.
 _CLOSE, _NOTHING = 1e-6, 1e-9

@@ -12,18 +12,18 @@ import pinocchio as pin
 import yaml
 from pandas.api.types import is_numeric_dtype
 
-from elastocal.audit.arm import Arm
-from elastocal.audit.audited import WRENCH
-from elastocal.audit.elastic import STATE, far_off, find_configurations, good_rows
-from elastocal.audit.equilibrium import Sagging, sagging
-from elastocal.audit.findings import Finding, compare, require
-from elastocal.audit.fits import SETTLED, STEP_BACK
-from elastocal.audit.streams import numbers
+from elastocal_proof.audit.arm import Arm
+from elastocal_proof.audit.audited import WRENCH
+from elastocal_proof.audit.elastic import STATE, far_off, find_configurations, good_rows
+from elastocal_proof.audit.equilibrium import Sagging, sagging
+from elastocal_proof.audit.findings import Finding, compare, require
+from elastocal_proof.audit.fits import SETTLED, STEP_BACK
+from elastocal_proof.audit.streams import numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
 _POSE = ["session", "pose"]
 # Effects that go with the time or with the row of a measurement.

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 
-from elastocal.audit.arm import Arm
+from elastocal_proof.audit.arm import Arm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -15,15 +15,15 @@ import statsmodels.api as sm
 from scipy.stats import median_abs_deviation
 from statsmodels.stats.multitest import multipletests
 
-from elastocal.audit.findings import Finding, compare, require
-from elastocal.audit.questions import estimate, simulate
-from elastocal.audit.scores import errors_of, judge_on, weights_of
-from elastocal.audit.tables import find_groups, find_root_mean, follow_cells, reach
+from elastocal_proof.audit.findings import Finding, compare, require
+from elastocal_proof.audit.questions import estimate, simulate
+from elastocal_proof.audit.scores import errors_of, judge_on, weights_of
+from elastocal_proof.audit.tables import find_groups, find_root_mean, follow_cells, reach
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    from elastocal.audit.audited import Audited
+    from elastocal_proof.audit.audited import Audited
 
     _Rows = Iterator[dict[Any, Any]]
 

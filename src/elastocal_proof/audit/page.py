@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment
 
-from elastocal.audit.files import OF_EVERY_FILE
-from elastocal.audit.whole import checks_of
+from elastocal_proof.audit.files import OF_EVERY_FILE
+from elastocal_proof.audit.whole import checks_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,7 +38,7 @@ def page(table: pd.DataFrame, facts: Mapping[str, str]) -> str:
     of_every_file = labelled["checked"].isin(OF_EVERY_FILE)
     recomputed, alike = labelled[~of_every_file], labelled[of_every_file]
     wrong = table[~table["holds"]]
-    template = resources.files("elastocal.audit").joinpath("audit.html").read_text("utf-8")
+    template = resources.files("elastocal_proof.audit").joinpath("audit.html").read_text("utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string(template).render(
         facts=facts,

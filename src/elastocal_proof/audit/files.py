@@ -11,15 +11,15 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from elastocal import __version__
-from elastocal.audit.findings import Finding, require
-from elastocal.audit.schemas import SCHEMAS
 from elastocal.io.storage import head_columns
+from elastocal_proof.audit.findings import Finding, require
+from elastocal_proof.audit.schemas import SCHEMAS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from elastocal.audit.audited import Audited
     from elastocal.io.storage import Column
+    from elastocal_proof.audit.audited import Audited
 
 # What is asked of every file, whatever it holds; other checks work something out again.
 OF_EVERY_FILE = frozenset(
