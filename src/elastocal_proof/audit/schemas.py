@@ -5,11 +5,11 @@ from __future__ import annotations
 from inspect import isfunction
 from typing import TYPE_CHECKING
 
-from elastocal.blind import schemas as of_blind
 from elastocal.io.storage import TableSchema
-from elastocal.league import schemas as of_league
 from elastocal.loop import schemas as of_loop
 from elastocal.study import table_schemas as of_study
+from elastocal_proof.blind import schemas as of_blind
+from elastocal_proof.league import schemas as of_league
 
 if TYPE_CHECKING:
     from collections.abc import Callable
