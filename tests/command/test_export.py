@@ -20,7 +20,7 @@ from elastocal.exchange.urdf_writing import urdf_of
 from elastocal.mechanics.kinematics import poses
 
 
-def test_robot_file_urdf_and_sidecar_hold_what_was_found(there, elastocal, tmp_path):
+def test_robot_file_urdf_and_sidecar_hold_what_was_found(in_checkout, elastocal, tmp_path):
     result = elastocal("export", "made", "--output", tmp_path / "out", "--date", "2026-11-23")
     assert result.exit_code == 0, result.output
     robot = read_robot(tmp_path / "out" / "robot.yaml")
@@ -42,7 +42,9 @@ def test_robot_file_urdf_and_sidecar_hold_what_was_found(there, elastocal, tmp_p
     assert document["effects"] == [] and document["date"] == "2026-11-23" and len(document["joint_compliance"]) == 6
 
 
-def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(there, elastocal, refusal, tmp_path):
+def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(
+    in_checkout, elastocal, refusal, tmp_path
+):
     mine, output = tmp_path / "mine.urdf", tmp_path / "out"
     mine.write_text(urdf_of(analysed("kuka")).replace("<robot ", "<!-- mine --><robot ").replace('effort="1e9"', 'effort="77"'))
     result = elastocal("export", "made", "--urdf", mine, "--output", output)

@@ -14,6 +14,7 @@ from snakemake.iocontainers import Wildcards
 from elastocal.campaigns.importers.catalogue import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
+from elastocal.counting import spell_count
 from elastocal.errors import InputError
 from elastocal.io.origin import Origin, configuration_sha256, environment
 from elastocal.io.provenance import SOURCES_DIGEST

@@ -19,6 +19,7 @@ from elastocal.audit.findings import Finding, compare, require
 from elastocal.audit.questions import estimate, simulate
 from elastocal.audit.scores import errors_of, judge_on, weights_of
 from elastocal.audit.tables import find_groups, find_root_mean, follow_cells, reach
+from elastocal.counting import spell_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -34,14 +35,12 @@ _LEVEL = 0.05
 # Monte Carlo standard errors: one value in 30,000 is further off by chance.
 _SIGMAS = 4.0
 _VERDICTS = {"holds", "holds in part", "does not hold"}
-# Numbers of reflectors by what a table calls them.
-_COUNTED = {1: "one reflector", 3: "three reflectors"}
 
 
 def table4_studies(run: Audited) -> _Rows:
     length, limits = run.configuration["tables"]["length"], run.configuration["tables"]
     of = {"pose": _USUAL} | {
-        _COUNTED.get(len(some["reflectors_m"]), f"{len(some['reflectors_m'])} reflectors"): name
+        spell_count(len(some["reflectors_m"]), "reflector"): name
         for name, some in run.configuration["switched"].items()
         if "reflectors_m" in some
     }

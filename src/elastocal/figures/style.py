@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from elastocal.io.atomic_writes import atomic_write
 
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.axis import Axis
     from matplotlib.typing import RcKeyType
 
     from elastocal.io.origin import Origin
@@ -58,6 +60,14 @@ def note(text: str, height_mm: float = 25) -> Figure:
 def line_style(index: int) -> dict[str, Any]:
     """Colour and dashes of the strategy with this place in the list; lines that coincide remain visible through the gaps."""
     return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index % len(DASHES)]}
+
+
+def label_decades(*axes: Axis) -> None:
+    """Plain numbers on logarithmic axes, at 2 and 5 between the decades, too."""
+    for axis in axes:
+        axis.set_major_locator(LogLocator(subs=[1.0, 2.0, 5.0]))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
 
 
 def ink_on(colour: tuple[float, ...]) -> str:
