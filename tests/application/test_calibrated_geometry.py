@@ -7,8 +7,8 @@ import pytest
 from analysed_robots import analysed
 from made_calibrated import made_calibrated, plain_estimate, plain_model
 
-from elastocal.application.calibrated import OperatingConditions, calibrated_of, forward
-from elastocal.application.calibrated_geometry import folded
+from elastocal.application.calibrated import OperatingConditions, calibrate_by_model, forward
+from elastocal.application.calibrated_geometry import fold_effects
 from elastocal.effects.catalogue import candidates_on
 from elastocal.mechanics.robot_file import document_of, robot_from_document
 from elastocal.mechanics.sites import sites_of
@@ -29,7 +29,7 @@ def as_file(robot):
     values = [robot.compliance if e.effect == "joint_compliance" else np.zeros(len(e.parameters)) for e in model.effects]
     count = sum(len(value) for value in values)
     noise = made_calibrated(robot).noise
-    return calibrated_of(robot, model, plain_estimate(model, values), np.zeros((count, count)), noise)
+    return calibrate_by_model(robot, model, plain_estimate(model, values), np.zeros((count, count)), noise)
 
 
 @pytest.mark.parametrize("name", ["gp180", "iiwa14", "fanuc_static", "fanuc_cpa", "ur10", "abb"])
@@ -37,7 +37,7 @@ def test_poses_under_load_are_those_of_the_calibrated_robot(name):
     robot = analysed(name)
     known = candidates_on(sites_of(robot))
     calibrated = made_calibrated(robot, *(key for key in (*GEOMETRY, "link_geometry@6") if key in known), size=1.0)
-    found = folded(calibrated)
+    found = fold_effects(calibrated)
     assert found.left_out == ()
     angles, operating = drawn(robot)
     through_file = robot_from_document(document_of(found.robot))
@@ -50,7 +50,7 @@ def test_poses_under_load_are_those_of_the_calibrated_robot(name):
 @pytest.mark.parametrize("key", ["transmission_ratio@3", "transmission_ratio@1"])
 def test_ratios_go_into_what_the_controllers_angles_mean(key):
     calibrated = made_calibrated(analysed("fanuc_cpa"), key, size=1.0)
-    found = folded(calibrated)
+    found = fold_effects(calibrated)
     assert found.left_out == ()
     angles, operating = drawn(calibrated.robot)
     mine, theirs = (forward(each, angles, operating)[0] for each in (as_file(found.robot), calibrated))
@@ -59,7 +59,7 @@ def test_ratios_go_into_what_the_controllers_angles_mean(key):
 
 def test_what_a_robot_file_cannot_say_is_left_out_and_changes_nothing_else():
     calibrated = made_calibrated(analysed("gp180"), *GEOMETRY, "lost_motion@2", "transmission_harmonic@1[orders 1-2]")
-    found = folded(calibrated)
+    found = fold_effects(calibrated)
     keys = [calibrated.model.effects[number].key for number in found.left_out]
     assert keys == ["lost_motion@2", "transmission_harmonic@1[orders 1-2]"]
     bare = tuple(0 * v if n in found.left_out else v for n, v in enumerate(calibrated.estimate.coefficients))

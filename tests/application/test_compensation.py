@@ -7,7 +7,7 @@ import pytest
 from analysed_robots import analysed
 from made_calibrated import USUAL, made_calibrated
 
-from elastocal.application.accuracy import predicted
+from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import (
     NEUTRAL,
     OperatingConditions,
@@ -16,7 +16,7 @@ from elastocal.application.calibrated import (
     forward,
     nominal_forward,
 )
-from elastocal.application.compensation import OK, OUTSIDE_LIMITS, SINGULAR, UNREACHABLE, corrected
+from elastocal.application.compensation import OK, OUTSIDE_LIMITS, SINGULAR, UNREACHABLE, find_joint_targets
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
 
@@ -52,7 +52,7 @@ def test_corrected_targets_bring_the_robot_to_the_wanted_poses(name):
     robot = made(name, *EFFECTS)
     angles, operating = drawn(robot, 150)
     position, rotation = nominal_forward(robot.robot, angles)
-    found = corrected(robot, position, rotation, operating, angles)
+    found = find_joint_targets(robot, position, rotation, operating, angles)
     good = found.status == OK
     assert good.mean() > 0.9
     off = pose_differences(position, rotation, *settled(robot, found.joint_angles, operating))[good]
@@ -65,7 +65,7 @@ def test_the_error_before_is_that_of_the_rigid_robots_targets():
     robot = made("gp180", *EFFECTS)
     angles, operating = drawn(robot, 20)
     position, rotation = nominal_forward(robot.robot, angles)
-    found = corrected(robot, position, rotation, operating, angles)
+    found = find_joint_targets(robot, position, rotation, operating, angles)
     np.testing.assert_allclose(nominal_forward(robot.robot, found.uncorrected)[0], position, atol=1e-7)
     missed = pose_differences(position, rotation, *forward(robot, found.uncorrected, operating))
     np.testing.assert_allclose(found.error_before, missed, atol=1e-12)
@@ -75,11 +75,11 @@ def test_repeatability_is_that_of_the_joints_seen_through_the_jacobian():
     """20,000 draws: standard errors of the distances are 0.4 %."""
     robot = made("gp180")
     angles, operating = drawn(robot, 4)
-    found = corrected(robot, *nominal_forward(robot.robot, angles), operating, angles)
+    found = find_joint_targets(robot, *nominal_forward(robot.robot, angles), operating, angles)
     draws = np.random.default_rng(1).standard_normal((20000, 6)) * robot.noise.joint_rad
     jacobian = jacobians(robot.robot.chain, robot.robot.model_angles(found.joint_angles), robot.robot.chain.end_effector)
     distances = np.linalg.norm(draws @ jacobian[:, :3].transpose(0, 2, 1), axis=2)
-    stated = predicted(robot, found.joint_angles, operating).repeated_m
+    stated = predict_errors(robot, found.joint_angles, operating).repeated_m
     np.testing.assert_allclose(stated, np.sqrt((distances**2).mean(axis=1)), rtol=0.03)
 
 
@@ -93,7 +93,7 @@ def test_what_cannot_be_corrected_is_named():
     reported = robot.robot.reported_angles(angles)
     position, rotation = nominal_forward(robot.robot, reported)
     position[3] *= 5.0
-    found = corrected(robot, position, rotation, NEUTRAL, reported)
+    found = find_joint_targets(robot, position, rotation, NEUTRAL, reported)
     assert found.status.tolist() == [OK, OUTSIDE_LIMITS, SINGULAR, UNREACHABLE]
     assert np.isfinite(found.joint_angles).all()
 
@@ -103,7 +103,7 @@ def test_a_path_without_a_start_is_corrected_in_one_posture():
     angles = robot.robot.joint_limits.mean(axis=1) + BENT + 0.2 * np.linspace(0.0, 1.0, 30)[:, None]
     done = []
     position, rotation = nominal_forward(robot.robot, robot.robot.reported_angles(angles))
-    found = corrected(robot, position, rotation, NEUTRAL, progress=done.append)
+    found = find_joint_targets(robot, position, rotation, NEUTRAL, progress=done.append)
     assert (found.status == OK).all()
     assert np.abs(np.diff(found.joint_angles, axis=0)).max() < 0.05
     assert done == [30]

@@ -10,12 +10,12 @@ from analysed_robots import analysed
 from made_calibrated import made_calibrated
 from made_urdf import joint, link, written
 
-from elastocal.application.calibrated_geometry import folded
+from elastocal.application.calibrated_geometry import fold_effects
 from elastocal.campaigns.reading import read_robot
 from elastocal.command.export import _drop_in
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.exchange.urdf_origins import with_calibrated_origins
+from elastocal.exchange.urdf_origins import write_calibrated_origins
 from elastocal.exchange.urdf_writing import urdf_of
 from elastocal.mechanics.kinematics import poses
 
@@ -73,8 +73,8 @@ def test_what_a_urdf_has_no_place_for_is_stated_in_millimetres(tmp_path):
     angles = np.array([[0.4, -0.3], [1.0, 0.2]])
 
     def lines(*keys):
-        robot = folded(made_calibrated(nominal, *keys, identified=False)).robot
-        drop_in = with_calibrated_origins(path, nominal, robot)
+        robot = fold_effects(made_calibrated(nominal, *keys, identified=False)).robot
+        drop_in = write_calibrated_origins(path, nominal, robot)
         output = tmp_path / "robot.urdf"
         output.write_bytes(drop_in.content)
         return _drop_in(drop_in, output, nominal, robot, angles)

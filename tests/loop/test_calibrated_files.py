@@ -11,7 +11,7 @@ from analysed_robots import ROBOTS
 from certified import ENGINE
 from support import refused
 
-from elastocal.application.calibrated import calibrated_from
+from elastocal.application.calibrated import calibrate_by_fit
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
 from elastocal.io.sources import source_digest
@@ -33,7 +33,7 @@ def test_the_robot_is_that_of_the_final_fit(checkout):
     tables = checkout / "results/loop/made"
     steps = read_table(tables / "steps.parquet", STEPS)
     again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"), steps)
-    expected = calibrated_from(again.final, found.case.campaign.robot)
+    expected = calibrate_by_fit(again.final, found.case.campaign.robot)
     assert [e.key for e in found.calibrated.model.effects] == ["joint_compliance", "joint_offset@3"]
     for mine, theirs in zip(found.calibrated.estimate.coefficients, expected.estimate.coefficients, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=1e-6)

@@ -73,14 +73,14 @@ def test_only_the_metric_that_puts_them_in_the_other_order_reverses(found):
 @pytest.mark.parametrize("metric", [REFERENCE, "mean_um", "pooled_p95_um"])
 def test_intervals_of_ratios_hold_the_ratio_of_the_population(metric):
     """Two independent strategies of ratio 1.5: 95 % of 200 intervals hold it; fewer than 90 % by chance in 1 of 1000 tries."""
-    held = 0
+    covered = 0
     for seed in range(200):
         one, other = uses_of("A", 75.0, 2 * seed), uses_of("B", 50.0, 2 * seed + 1)
         metrics, replicates = (pd.concat(parts) for parts in zip(averaged("A", 1, 1), averaged("B", 1, 1), strict=True))
         by = scores(pd.concat([one, other]), metrics, replicates, LENGTH)[metric]
         _, low, high = by["A"].ratio(by["B"])
-        held += low < 1.5 < high
-    assert held / 200 > 0.90
+        covered += low < 1.5 < high
+    assert covered / 200 > 0.90
 
 
 def test_pairing_takes_out_what_strategies_share():

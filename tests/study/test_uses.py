@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.application.inverse_kinematics import beyond_limits
+from elastocal.application.inverse_kinematics import find_beyond_limits
 from elastocal.mechanics.kinematics import poses
 from elastocal.study.uses import iso_9283, milling_path
 
@@ -12,7 +12,7 @@ CENTRE = (1.6, 0.0, 1.0)
 
 def reached(robot, use):
     position, rotation = poses(robot.chain, use.joint_angles[0], robot.chain.end_effector)
-    assert not beyond_limits(robot, use.joint_angles[0]).any()
+    assert not find_beyond_limits(robot, use.joint_angles[0]).any()
     # The spindle looks down.
     np.testing.assert_allclose(rotation[..., 0], np.tile([0, 0, -1.0], (len(position), 1)), atol=1e-6)
     return position

@@ -80,7 +80,7 @@ class OperatingConditions:
 NEUTRAL = OperatingConditions()
 
 
-def calibrated_from(fit: Fit, robot: Robot) -> CalibratedRobot:
+def calibrate_by_fit(fit: Fit, robot: Robot) -> CalibratedRobot:
     """A calibrated robot from the final fit of a diagnosis.
 
     Parameters
@@ -93,10 +93,10 @@ def calibrated_from(fit: Fit, robot: Robot) -> CalibratedRobot:
     -------
     CalibratedRobot
     """
-    return calibrated_of(robot, fit.model, fit.estimate, fit.covariance, fit.noise)
+    return calibrate_by_model(robot, fit.model, fit.estimate, fit.covariance, fit.noise)
 
 
-def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
+def calibrate_by_model(robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
     """A calibrated robot from a fitted model.
 
     `covariance` (P, P): of all `parameters` of the model.
@@ -104,7 +104,7 @@ def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np
     kept = [number for number, effect in enumerate(model.effects) if moves_robot(effect)]
     keys = {model.effects[number].key for number in kept}
     rows = np.flatnonzero([owner in keys for owner, _ in parameters(model, estimate)])
-    bare, values = at_end_effector(model, estimate)
+    bare, values = move_to_end_effector(model, estimate)
     bare = replace(bare, effects=tuple(model.effects[number] for number in kept))
     values = replace(
         values,
@@ -114,7 +114,7 @@ def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np
     return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise)
 
 
-def at_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
+def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
     """A model with all its effects whose one target is the end effector's measuring point, in the robot's base frame."""
     end = model.sites.chain.end_effector
     target = Target("end effector", end.name, end.offset_m)

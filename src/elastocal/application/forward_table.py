@@ -32,7 +32,7 @@ def forward_table(calibrated: CalibratedRobot, rows: int, operating: OperatingCo
     """
     low, high = calibrated.robot.joint_limits.T
     points = qmc.Sobol(len(low), rng=np.random.default_rng(seed)).random_base2(int(np.ceil(np.log2(max(rows, 2)))))
-    return _tabulated(calibrated, calibrated.robot.reported_angles(low + points * (high - low)), operating)
+    return _tabulate(calibrated, calibrated.robot.reported_angles(low + points * (high - low)), operating)
 
 
 def interpolation_error_m(
@@ -53,7 +53,7 @@ def interpolation_error_m(
     scale = np.ptp(known, axis=0)
     errors = list(_ERRORS[:3])
     spline = RBFInterpolator(known / scale, table[errors].to_numpy(), min(_NEIGHBOURS, len(known)))
-    true = _tabulated(calibrated, angles, operating)[errors].to_numpy()
+    true = _tabulate(calibrated, angles, operating)[errors].to_numpy()
     return _rms(spline(angles / scale) - true), _rms(true)
 
 
@@ -61,7 +61,7 @@ def _rms(displacement: np.ndarray) -> float:
     return float(np.sqrt((displacement**2).sum(axis=1).mean()))
 
 
-def _tabulated(calibrated: CalibratedRobot, reported: np.ndarray, operating: OperatingConditions) -> pd.DataFrame:
+def _tabulate(calibrated: CalibratedRobot, reported: np.ndarray, operating: OperatingConditions) -> pd.DataFrame:
     there, turned = forward(calibrated, reported, operating)
     position, rotation = nominal_forward(calibrated.robot, reported)
     angles = {f"q{joint}": column for joint, column in enumerate(reported.T, 1)}

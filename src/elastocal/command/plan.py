@@ -159,16 +159,16 @@ def _check_places(options: Options) -> list[str]:
 
 def _choose(task: _Task, options: Options) -> tuple[Candidates, Plan]:
     """Configurations that the cell allows, and the plan among them: of the fewest poses where an accuracy is wanted."""
-    from elastocal.application.planning.plan import allowed_candidates, fewest_poses, planned, poses_needed
+    from elastocal.application.planning.plan import choose_plan, count_needed_poses, fewest_poses, find_allowed_candidates
 
     def choose(poses: int) -> Plan:
-        return planned(task.survey, some, poses, options.held_out, options.criterion, options.seed)
+        return choose_plan(task.survey, some, poses, options.held_out, options.criterion, options.seed)
 
-    some = allowed_candidates(task.survey, task.cell, task.loads, options.number, options.seed)
+    some = find_allowed_candidates(task.survey, task.cell, task.loads, options.number, options.seed)
     found = choose(options.poses)
     if task.accuracy_m is None:
         return some, found
-    enough = poses_needed(found.accuracy_m, task.accuracy_m)
+    enough = count_needed_poses(found.accuracy_m, task.accuracy_m)
     if enough is None:
         best = f"{1e3 * found.accuracy_m[-1]:.3f} mm with {counted(options.poses, 'pose')}"
         raise InputError("--accuracy", "", best, "more poses, or an accuracy that they reach")

@@ -28,7 +28,7 @@ from typing import Any
 from elastocal.campaigns.measurements import closest_first
 from elastocal.counting import counted
 from elastocal.errors import InputError
-from elastocal.exchange.column_names import units_in, without_unit
+from elastocal.exchange.column_names import read_units, split_unit
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.io.documents import read_document
 from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
@@ -133,7 +133,7 @@ def _csv_rows(path: str | Path, source: str, options: DhOptions) -> _Rows:
         Dialect(decimal=options.decimal),
         options.ignore,
         wanted="columns d, a and alpha, such as d_m or d_mm",
-        units_in=units_in,
+        units_in=read_units,
     )
     if text.dialect.decimal == "comma" and options.decimal is None:
         raise InputError(source, "", "numbers with commas", "--decimal comma where the comma is the decimal mark, else points")
@@ -146,7 +146,7 @@ def _csv_rows(path: str | Path, source: str, options: DhOptions) -> _Rows:
 
 
 def _has_known_column(cells: Sequence[str]) -> bool:
-    return any(without_unit(cell)[0] in _NEEDED for cell in cells)
+    return any(split_unit(cell)[0] in _NEEDED for cell in cells)
 
 
 def _yaml_rows(path: str | Path, source: str, options: DhOptions) -> _Rows:
@@ -167,7 +167,7 @@ def _meanings(columns: Mapping[str, str], options: DhOptions, source: str) -> di
     found: dict[str, _Meaning] = {}
     for column, below in columns.items():
         known = column in (*_PLAIN, *_WORDS)
-        name, stated = (column, None) if known else without_unit(column)
+        name, stated = (column, None) if known else split_unit(column)
         stated = {"°": "deg"}.get(stated or "", stated)
         unit = stated or {"°": "deg"}.get(below, below)
         if stated and below and unit != {"°": "deg"}.get(below, below):

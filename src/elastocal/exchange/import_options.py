@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from elastocal.campaigns.measurements import SHOWN, SHOWN_TO, TICK, file_columns, sheet_columns, shown
+from elastocal.campaigns.measurements import SHOWN, SHOWN_TO, TICK, file_columns, sheet_columns, show_cell
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import LENGTH, POSITION, VECTOR, kind_of
 from elastocal.exchange.csv_dialect import TextTable
@@ -90,7 +90,7 @@ def sheet_options(text: TextTable, options: ImportOptions) -> ImportOptions:
             value, other = plain_number(exact), plain_number(seen)
             if value is not None and other is not None and abs(value / SHOWN[unit] - other) > SHOWN_TO:
                 allowed = f"{value / SHOWN[unit]:.3f}, which is {name}, or a table without the column {header}"
-                raise InputError(text.path, f"line {line}, column {header}", shown(seen), allowed)
+                raise InputError(text.path, f"line {line}, column {header}", show_cell(seen), allowed)
     given = dict(options.units or {})
     for name in (*POSITION, *VECTOR):
         kind, usual = ("lengths", "m") if kind_of(name)[0] == LENGTH else ("angles", "rad")

@@ -50,7 +50,7 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
                 alpha=0.6,
                 label="further studies, mean ± 2 standard deviations",
             )
-            expected = _expected(expectations, robot, quantity)
+            expected = _read_expected(expectations, robot, quantity)
             axis.plot(expected, [strategies.index(name) for name in expected.index], "|", color="black", markersize=8)
             for differs, colour, name in ((False, "white", "paper"), (True, PALETTE[1], "paper, differs (Holm)")):
                 some = ((cells.p_holm < LEVEL) == differs).to_numpy()
@@ -70,7 +70,7 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
     return figure
 
 
-def _expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Series:
+def _read_expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Series:
     """Expectations of one quantity by strategy; none of lengths."""
     names = {f"{quantity}_percent_fixed_joints", f"{quantity}_um"}
     mine = expectations[(expectations.robot == robot) & expectations.quantity.isin(names) & expectations.paper.notna()]

@@ -73,7 +73,7 @@ def signature(name: str, robot: Robot) -> Signature:
     links weigh is left aside, since the weight of links is an effect only where it is not declared.
     """
     sites = _weightless(robot)
-    offered = offered_candidates(name, robot)
+    offered = list_candidates(name, robot)
     candidate = next((each for each in offered if each.joints[:1] == (_SHOWN_AT,)), offered[0])
     joint = (*candidate.joints, *candidate.turning, _SHOWN_AT)[0]
     limits = np.degrees(robot.joint_limits[joint - 1])
@@ -100,7 +100,7 @@ def signature(name: str, robot: Robot) -> Signature:
     )
 
 
-def offered_candidates(name: str, robot: Robot) -> list[Candidate]:
+def list_candidates(name: str, robot: Robot) -> list[Candidate]:
     """Every way in which an effect can act on the arm of the figures, see `signature`."""
     return effects()[name].candidates(_weightless(robot))
 

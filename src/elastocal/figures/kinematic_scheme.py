@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Circle, Polygon
 
-from elastocal.figures.scheme_layout import DEPTH_RATIO, PARALLEL, Joint, Point, Segment, laid_out, projected, view_of
+from elastocal.figures.scheme_layout import DEPTH_RATIO, PARALLEL, Joint, Point, Segment, lay_out, project_on_paper, view_of
 from elastocal.figures.scheme_sheet import (
     BLUE,
     BOLD,
@@ -22,7 +22,7 @@ from elastocal.figures.scheme_sheet import (
     SYMBOL_RADIUS_MM,
     TEXT_HEIGHT_MM,
     Sheet,
-    subscripted,
+    write_subscript,
 )
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def kinematic_scheme(robot: Robot) -> Figure:
     A joint that turns about its own link is drawn on that link instead of at its end: moved along its axis, it is the same
     joint. So the three joints of a spherical wrist can be seen apart.
     """
-    items, depth = laid_out(robot.chain)
+    items, depth = lay_out(robot.chain)
     segments = [item for item in items if isinstance(item, Segment)]
     joints = [item for item in items if isinstance(item, Joint)]
     points = [item for item in items if isinstance(item, Point)]
@@ -58,7 +58,7 @@ def kinematic_scheme(robot: Robot) -> Figure:
     for segment in segments:
         _draw_segment(sheet, segment)
     for joint in joints:
-        _draw_joint(sheet, joint.place, None if joint.across else projected(joint.axis, depth))
+        _draw_joint(sheet, joint.place, None if joint.across else project_on_paper(joint.axis, depth))
     _draw_points(sheet, points)
     _draw_labels(sheet, segments, joints, points)
     low, high = sheet.taken[:, :2].min(axis=0), sheet.taken[:, 2:].max(axis=0)
@@ -137,7 +137,7 @@ def _draw_labels(sheet: Sheet, segments: Sequence[Segment], joints: Sequence[Joi
     for joint in joints:
         away = _outward(joint.place, middle)
         reach = (SYMBOL_RADIUS_MM if joint.across else HALF_WIDTH_MM) + 0.3
-        sheet.label(subscripted("q", joint.number), [joint.place], away, (reach, 9.0), f"joint-{joint.number}")
+        sheet.label(write_subscript("q", joint.number), [joint.place], away, (reach, 9.0), f"joint-{joint.number}")
     for number, segment in enumerate((s for s in segments if s.label), start=1):
         anchors = _visible_places(segment)
         along = (segment.end - segment.start) / np.linalg.norm(segment.end - segment.start)

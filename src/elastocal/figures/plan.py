@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from elastocal.application.planning.cell import link_points
-from elastocal.figures.arm_view import as_seen, draw_arm
+from elastocal.figures.arm_view import draw_arm, project_view
 from elastocal.figures.style import PALETTE, label_decades, panels, styled
 from elastocal.mechanics.kinematics import poses
 
@@ -97,8 +97,8 @@ def pose_pictures(robot: Robot, plan: Plan) -> list[Figure]:
     angles = robot.model_angles(np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles]))
     force = np.concatenate([plan.fitted.force, plan.held_out.force])
     links = link_points(robot, angles).transpose(1, 0, 2)
-    arms = as_seen(links)
-    pull = as_seen(force / max(np.linalg.norm(force, axis=1).max(), 1e-9))
+    arms = project_view(links)
+    pull = project_view(force / max(np.linalg.norm(force, axis=1).max(), 1e-9))
     middle, half = (arms.max((0, 1)) + arms.min((0, 1))) / 2, 0.53 * np.ptp(arms, axis=(0, 1)).max()
     figures = []
     for first in range(0, len(arms), _MOST_ON_PAGE):

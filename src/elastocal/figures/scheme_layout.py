@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.figures.scheme_sheet import subscripted
+from elastocal.figures.scheme_sheet import write_subscript
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -71,7 +71,7 @@ class Point:
 Item = Segment | Joint | Point
 
 
-def laid_out(chain: Chain) -> tuple[list[Item], np.ndarray]:
+def lay_out(chain: Chain) -> tuple[list[Item], np.ndarray]:
     """Everything at its place, and the direction on paper of what recedes.
 
     Places are in millimetres of paper. The kinematic scheme is a side view with the base's z upwards, in an oblique
@@ -111,7 +111,7 @@ def view_of(chain: Chain) -> np.ndarray:
     return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 
 
-def projected(vector: np.ndarray, depth: np.ndarray) -> np.ndarray:
+def project_on_paper(vector: np.ndarray, depth: np.ndarray) -> np.ndarray:
     """(right, up, into the paper) on paper, (2,), where `depth` (2,) is what a unit into the paper becomes."""
     return vector[:2] + vector[2] * depth
 
@@ -151,7 +151,7 @@ def _walk(chain: Chain, last_heading: float) -> list[Item]:
             items.append(Joint(transform.coordinate + 1, direction))
         elif transform.kind == "T" and transform.constant != 0:
             lengths += 1
-            label = f"{subscripted('l', lengths)} = {_millimetres(transform.constant)} mm"
+            label = f"{write_subscript('l', lengths)} = {_millimetres(transform.constant)} mm"
             items.append(Segment(np.sign(transform.constant) * direction, abs(transform.constant), label))
     return items
 
@@ -196,7 +196,7 @@ def _spread(items: list[Item]) -> list[Item]:
     spread: list[Item] = []
     run: list[Joint | Point] = []
     before: Segment | None = None
-    if isinstance(_without_points(items)[0], Joint):
+    if isinstance(_drop_points(items)[0], Joint):
         # A joint in the base's origin would be drawn on the ground.
         items = [Segment(np.array([0.0, 1.0, 0.0]), 0.0), *items]
     for item in [*items, None]:
@@ -209,7 +209,7 @@ def _spread(items: list[Item]) -> list[Item]:
     return spread
 
 
-def _without_points(items: Iterable[Item]) -> list[Segment | Joint]:
+def _drop_points(items: Iterable[Item]) -> list[Segment | Joint]:
     return [item for item in items if not isinstance(item, Point)]
 
 
@@ -257,17 +257,17 @@ def _place(items: Sequence[Item], scale: float, depth: np.ndarray) -> np.ndarray
     longest = max((item.length_m for item in items if isinstance(item, Segment)), default=0.0)
     here, places = np.zeros(3), [np.zeros(2)]
     for item in items:
-        place = projected(here, depth)
+        place = project_on_paper(here, depth)
         if isinstance(item, Segment):
             item.start = place
             here = here + item.direction * _drawn_length(item, longest, scale)
-            item.end = place = projected(here, depth)
+            item.end = place = project_on_paper(here, depth)
             for number, joint in enumerate(item.carried, start=1):
                 joint.place = item.start + (item.end - item.start) * number / (len(item.carried) + 1)
         elif isinstance(item, Point):
             offset = np.linalg.norm(item.offset)
             along = item.offset / offset * (SHORTEST_MM + 0.3 * scale) if offset else np.zeros(3)
-            item.node, item.place = place, projected(here + along, depth)
+            item.node, item.place = place, project_on_paper(here + along, depth)
             place = item.place
         elif item.carrier is None:
             item.place = place

@@ -127,7 +127,7 @@ class Sheet:
     def legend(self, entries: Sequence[tuple[Callable[[np.ndarray], Any], float, str]], middle: float, top: float) -> float:
         """Rows of (draw, width of the symbol, text), centred, as many in a row as fit; returns where they end."""
         widths = [symbol + 1.5 + _text_width(text) for _, symbol, text in entries]
-        for row in filled_rows(widths, WIDTH_MM - 2 * MARGIN_MM, gap=LEGEND_GAP_MM):
+        for row in fill_rows(widths, WIDTH_MM - 2 * MARGIN_MM, gap=LEGEND_GAP_MM):
             x = middle - (sum(widths[i] for i in row) + LEGEND_GAP_MM * (len(row) - 1)) / 2
             for i in row:
                 draw, symbol, text = entries[i]
@@ -147,12 +147,12 @@ class Sheet:
         return self.figure
 
 
-def subscripted(letter: str, number: int) -> str:
+def write_subscript(letter: str, number: int) -> str:
     """A letter with a number below, as mathematics."""
     return f"${letter}_{{{number}}}$"
 
 
-def filled_rows(widths: Sequence[float], limit: float, gap: float) -> list[list[int]]:
+def fill_rows(widths: Sequence[float], limit: float, gap: float) -> list[list[int]]:
     """Indices of widths that fill rows one after another."""
     rows: list[list[int]] = [[]]
     used = 0.0

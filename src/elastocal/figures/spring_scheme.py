@@ -20,8 +20,8 @@ from elastocal.figures.scheme_sheet import (
     WIDTH_MM,
     Place,
     Sheet,
-    filled_rows,
-    subscripted,
+    fill_rows,
+    write_subscript,
 )
 
 if TYPE_CHECKING:
@@ -68,12 +68,12 @@ def _blocks(robot: Robot, extended: bool) -> list[_Block]:
     for transform in robot.chain.transforms:
         if transform.kind == "T" and transform.constant != 0:
             lengths += 1
-            names.append(subscripted("l", lengths))
+            names.append(write_subscript("l", lengths))
         elif transform.coordinate is not None:
             # All that lies between two joints is one rigid link.
             blocks += [_Block(link, ", ".join(names))] if names else []
             names, number = [], transform.coordinate + 1
-            blocks.append(_Block("actuator", f"{subscripted('q', number)} + {subscripted(THETA, number)}"))
+            blocks.append(_Block("actuator", f"{write_subscript('q', number)} + {write_subscript(THETA, number)}"))
     blocks += [_Block(link, ", ".join(names))] if names else []
     return [*blocks, _Block("end-effector", "End-\neffector")]
 
@@ -101,9 +101,9 @@ def _draw_model(sheet: Sheet, blocks: Sequence[_Block], top: float) -> float:
 def _even_rows(widths: Sequence[float]) -> list[list[int]]:
     """As few rows as possible, the longest of them as short as possible."""
     widest = WIDTH_MM - 2 * MARGIN_MM - 8.0
-    rows = filled_rows(widths, widest, BLOCK_GAP_MM)
+    rows = fill_rows(widths, widest, BLOCK_GAP_MM)
     for limit in np.arange(widest, max(widths), -1.0):
-        shorter = filled_rows(widths, limit, BLOCK_GAP_MM)
+        shorter = fill_rows(widths, limit, BLOCK_GAP_MM)
         if len(shorter) > len(rows):
             break
         rows = shorter

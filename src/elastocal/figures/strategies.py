@@ -106,7 +106,7 @@ def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[s
         for axis, (quantity, scale, name, span) in zip(column, quantities, strict=True):
             mine = studies[studies.robot == robot]
             means = mine.pivot_table(index="length", columns="strategy", values=quantity, observed=True)
-            for index in _distinct(means, order):
+            for index in _find_distinct(means, order):
                 strategy, style = order[index], line_style(index)
                 curves = scale * mine[mine.strategy == strategy].pivot(index="study", columns="length", values=quantity)
                 middle, spread = curves.mean(), curves.std()
@@ -186,14 +186,14 @@ def accuracy_of_one_data_set(per_dataset: pd.DataFrame, titles: Mapping[str, str
 def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str, scale: float, order: Sequence[str]) -> None:
     # Where the mean of 1/c exists in practice.
     mine = metrics[(metrics.robot == robot) & metrics.trustworthy]
-    for index in _distinct(mine.pivot(index="length", columns="strategy", values=quantity), order):
+    for index in _find_distinct(mine.pivot(index="length", columns="strategy", values=quantity), order):
         cell, style = mine[mine.strategy == order[index]], line_style(index)
         axis.plot(cell.length, scale * cell[quantity], label=order[index], **style)
         _band(axis, cell.length, scale * cell[quantity], scale * cell[f"{quantity}_std_error"], style["color"])
     axis.set_xlim(2, 1.02 * metrics.length.max())
 
 
-def _distinct(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
+def _find_distinct(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
     """Places of the strategies whose curve (a column each) no strategy before them has, to rounding."""
     found: list[int] = []
     for index, name in enumerate(order):

@@ -37,7 +37,7 @@ def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
     return np.where(~above.any(axis=-1), 1.0, np.where(reached, between, np.inf))
 
 
-def needed_by_set(
+def find_needed_by_set(
     frame: pd.DataFrame, point_sets: Mapping[str, Sequence[str]], accuracy_um: float, weights: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Configurations needed by each set of points in each bootstrap replicate, the first of which is no replicate.
@@ -70,7 +70,7 @@ def break_even_table(
     against = next(iter(point_sets))
     for robot, frame in frames.items():
         for accuracy in accuracies_um:
-            needed = needed_by_set(frame, point_sets, accuracy, weights[robot])
+            needed = find_needed_by_set(frame, point_sets, accuracy, weights[robot])
             if against not in needed:
                 continue
             theirs, m = needed[against], len(point_sets[against])
@@ -101,7 +101,7 @@ def cost_table(
     rows = []
     against = next(iter(point_sets))
     for robot, frame in frames.items():
-        needed = needed_by_set(frame, point_sets, accuracy_um, weights[robot])
+        needed = find_needed_by_set(frame, point_sets, accuracy_um, weights[robot])
         for each in CONFIGURATION_COSTS:
             costs = {points: n * (each + len(point_sets[points])) for points, n in needed.items() if np.isfinite(n[0])}
             cheapest = min(costs, key=lambda points: costs[points][0], default="")

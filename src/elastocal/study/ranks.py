@@ -85,7 +85,7 @@ def ranks_table(found: Mapping[str, Mapping[str, Mapping[str, Score]]], classica
     for robot, by_metric in found.items():
         for metric, by_strategy in by_metric.items():
             values = np.array([score.value for score in by_strategy.values()])
-            places = rankdata(_rounded(np.abs(values)), method="min")
+            places = rankdata(_round(np.abs(values)), method="min")
             for (strategy, score), rank in zip(by_strategy.items(), places, strict=True):
                 ratio, low, high = score.ratio(by_strategy[classical])
                 rows.append(
@@ -113,7 +113,7 @@ def pairs_table(found: Mapping[str, Mapping[str, Mapping[str, Score]]]) -> pd.Da
     rows = []
     for robot, by_metric in found.items():
         reference = by_metric[REFERENCE]
-        names = _distinct(reference)
+        names = _find_distinct(reference)
         for metric, by_strategy in by_metric.items():
             for index, strategy in enumerate(names):
                 for other in names[index + 1 :]:
@@ -149,13 +149,13 @@ def _of_single_sets(mine: pd.DataFrame) -> dict[str, Score]:
     return found
 
 
-def _rounded(values: np.ndarray) -> np.ndarray:
+def _round(values: np.ndarray) -> np.ndarray:
     return np.array([float(f"{value:.{_DIGITS}g}") for value in values])
 
 
-def _distinct(by_strategy: Mapping[str, Score]) -> Sequence[str]:
+def _find_distinct(by_strategy: Mapping[str, Score]) -> Sequence[str]:
     """The first name of each estimator."""
     seen: dict[float, str] = {}
     for strategy, score in by_strategy.items():
-        seen.setdefault(float(_rounded(np.array([score.value]))[0]), strategy)
+        seen.setdefault(float(_round(np.array([score.value]))[0]), strategy)
     return [*seen.values()]

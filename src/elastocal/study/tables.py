@@ -27,7 +27,7 @@ def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
 
     Returns robot, c1.. in µrad/(N m).
     """
-    rows = [{"robot": name} | _numbered("c", MICRO * robot.compliance) for name, robot in robots.items()]
+    rows = [{"robot": name} | _number_columns("c", MICRO * robot.compliance) for name, robot in robots.items()]
     return pd.DataFrame(rows)
 
 
@@ -236,7 +236,7 @@ def solver_summary(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def with_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
+def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
     """A table with the names of the strategies' files, which those of folders are, behind the names of strategies.
 
     `slugs`: names of files by the names of strategies.
@@ -246,7 +246,7 @@ def with_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
     ]
 
 
-def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
+def merge_errors(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
     """The same table for people: each value with its standard error behind a ± sign, an infinite length as "not reached".
 
     `digits`: significant digits of a value without error.
@@ -256,13 +256,13 @@ def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
         if column.endswith("_std_error"):
             continue
         errors = frame.get(f"{column}_std_error", pd.Series(np.nan, frame.index))
-        shown[column] = [worded(value, error, digits) for value, error in zip(frame[column], errors, strict=True)]
+        shown[column] = [word_value(value, error, digits) for value, error in zip(frame[column], errors, strict=True)]
     return pd.DataFrame(shown)
 
 
-def headed_rows(frame: pd.DataFrame) -> list[list[str]]:
+def list_rows(frame: pd.DataFrame) -> list[list[str]]:
     """The table for people as rows of words, its header first, with names of columns that break at blanks."""
-    shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set|strategy_file")])
+    shown = merge_errors(frame.loc[:, ~frame.columns.str.contains("_one_set|strategy_file")])
     return [[column_head(name) for name in shown.columns], *shown.to_numpy().tolist()]
 
 
@@ -288,7 +288,7 @@ _HEADS = (
 )
 
 
-def worded(value: float | str, error: float, digits: int = 3) -> str:
+def word_value(value: float | str, error: float, digits: int = 3) -> str:
     """A value for people, with two digits of its standard error.
 
     `error`: not a number or zero where there is none. `digits`: significant digits of a value without error.
@@ -329,7 +329,7 @@ def _curves(drawn: pd.DataFrame, name: str) -> np.ndarray:
     return drawn.pivot(index="replicate", columns="length", values=name).to_numpy()
 
 
-def _numbered(prefix: str, values: Iterable[float]) -> dict[str, float]:
+def _number_columns(prefix: str, values: Iterable[float]) -> dict[str, float]:
     return {f"{prefix}{j}": float(value) for j, value in enumerate(values, 1)}
 
 

@@ -5,7 +5,7 @@ import yaml
 from analysed_robots import ROBOTS
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.plan import planned
+from elastocal.application.planning.plan import choose_plan
 from elastocal.application.planning.sheet import REPEATED_POSES, REPEATS, campaign_document, sheet
 from elastocal.blind.rehearsal import filled_sheet, hidden_robot
 from elastocal.campaigns.measurements import TICK
@@ -14,7 +14,7 @@ from elastocal.campaigns.reading import read_campaign
 
 def made():
     survey = made_survey()
-    return survey, planned(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    return survey, choose_plan(survey, made_candidates(survey, 300), 14, 4, "D", 1)
 
 
 def test_each_state_of_each_pose_is_a_row_and_the_first_poses_are_repeated():

@@ -15,7 +15,7 @@ from made_study_blocks import (
 )
 
 from elastocal.mechanics.robot import with_target_offset
-from elastocal.study.steps.evaluate import evaluated
+from elastocal.study.steps.evaluate import evaluate_strategy
 from elastocal.study.steps.weights import weight_blocks
 
 
@@ -37,7 +37,7 @@ def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
 
     scores = judge(kuka)
     whole, parts = (
-        evaluated(cut(table, 4, c), cut(counts, 10, c), tests, scores, (0,), "stiffness", "averaged_model", [2, 4])
+        evaluate_strategy(cut(table, 4, c), cut(counts, 10, c), tests, scores, (0,), "stiffness", "averaged_model", [2, 4])
         for c in ((0, 12), (0, 1, 7, 12))
     )
     for one, other in zip(whole, parts, strict=True):
@@ -108,4 +108,4 @@ def test_initial_errors_are_the_displacements_of_the_end_effector(kuka):
 def test_weights_with_another_number_of_blocks_are_not_used(kuka):
     *counts, tests = weight_blocks("kuka", 1, 12, CONFIGURATIONS_OF_THE_TEST, 10)
     with pytest.raises(ValueError, match="zip"):
-        evaluated([], counts, tests, judge(kuka), (0,), "stiffness", "averaged_model", [1])
+        evaluate_strategy([], counts, tests, judge(kuka), (0,), "stiffness", "averaged_model", [1])

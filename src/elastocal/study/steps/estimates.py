@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.identification import estimate_compliance, first_solvable_length
-from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+from elastocal.study.strategies import Stage, Strategy, drop_forgotten_stages
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +23,7 @@ def estimates(study: StudyInMemory, strategies: Sequence[Strategy], number: int 
     them.
     """
     joints = study.robot.joints
-    stages = {strategy.name: without_forgotten_stages(strategy, joints).stages for strategy in strategies}
+    stages = {strategy.name: drop_forgotten_stages(strategy, joints).stages for strategy in strategies}
     points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
     found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
     for sets in study.blocks(number):

@@ -30,7 +30,7 @@ def judge_from(
     return make_judge(robot, to_experiments(test_experiments), to_deflections(test_deflections), wrench_at)
 
 
-def evaluated(
+def evaluate_strategy(
     identified_blocks: Iterable[Mapping[str, np.ndarray]],
     weight_blocks: Iterable[Mapping[str, np.ndarray]],
     test_weights: Mapping[str, np.ndarray],
