@@ -16,14 +16,14 @@ from elastocal.mechanics.sites import sites_of
 GEOMETRY = ("joint_offset@2", "joint_offset@4", "link_geometry@1", "link_geometry@2", "link_geometry@3", "link_geometry@4")
 
 
-def drawn(robot, count=25):
+def draw_states(robot, count=25):
     draws = np.random.default_rng(5)
     low, high = robot.joint_limits.T
     angles = low + (high - low) * draws.random((count, robot.joints))
     return robot.reported_angles(angles), OperatingConditions(draws.standard_normal((count, 6)) * 50.0)
 
 
-def as_file(robot):
+def read_file_model(robot):
     """The calibrated robot that a robot file alone describes: its springs, its weight, no effect."""
     model = plain_model(robot)
     values = [robot.compliance if e.effect == "joint_compliance" else np.zeros(len(e.parameters)) for e in model.effects]
@@ -39,10 +39,10 @@ def test_poses_under_load_are_those_of_the_calibrated_robot(name):
     calibrated = made_calibrated(robot, *(key for key in (*GEOMETRY, "link_geometry@6") if key in known), size=1.0)
     found = fold_effects(calibrated)
     assert found.left_out == ()
-    angles, operating = drawn(robot)
+    angles, operating = draw_states(robot)
     through_file = robot_from_document(document_of(found.robot))
     for mine, theirs in zip(
-        forward(as_file(through_file), angles, operating), forward(calibrated, angles, operating), strict=True
+        forward(read_file_model(through_file), angles, operating), forward(calibrated, angles, operating), strict=True
     ):
         np.testing.assert_allclose(mine, theirs, atol=1e-9)
 
@@ -52,8 +52,8 @@ def test_ratios_go_into_what_the_controllers_angles_mean(key):
     calibrated = made_calibrated(analysed("fanuc_cpa"), key, size=1.0)
     found = fold_effects(calibrated)
     assert found.left_out == ()
-    angles, operating = drawn(calibrated.robot)
-    mine, theirs = (forward(each, angles, operating)[0] for each in (as_file(found.robot), calibrated))
+    angles, operating = draw_states(calibrated.robot)
+    mine, theirs = (forward(each, angles, operating)[0] for each in (read_file_model(found.robot), calibrated))
     np.testing.assert_allclose(mine, theirs, atol=1e-9)
 
 
@@ -64,6 +64,6 @@ def test_what_a_robot_file_cannot_say_is_left_out_and_changes_nothing_else():
     assert keys == ["lost_motion@2", "transmission_harmonic@1[orders 1-2]"]
     bare = tuple(0 * v if n in found.left_out else v for n, v in enumerate(calibrated.estimate.coefficients))
     without = replace(calibrated, estimate=replace(calibrated.estimate, coefficients=bare))
-    angles, operating = drawn(calibrated.robot)
-    mine, theirs = (forward(each, angles, operating)[0] for each in (as_file(found.robot), without))
+    angles, operating = draw_states(calibrated.robot)
+    mine, theirs = (forward(each, angles, operating)[0] for each in (read_file_model(found.robot), without))
     np.testing.assert_allclose(mine, theirs, atol=1e-9)

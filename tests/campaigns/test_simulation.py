@@ -21,7 +21,7 @@ def angles_of(table, robot):
     return np.column_stack([table[f"q{joint + 1}"] for joint in range(robot.joints)])
 
 
-def at(table, point):
+def select(table, point):
     mask = table["target"] == point
     return {name: values[mask] for name, values in table.items()}
 
@@ -29,7 +29,7 @@ def at(table, point):
 def test_without_noise_it_is_the_elastostatics_of_the_reduced_robot(robot):
     table = draw_measurements(robot, PLAN, 1, "exact")
     for point in POINTS:
-        part = at(table, point)
+        part = select(table, point)
         angles, wrench = angles_of(part, robot), np.column_stack([part[name] for name in WRENCH_NAMES])
         place = robot.chain.point(point)
         end = poses_and_jacobians(robot.chain, angles, robot.chain.end_effector)[2]
@@ -45,7 +45,7 @@ def test_without_noise_it_is_the_elastostatics_of_the_reduced_robot(robot):
 
 
 def test_wrench_is_that_of_a_force_beside_the_last_point(kuka):
-    table = at(draw_measurements(kuka, PLAN, 2, "wrench"), "6DoF")
+    table = select(draw_measurements(kuka, PLAN, 2, "wrench"), "6DoF")
     force = np.column_stack([table[name] for name in WRENCH_NAMES[:3]])
     moment = np.column_stack([table[name] for name in WRENCH_NAMES[3:]])
     np.testing.assert_allclose(moment, np.cross(PLAN.offset_m, force), atol=1e-9)
@@ -57,7 +57,7 @@ def test_wrench_is_that_of_a_force_beside_the_last_point(kuka):
 
 
 def test_the_plan_is_kept(kuka):
-    table = at(draw_measurements(kuka, PLAN, 3, "plan"), "3DoF")
+    table = select(draw_measurements(kuka, PLAN, 3, "plan"), "3DoF")
     visits = list(zip(table["pose"], table["load"], table["repeat"], strict=True))
     assert len(set(visits)) == len(visits) == 2 * (3 + 3 + 1) + 8 * 3
     assert {visit for visit in visits if visit[0] == 1} == {(1, 0, r) for r in range(3)} | {(1, 1, r) for r in range(3)} | {
