@@ -220,8 +220,7 @@ def test_other_encodings_stay_what_they_are(cell, encoding):
     other.write_bytes(text().replace('encoding="utf-8"', f'encoding="{encoding.removesuffix("-sig")}"').encode(encoding))
     found = write_calibrated_origins(other, robot, calibrated)
     assert (
-        strip_origins(found.content) == strip_origins(other.read_bytes())
-        and "geprüft".encode(encoding)[-7:] in found.content
+        strip_origins(found.content) == strip_origins(other.read_bytes()) and "geprüft".encode(encoding)[-7:] in found.content
     )
     usual = path.with_name("usual.urdf")
     usual.write_bytes(found.content)

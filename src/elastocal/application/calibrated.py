@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # States at a time: what a walk along all sites makes of them stays in the processor's cache.
 AT_ONCE = 1024
 # °C, at which dimensions are stated (ISO 1).
-REFERENCE_C = 20.0
+_REFERENCE_C = 20.0
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def assumptions(calibrated: CalibratedRobot, conditions: OperatingConditions) ->
     taken = {
         "approach": (conditions.approach, "no joint's sense of approach is known, and hysteresis is left out"),
         "time": (conditions.time_s, "the time is that of the campaign's first measurement, when nothing had warmed up"),
-        "temperature": (conditions.temperature_c, f"the temperature is {REFERENCE_C:g} °C"),
+        "temperature": (conditions.temperature_c, f"the temperature is {_REFERENCE_C:g} °C"),
     }
     named = {name: ", ".join(e.key for e in calibrated.model.effects if name in e.needs) for name in taken}
     return [
@@ -262,7 +262,7 @@ def states_of(calibrated: CalibratedRobot, reported_angles: np.ndarray, operatin
         repeats=np.ones(count, int),
         approach=np.sign(rows(operating.approach, 0.0, robot.joints) @ robot.reported_matrix.T),
         time_s=rows(operating.time_s, calibrated.model.time_zero_s),
-        temperature_c=rows(operating.temperature_c, REFERENCE_C),
+        temperature_c=rows(operating.temperature_c, _REFERENCE_C),
     )
 
 

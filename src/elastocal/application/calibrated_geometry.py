@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.mechanics.robot import Robot
 
-OFFSET, RATIO, GEOMETRY, SPRINGS = "joint_offset", "transmission_ratio", "link_geometry", "joint_compliance"
-FOLDED = (OFFSET, RATIO, GEOMETRY, SPRINGS, declared_weight.EFFECT)
+_OFFSET, _RATIO, GEOMETRY, SPRINGS = "joint_offset", "transmission_ratio", "link_geometry", "joint_compliance"
+_FOLDED = (_OFFSET, _RATIO, GEOMETRY, SPRINGS, declared_weight.EFFECT)
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ def fold_effects(calibrated: CalibratedRobot) -> Folded:
     left_out = []
     for number, (effect, values) in enumerate(zip(model.effects, estimate.coefficients, strict=True)):
         joint = effect.joints[0] - 1 if effect.joints else 0
-        if effect.effect == OFFSET:
+        if effect.effect == _OFFSET:
             offset[joint] += values[0]
-        elif effect.effect == RATIO:
+        elif effect.effect == _RATIO:
             for parameter, value in zip(effect.parameters, values, strict=True):
                 ratio[joint, int(parameter.name.removeprefix("per_q")) - 1] += value
         elif effect.effect == GEOMETRY:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # Steps after which a start has converged or will not: Newton's method doubles the digits in the last few.
 _STEPS = 60
 # Of the pose error, m and as length at the reach; rounding of poses of some metres is a thousandth of it.
-CONVERGED_M = 1e-10
+_CONVERGED_M = 1e-10
 # Of a solution: beyond it the pose is out of reach.
 SOLVED_M = 1e-7
 # Damping in parts of the largest squared singular value, and by how much a step that fails or succeeds changes it.
@@ -62,7 +62,7 @@ def refine(robot: Robot, position: np.ndarray, rotation: np.ndarray, start: np.n
         angles[rows], error[rows] = trial[rows], left[better]
         step_of[0][rows], step_of[1][rows] = off[better], jacobian[better] * scale[:, None]
         damping[open_rows] = np.maximum(damping[open_rows] * np.where(better, _SHRINKS, _GROWS), _LEAST)
-        open_rows = np.flatnonzero((error > CONVERGED_M) & (damping < 1e6))
+        open_rows = np.flatnonzero((error > _CONVERGED_M) & (damping < 1e6))
         if not len(open_rows):
             break
         trial[open_rows] = angles[open_rows] + _step_damped(step_of[1][open_rows], step_of[0][open_rows], damping[open_rows])

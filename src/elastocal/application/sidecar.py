@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from elastocal.application.accuracy import Accuracy
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
 
-CONVENTIONS = {
+_CONVENTIONS = {
     "base": "poses are in the robot's base frame: the frame of the chain before its first transform, as the fit placed it",
     "joint_angles": "q = matrix * reported + offset of the robot file, rad; reported angles are the controller's",
     "links": "errors of link k act at its far end, before joint k + 1: Tx Ty Tz Rx Ry Rz in the frame of the chain there",
@@ -57,7 +57,7 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
         "robot": calibrated.robot.name,
         "date": date,
         "elastocal_version": __version__,
-        "conventions": CONVENTIONS,
+        "conventions": _CONVENTIONS,
         "accuracy": accuracy.document() | {"words": accuracy_sentence(accuracy)},
         "joint_compliance": springs,
         "effects": entries,

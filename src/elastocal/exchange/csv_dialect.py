@@ -165,7 +165,7 @@ def _read_names(cells: Sequence[str], kept: Sequence[tuple[int, str]], separator
     return (both, True) if len(set(both)) == len(both) else (names, False)
 
 
-def split_lines(text: str, path: str | Path) -> list[str]:
+def _split_lines(text: str, path: str | Path) -> list[str]:
     """Lines of a file's text as editors count them; control characters and marks that turn the order of letters are refused."""
     lines = _ENDS.split(text)
     for number, line in enumerate(lines, 1):
@@ -178,7 +178,7 @@ def split_lines(text: str, path: str | Path) -> list[str]:
 def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]:
     content = read_bytes(path, LARGEST_BYTES, "a table with a line for each measurement")
     text, encoding = _decode(content, path, encoding)
-    lines = split_lines(text, path)
+    lines = _split_lines(text, path)
     if len(lines) > MOST_LINES:
         allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
         raise InputError(path, "", counted(len(lines), "line"), allowed)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 MICRO = 1e6
 # Costs of a configuration, in measurements, at which curves are given: from none to a robot that is loaded by hand.
-CONFIGURATION_COSTS = (0.0, *np.logspace(-2, 1.5, 43).round(4).tolist())
+_CONFIGURATION_COSTS = (0.0, *np.logspace(-2, 1.5, 43).round(4).tolist())
 
 
 def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
@@ -102,7 +102,7 @@ def cost_table(
     against = next(iter(point_sets))
     for robot, frame in frames.items():
         needed = find_needed_by_set(frame, point_sets, accuracy_um, weights[robot])
-        for each in CONFIGURATION_COSTS:
+        for each in _CONFIGURATION_COSTS:
             costs = {points: n * (each + len(point_sets[points])) for points, n in needed.items() if np.isfinite(n[0])}
             cheapest = min(costs, key=lambda points: costs[points][0], default="")
             for points, cost in costs.items():

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 STEPS = 30
 # Relative size of the last step but one. Each step is about a thousand times smaller than the one before, down to the rounding
 # of positions of metres against deflections of millimetres, which the condition number magnifies.
-LAST_STEP = 1e-7
+_LAST_STEP = 1e-7
 
 
 def identify_exactly(
@@ -85,7 +85,7 @@ def _solve_stage(
             compliance[:, identified] += step
             if settled.all():
                 break
-            settled = np.abs(step).max(axis=1) <= LAST_STEP * np.abs(compliance).max(axis=1)
+            settled = np.abs(step).max(axis=1) <= _LAST_STEP * np.abs(compliance).max(axis=1)
     compliance[~settled] = np.nan
     return compliance
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
 # the measurements do not determine the compliances.
-LARGEST_CONDITION = 1e7
+_LARGEST_CONDITION = 1e7
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def find_undetermined_prefixes(
     (configurations, sets) of bool.
     """
     rows = next(iter(measurements.values())).regressor.shape[0]
-    undetermined = ~(condition < LARGEST_CONDITION)
+    undetermined = ~(condition < _LARGEST_CONDITION)
     undetermined[: first_solvable_length(strategy, rows) - 1] = True
     return undetermined
 
@@ -285,7 +285,7 @@ def cholesky_triangles(information: np.ndarray) -> np.ndarray:
     """Upper triangular Cholesky factors R of symmetric matrices R^T R.
 
     `information` (configurations, m, m, sets): only the upper triangles are read. Returns (configurations, m, m, sets): not a
-    number where a matrix is not positive definite to rounding, see `LARGEST_CONDITION`.
+    number where a matrix is not positive definite to rounding, see `_LARGEST_CONDITION`.
     """
     size = information.shape[1]
     triangle = np.zeros_like(information)
@@ -294,7 +294,7 @@ def cholesky_triangles(information: np.ndarray) -> np.ndarray:
         for above in range(row):
             rest -= triangle[:, above, row, None] * triangle[:, above, row:]
         pivot, diagonal = rest[:, 0], information[:, row, row]
-        pivot[~(pivot > diagonal / LARGEST_CONDITION**2)] = np.nan
+        pivot[~(pivot > diagonal / _LARGEST_CONDITION**2)] = np.nan
         triangle[:, row, row:] = rest / np.sqrt(pivot)[:, None]
     return triangle
 
