@@ -1,6 +1,6 @@
 """Data sets in memory are those of the pipeline, by number."""
 
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -54,3 +54,9 @@ def test_a_reflector_is_a_target_that_the_point_carries(kuka, point):
     np.testing.assert_allclose(found.deflection[:3], expected.deflection, atol=1e-12)
     np.testing.assert_allclose(found.regressor[:3], expected.regressor, rtol=1e-9, atol=1e-9)
     assert found.deflection.shape[0] == 6 and carried.independent_rows == 6
+
+
+@pytest.mark.parametrize(("what", "name"), [(USUAL, "average"), (SIZE, "noise")])
+def test_how_the_paper_is_read_and_how_large_a_study_is_are_frozen(what, name):
+    with pytest.raises(FrozenInstanceError):
+        setattr(what, name, None)

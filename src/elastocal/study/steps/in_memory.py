@@ -16,7 +16,6 @@ from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot import Robot, with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.identification import Measurements
-from elastocal.study.interpretation import Interpretation, Size
 from elastocal.study.metrics import Judge, make_judge
 from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
 from elastocal.study.steps.blocks import blocks_of_sets
@@ -27,6 +26,41 @@ if TYPE_CHECKING:
 
     from elastocal.mechanics.chain import MeasuringPoint
     from elastocal.study.experiments import Experiments
+
+
+@dataclass(frozen=True)
+class Interpretation:
+    """How the paper's open points are read, see ``schemas/config.yaml``.
+
+    `loading`: R3, R4. `rows`: 6 where poses are measured, 3 where positions are (R5). `wrench_at`: R6. `average`,
+    `deviation_of`: R7 and R8, see `evaluation.average`. `reflectors_m`: from each measuring point, in its frame, to the
+    reflectors whose positions are measured there; without, the target of the robot itself is measured.
+    """
+
+    loading: Loading
+    rows: int
+    wrench_at: str
+    average: str
+    deviation_of: str
+    reflectors_m: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def independent_rows(self) -> int:
+        """Independent measurements of one point in one configuration: a rigid body moves in six ways."""
+        return min(6, self.rows * max(1, len(self.reflectors_m)))
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a study is.
+
+    `noise`: standard deviation, the same number in m and rad.
+    """
+
+    data_sets: int
+    configurations: int
+    tests: int
+    noise: float
 
 
 @dataclass(frozen=True)
