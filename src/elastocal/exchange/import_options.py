@@ -11,7 +11,7 @@ import yaml
 from elastocal.campaigns.measurements import SHOWN, SHOWN_TO, TICK, file_columns, sheet_columns, show_cell
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import LENGTH, POSITION, VECTOR, kind_of
-from elastocal.exchange.csv_dialect import TextTable
+from elastocal.exchange.csv_dialect import Dialect, TextTable
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import plain_number
 
@@ -21,27 +21,22 @@ _MOST_JOINTS = 99
 
 
 @dataclass(frozen=True)
-class ImportOptions:
+class ImportOptions(Dialect):
     """How a table is read; what is None or absent is found out, or refused where it is ambiguous.
 
-    `separator`, `decimal`, `header`, `encoding`, `thousands`: as in `csv_dialect.Dialect`. `ignore`: headers of columns that
-    are left out. `columns`: headers by the names of `column_names`. `units`: units by the same names; ``angles`` and
-    ``lengths`` for all that have no other. `rotation`: notation of `rotations`. `target`: name for all rows where no column has
-    it. `targets`: markers of rows that hold several, by the names of the targets that they are; see `markers`. `wrench`: what
-    the forces act on; those that the robot exerts are turned round. `skip_empty`: whether rows without a position are left out.
+    `ignore`: headers of columns that are left out. `columns`: headers by the names of `column_names`. `units`: units by the
+    same names; ``angles`` and ``lengths`` for all that have no other. `rotation`: notation of `rotations`. `target`: name for
+    all rows where no column has it. `targets`: markers of rows that hold several, by the names of the targets that they are;
+    see `markers`. `wrench`: what the forces act on; those that the robot exerts are turned round. `skip_empty`: whether rows
+    without a position are left out.
     """
 
-    separator: str | None = None
-    decimal: str | None = None
-    header: int | None = None
     columns: Mapping[str, str] | None = None
     units: Mapping[str, str] | None = None
     rotation: str | None = None
     target: str | None = None
     wrench: str = _ON_ROBOT
     skip_empty: bool = False
-    encoding: str | None = None
-    thousands: str | None = None
     ignore: Sequence[str] | None = None
     targets: Mapping[str, str] | None = None
 

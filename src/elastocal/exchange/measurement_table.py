@@ -18,7 +18,7 @@ from elastocal.campaigns.measurements import closest_first, file_columns
 from elastocal.errors import InputError, text_fault
 from elastocal.exchange.column_meanings import check_complete, find_columns, find_rotation, find_units
 from elastocal.exchange.column_names import ANGLE, POSITION, UNITS, VECTOR, find_joints, is_name, read_units, recognize_column
-from elastocal.exchange.csv_dialect import Dialect, read_text_table
+from elastocal.exchange.csv_dialect import read_text_table
 from elastocal.exchange.import_options import BY_ROBOT, ImportOptions, sheet_options
 from elastocal.exchange.markers import choose_markers, has_position, markers_in, one_row_each
 from elastocal.exchange.measurement_cells import CellReader, covariates_of, rows_with_position
@@ -66,8 +66,7 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
         names = {recognize_column(cell)[0] for cell in cells} | {name for name, header in mapped.items() if header in cells}
         return has_position(names) or bool(markers_in(cells))
 
-    dialect = Dialect(options.separator, options.decimal, options.header, options.encoding, options.thousands)
-    text = read_text_table(path, is_header, dialect, options.ignore or (), units_in=read_units)
+    text = read_text_table(path, is_header, options, options.ignore or (), units_in=read_units)
     options = sheet_options(text, options)
     mapped, notes = dict(options.columns or {}), [f"units in the row under the header: {len(text.units)}"] if text.units else []
     if targets := choose_markers(text, options.target, options.targets, mapped):
