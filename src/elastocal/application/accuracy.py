@@ -303,6 +303,11 @@ def quantile_of_length(covariance: np.ndarray) -> np.ndarray:
     return np.sqrt(gamma.ppf(CONFIDENCE, shape) * mean / shape)
 
 
+def root_mean_square(displacement: np.ndarray) -> float:
+    """Root mean square of the lengths of displacements (N, 3)."""
+    return float(np.sqrt((displacement**2).sum(axis=1).mean()))
+
+
 def accuracy_sentence(accuracy: Accuracy) -> str:
     """One sentence with everything that an accuracy statement has, the same wherever it stands."""
     kind, offset = (

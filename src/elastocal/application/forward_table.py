@@ -10,10 +10,12 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
+from elastocal.application.accuracy import root_mean_square
 from elastocal.application.calibrated import forward, nominal_forward
 
 if TYPE_CHECKING:
-    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.application.accuracy import root_mean_square
+from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
 
 # Rows in whose neighbourhood the error of interpolation is measured, and of how many neighbours one interpolates.
 _TRIED, _NEIGHBOURS = 256, 60
@@ -54,11 +56,7 @@ def interpolation_error_m(
     errors = list(_ERRORS[:3])
     spline = RBFInterpolator(known / scale, table[errors].to_numpy(), min(_NEIGHBOURS, len(known)))
     true = _tabulate(calibrated, angles, operating)[errors].to_numpy()
-    return _rms(spline(angles / scale) - true), _rms(true)
-
-
-def _rms(displacement: np.ndarray) -> float:
-    return float(np.sqrt((displacement**2).sum(axis=1).mean()))
+    return root_mean_square(spline(angles / scale) - true), root_mean_square(true)
 
 
 def _tabulate(calibrated: CalibratedRobot, reported: np.ndarray, operating: OperatingConditions) -> pd.DataFrame:

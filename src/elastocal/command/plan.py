@@ -201,7 +201,7 @@ def _write_files(task: _Task, options: Options, names: list[str], found: Plan, t
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
     from elastocal.figures.plan import plan_picture, pose_pictures
-    from elastocal.figures.style import save
+    from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import write_together
     from elastocal.io.data_frames import write_csv
     from elastocal.report.plan_pages import plan_facts, write_plan_sheet
@@ -211,10 +211,7 @@ def _write_files(task: _Task, options: Options, names: list[str], found: Plan, t
         with tempfile.TemporaryDirectory() as scratch:
             arm = task.survey.robot
             pages = {f"poses{page}": figure for page, figure in enumerate(pose_pictures(arm, found))}
-            drawn = {"overview": plan_picture(arm, task.cell, found), **pages}
-            for name, figure in drawn.items():
-                save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")
-            pictures = {name: f"{scratch}/{name}.pdf" for name in drawn}
+            pictures = save_all({"overview": plan_picture(arm, task.cell, found), **pages}, scratch)
             write_plan_sheet(place / names[1], plan_facts(task.survey, found, table, worth), pictures)
             shutil.copyfile(f"{scratch}/overview.png", place / names[2])
 

@@ -220,7 +220,7 @@ def _families_legend(figure: Figure, table: Mapping[str, np.ndarray], order: np.
         handles.append(Patch(facecolor="none", edgecolor="black", linewidth=1.3, label="in the most probable model"))
     untestable = len(set(table["candidate"])) - len(order)
     words = f"{len(order)} candidate causes tested; {untestable} more cannot be tested with these measurements"
-    figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4, title_fontsize=7.5)
+    figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4)
 
 
 def _frame(number: int, count: int) -> Rectangle:

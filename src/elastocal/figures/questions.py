@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.ticker import NullLocator
 
 from elastocal.figures.style import PALETTE, label_decades, line_style, note, panels, styled
+from elastocal.study.budget_tables import QUANTILE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -41,7 +42,7 @@ def ladder(table: pd.DataFrame) -> Figure:
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("RMS error of one data set (µm)")
     title = "configurations in the data set; discs: share of data sets in which cross-validation stops there"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=6, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=6)
     return figure
 
 
@@ -63,7 +64,8 @@ def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figur
             (equal, PALETTE[1], 0.16, f"{2 * length} measurements each"),
         ):
             rows = [labels.index(points) + shift for points in cells.points]
-            axis.errorbar(cells.rms_um, rows, xerr=1.96 * cells.std_error_um, fmt="o", color=colour, markersize=4, label=name)
+            spans = QUANTILE * cells.std_error_um
+            axis.errorbar(cells.rms_um, rows, xerr=spans, fmt="o", color=colour, markersize=4, label=name)
             axis.plot(cells.crlb_rms_um, rows, "|", color="black", markersize=7, label="Cramér-Rao bound")
         axis.set(title=title, xlabel="RMS error of one data set (µm), 95 % intervals", yticks=range(len(labels)))
         axis.set(ylim=(len(labels) - 0.5, -0.5), xlim=(0, None))
@@ -96,7 +98,7 @@ def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) ->
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel(f"cost of {accuracy_um:g} µm over that of {labels[0] if labels else ''}")
     title = "points measured in each configuration; bands: 95 % intervals by bootstrap over data sets"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=4, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=4)
     return figure
 
 
@@ -122,7 +124,7 @@ def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, 
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("bound of the RMS error (µm)")
     title = f"band: 5 to 95 % of random designs; line: {accuracy_um:g} µm"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5)
     return figure
 
 
@@ -148,5 +150,5 @@ def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, 
         axis.grid(visible=False, axis="y")
     axes[0, 0].set_yticklabels([name.replace("k_Σ", r"$k_\Sigma$") for name in names.values()])
     title = "score over that of the first strategy, 95 % intervals"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5)
     return figure

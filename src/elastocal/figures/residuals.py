@@ -73,7 +73,7 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
         axis.set_ylabel(f"residual ({unit})")
     above = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
     handles = _legend(stages, bool(held_out.any()))
-    figure.legend(handles=handles, title=above, loc="outside lower center", ncols=4, title_fontsize=7.5, columnspacing=1.4)
+    figure.legend(handles=handles, title=above, loc="outside lower center", ncols=4, columnspacing=1.4)
     figure.set_dpi(_PIXELS_PER_INCH)
     return figure
 
@@ -118,7 +118,7 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
         else "each arrow: mean of the repeats"
     )
     handles = [Line2D([], [], color=_STAGES[stage][1], linewidth=2, label=_STAGES[stage][0]) for stage in stages]
-    figure.legend(handles=handles, title=which, loc="outside lower center", ncols=2, title_fontsize=7.5)
+    figure.legend(handles=handles, title=which, loc="outside lower center", ncols=2)
     return figure
 
 

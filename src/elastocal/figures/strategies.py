@@ -47,7 +47,7 @@ def noise_impact(metrics: pd.DataFrame, strategy: str, titles: Mapping[str, str]
     axes[0, 0].set_ylabel("dev, equation 15 (µm)")
     axes[1, 0].set_ylabel("the same, linear (µm)")
     title = "noise (µm and µrad); bands: a standard error as a factor; thin: some ĉ ≤ 0, or ĉ scatters by over a quarter"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5)
     return figure
 
 
@@ -155,7 +155,7 @@ def bias_and_accuracy(
     axes[0, 0].set_ylabel("end-effector error (µm)")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     note = "bands: from the mean to the 95th percentile of one data set's error"
-    figure.legend(handles, labels, title=note, loc="outside lower center", ncols=len(order), title_fontsize=7.5)
+    figure.legend(handles, labels, title=note, loc="outside lower center", ncols=len(order))
     return figure
 
 
@@ -206,7 +206,7 @@ def _find_distinct(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
 def _legend_below(figure: Figure, axes: np.ndarray, title: str) -> None:
     """One legend of all panels, each entry once."""
     handles = {label: handle for axis in axes.flat for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    figure.legend([*handles.values()], [*handles], title=title, loc="outside lower center", ncols=4, title_fontsize=7.5)
+    figure.legend([*handles.values()], [*handles], title=title, loc="outside lower center", ncols=4)
 
 
 def _printed_marks(axis: Axes, printed: pd.DataFrame, robot: str, quantity: str, order: Sequence[str]) -> None:

@@ -11,6 +11,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from elastocal.io.atomic_writes import atomic_write
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
     from matplotlib.axis import Axis
     from matplotlib.typing import RcKeyType
@@ -32,6 +34,7 @@ SETTINGS: dict[RcKeyType, Any] = {
     "lines.linewidth": 1.4,
     "legend.frameon": False,
     "legend.fontsize": 7.5,
+    "legend.title_fontsize": 7.5,
     "pdf.fonttype": 42,
 }
 
@@ -98,6 +101,13 @@ def save(figure: Figure, pdf: str, png: str, origin: Origin | None = None) -> No
     for path, options in ((pdf, {"metadata": of_pdf}), (png, {"dpi": 150, "metadata": of_png})):
         with atomic_write(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
+
+
+def save_all(figures: Mapping[str, Figure], folder: str) -> dict[str, str]:
+    """Write figures into a folder; returns the path of the PDF of each, by its name."""
+    for name, figure in figures.items():
+        save(figure, f"{folder}/{name}.pdf", f"{folder}/{name}.png")
+    return {name: f"{folder}/{name}.pdf" for name in figures}
 
 
 @styled

@@ -11,7 +11,6 @@ how figures depend on one another [2]; of k studies it is no smaller than 1/(k +
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,7 +55,7 @@ def _judge_by_others(scatter: Predicted) -> list[float]:
     """p value of each study by the others."""
     some = scatter.values  # noqa: PD011 (of a dataclass)
     printed = np.exp(some) if scatter.logarithmic else some
-    return [replace(scatter, values=np.delete(scatter.values, s)).p_value(value) for s, value in enumerate(printed)]
+    return [others.p_value(value) for others, value in zip(scatter.leave_out_each(), printed, strict=True)]
 
 
 def _rank(name: str, value: float, others: np.ndarray | Sequence[float]) -> dict[str, float]:

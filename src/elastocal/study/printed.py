@@ -11,7 +11,7 @@ Holm's procedure [2].
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,6 +62,10 @@ class Predicted:
         """Log predictive density of the printed figure; of lengths, of their logarithm."""
         standard, scale = self._standardize(printed)
         return float(student.logpdf(standard, len(self.values) - 1) - np.log(scale))
+
+    def leave_out_each(self) -> list[Predicted]:
+        """The same by all studies but one, for each of them."""
+        return [replace(self, values=np.delete(self.values, place)) for place in range(len(self.values))]
 
     def _standardize(self, printed: float) -> tuple[float, float]:
         digit, value = (self.digit / printed, np.log(printed)) if self.logarithmic else (self.digit, printed)

@@ -17,14 +17,12 @@ import numpy as np
 import pandas as pd
 from scipy.stats import rankdata
 
-from elastocal.study.budget_tables import MICRO
+from elastocal.study.budget_tables import MICRO, QUANTILE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 REFERENCE = "rms_um"
-# Of a normal distribution: 95 % within.
-_QUANTILE = 1.96
 # Scores of strategies that are one estimator agree to rounding.
 _DIGITS = 6
 # Scores of averaged models, with the factor to their units.
@@ -51,7 +49,7 @@ class Score:
     def ratio(self, other: Score) -> tuple[float, float, float]:
         """Ratio to another strategy's score with its 95 % interval, paired."""
         ratio = self.value / other.value
-        error = _QUANTILE * self.spread * (self.relative - other.relative).std(ddof=1)
+        error = QUANTILE * self.spread * (self.relative - other.relative).std(ddof=1)
         return ratio, ratio * np.exp(-error), ratio * np.exp(error)
 
 

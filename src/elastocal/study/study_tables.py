@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -135,11 +134,7 @@ def _of_interpretation(
             group = next(group for start, group in _GROUPS.items() if quantity.startswith(start))
             totals[group] += scatter.log_density(value)
             p_values.append(scatter.p_value(value))
-            deleted += [replace(scatter, values=some).log_density(value) for some in _leave_out_each(scatter.values)]
+            deleted += [others.log_density(value) for others in scatter.leave_out_each()]
     row |= {f"log_likelihood_{group}": value for group, value in totals.items()}
     row["log_likelihood"] = sum(totals.values())
     return row | {"cells": len(p_values), "differ": int((holm(np.array(p_values)) < LEVEL).sum())}, deleted
-
-
-def _leave_out_each(values: np.ndarray) -> list[np.ndarray]:
-    return [np.delete(values, place) for place in range(len(values))]

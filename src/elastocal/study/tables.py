@@ -43,19 +43,19 @@ def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray
         count = weights[robot] @ frame.configurations
         mean = weights[robot] @ (frame.configurations * frame["mean"]) / count
         std = np.sqrt(weights[robot] @ (frame.configurations * frame.mean_square) / count - mean**2)
-        single: dict[str, pd.Series] = {
-            "mean_mm": frame["mean"],
-            "std_mm": pd.Series(np.sqrt(frame.mean_square - frame["mean"] ** 2)),
-            "max_mm": frame.maximum,
-        }
         row: dict[str, str | float] = {"robot": robot}
         for name, values in (("mean_mm", mean), ("std_mm", std)):
             row |= _value_and_error(name, MILLI * values)
         row["max_mm"] = MILLI * frame.maximum.max()
-        for name, values in single.items():
-            row |= {f"{name}_one_set": MILLI * values.mean(), f"{name}_one_set_std": MILLI * values.std(ddof=1)}
+        for name, values in find_statistics(frame).items():
+            row |= {f"{name}_mm_one_set": MILLI * values.mean(), f"{name}_mm_one_set_std": MILLI * values.std(ddof=1)}
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def find_statistics(frame: pd.DataFrame) -> dict[str, pd.Series]:
+    """Mean, standard deviation and largest of the deflections of each data set, m, of the initial table or that of tubes."""
+    return {"mean": frame["mean"], "std": (frame.mean_square - frame["mean"] ** 2) ** 0.5, "max": frame.maximum}
 
 
 def table3(metrics: pd.DataFrame, robots: Iterable[str], strategy: str, noise_um: float, length: int) -> pd.DataFrame:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import before_m, predict_errors, scope_in, subtract_placement
+from elastocal.application.accuracy import before_m, predict_errors, root_mean_square, scope_in, subtract_placement
 from elastocal.application.calibrated import forward, nominal_forward, observations_of, square_root, states_of
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
@@ -94,7 +94,7 @@ def effect_costs(calibrated: CalibratedRobot, reported_angles: np.ndarray, opera
         mine = [number for number, effect in enumerate(calibrated.model.effects) if effect.effect == name]
         other = forward(_leave_out(calibrated, name, mine), reported_angles, operating)
         apart = pose_differences(whole, turned, *other)[..., None]
-        costs[name] = _rms(subtract_placement(scope_in(calibrated), whole, turned, apart)[:, :3, 0])
+        costs[name] = root_mean_square(subtract_placement(scope_in(calibrated), whole, turned, apart)[:, :3, 0])
     return costs
 
 
@@ -147,7 +147,3 @@ def _limits(
     linear = np.sqrt(max(values @ gram @ values, 0.0))
     low, high = np.quantile(contributions, _ENDS) * (rms / linear if linear > 0.0 else 1.0)
     return float(low), float(high)
-
-
-def _rms(displacement: np.ndarray) -> float:
-    return float(np.sqrt((displacement**2).sum(axis=1).mean()))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.accuracy import remove_rigid_motion
+from elastocal.application.accuracy import remove_rigid_motion, root_mean_square
 from elastocal.application.planning.criteria import Criterion, mean_squares
 from elastocal.application.planning.exchange import add_prior, choose_greedily, exchange_candidates, matrix_of
 from elastocal.application.planning.plan import find_allowed_candidates
@@ -121,7 +121,7 @@ def _fitted_error(survey: Survey, design: Candidates, places: Candidates, seed: 
     if survey.unknown_base:
         unknown = survey.targets[0].offset_m is None
         off = remove_rigid_motion(off, position, rotation if unknown else None)
-    return float(np.sqrt((off**2).sum(axis=1).mean()))
+    return root_mean_square(off)
 
 
 def _off(model: Model, nominal: Estimate, draws: np.random.Generator) -> Estimate:

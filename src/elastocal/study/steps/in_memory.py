@@ -15,7 +15,7 @@ from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regre
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot import Robot, with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.identification import Measurements
+from elastocal.study.identification import Measurements, estimate_compliance, first_solvable_length
 from elastocal.study.metrics import Judge, make_judge
 from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
 from elastocal.study.steps.blocks import blocks_of_sets
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from elastocal.mechanics.chain import MeasuringPoint
     from elastocal.study.experiments import Experiments
+    from elastocal.study.strategies import Strategy
 
 
 @dataclass(frozen=True)
@@ -147,6 +148,12 @@ class StudyInMemory:
                 deflection = deflection + self.size.noise * self.noise(sets, name + repeat)
                 found[name] = Measurements(regressors[name], np.moveaxis(configuration_first(deflection)[..., :rows], -1, 0))
         return found
+
+    def estimate(self, strategy: Strategy, measurements: Mapping[str, Measurements]) -> np.ndarray:
+        """Compliances (lengths, n, sets), rad/(N m), not a number where a length does not determine them."""
+        compliance = estimate_compliance(strategy, measurements, self.robot.joints)[0]
+        compliance[: first_solvable_length(strategy, self.interpretation.independent_rows) - 1] = np.nan
+        return compliance
 
     def _reflectors(
         self, sets: np.ndarray, name: str, repeat: str, drawn: Experiments, regressor: np.ndarray, deflection: np.ndarray
