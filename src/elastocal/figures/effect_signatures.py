@@ -83,7 +83,7 @@ def signature(name: str, robot: Robot) -> Signature:
     turned = np.tile(np.radians(_POSE_DEG[: robot.joints]), (_SAMPLES, 1))
     turned[:, joint - 1] = np.radians(angle)
 
-    def moved(angles: np.ndarray | None = None, newtons: np.ndarray | float = 0.0, **more: Any) -> np.ndarray:
+    def displace(angles: np.ndarray | None = None, newtons: np.ndarray | float = 0.0, **more: Any) -> np.ndarray:
         return _displacement_mm(candidate, sites, robot.compliance, _states(robot.joints, angles, newtons, **more))
 
     return Signature(
@@ -92,11 +92,11 @@ def signature(name: str, robot: Robot) -> Signature:
         angle,
         force,
         time,
-        moved(turned),
-        moved(turned, _PULL_N),
-        moved(None, force),
-        moved(None, force, approach=-1.0),
-        moved(None, time_h=time),
+        displace(turned),
+        displace(turned, _PULL_N),
+        displace(None, force),
+        displace(None, force, approach=-1.0),
+        displace(None, time_h=time),
     )
 
 

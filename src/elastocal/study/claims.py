@@ -61,13 +61,13 @@ class Evidence:
         """Scores (studies,) at the length of the tables."""
         return self.curves(robot, strategy, column)[:, self.length - 1]
 
-    def reached(self, robot: str, strategy: str, column: str) -> np.ndarray:
+    def find_lengths(self, robot: str, strategy: str, column: str) -> np.ndarray:
         """Configurations (studies,) at which a score reaches its limit of Table 4."""
         return length_to_reach(self.curves(robot, strategy, column), _LIMITS[column])
 
     def figures(self, robot: str, strategy: str, sigma: str) -> np.ndarray:
         """The four figures of Table 4, (4, studies)."""
-        return np.stack([of(robot, strategy, column) for column in (sigma, _DEV) for of in (self.scores, self.reached)])
+        return np.stack([of(robot, strategy, column) for column in (sigma, _DEV) for of in (self.scores, self.find_lengths)])
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def _expected_dev(evidence: Evidence, robot: str, noise: float) -> float:
 
 
 def _below_two(evidence: Evidence) -> Finding:
-    lengths = [evidence.reached(robot, _PLAIN, _DEV) for robot in evidence.robots]
+    lengths = [evidence.find_lengths(robot, _PLAIN, _DEV) for robot in evidence.robots]
     text, p = _often(np.all([each < 50 for each in lengths], axis=0))
     means = "; ".join(f"{robot} {np.median(each):.0f}" for robot, each in zip(evidence.robots, lengths, strict=True))
     return _one(f"dev of 6DoF reaches 2 µm at {means} configurations (median), below 50 on both {text}", FAILS, p)
@@ -239,7 +239,7 @@ def _depends_on_robot(evidence: Evidence) -> Finding:
 
 def _within_thirty(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
     name = _OTHERS[1]
-    kuka, fanuc = (evidence.reached(robot, name, sigma) for robot in evidence.robots)
+    kuka, fanuc = (evidence.find_lengths(robot, name, sigma) for robot in evidence.robots)
     text, p = _often((fanuc <= 30) & (kuka > 30))
     return f"n for 1 %: fanuc {_spread(fanuc, 0)}, kuka {_spread(kuka, 0)}; as claimed {text}", bool(np.median(fanuc) <= 30), p
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from elastocal.study.evaluation import reached_length
+from elastocal.study.evaluation import find_length
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -102,10 +102,10 @@ def table4(
                 name = f"k_sigma{suffix}"
                 row |= {f"k_sigma_{length}_percent{suffix}": at[name]}
                 row |= {f"k_sigma_{length}_percent{suffix}_std_error": at[f"{name}_std_error"]}
-                reached, error = reached_length(cell[name].to_numpy(), _curves(drawn, name), k_sigma_limit_percent)
+                reached, error = find_length(cell[name].to_numpy(), _curves(drawn, name), k_sigma_limit_percent)
                 row |= {f"n_k_sigma_{limit}{suffix}": reached, f"n_k_sigma_{limit}{suffix}_std_error": error}
             row |= {f"dev_{length}_um": MICRO * at.deviation, f"dev_{length}_um_std_error": MICRO * at.deviation_std_error}
-            reached, error = reached_length(cell.deviation.to_numpy(), _curves(drawn, "deviation"), deviation_limit_um / MICRO)
+            reached, error = find_length(cell.deviation.to_numpy(), _curves(drawn, "deviation"), deviation_limit_um / MICRO)
             row |= {f"n_dev_{deviation_limit_um:g}_um": reached, f"n_dev_{deviation_limit_um:g}_um_std_error": error}
             rows.append(row)
     return pd.DataFrame(rows)

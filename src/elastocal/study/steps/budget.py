@@ -36,8 +36,8 @@ def budget_blocks(study: StudyInMemory, point_sets: Mapping[str, Sequence[str]])
     names = tuple(dict.fromkeys(name for points in point_sets.values() for name in points))
     twice = tuple(name for name in names if any([*points].count(name) > 1 for points in point_sets.values()))
     for sets in study.blocks():
-        measurements = study.measured(sets, names)
-        again = study.measured(sets, twice, _AGAIN) if twice else {}
+        measurements = study.measure(sets, names)
+        again = study.measure(sets, twice, _AGAIN) if twice else {}
         measurements |= {name + _AGAIN: found for name, found in again.items()}
         information = {name: prefix_information(measurements[name].regressor) for name in names}
         for label, points in point_sets.items():

@@ -25,7 +25,7 @@ def estimates(study: StudyInMemory, strategies: Sequence[Strategy], number: int 
     points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
     found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
     for sets in study.blocks(number):
-        measurements = study.measured(sets, points)
+        measurements = study.measure(sets, points)
         for estimator in dict.fromkeys(stages.values()):
             compliance = study.estimate(Strategy("", estimator), measurements)
             found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))

@@ -37,7 +37,7 @@ def few_blocks(
     ]
     points = tuple(dict.fromkeys(name for strategy in strategies for name in strategy.points))
     for sets in study.blocks():
-        measurements = study.measured(sets, points)
+        measurements = study.measure(sets, points)
         normal = draw(study.seed, study.key, "nominal compliances", sets, lambda stream: stream.standard_normal(n)).T
         for error in nominal_errors:
             nominal = robot.compliance[:, None] * np.exp(error * normal)

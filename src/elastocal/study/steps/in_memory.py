@@ -127,7 +127,7 @@ class StudyInMemory:
         tests = self.tests(number)
         return make_judge(self.robot, tests, self.deflections(tests), self.interpretation.wrench_at)
 
-    def measured(
+    def measure(
         self, sets: np.ndarray, points: Sequence[str], repeat: str = "", drawn: Experiments | None = None
     ) -> dict[str, Measurements]:
         """What each measuring point contributes to some data sets.

@@ -46,7 +46,7 @@ def kind_blocks(
         found: dict[str, Measurements] = {}
         for suffix, experiments in (("", drawn), (ONE_JOINT, one_joint_at_a_time(drawn))):
             for name, way in ways.items():
-                found[name + suffix] = replace(study, interpretation=way).measured(sets, (end,), suffix, experiments)[end]
+                found[name + suffix] = replace(study, interpretation=way).measure(sets, (end,), suffix, experiments)[end]
         found |= {f"{ENCODERS}, {1e6 * std:g} µrad": simulate_encoders(study, sets, drawn, std) for std in encoders_rad}
         strategy = Strategy("", (Stage((end,), tuple(range(n))),))
         for kind, measured in found.items():
