@@ -34,7 +34,7 @@ _LONGEST_NAME = 80
 
 
 @dataclass(frozen=True)
-class Options:
+class _Options:
     """What the command line states."""
 
     robot: Annotated[Path, Argument(help="Robot file.")]
@@ -90,7 +90,7 @@ def plan(**words: Any) -> None:
     from elastocal.application.planning.sheet import sheet
     from elastocal.campaigns.measurements import CSV
 
-    options, console = Options(**words), Console(stderr=True)
+    options, console = _Options(**words), Console(stderr=True)
     task = _read_task(options)
     names = _check_places(options)
     with console.status("planning"):
@@ -109,10 +109,10 @@ def plan(**words: Any) -> None:
 
 
 # Where typer looks for the options of a command.
-plan.__signature__ = inspect.signature(Options, eval_str=True)  # type: ignore[attr-defined]
+plan.__signature__ = inspect.signature(_Options, eval_str=True)  # type: ignore[attr-defined]
 
 
-def _read_task(options: Options) -> _Task:
+def _read_task(options: _Options) -> _Task:
     """The task that the options state; the first that is wrong is refused by its name."""
     from elastocal.application.inverse_kinematics import reach_m
     from elastocal.application.planning.cell import RADIUS_SHARE, Cell
@@ -139,7 +139,7 @@ def _read_task(options: Options) -> _Task:
     return _Task(survey, Cell(boxes, tracker, RADIUS_SHARE * reach_m(arm)), loads, sensor, accuracy)
 
 
-def _check_places(options: Options) -> list[str]:
+def _check_places(options: _Options) -> list[str]:
     """Names of the table, the sheet and the picture; places where they cannot go are refused."""
     from elastocal.io.atomic_writes import check_places
     from elastocal.io.texts import kind_of
@@ -157,7 +157,7 @@ def _check_places(options: Options) -> list[str]:
     return names
 
 
-def _choose(task: _Task, options: Options) -> tuple[Candidates, Plan]:
+def _choose(task: _Task, options: _Options) -> tuple[Candidates, Plan]:
     """Configurations that the cell allows, and the plan among them: of the fewest poses where an accuracy is wanted."""
     from elastocal.application.planning.plan import choose_plan, count_needed_poses, fewest_poses, find_allowed_candidates
 
@@ -175,7 +175,7 @@ def _choose(task: _Task, options: Options) -> tuple[Candidates, Plan]:
     return some, choose(max(enough, fewest_poses(task.survey)))
 
 
-def _describe(task: _Task, options: Options, found: Plan) -> list[str]:
+def _describe(task: _Task, options: _Options, found: Plan) -> list[str]:
     """What a plan is worth, in sentences."""
     import numpy as np
 
@@ -196,7 +196,7 @@ def _describe(task: _Task, options: Options, found: Plan) -> list[str]:
     ]
 
 
-def _write_files(task: _Task, options: Options, names: list[str], found: Plan, table: pd.DataFrame, worth: list[str]) -> None:
+def _write_files(task: _Task, options: _Options, names: list[str], found: Plan, table: pd.DataFrame, worth: list[str]) -> None:
     """The campaign's folder, if one is wanted, and the table, the sheet and the picture there or beside the output."""
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
