@@ -10,10 +10,11 @@ from planted import planted, two_loads_a_pose
 from scipy.stats import binom
 from synthetic import seen_exactly, with_noise
 
-from elastocal.diagnosis import new_states
+from elastocal.diagnosis import new_states, next_experiment, verdict
 from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.promise import Promise
 from elastocal.diagnosis.proposal import DATA_AT_FAULT, NOTHING_AMBIGUOUS, facts_of, sentence_of, table_of
+from elastocal.diagnosis.verdict import mechanisms_of_models
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import stepped
@@ -64,6 +65,23 @@ def test_proposal_is_within_reach(ambiguous, proposal, kuka):
     np.testing.assert_allclose(np.linalg.norm(proposal.wrench[:, :3], axis=1), largest)
     assert proposal.shares == LADDER and proposal.approach is None and not proposal.reference_weight.any()
     assert proposal.points == ("3DoF", "6DoF")
+
+
+def test_models_belong_to_the_hypothesis_that_they_state_and_not_to_that_of_their_parts(ambiguous, kuka, monkeypatch):
+    """A model of a law beside a smooth error may state one alone, for all models of a hypothesis even."""
+
+    def stated(problem, posterior):
+        return [tuple(f"stated {name}" for name in names) for names in mechanisms_of_models(problem, posterior)]
+
+    diagnosis, _ = ambiguous
+    monkeypatch.setattr(verdict, "mechanisms_of_models", stated)
+    monkeypatch.setattr(next_experiment, "mechanisms_of_models", stated)
+    evidence = diagnosis.evidence
+    hypotheses = verdict.hypotheses_of(evidence.linearized.problem, evidence.posterior)
+    conclusion = replace(evidence.conclusion, hypotheses=hypotheses, best=hypotheses[0])
+    found = SimpleNamespace(**vars(diagnosis) | {"evidence": SimpleNamespace(**vars(evidence) | {"conclusion": conclusion})})
+    proposal = propose(found, limits(kuka), SETTINGS, np.random.default_rng(0), 4, LADDER)
+    assert {*proposal.best, *proposal.nearest} <= {f"stated {name}" for name in ELASTIC}
 
 
 def test_of_an_exact_alias_no_pose_is_asked_for(kuka):
