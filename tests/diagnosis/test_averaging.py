@@ -9,6 +9,7 @@ from made_problems import made_problem, made_rows, made_unit
 
 from elastocal.diagnosis.averaging import averaged, expected_to_help, other_predictions, squares_explained
 from elastocal.diagnosis.evidence import Joint
+from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.search import Model, Posterior
 
 TAU = np.array([0.0, 0.3, 0.9])
@@ -24,6 +25,11 @@ UNITS = (
     made_unit("b", (1,), 2, candidate=candidate("b", 1)),
     made_unit("other", (1,), [3, 4]),
 )
+
+
+def on_the_mean(problem):
+    """A problem in which a gain need not be sure."""
+    return replace(problem, settings=replace(problem.settings, useful=0.0))
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +160,7 @@ def test_a_model_is_expected_to_help_where_the_expected_square_of_the_error_fall
     found = posterior_of(((0,), [0.3], 0.0, best), *rest)
     for model in found.models:
         falls = expected_square(rows, line.problem, found, model) < expected_square(rows, line.problem, found, None)
-        assert expected_to_help(line.problem, found, model) == (falls and len(model.units) > 0)
+        assert expected_to_help(on_the_mean(line.problem), found, model) == (falls and len(model.units) > 0)
 
 
 def test_what_is_there_or_not_helps_where_it_is_more_probable_than_not(made):
@@ -162,7 +168,7 @@ def test_what_is_there_or_not_helps_where_it_is_more_probable_than_not(made):
     _, line = made
     for probability, helps in ((0.49, False), (0.51, True)):
         found = posterior_of(((0,), [0.3], 0.0, probability), ((), [], 0.0, 1 - probability))
-        assert expected_to_help(line.problem, found, found.models[0]) == helps
+        assert expected_to_help(on_the_mean(line.problem), found, found.models[0]) == helps
 
 
 def test_what_other_models_predict_as_well_helps_however_improbable_it_is_by_itself():
@@ -171,11 +177,22 @@ def test_what_other_models_predict_as_well_helps_however_improbable_it_is_by_its
     candidates = rows.candidates.copy()
     candidates[:, 2] = candidates[:, 0]
     rows = replace(rows, candidates=candidates, residual=rows.residual + 0.5 * candidates[:, 0])
-    problem, _ = made_problem(rows, (made_unit("a", (1,), 0), made_unit("b", (1,), 2)), tau=TAU)
+    problem = on_the_mean(made_problem(rows, (made_unit("a", (1,), 0), made_unit("b", (1,), 2)), tau=TAU)[0])
     found = posterior_of(((0,), [0.3], 0.0, 0.3), ((1,), [0.3], 0.0, 0.3), ((), [], 0.0, 0.4))
     assert expected_to_help(problem, found, found.models[0]) and expected_to_help(problem, found, found.models[1])
     apart = posterior_of(((0,), [0.3], 0.0, 0.3), ((), [], 0.0, 0.7))
     assert not expected_to_help(problem, apart, apart.models[0])
+
+
+@pytest.mark.parametrize(("times", "helps"), [(1.05, True), (0.95, False)])
+def test_a_gain_helps_where_its_interval_excludes_nothing(made, times, helps):
+    """Of a model that is certain the gain is what it explains, d'd, and its standard error at most twice the root of that."""
+    _, line = made
+    found = posterior_of(((0,), [0.3], 0.0, 1.0))
+    explained = squares_explained(line.problem, found.models[0])["a"]
+    limit = np.sqrt(explained / max(mean_square_left(line.problem, found.models[0]), 1.0)) / 2.0
+    problem = replace(line.problem, settings=replace(line.problem.settings, useful=limit / times))
+    assert expected_to_help(problem, found, found.models[0]) == helps
 
 
 def test_squares_explained_are_those_of_the_displacements_that_each_mechanism_makes(made):

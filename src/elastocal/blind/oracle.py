@@ -23,6 +23,7 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.whole import cases_in
 from elastocal.plant.defects import OUTSIDE
+from elastocal.validation.fitted_range import outside_poses
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -62,7 +63,8 @@ def oracle(
     declared = fit_declared(case.model, case.observations, noise_from(verdict).of_measurements)
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
-    _, heldout, _ = heldout_errors([Step("oracle", "declared", fitted)], case, unseen, seed)
+    outside = outside_poses(fitted, case, unseen)
+    _, heldout, _ = heldout_errors([Step("oracle", "declared", fitted)], case, unseen, outside, seed)
     return _outcome(members, p_value, heldout["before"])
 
 

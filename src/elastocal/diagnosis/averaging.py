@@ -73,8 +73,9 @@ def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bo
     """Whether predictions are expected to be better with a model than without it, at poses like those of the measurements.
 
     By the posterior expectation of squared error: with d the displacement that a model predicts and E d its mean over all
-    models, the expected square of the error falls from E d'd to E d'd - 2 d'E d + d'd where d is added: where 2 d'E d exceeds
-    d'd. Measurements that were held out take no part.
+    models, the expected square of the error falls from E d'd to E d'd - 2 d'E d + d'd where d is added: by 2 d'E d - d'd. Under
+    the model alone that has at most the variance 4 d'd of a least-squares estimate; the interval of the gain has to exclude
+    nothing. Measurements that were held out take no part.
 
     `model`: of the posterior.
     """
@@ -82,7 +83,8 @@ def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bo
     mean, mine = np.zeros(len(gram)), _predicted(problem, model)
     for other, probability in _likely(posterior, model):
         mean += probability * _predicted(problem, other)
-    return bool(mine @ gram @ (2.0 * mean - mine) > 0.0)
+    error = 2.0 * np.sqrt(mine @ gram @ mine * max(mean_square_left(problem, model), 1.0))
+    return bool(mine @ gram @ (2.0 * mean - mine) > problem.settings.useful * error)
 
 
 def other_predictions(problem: Problem, posterior: Posterior, model: Model) -> float:

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape
+from elastocal.effects.protocol import Candidate, Shape
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -29,8 +30,7 @@ MOVES_ROBOT = True
 WORDS = "elastic bending and torsion"
 PART = "link"
 DETAIL_WORDS = {"one section": "all of one cross-section"}
-# One per mille of the bending compliance of a solid steel rod of 0.1 m is 1e-9; thin-walled cast arms reach 1e-6.
-_PARAMETERS = tuple(Parameter(name, "1/(N m^2)", 3e-7, sign=1) for name in ("bending_1_over_EI", "torsion_1_over_GJ"))
+_NAMES = ("bending_1_over_EI", "torsion_1_over_GJ")
 _SHORTEST_M = 0.05
 # Arms get thinner towards the wrist.
 _TAPER = Shape("taper", "1", 0.3, 0.0, 0.6, tried=1)
@@ -63,8 +63,11 @@ def _candidate(sites: Sites, links: tuple[int, ...], detail: str) -> Candidate:
         return [bent, twisted]
 
     joints = tuple(k for k in links if k)
+    longest = max(links, key=lambda k: float(np.linalg.norm(sites.link_vectors_m[k])))
+    length = float(np.linalg.norm(sites.link_vectors_m[longest]))
+    parameters = sized(NAME, "1/EI", _NAMES, "1/(N m^2)", sites, max(longest - 1, 0), over=length)
     return Candidate(
-        NAME, FAMILY, joints, detail, _PARAMETERS, displacement, frozenset({"load"}), (_TAPER,), location_name=detail
+        NAME, FAMILY, joints, detail, parameters, displacement, frozenset({"load"}), (_TAPER,), location_name=detail
     )
 
 

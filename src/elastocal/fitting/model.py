@@ -99,6 +99,7 @@ def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Mod
     `effects`: declared effects.
     """
     sites = sites_of(campaign.robot)
+    sites = replace(sites, usual_weight=not sites.masses and not campaign.measurements.wrench.any())
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
     weight = (declared_weight.candidate(sites),) if sites.masses else ()
     return Model(
