@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made_problems import made_problem, made_rows, made_unit
+from scipy.optimize import minimize
 
-from elastocal.diagnosis.averaging import averaged, expected_to_help, other_predictions, squares_explained
+from elastocal.diagnosis.averaging import averaged, expected_to_help, other_predictions, squares_beyond, squares_explained
 from elastocal.diagnosis.evidence import Joint
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.search import Model, Posterior
@@ -208,6 +209,28 @@ def test_squares_explained_are_those_of_the_displacements_that_each_mechanism_ma
         some[columns] = coefficients[columns]
         expected[mechanism] = some @ gram @ some
     assert squares_explained(problem, model) == pytest.approx(expected, rel=1e-6)
+
+
+def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_with_their_priors(made):
+    """As the least penalised sum of squares, found by a search, and all of them where nothing else is in the model."""
+    rows, _ = made
+    problem, _ = made_problem(rows, UNITS, tau=TAU)
+    model = Model((0, 2), 0.0, np.array([0.3, 0.1]), 0.0)
+    coefficients, gram = most_probable(rows, problem, model), projected_gram(rows)
+    mine, others = UNITS[0].columns, UNITS[2].columns
+
+    def left(values):
+        off = np.zeros(len(coefficients))
+        off[mine], off[others] = coefficients[mine], -values
+        return off @ gram @ off + (values**2).sum() / 0.1**2
+
+    whole, beyond = squares_beyond(problem, model, {"a"})
+    assert whole == pytest.approx(squares_explained(problem, model)["a"], rel=1e-6)
+    assert beyond == pytest.approx(minimize(left, np.zeros(len(others))).fun, rel=1e-6)
+    assert 0.0 < beyond < whole
+    assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[1] == pytest.approx(
+        squares_explained(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
+    )
 
 
 def test_other_models_predict_otherwise_by_their_probability_and_unknown_causes_are_in_none_that_is_kept(made):

@@ -8,7 +8,7 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 
 from elastocal.diagnosis.alarm import Alarm
-from elastocal.diagnosis.averaging import squares_explained
+from elastocal.diagnosis.averaging import squares_beyond
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.search import Model, Posterior
 from elastocal.diagnosis.settings import Settings
@@ -108,12 +108,13 @@ def test_a_mechanism_beside_the_competitor_is_a_class_with_a_related_one():
 @pytest.mark.parametrize(
     ("sizes", "mechanisms"), [((1.0, 0.1), ("offset",)), ((1.0, 1.0), ("offset", OTHER)), ((0.01, 1.0), (OTHER,))]
 )
-def test_what_a_model_states_goes_by_what_its_smooth_error_explains_beside_a_law(sizes, mechanisms):
-    """Within the tolerance of the law it is of that mechanism; where it explains more than that, the law names nothing."""
+def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_other(sizes, mechanisms):
+    """Little is what laws are allowed to be off: of squares, that part which the other cannot make, whatever its size."""
     posterior = Posterior((Model((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1))
-    explained = squares_explained(PROBLEM, posterior.models[0])
-    share = explained[OTHER] / explained["offset"]
-    assert (share < Settings().law_tolerance ** 2, share > 1.0) == (mechanisms[-1] == "offset", "offset" not in mechanisms)
+    law, law_alone = squares_beyond(PROBLEM, posterior.models[0], {"offset"})
+    unknown, unknown_alone = squares_beyond(PROBLEM, posterior.models[0], {OTHER})
+    small = Settings().law_tolerance ** 2
+    assert (unknown_alone < small * law, law_alone < small * unknown) == (OTHER not in mechanisms, "offset" not in mechanisms)
     assert hypotheses_of(PROBLEM, posterior)[0].mechanisms == mechanisms
 
 

@@ -22,7 +22,7 @@ from elastocal.diagnosis.search import UNLIKELY
 from elastocal.diagnosis.statistics import normal_equations
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.linearize import Linearized
@@ -125,6 +125,25 @@ def squares_explained(problem: Problem, model: Model) -> dict[str, float]:
         columns = np.concatenate([unit.columns for unit in units])
         found[mechanism] = float(coefficients[columns] @ gram[np.ix_(columns, columns)] @ coefficients[columns])
     return found
+
+
+def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) -> tuple[float, float]:
+    """Sum of squares of the displacements that some mechanisms of a model make, and how much of it the others cannot make.
+
+    The others may take any size that their priors allow: a Schur complement of the Gram matrix with the priors of the others.
+    """
+    coefficients, gram = _predicted(problem, model), problem.statistics.gram[0]
+    units = [problem.units[number] for number in model.units]
+    deviations = np.repeat(model.scales, [len(unit.columns) for unit in units])
+    mine = np.repeat([unit.mechanism in mechanisms for unit in units], [len(unit.columns) for unit in units])
+    columns = np.concatenate([unit.columns for unit in units])
+    ours, rest = columns[mine], columns[~mine]
+    made = gram[:, ours] @ coefficients[ours]
+    whole = float(coefficients[ours] @ made[ours])
+    if not len(rest):
+        return whole, whole
+    inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~mine] ** -2.0)
+    return whole, whole - float(made[rest] @ np.linalg.solve(inner, made[rest]))
 
 
 def _predicted(problem: Problem, model: Model) -> np.ndarray:

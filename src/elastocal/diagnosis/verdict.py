@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.diagnosis.averaging import squares_explained
+from elastocal.diagnosis.averaging import squares_beyond
 from elastocal.diagnosis.hypotheses import OTHER
 
 if TYPE_CHECKING:
@@ -149,20 +149,21 @@ def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[s
 
 
 def _mechanisms_of(problem: Problem, model: Model, probability: float) -> set[str]:
-    """What a model says that acts: of mechanisms and a smooth error that which explains most, and what is not small beside it.
+    """What a model says that acts: its mechanisms, and something unknown where it has a smooth error beside them.
 
-    A smooth error within the tolerance of the laws counts as theirs; laws that explain less than it does fit what it leaves of
-    something unknown.
+    Neither a law nor the smooth error is quite what the machine does. So of the two that counts as a part of the other which
+    makes displacements that the other cannot make, but within the tolerance of laws.
     """
     names = {problem.units[unit].mechanism for unit in model.units}
-    if OTHER in names and len(names) > 1 and probability > _TELLING:
-        explained = squares_explained(problem, model)
-        unknown, known = explained.pop(OTHER), max(explained.values())
-        if unknown > known:
-            return {OTHER}
-        if unknown < problem.settings.law_tolerance**2 * known:
-            names.remove(OTHER)
-    return names
+    known = names - {OTHER}
+    if OTHER not in names or not known or probability <= _TELLING:
+        return names
+    by_laws, beyond_unknown = squares_beyond(problem, model, known)
+    by_unknown, beyond_laws = squares_beyond(problem, model, {OTHER})
+    tolerance = problem.settings.law_tolerance**2
+    if beyond_laws < tolerance * by_laws:
+        return known
+    return {OTHER} if beyond_unknown < tolerance * by_unknown else names
 
 
 def location_probabilities(problem: Problem, posterior: Posterior, mechanism: str) -> dict[tuple[int | str, ...], float]:
