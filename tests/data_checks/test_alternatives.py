@@ -7,7 +7,7 @@ import pytest
 from made_campaigns import Plan, made, with_other_compliances
 from scipy.spatial.transform import Rotation
 
-from elastocal.data_checks.alternatives import find
+from elastocal.data_checks.alternatives import find, placements
 from elastocal.mechanics.kinematics import poses
 
 
@@ -156,6 +156,30 @@ def test_each_session_has_a_transform_of_its_own(fanuc):
     told = {value.name: value.value for value in fault.parameters}
     assert told["x of the base in the frame of session 0"] == pytest.approx(1.0, abs=1e-3)
     assert told["y of the base in the frame of session 1"] == pytest.approx(3.0, abs=1e-3)
+
+
+def test_a_target_that_is_mounted_anew_between_sessions_is_named_with_how_far(campaign):
+    turn, shift = Rotation.from_rotvec([0.0, 0.3, 0.5]), np.array([0.004, 0.0, 0.003])
+    measurements = campaign.measurements
+    later = measurements.pose >= 10
+    mount = Rotation.from_rotvec(measurements.rotation_vector)
+    position = measurements.position + np.where(later[:, None], mount.apply(shift), 0.0)
+    vectors = np.where(later[:, None], (mount * turn).as_rotvec(), measurements.rotation_vector)
+    written = replace(measurements, session=later.astype(np.int32), position=position, rotation_vector=vectors)
+    (fault,) = find(replace(campaign, measurements=written), written)
+    assert (fault.name, fault.decisive) == ("mounted_anew", True)
+    assert "was mounted anew between sessions 0 and 1, turned by 33.4° and" in fault.detail
+    values = {value.name.partition(" of ")[0]: value.value for value in fault.parameters}
+    assert values["turn"] == pytest.approx(turn.magnitude(), rel=1e-3)
+    assert values["shift"] == pytest.approx(np.linalg.norm(shift), rel=0.02)
+
+
+def test_a_target_of_its_own_for_each_session_was_not_mounted_anew(campaign):
+    measurements = replace(campaign.measurements, session=campaign.measurements.target)
+    names = [change.name for change in placements(replace(campaign, measurements=measurements))]
+    assert "mounted_anew" not in names
+    measurements = replace(campaign.measurements, session=(campaign.measurements.pose >= 10).astype(np.int32))
+    assert [change.name for change in placements(replace(campaign, measurements=measurements))][-1] == "mounted_anew"
 
 
 @pytest.mark.parametrize("joint", [1, 2])

@@ -50,6 +50,7 @@ def test_every_fault_of_the_design_is_there_and_of_family_data():
     assert known_faults() == {
         "constant_columns",
         "implausible_measurements",
+        "mounted_anew",
         "shuffled_rows",
         "swapped_axes",
         "wrong_frame",

@@ -2,8 +2,8 @@
 
 One scan over a short list of hypotheses, nearly all of them discrete. They are only compared where the measurements as written
 are absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change first, then a base or
-targets that stand elsewhere, then two changes together. Senses, axes and units are facts, not parameters: each is tried, none
-is fitted.
+targets that stand elsewhere or were mounted anew, then two changes together. Senses, axes and units are facts, not parameters:
+each is tried, none is fitted.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate
 
 NAMES, FAMILY, AFTER = (
-    ("wrong_sign", "swapped_axes", "wrong_unit", "wrong_frame", "wrong_target"),
+    ("wrong_sign", "swapped_axes", "wrong_unit", "wrong_frame", "wrong_target", "mounted_anew"),
     "data",
     ("constant_columns",),
 )
@@ -53,6 +53,7 @@ _MOST_ALIKE = 5
 _NEAR_M, _NEAR_RAD = 0.05, 0.05
 # Faults that are mended one after the other.
 _ROUNDS = 3
+_IN_SESSION = " in session "
 # Metres for each unit that people write for metres.
 _LENGTHS = {
     "millimetres": 1e-3,
@@ -170,7 +171,10 @@ def placements(campaign: Campaign) -> list[Change]:
         unknown.append({"rotation": None})
     if any(target.offset_m is not None for target in campaign.targets):
         unknown.append({"offset_m": None, "rotation": None})
-    return [*found, *(Change("wrong_target", "", _with_unknown(parts), placement="targets") for parts in unknown)]
+    found += [Change("wrong_target", "", _with_unknown(parts), placement="targets") for parts in unknown]
+    if len(_mounts(campaign.measurements)) > len(np.unique(campaign.measurements.target)):
+        found.append(Change("mounted_anew", "", _with_a_mount_each_session, placement="mounts"))
+    return found
 
 
 def pairs(campaign: Campaign) -> list[tuple[Change, ...]]:
@@ -243,6 +247,8 @@ class _Winner:
             if change.placement == "targets":
                 estimates = written.estimate, self.placement.estimate
                 detail, parameters = _target_fault(self.tried.campaign.targets, *estimates, IMPLAUSIBLE_M, IMPLAUSIBLE_RAD)
+            if change.placement == "mounts":
+                detail, parameters = _mount_fault(self.tried.campaign.targets, self.placement.estimate)
             parameters = (*parameters, Value("poses compared", float(len(np.unique(measurements.pose))), "–"))
             alike = self.alike if len(self.tried.changes) == 1 else ()
             found.append(Fault(change.name, change.joints, detail, parameters, self.evidence, (), decisive, alike))
@@ -455,6 +461,20 @@ def _with_unknown(parts: Mapping[str, Any]) -> Callable[[Campaign, Measurements]
     return correct
 
 
+def _with_a_mount_each_session(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
+    mounts = _mounts(measurements)
+    named = [(campaign.targets[target], session) for target, session in mounts]
+    targets = [replace(t, name=f"{t.name}{_IN_SESSION}{session}", offset_m=None, rotation=None) for t, session in named]
+    number = {mount: index for index, mount in enumerate(mounts)}
+    each = np.array([number[mount] for mount in zip(measurements.target, measurements.session, strict=True)])
+    return replace(campaign, targets=tuple(targets)), replace(measurements, target=each)
+
+
+def _mounts(measurements: Measurements) -> list[tuple[int, int]]:
+    """Targets and the sessions in which they are measured."""
+    return sorted(set(zip(measurements.target.tolist(), measurements.session.tolist(), strict=True)))
+
+
 def _with_offsets(names: Iterable[str], factor: float) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
     def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
         targets = [
@@ -485,6 +505,22 @@ def _frame_fault(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str
         return f"measurements do not lie in the base frame: the robot would stand {where}", tuple(parameters), True
     better = before.together / max(after.together, 1e-12)
     return f"measurements would fit {better:.0f} times better if the base stood {where}", tuple(parameters), False
+
+
+def _mount_fault(targets: Sequence[Target], estimate: Estimate) -> tuple[str, tuple[Value, ...]]:
+    """Sentence and numbers of a target that was mounted anew: the two of its mounts that are farthest apart."""
+    rotations = Rotation.from_matrix(estimate.target_rotation)
+    parted = [target.name.rpartition(_IN_SESSION) for target in targets]
+    pairs = [(a, b) for a, b in combinations(range(len(targets)), 2) if parted[a][0] == parted[b][0]]
+    turns = np.array([(rotations[a].inv() * rotations[b]).magnitude() for a, b in pairs])
+    shifts = np.array([np.linalg.norm(estimate.target_offset[a] - estimate.target_offset[b]) for a, b in pairs])
+    far = int(np.argmax(np.hypot(shifts, IMPLAUSIBLE_M / IMPLAUSIBLE_RAD * turns)))
+    (name, _, before), (_, _, after) = (parted[number] for number in pairs[far])
+    detail = (
+        f"{name} was mounted anew between sessions {before} and {after}, turned by {np.degrees(turns[far]):.3g}° and"
+        f" {1e3 * shifts[far]:.3g} mm elsewhere: a target for each of its mounts in campaign.yaml fits"
+    )
+    return detail, (Value(f"turn of {name}", float(turns[far]), "rad"), Value(f"shift of {name}", float(shifts[far]), "m"))
 
 
 def _target_fault(

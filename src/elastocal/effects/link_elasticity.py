@@ -79,9 +79,7 @@ def _end_compliance(sites: Sites, link: int, taper: float) -> tuple[np.ndarray, 
     along = sites.link_vectors_m[link] / length
     lengthwise = np.outer(along, along)
     across, turned = np.eye(3) - lengthwise, np.cross(np.eye(3), along).T * by_either * length**2
-    bending = np.block(
-        [[length**3 / 3.0 * across, turned @ across], [-turned @ across, turn_by_moment * length * across]]
-    )
+    bending = np.block([[length**3 / 3.0 * across, turned @ across], [-turned @ across, turn_by_moment * length * across]])
     return bending, length * lengthwise
 
 
