@@ -387,7 +387,7 @@ def defects_of(case: Case, robot: PhysicalRobot, design: Design) -> list[_Sized]
     """
     if not case.effects:
         return []
-    yardstick = _yardstick(case, robot, design)
+    yardstick = yardstick_of(case, robot, design)
     found: list[_Sized] = []
     for order, (effect, level) in enumerate(zip(case.effects, case.levels, strict=True)):
         drawn = [_drawn(case, robot, effect, case.seed + 1000 * order + draw) for draw in range(_DRAWS)]
@@ -425,7 +425,7 @@ def angle_to_alternative(case: Case, robot: PhysicalRobot, design: Design, bad: 
 
     `case`: of a sweep. `robot`, `bad`: without and with the defects.
     """
-    kind, yardstick = KINDS[case.alternative], _yardstick(case, robot, design)
+    kind, yardstick = KINDS[case.alternative], yardstick_of(case, robot, design)
 
     def at(location: tuple[int, ...]) -> list[PhysicalRobot]:
         """Alternatives whose details differ and which together span what there is at a location."""
@@ -435,7 +435,8 @@ def angle_to_alternative(case: Case, robot: PhysicalRobot, design: Design, bad: 
     return min(yardstick.angle_deg(bad, at(location)) for location in kind.locations(robot.arm))
 
 
-def _yardstick(case: Case, robot: PhysicalRobot, design: Design) -> Yardstick:
+def yardstick_of(case: Case, robot: PhysicalRobot, design: Design) -> Yardstick:
+    """To which the defective robots of a case are compared; `robot`: faultless."""
     targets = [robot.arm.points.index(point) for point in design.targets_on(robot.arm)]
     return Yardstick(
         robot,

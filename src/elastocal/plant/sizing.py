@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.plant.physical_robot import PhysicalRobot, Schedule, at_rest, seen_at_rest, seen_poses
+from elastocal.plant.random_numbers import stream
 from elastocal.plant.tracker import rotation_vector
 from elastocal.plant.weights import allowed_centre_std_m
 
@@ -89,11 +90,16 @@ class Yardstick:
         """Change of the measurements against the faultless robot in standard deviations, ndarray (S, targets, 3 or 6)."""
         return self._whitened(*self._change(robot))
 
+    def residual(self, robot: PhysicalRobot) -> np.ndarray:
+        """As `left`, of a robot's measurements with the noise that they have in its campaign."""
+        position, rotation = seen_poses(robot, self.schedule, self._rest)
+        read = robot.tracker.read(position, rotation, stream(self.schedule.seed, "readings"))
+        return self._seen_and_left(*self._apart(*read[:2]))[1]
+
     def signal(self, robot: PhysicalRobot) -> Signal:
         """How a robot differs from the faultless one."""
         metres, radians = self._change(robot)
-        seen = self._whitened(metres, radians)[self.schedule.training].ravel()
-        left = self._left_of(seen)
+        seen, left = self._seen_and_left(metres, radians)
         rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in (metres, radians)]
         return Signal(float(seen @ seen), float(left @ left), *rms)
 
@@ -102,7 +108,11 @@ class Yardstick:
 
         Its last entries are the weights, in their standard deviations, that absorb the rest.
         """
-        return self._left_of(self.change(robot)[self.schedule.training].ravel())
+        return self.seen_and_left(robot)[1]
+
+    def seen_and_left(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
+        """A robot's change in the measurements that are not held out, and what is left of it as in `left`."""
+        return self._seen_and_left(*self._change(robot))
 
     def angle_deg(self, robot: PhysicalRobot, others: Iterable[PhysicalRobot]) -> float:
         """Principal angle [1] between what is left of a robot and all that others make together, in any proportion.
@@ -121,12 +131,18 @@ class Yardstick:
         share = float(np.linalg.norm(directions[size > _SAME * size[0]] @ mine) / np.linalg.norm(mine))
         return float(np.degrees(np.arccos(min(share, 1.0))))
 
+    def _seen_and_left(self, metres: np.ndarray, radians: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        seen = self._whitened(metres, radians)[self.schedule.training].ravel()
+        return seen, self._left_of(seen)
+
     def _left_of(self, seen: np.ndarray) -> np.ndarray:
         seen = np.append(seen, np.zeros(self._priors))
         return seen - self._absorbed @ (self._absorbed.T @ seen)
 
     def _change(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
-        position, rotation = seen_poses(robot, self.schedule, self._rest)
+        return self._apart(*seen_poses(robot, self.schedule, self._rest))
+
+    def _apart(self, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         position_0, rotation_0 = self.poses
         relative = rotation @ np.swapaxes(rotation_0, -1, -2)
         return (position - position_0)[:, self.targets], rotation_vector(relative)[:, self.targets]
