@@ -18,14 +18,14 @@ from typing import Any
 import yaml
 from common import ROOT, Row, beside_yardstick
 
-from elastocal.blind.cases import SIZES, cases_of, make_case
-from elastocal.blind.folders import write_dynamic_campaign
 from elastocal.campaigns.importers import ur10_ipa
 from elastocal.campaigns.public_data import FOLDER_VARIABLE
-from elastocal.plant.arm import arm_from_file
-from elastocal.plant.defects import Defect, with_defects
-from elastocal.plant.physical_robot import specimen
-from elastocal.plant.weights import declared_masses
+from elastocal_proof.blind.cases import SIZES, cases_of, make_case
+from elastocal_proof.blind.folders import write_dynamic_campaign
+from elastocal_proof.plant.arm import arm_from_file
+from elastocal_proof.plant.defects import Defect, with_defects
+from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.weights import declared_masses
 
 ROBOTS = ROOT / "config" / "robots"
 SEED = 2026

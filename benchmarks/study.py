@@ -45,6 +45,8 @@ def rows(work: Path, setting: Setting) -> list[Row]:
     `work`: temporary folder; the finished study stays there.
     """
     empty, importing = copy_study(work / "empty"), copy_study(work / "importing")
+    # Of every job, in the small setting too: a source that a copy lacks shows at once.
+    snakemake(importing, "-n", *FULL.jobs)
     reduce_to_records(empty)
     reduce_to_imports(importing)
     empty_s, _ = snakemake(empty, *setting.jobs)

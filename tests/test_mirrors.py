@@ -1,4 +1,4 @@
-"""Where the tests of a module are: every module of the package has a file of its name, in the folder of its room."""
+"""Where the tests of a module are: every module of both packages has a file of its name, in the folder of its room."""
 
 from pathlib import Path
 
@@ -7,14 +7,17 @@ import pytest
 from elastocal.effects import catalogue
 
 TESTS = Path(__file__).resolve().parent
-PACKAGE = TESTS.parent / "src" / "elastocal"
+SOURCES = [TESTS.parent / "src" / name for name in ("elastocal", "elastocal_proof")]
+PACKAGE = SOURCES[0]
 EFFECTS = {f"effects/{name}.py" for name in (module.__name__.rpartition(".")[2] for module in catalogue.effects().values())}
 # Each of these goes through the catalogue: an effect that is new is tested by itself, or fails by its name.
 OF_EVERY_EFFECT = ("effects/test_closed_forms.py", "effects/test_catalogue.py")
 
 
 def modules():
-    return sorted(path.relative_to(PACKAGE).as_posix() for path in PACKAGE.rglob("*.py") if path.name != "__init__.py")
+    return sorted(
+        path.relative_to(top).as_posix() for top in SOURCES for path in top.rglob("*.py") if path.name != "__init__.py"
+    )
 
 
 @pytest.mark.parametrize("module", [module for module in modules() if module not in EFFECTS])
@@ -22,13 +25,18 @@ def test_a_module_has_a_file_of_tests_of_its_name(module):
     path = Path(module)
     mirror = TESTS / path.parent / f"test_{path.name}"
     there = mirror.is_file() and "\ndef test_" in mirror.read_text(encoding="utf-8")
-    assert there, f"src/elastocal/{module} has no tests in {mirror.relative_to(TESTS.parent)}"
+    assert there, f"{module} has no tests in {mirror.relative_to(TESTS.parent)}"
 
 
-@pytest.mark.parametrize("folder", sorted({Path(module).parent.as_posix() for module in modules()}))
-def test_a_room_that_only_says_what_it_is_needs_no_tests(folder):
+def test_no_module_of_the_proof_has_the_tests_of_one_of_the_tool():
+    """A room of one name in both packages has one folder of tests."""
+    assert len(modules()) == len(set(modules()))
+
+
+@pytest.mark.parametrize("room", [path for top in SOURCES for path in top.rglob("__init__.py")], ids=str)
+def test_a_room_that_only_says_what_it_is_needs_no_tests(room):
     """What an `__init__` would do is in no mirror."""
-    text = (PACKAGE / folder / "__init__.py").read_text(encoding="utf-8")
+    text = room.read_text(encoding="utf-8")
     assert "\ndef " not in text and "\nclass " not in text
 
 
@@ -39,5 +47,7 @@ def test_effects_are_tested_one_by_one_as_the_catalogue_lists_them(path):
 
 def test_every_module_with_candidates_is_an_effect_of_the_catalogue():
     """One without a name would be in no list, and so without tests."""
-    offering = {m for m in modules() if "\ndef candidates(" in (PACKAGE / m).read_text(encoding="utf-8")}
-    assert offering == EFFECTS
+    offering = [
+        file for top in SOURCES for file in top.rglob("*.py") if "\ndef candidates(" in file.read_text(encoding="utf-8")
+    ]
+    assert {file.relative_to(PACKAGE).as_posix() for file in offering} == EFFECTS

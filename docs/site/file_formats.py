@@ -25,8 +25,8 @@ DOCUMENTS = {
 TABLES = {
     "elastocal.study.table_schemas": "The study: `data/simulated`, `results`.",
     "elastocal.loop.schemas": "The loop: `results/loop`, `reports/loop`.",
-    "elastocal.league.schemas": "The league of methods: `results/league`, `reports/league`.",
-    "elastocal.blind.schemas": "The closed loop and bad rows: `results/closed_loop`, `results/bad_rows`.",
+    "elastocal_proof.league.schemas": "The league of methods: `results/league`, `reports/league`.",
+    "elastocal_proof.blind.schemas": "The closed loop and bad rows: `results/closed_loop`, `results/bad_rows`.",
 }
 # Robots have different numbers of joints; tables are shown for this one.
 JOINTS = 6

@@ -10,8 +10,9 @@ Rooms, from the ground up; each imports only what stands above it here, as `[too
     data_checks, validation               faults of the data; held-out poses
     diagnosis                             what a fitted model lacks
     loop                                  from a campaign's folder to the verdict
-    blind, with plant                     the blind proof, on a physical robot that shares no code with the rest
     figures, report                       what people see
+
+What proves it is a package of its own, `elastocal_proof`, which `elastocal demo` alone imports.
 """
 
 __version__ = "0.1.0"

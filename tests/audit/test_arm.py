@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from elastocal.audit.arm import Arm
 from elastocal.mechanics.elastostatics import joint_torques, regressor
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.robot_file import robot_from_document
+from elastocal_proof.audit.arm import Arm
 
 BEAM = {
     "chain": "Rz(q1) Tx(2.0) [tip]",

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from made_audits import CONFIGURATION, ROBOT
 
-from elastocal.audit.arm import Arm
-from elastocal.audit.assumptions import qualities, stretch
-from elastocal.audit.audited import Audited
+from elastocal_proof.audit.arm import Arm
+from elastocal_proof.audit.assumptions import qualities, stretch
+from elastocal_proof.audit.audited import Audited
 
 QUESTIONS = {"geometry_errors": {"zero_rad": 1e-3, "length_m": 5e-4}}
 

@@ -8,10 +8,10 @@ import pytest
 import yaml
 from made_audits import CONFIGURATION, ROBOT, failed
 
-from elastocal.audit import campaigns
-from elastocal.audit.audited import WRENCH, Audited
 from elastocal.campaigns.simulation import Plan, simulated_measurements
 from elastocal.mechanics.robot_file import robot_from_document
+from elastocal_proof.audit import campaigns
+from elastocal_proof.audit.audited import WRENCH, Audited
 
 FOLDER, REPORTS = "results/loop/cell", "reports/loop/cell"
 

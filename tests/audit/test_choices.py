@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_audits import CONFIGURATION
 
-from elastocal.audit.audited import Audited
-from elastocal.audit.choices import _best_weights, _error, _exchange, _least_squares, _springs, _taken, _value
-from elastocal.audit.streams import draw
+from elastocal_proof.audit.audited import Audited
+from elastocal_proof.audit.choices import _best_weights, _error, _exchange, _least_squares, _springs, _taken, _value
+from elastocal_proof.audit.streams import draw
 
 # A cantilever that is askew to the axes of its chain, behind a joint.
 BENT = {

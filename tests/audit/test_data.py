@@ -3,7 +3,7 @@
 import pytest
 from made_audits import altered, failed, made_run
 
-from elastocal.audit import data
+from elastocal_proof.audit import data
 
 EXPERIMENTS, IDEAL = "data/simulated/two/experiments.parquet", "data/simulated/two/ideal.parquet"
 MEASURED = "data/simulated/two/100um/measured.parquet"

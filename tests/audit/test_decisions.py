@@ -5,12 +5,12 @@ import pandas as pd
 import pytest
 from made_audits import CONFIGURATION, ROBOT, STRATEGY, failed, made_run
 
-from elastocal.audit import decisions, tables
-from elastocal.audit.audited import Audited
-from elastocal.audit.questions import estimate
-from elastocal.audit.scores import errors_of
 from elastocal.study.costs import break_even_table, configurations_needed, cost_table
 from elastocal.study.study_tables import measured_table
+from elastocal_proof.audit import decisions, tables
+from elastocal_proof.audit.audited import Audited
+from elastocal_proof.audit.questions import estimate
+from elastocal_proof.audit.scores import errors_of
 
 SETS = {"one": ["hand"], "twice": ["hand", "hand"]}
 LENGTHS = np.arange(1, 6)

@@ -6,9 +6,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
-from elastocal.audit.audited import WRENCH
-from elastocal.audit.elastic import Robot, Springs, averages, far_off, find_configurations
 from elastocal.campaigns.joint_space import configurations
+from elastocal_proof.audit.audited import WRENCH
+from elastocal_proof.audit.elastic import Robot, Springs, averages, far_off, find_configurations
 
 BEAM = {"name": "beam", "chain": "Rz(q1) Tx(2.0) [tip]", "compliance_urad_per_Nm": [0.5]}
 LENGTH, BENDING, TORSION = 2.0, 1e-6, 2e-6

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from made_audits import CONFIGURATION
 
-from elastocal.audit.arm import Arm
-from elastocal.audit.audited import WRENCH, Audited
-from elastocal.audit.equilibrium import sagging
+from elastocal_proof.audit.arm import Arm
+from elastocal_proof.audit.audited import WRENCH, Audited
+from elastocal_proof.audit.equilibrium import sagging
 
 CHAIN = "Tz(0.4) Rz(q1) Tx(0.1) Ry(q2) Tx(0.7) Ry(q3) Tx(0.5) [hand]"
 MASSES = [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.audit.estimates import points_of, solve_staged
+from elastocal_proof.audit.estimates import points_of, solve_staged
 
 ONE = {"stages": [{"points": ["a"], "joints": [1, 2]}]}
 TWO = {"stages": [{"points": ["a"], "joints": [1]}, {"points": ["b"], "joints": [2], "held": [1]}]}

@@ -6,12 +6,12 @@ import pytest
 from made_audits import CONFIGURATION, ROBOT, failed
 from planted_errors import forge
 
-from elastocal.audit.audited import Audited
-from elastocal.audit.files import described, intact
 from elastocal.io.provenance import provenance
 from elastocal.io.records import recorded
 from elastocal.io.storage import write_table
 from elastocal.study.table_schemas import INITIAL
+from elastocal_proof.audit.audited import Audited
+from elastocal_proof.audit.files import described, intact
 
 FILE = "results/initial/two.parquet"
 

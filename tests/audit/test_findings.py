@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from elastocal.audit.findings import compare, compare_columns, require, require_each_once
+from elastocal_proof.audit.findings import compare, compare_columns, require, require_each_once
 
 
 def test_equal_values_hold_even_where_nothing_is_allowed():

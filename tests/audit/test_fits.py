@@ -9,9 +9,9 @@ from made_audits import CONFIGURATION, ROBOT, failed
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from elastocal.audit import fits
-from elastocal.audit.audited import COMPONENTS, WRENCH, Audited
-from elastocal.audit.elastic import Robot, Springs, averages
+from elastocal_proof.audit import fits
+from elastocal_proof.audit.audited import COMPONENTS, WRENCH, Audited
+from elastocal_proof.audit.elastic import Robot, Springs, averages
 
 FOLDER, REPORTS = "results/loop/cell", "reports/loop/cell"
 TARGETS = {"hand": {"point": "hand", "offset_m": [0.0, 0.1, 0.0]}}

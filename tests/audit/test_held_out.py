@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from made_audits import CONFIGURATION, failed
 
-from elastocal.audit import held_out
-from elastocal.audit.audited import Audited
 from elastocal.validation import held_out as validated
+from elastocal_proof.audit import held_out
+from elastocal_proof.audit.audited import Audited
 
 FOLDER, REPORTS = "results/loop/cell", "reports/loop/cell"
 POSES = 9

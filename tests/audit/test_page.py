@@ -1,8 +1,8 @@
 """The page of an audit says first whether all holds."""
 
-from elastocal.audit.findings import Finding
-from elastocal.audit.page import kind_of, page
-from elastocal.audit.whole import as_table
+from elastocal_proof.audit.findings import Finding
+from elastocal_proof.audit.page import kind_of, page
+from elastocal_proof.audit.whole import as_table
 
 GOOD = Finding("deviation", "pinocchio", 4, 1e-5, file="results/metrics/kuka/200um/6DoF.parquet")
 BAD = Finding("column <dev>", "pandas", 2, 7.0, "found 1, expected 2", "reports/tables/table4.csv")

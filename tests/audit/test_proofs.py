@@ -9,7 +9,7 @@ from made_blind_documents import effect, truth, verdict
 from made_proofs import audited_proofs, made_proofs
 from statsmodels.stats.proportion import proportion_confint
 
-from elastocal.audit import proofs
+from elastocal_proof.audit import proofs
 
 ONE = truth(("joint_offset", 3))
 TWO = truth(("joint_offset", 3), ("payload",))

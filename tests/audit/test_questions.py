@@ -3,8 +3,8 @@
 import numpy as np
 from made_audits import made_run
 
-from elastocal.audit.questions import estimate, simulate
-from elastocal.audit.streams import draw
+from elastocal_proof.audit.questions import estimate, simulate
+from elastocal_proof.audit.streams import draw
 
 
 def test_a_data_set_that_is_drawn_again_is_the_one_in_the_file(tmp_path):

@@ -1,7 +1,7 @@
 """Schemas are found by the name that a file has for itself."""
 
-from elastocal.audit.schemas import SCHEMAS
 from elastocal.study.table_schemas import identified
+from elastocal_proof.audit.schemas import SCHEMAS
 
 
 def test_tables_of_study_and_loop_are_known():

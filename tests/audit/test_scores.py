@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_audits import made_run
 
-from elastocal.audit.scores import average, errors_of, fixed_joints, moment
+from elastocal_proof.audit.scores import average, errors_of, fixed_joints, moment
 
 
 def test_the_true_compliances_leave_no_error(tmp_path):

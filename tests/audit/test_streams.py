@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from elastocal.audit.streams import numbers
 from elastocal.random_streams import stream
+from elastocal_proof.audit.streams import numbers
 
 
 @pytest.mark.parametrize("name", [(1, "kuka", "identification/force", 0), (7, "fanuc", "noise/6DoF/again", 999)])

@@ -6,8 +6,8 @@ import pytest
 from made_audits import CONFIGURATION, ROBOT, failed
 from scipy.stats import t as student
 
-from elastocal.audit import tables
-from elastocal.audit.audited import Audited
+from elastocal_proof.audit import tables
+from elastocal_proof.audit.audited import Audited
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import hashlib
 
 from planted_errors import forge
 
-from elastocal.audit.targets import OTHERS, finished
+from elastocal_proof.audit.targets import OTHERS, finished
 
 
 def test_a_target_has_finished_where_its_last_file_is_there_with_its_record(tmp_path):

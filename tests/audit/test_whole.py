@@ -7,9 +7,9 @@ from made_audits import CONFIGURATION, failed
 from planted_errors import forge
 from support import refused
 
-from elastocal.audit.audited import Audited
-from elastocal.audit.findings import Finding
-from elastocal.audit.whole import as_table, audit, require_all
+from elastocal_proof.audit.audited import Audited
+from elastocal_proof.audit.findings import Finding
+from elastocal_proof.audit.whole import as_table, audit, require_all
 
 
 def test_an_empty_folder_is_no_finished_run(tmp_path):

@@ -8,14 +8,14 @@ from analysed_robots import ROBOTS
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
-from elastocal.blind import bad_rows as module
-from elastocal.blind import schemas
-from elastocal.blind.bad_rows import MIXTURE, compare_verdicts, draw_campaign, draw_seeds
-from elastocal.blind.cases import PROOF
 from elastocal.io.storage import read_table, write_table
-from elastocal.plant.bad_rows import BadReading
-from elastocal.plant.campaigns import measured_table
 from elastocal.study.configuration import parsed
+from elastocal_proof.blind import bad_rows as module
+from elastocal_proof.blind import schemas
+from elastocal_proof.blind.bad_rows import MIXTURE, compare_verdicts, draw_campaign, draw_seeds
+from elastocal_proof.blind.cases import PROOF
+from elastocal_proof.plant.bad_rows import BadReading
+from elastocal_proof.plant.campaigns import measured_table
 
 KUKA = ROBOTS / "kuka.yaml"
 

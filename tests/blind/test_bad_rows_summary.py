@@ -6,7 +6,7 @@ import pytest
 from made_proofs import made_slips
 from scipy.stats import binomtest
 
-from elastocal.blind.bad_rows_summary import NAMED, SAME, SAME_JOINTS, UNTOUCHED, judge_cases, summarize
+from elastocal_proof.blind.bad_rows_summary import NAMED, SAME, SAME_JOINTS, UNTOUCHED, judge_cases, summarize
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from made_blind_documents import silence, truth, verdict
 
-from elastocal.blind.calibration import (
+from elastocal_proof.blind.calibration import (
     by_chance,
     calibration_error,
     credible,

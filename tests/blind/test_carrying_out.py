@@ -9,12 +9,12 @@ import yaml
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
-from elastocal.blind.carrying_out import carry_out, random_experiment
-from elastocal.blind.cases import Case, design_of, make_case
-from elastocal.blind.follow_up import ARMS, LADDER, POSES, folder_name
 from elastocal.campaigns.holdout import split
 from elastocal.campaigns.reading import read_campaign
-from elastocal.plant.arm import arm_from_file
+from elastocal_proof.blind.carrying_out import carry_out, random_experiment
+from elastocal_proof.blind.cases import Case, design_of, make_case
+from elastocal_proof.blind.follow_up import ARMS, LADDER, POSES, folder_name
+from elastocal_proof.plant.arm import arm_from_file
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 CASE = Case("lost motion", "single", "kuka", ("lost_motion",), (50.0,), "usual", 187654321)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_blind_documents import effect, oracle, silence, truth, verdict
 
-from elastocal.blind.case_rows import EXACT_ALIASES, case_row
+from elastocal_proof.blind.case_rows import EXACT_ALIASES, case_row
 
 # As the verdict says it, and what it says beside that.
 GREW = "the RMS error of the validation poses grew from 0.100 to 0.110 mm"

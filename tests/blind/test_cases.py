@@ -10,7 +10,8 @@ import pytest
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
-from elastocal.blind.cases import (
+from elastocal.campaigns.reading import read_campaign
+from elastocal_proof.blind.cases import (
     FOREIGN,
     HARD,
     NAMED,
@@ -28,14 +29,13 @@ from elastocal.blind.cases import (
     specimen_of,
     write_manifest,
 )
-from elastocal.campaigns.reading import read_campaign
-from elastocal.plant.arm import LinkMass, arm_from_file
-from elastocal.plant.campaigns import schedule_of
-from elastocal.plant.defects import KINDS, with_defects
-from elastocal.plant.drives import Visits
-from elastocal.plant.physical_robot import seen_poses
-from elastocal.plant.sizing import Yardstick
-from elastocal.plant.weights import allowed_centre_std_m, centre_std_m
+from elastocal_proof.plant.arm import LinkMass, arm_from_file
+from elastocal_proof.plant.campaigns import schedule_of
+from elastocal_proof.plant.defects import KINDS, with_defects
+from elastocal_proof.plant.drives import Visits
+from elastocal_proof.plant.physical_robot import seen_poses
+from elastocal_proof.plant.sizing import Yardstick
+from elastocal_proof.plant.weights import allowed_centre_std_m, centre_std_m
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 

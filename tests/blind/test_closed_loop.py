@@ -5,9 +5,10 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 
-from elastocal.blind import closed_loop as module
-from elastocal.blind import schemas
-from elastocal.blind.closed_loop import (
+from elastocal.io.storage import read_table, write_table
+from elastocal_proof.blind import closed_loop as module
+from elastocal_proof.blind import schemas
+from elastocal_proof.blind.closed_loop import (
     DECLARED,
     FOUND,
     GEOMETRY,
@@ -19,9 +20,8 @@ from elastocal.blind.closed_loop import (
     closed_loop,
     hidden_effects,
 )
-from elastocal.blind.folders import write_blind_campaign
-from elastocal.blind.rehearsal import hidden_robot
-from elastocal.io.storage import read_table, write_table
+from elastocal_proof.blind.folders import write_blind_campaign
+from elastocal_proof.blind.rehearsal import hidden_robot
 
 
 @pytest.fixture(scope="module")

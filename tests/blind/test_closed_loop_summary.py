@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from elastocal.blind.closed_loop import FOUND, MODELS, PARTS, TRUE
-from elastocal.blind.closed_loop_summary import GOAL, case_errors, goals, summary
+from elastocal_proof.blind.closed_loop import FOUND, MODELS, PARTS, TRUE
+from elastocal_proof.blind.closed_loop_summary import GOAL, case_errors, goals, summary
 
 SIZES = {"uncorrected": 3e-3, "geometry": 2e-3, "declared": 2e-4, "found": 1.1e-4, "true": 1e-4}
 

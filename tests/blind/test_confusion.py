@@ -2,7 +2,7 @@
 
 from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 
-from elastocal.blind.confusion import confused
+from elastocal_proof.blind.confusion import confused
 
 PAIR = truth(("payload",), ("joint_tilt", 2), group="pair", level=200.0)
 ENTRIES = [

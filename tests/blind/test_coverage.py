@@ -3,7 +3,7 @@
 import pandas as pd
 from made_blind_documents import effect, silence, truth, verdict
 
-from elastocal.blind.coverage import covered, intervals_of
+from elastocal_proof.blind.coverage import covered, intervals_of
 
 
 def with_parameters(document, **parameters):

@@ -8,8 +8,6 @@ import pytest
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
 
-from elastocal.blind.case_rows import EXACT_ALIASES
-from elastocal.blind.cases import Case, make_case
 from elastocal.campaigns.columns import columns_of
 from elastocal.fitting.case import case_from, noise_from
 from elastocal.fitting.displacement import conditions
@@ -17,6 +15,8 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.noise_estimation import noise_of
 from elastocal.loop.loading import load_campaign
+from elastocal_proof.blind.case_rows import EXACT_ALIASES
+from elastocal_proof.blind.cases import Case, make_case
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 _SINE, _ROUNDING = 1e-6, 1e-7

@@ -9,15 +9,21 @@ import pytest
 import yaml
 from analysed_robots import ROBOTS
 
-from elastocal.blind.folders import campaign_document, robot_document, write_blind_campaign, write_dynamic_campaign, write_truth
 from elastocal.campaigns.holdout import split
 from elastocal.campaigns.reading import read_campaign
-from elastocal.plant.arm import arm_from_file
-from elastocal.plant.campaigns import Design, schedule_of
-from elastocal.plant.defects import Defect, truth_of, with_defects
-from elastocal.plant.physical_robot import specimen
-from elastocal.plant.tracker import Tracker
-from elastocal.plant.weights import declared_masses
+from elastocal_proof.blind.folders import (
+    campaign_document,
+    robot_document,
+    write_blind_campaign,
+    write_dynamic_campaign,
+    write_truth,
+)
+from elastocal_proof.plant.arm import arm_from_file
+from elastocal_proof.plant.campaigns import Design, schedule_of
+from elastocal_proof.plant.defects import Defect, truth_of, with_defects
+from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.tracker import Tracker
+from elastocal_proof.plant.weights import declared_masses
 
 FILES = ["campaign.yaml", "measurements.parquet", "robot.yaml"]
 

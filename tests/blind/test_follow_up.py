@@ -6,13 +6,13 @@ import sys
 
 from made_folders import made_folder, made_table
 
-from elastocal.blind.follow_up import ARMS, POSES, diagnosed_anew, diagnosed_until_named, folder_name, followed_up
+from elastocal_proof.blind.follow_up import ARMS, POSES, diagnosed_anew, diagnosed_until_named, folder_name, followed_up
 
 WATCHED = """
 import json, sys
 opened = []
 sys.addaudithook(lambda event, details: opened.append(str(details[0])) if event == "open" else None)
-from elastocal.blind.follow_up import diagnosed_anew
+from elastocal_proof.blind.follow_up import diagnosed_anew
 from elastocal.loop.proposed import proposed
 from elastocal.loop.whole import diagnosed
 folder, again, robots = sys.argv[1:]
@@ -20,7 +20,7 @@ verdict = diagnosed(folder, robots, 1)
 effect = verdict["effects"][0]
 frame = proposed(folder, robots, 3, (0.0, 1.0), 1)
 anew = diagnosed_anew(again, lambda path: diagnosed(path, robots, 1))
-modules = [name for name in sys.modules if name.startswith(("elastocal.plant", "elastocal.blind.cases", "mujoco"))]
+modules = [name for name in sys.modules if name.startswith(("elastocal_proof.plant", "elastocal_proof.blind.cases", "mujoco"))]
 print(json.dumps({"opened": opened, "modules": modules, "states": len(frame), "said": effect, "anew": len(anew)}))
 """
 

@@ -6,7 +6,7 @@ import pytest
 from made_verdicts import truth, verdict_of
 from scipy.stats import beta
 
-from elastocal.blind.follow_up_scores import (
+from elastocal_proof.blind.follow_up_scores import (
     followed,
     poses_needed,
     promised,

@@ -4,8 +4,8 @@ import hashlib
 
 import pytest
 
-from elastocal.blind.ground_truth import load_ground_truth
 from elastocal.errors import InputError
+from elastocal_proof.blind.ground_truth import load_ground_truth
 
 
 @pytest.fixture

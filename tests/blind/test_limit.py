@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from elastocal.blind import limit as module
-from elastocal.blind.cases import Counts, cases_of, design_of, specimen_of, yardstick_of
-from elastocal.blind.limit import limit, log_bayes_factors, signals_of
-from elastocal.plant.defects import KINDS
+from elastocal_proof.blind import limit as module
+from elastocal_proof.blind.cases import Counts, cases_of, design_of, specimen_of, yardstick_of
+from elastocal_proof.blind.limit import limit, log_bayes_factors, signals_of
+from elastocal_proof.plant.defects import KINDS
 
 ROBOTS = "config/robots"
 SOME = ("force_bias", "joint_tilt", "setup_step", "tracker_scale")

@@ -9,13 +9,13 @@ from scipy.stats import chi2
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
-from elastocal.blind.cases import Case, make_case
-from elastocal.blind.oracle import members_of, oracle
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.case import noise_facts
 from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.loop.whole import cases_in, diagnosed
 from elastocal.mechanics.sites import sites_of
+from elastocal_proof.blind.cases import Case, make_case
+from elastocal_proof.blind.oracle import members_of, oracle
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 

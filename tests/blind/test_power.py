@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 
-from elastocal.blind.power import powers, undetectable
+from elastocal_proof.blind.power import powers, undetectable
 
 PAYLOAD = verdict("named", effect("payload"))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from elastocal.blind.rates import headed, rate
+from elastocal_proof.blind.rates import headed, rate
 
 
 @pytest.mark.parametrize("hits, cases", [(1, 3), (7, 20), (19, 20), (150, 400)])

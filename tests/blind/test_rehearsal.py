@@ -6,11 +6,11 @@ import pytest
 from analysed_robots import ROBOTS
 from scipy.spatial.transform import Rotation
 
-from elastocal.blind.rehearsal import filled_sheet, hidden_robot, reached
 from elastocal.errors import InputError
 from elastocal.io.documents import read_document
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot_file import robot_from_document
+from elastocal_proof.blind.rehearsal import filled_sheet, hidden_robot, reached
 
 UR10 = ROBOTS / "ur10.yaml"
 WRENCH = ["fx", "fy", "fz", "mx", "my", "mz"]

@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 
-from elastocal.blind.rehearsal import hidden_robot
-from elastocal.blind.rehearsal_files import fill_sheet, lose_beam, measured_errors, write_milling_path
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
+from elastocal_proof.blind.rehearsal import hidden_robot
+from elastocal_proof.blind.rehearsal_files import fill_sheet, lose_beam, measured_errors, write_milling_path
 
 
 @pytest.fixture(scope="module")

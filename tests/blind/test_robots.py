@@ -2,7 +2,7 @@
 
 import pytest
 
-from elastocal.blind.robots import PROOF, TUNED, leading
+from elastocal_proof.blind.robots import PROOF, TUNED, leading
 
 
 @pytest.mark.parametrize("kinds", [[PROOF], [TUNED, PROOF], [TUNED, TUNED, PROOF, TUNED]])

@@ -1,7 +1,7 @@
 """Tables of the closed loop have columns with units and meanings, and an audit knows them."""
 
-from elastocal.audit.schemas import SCHEMAS
-from elastocal.blind import schemas
+from elastocal_proof.audit.schemas import SCHEMAS
+from elastocal_proof.blind import schemas
 
 
 def test_columns_are_named_once_and_say_what_they_are():

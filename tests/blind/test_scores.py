@@ -3,7 +3,7 @@
 import pytest
 from made_verdicts import truth, verdict_of
 
-from elastocal.blind.scores import outcome
+from elastocal_proof.blind.scores import outcome
 
 TILTED = {"misplaced": {"shift_m": [0.0, 0.0, 2e-4], "turn_rad": [3e-4, 0.0, 0.0]}}
 OUTCOMES = {

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal.blind.stated_accuracy import FRAMES, PARTS, coverage, stated_accuracy
+from elastocal_proof.blind.stated_accuracy import FRAMES, PARTS, coverage, stated_accuracy
 
 
 def made_rows(true_rms_m, decision="pass", verdict="named", frame="base"):

@@ -9,7 +9,7 @@ from scipy.stats import beta
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
-from elastocal.blind.cases import (
+from elastocal_proof.blind.cases import (
     SIZES,
     SWEEP_DESIGNS,
     SWEEP_PAIRS,
@@ -19,9 +19,9 @@ from elastocal.blind.cases import (
     design_of,
     specimen_of,
 )
-from elastocal.blind.sweep import against_angle, swept
-from elastocal.plant.campaigns import schedule_of
-from elastocal.plant.defects import Defect, with_defects
+from elastocal_proof.blind.sweep import against_angle, swept
+from elastocal_proof.plant.campaigns import schedule_of
+from elastocal_proof.plant.defects import Defect, with_defects
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 ONE = Counts(none=2, single=0, outside=0, pair=0, setting=0, sweep=1, robots=("kuka",))

@@ -5,9 +5,9 @@ import pytest
 from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 from scipy.stats import beta
 
-from elastocal.blind.calibration import statements
-from elastocal.blind.coverage import intervals_of
-from elastocal.blind.targets import by_setting, summarized
+from elastocal_proof.blind.calibration import statements
+from elastocal_proof.blind.coverage import intervals_of
+from elastocal_proof.blind.targets import by_setting, summarized
 
 PAYLOAD = verdict("named", effect("payload"))
 

@@ -35,7 +35,7 @@ def run(elastocal, monkeypatch, tmp_path):
         },
     }
     for name, stand_in in stand_ins.items():
-        monkeypatch.setattr(f"elastocal.blind.rehearsal_files.{name}", stand_in)
+        monkeypatch.setattr(f"elastocal_proof.blind.rehearsal_files.{name}", stand_in)
     monkeypatch.setattr("elastocal.campaigns.reading.read_descriptions", lambda *_: ({}, ""))
 
     def ended(*words, **other):

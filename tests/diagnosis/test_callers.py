@@ -11,13 +11,13 @@ import pytest
 from loop_scripts import ANALYSIS, Files, _Job, _Named, run_loop, run_script
 from made_folders import PLAN, made_folder, made_table
 
-from elastocal.blind.follow_up import ARMS, POSES, folder_name
 from elastocal.diagnosis import judge as judging
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.proposal import NOTHING_AMBIGUOUS, without_poses
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop import proposed, whole
 from elastocal.loop.whole import cases_in, diagnosed
+from elastocal_proof.blind.follow_up import ARMS, POSES, folder_name
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS, BENCHMARKS = ROOT / "config" / "robots", ROOT / "benchmarks"
@@ -26,10 +26,10 @@ SEED = 1
 CALLERS = {
     "src/elastocal/loop/whole.py": "the one call",
     "src/elastocal/loop/proposed.py": "the next experiment",
-    "src/elastocal/blind/follow_up.py": "follow-ups",
-    "src/elastocal/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
-    "src/elastocal/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",
-    "src/elastocal/blind/stated_accuracy.py": "the same, and compares what is stated of the correction",
+    "src/elastocal_proof/blind/follow_up.py": "follow-ups",
+    "src/elastocal_proof/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
+    "src/elastocal_proof/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",
+    "src/elastocal_proof/blind/stated_accuracy.py": "the same, and compares what is stated of the correction",
     "workflow/scripts/diagnose_campaign.py": "rules",
     "workflow/scripts/diagnose_cases.py": "blind proof",
     "workflow/scripts/diagnose_follow_ups.py": "follow-ups",
@@ -214,7 +214,7 @@ def test_benchmark_of_the_engine_times_the_same_verdict(kind, both, monkeypatch,
 
 def test_oracle_that_knows_the_effect_which_is_found_has_the_same_errors_on_held_out_poses(folder, expected):
     pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
-    from elastocal.blind.oracle import oracle
+    from elastocal_proof.blind.oracle import oracle
 
     known = oracle({"defects": [{"effect": "joint_offset", "joints": [3]}]}, expected, folder, ROBOTS, SEED)
     assert known["candidates"] == ["joint_offset@3"] and known["p_value"] < 1e-6

@@ -16,7 +16,7 @@ from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
-from elastocal.plant.tracker import EccentricNest
+from elastocal_proof.plant.tracker import EccentricNest
 
 GRAVITY = 9.80665
 

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries
 
-from elastocal.figures.blind_errors import errors_against_oracle
+from elastocal_proof.figures.blind_errors import errors_against_oracle
 
 
 def test_errors_are_points_of_cases_that_have_an_oracle():

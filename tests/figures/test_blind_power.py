@@ -6,8 +6,8 @@ import pytest
 from drawn_figures import assert_nothing_cut_off, row_labels, texts, texts_in_axes
 from matplotlib.colors import to_rgb
 
-from elastocal.blind.power import powers
-from elastocal.figures.blind_power import confusion_map, power_map
+from elastocal_proof.blind.power import powers
+from elastocal_proof.figures.blind_power import confusion_map, power_map
 
 POWER = ["detected", "held", "named", "oracle_detected"]
 

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels, texts, texts_in_axes
 
-from elastocal.blind.coverage import covered
-from elastocal.figures.blind_rates import coverage_by_effect, rates_and_targets
+from elastocal_proof.blind.coverage import covered
+from elastocal_proof.figures.blind_rates import coverage_by_effect, rates_and_targets
 
 
 def summary_row(quantity, rate, low, high, target, robots="proof"):

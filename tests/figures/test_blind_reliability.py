@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, texts_in_axes
 
-from elastocal.figures.blind_reliability import reliability_diagram
+from elastocal_proof.figures.blind_reliability import reliability_diagram
 
 
 def test_the_reliability_diagram_shows_shares_against_what_was_stated_and_numbers_of_cases():

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from elastocal.blind.closed_loop import MODELS, PARTS
-from elastocal.figures.closed_loop import closed_loop
+from elastocal_proof.blind.closed_loop import MODELS, PARTS
+from elastocal_proof.figures.closed_loop import closed_loop
 
 
 def test_every_error_is_drawn_where_its_model_stands():

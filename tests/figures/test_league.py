@@ -4,9 +4,9 @@ import pandas as pd
 import pytest
 from made_leagues import made_results
 
-from elastocal.figures.league import league_picture, mechanism_picture
-from elastocal.league.methods import Method
-from elastocal.league.table import league_table
+from elastocal_proof.figures.league import league_picture, mechanism_picture
+from elastocal_proof.league.methods import Method
+from elastocal_proof.league.table import league_table
 
 METHODS = {name: Method("geometry", words=f"{name} in words") for name in ("geometry", "half", "process")}
 

@@ -5,8 +5,8 @@ import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries
 from matplotlib.colors import to_hex
 
-from elastocal.blind.sweep import against_angle, swept
-from elastocal.figures.sweep import sweep
+from elastocal_proof.blind.sweep import against_angle, swept
+from elastocal_proof.figures.sweep import sweep
 
 OUTCOMES = ["right", "class", "wrong", "other"]
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from elastocal.plant.multibody import machine_of
-from elastocal.plant.statics import Loading, equilibrium
-from elastocal.plant.structure import Structure
+from elastocal_proof.plant.multibody import machine_of
+from elastocal_proof.plant.statics import Loading, equilibrium
+from elastocal_proof.plant.structure import Structure
 
 STATES = 100
 

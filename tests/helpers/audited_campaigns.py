@@ -6,9 +6,6 @@ import pandas as pd
 from analysed_robots import ROBOTS
 from made_audits import CONFIGURATION
 
-from elastocal.audit.audited import Audited
-from elastocal.audit.whole import checks_of
-from elastocal.blind.folders import write_blind_campaign
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import residual_blocks, split_table
@@ -21,11 +18,14 @@ from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop import schemas
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.whole import judged
-from elastocal.plant.arm import arm_from_file
-from elastocal.plant.campaigns import Design, schedule_of
-from elastocal.plant.defects import drawn_defect, with_defects
-from elastocal.plant.physical_robot import specimen
-from elastocal.plant.weights import declared_masses
+from elastocal_proof.audit.audited import Audited
+from elastocal_proof.audit.whole import checks_of
+from elastocal_proof.blind.folders import write_blind_campaign
+from elastocal_proof.plant.arm import arm_from_file
+from elastocal_proof.plant.campaigns import Design, schedule_of
+from elastocal_proof.plant.defects import drawn_defect, with_defects
+from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.weights import declared_masses
 
 USUAL = {"poses": 12, "held_out": 4, "ladder": (0.0, 1.0, -1.0), "repeats": 3, "repeated_poses": 4, "points": ("flange",)}
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from elastocal.audit.arm import Arm
-from elastocal.audit.audited import COMPONENTS, WRENCH, Audited
-from elastocal.audit.streams import numbers
+from elastocal_proof.audit.arm import Arm
+from elastocal_proof.audit.audited import COMPONENTS, WRENCH, Audited
+from elastocal_proof.audit.streams import numbers
 
 ROBOT = {
     "name": "two joints",

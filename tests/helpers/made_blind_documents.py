@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from elastocal.blind.case_rows import case_row
+from elastocal_proof.blind.case_rows import case_row
 
 JOINTS = 6
 

@@ -3,12 +3,12 @@
 import pandas as pd
 from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 
-from elastocal.blind.calibration import statements
-from elastocal.blind.confusion import confused
-from elastocal.blind.coverage import covered, intervals_of
-from elastocal.blind.power import powers, undetectable
-from elastocal.blind.targets import by_setting, summarized
-from elastocal.report.blind_facts import blind_facts
+from elastocal_proof.blind.calibration import statements
+from elastocal_proof.blind.confusion import confused
+from elastocal_proof.blind.coverage import covered, intervals_of
+from elastocal_proof.blind.power import powers, undetectable
+from elastocal_proof.blind.targets import by_setting, summarized
+from elastocal_proof.report.blind_facts import blind_facts
 
 PAYLOAD = verdict("named", effect("payload"))
 SWEEP = ["pair", "angle_up_to_deg", "cases"]

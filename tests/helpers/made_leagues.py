@@ -5,10 +5,10 @@ import pandas as pd
 from made_remainders import smoothly_wrong_folder
 
 from elastocal.campaigns.columns import columns_of
-from elastocal.league.folds import dealt
-from elastocal.league.rounds import DataSet
-from elastocal.league.table import Result
 from elastocal.loop.loading import load_whole_campaign
+from elastocal_proof.league.folds import dealt
+from elastocal_proof.league.rounds import DataSet
+from elastocal_proof.league.table import Result
 
 
 def made_data_set(folder, robot, robots_folder, poses=24, **changes):

@@ -10,23 +10,23 @@ from made_leagues import made_entries
 from planted_errors import forge
 
 from elastocal import __version__
-from elastocal.audit.audited import Audited
-from elastocal.blind import schemas as of_blind
-from elastocal.blind.bad_rows_summary import judge_cases, summarize
-from elastocal.blind.calibration import reliability, statements
-from elastocal.blind.case_rows import case_row
-from elastocal.blind.closed_loop import MODELS, PARTS
-from elastocal.blind.closed_loop_summary import case_errors, goals, summary
-from elastocal.blind.confusion import confused
-from elastocal.blind.coverage import covered, intervals_of
-from elastocal.blind.power import powers
-from elastocal.blind.targets import by_setting, summarized
 from elastocal.io.data_frames import write_csv
 from elastocal.io.storage import write_table
-from elastocal.league.folds import dealt
-from elastocal.league.schemas import ENTRIES, FOLDS, MECHANISMS
-from elastocal.league.table import Result, league_table, mechanism_table
 from elastocal.random_streams import stream
+from elastocal_proof.audit.audited import Audited
+from elastocal_proof.blind import schemas as of_blind
+from elastocal_proof.blind.bad_rows_summary import judge_cases, summarize
+from elastocal_proof.blind.calibration import reliability, statements
+from elastocal_proof.blind.case_rows import case_row
+from elastocal_proof.blind.closed_loop import MODELS, PARTS
+from elastocal_proof.blind.closed_loop_summary import case_errors, goals, summary
+from elastocal_proof.blind.confusion import confused
+from elastocal_proof.blind.coverage import covered, intervals_of
+from elastocal_proof.blind.power import powers
+from elastocal_proof.blind.targets import by_setting, summarized
+from elastocal_proof.league.folds import dealt
+from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
+from elastocal_proof.league.table import Result, league_table, mechanism_table
 
 SEED = 1
 LEAGUE = {

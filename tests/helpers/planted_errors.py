@@ -10,10 +10,10 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from elastocal.audit.schemas import SCHEMAS
 from elastocal.io.origin import Origin
 from elastocal.io.records import JobRecord, write_records
 from elastocal.io.storage import read_blocks, write_table
+from elastocal_proof.audit.schemas import SCHEMAS
 
 IDEAL = "data/simulated/kuka/ideal.parquet"
 EXPERIMENTS = "data/simulated/kuka/experiments.parquet"

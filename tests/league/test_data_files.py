@@ -5,9 +5,9 @@ from made_leagues import made_data_set
 
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import write_table
-from elastocal.league.data_files import load_data_set
-from elastocal.league.schemas import FOLDS
 from elastocal.loop.schemas import measurements
+from elastocal_proof.league.data_files import load_data_set
+from elastocal_proof.league.schemas import FOLDS
 
 
 def test_descriptions_measurements_and_folds_come_back(kuka, config_folder, tmp_path):

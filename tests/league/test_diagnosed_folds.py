@@ -6,10 +6,10 @@ from made_folders import made_folder, made_table
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
-from elastocal.league.diagnosed_folds import fold_facts, fold_fits, physics_of_fold
-from elastocal.league.mechanisms import mechanism_columns
-from elastocal.league.methods import DIAGNOSIS, GEOMETRY, Method
 from elastocal.loop.whole import cases_in
+from elastocal_proof.league.diagnosed_folds import fold_facts, fold_fits, physics_of_fold
+from elastocal_proof.league.mechanisms import mechanism_columns
+from elastocal_proof.league.methods import DIAGNOSIS, GEOMETRY, Method
 
 
 @pytest.fixture(scope="module")

@@ -4,10 +4,10 @@ import numpy as np
 from made_leagues import made_data_set
 
 from elastocal.io.storage import read_table, write_table
-from elastocal.league.entry_columns import entry_columns
-from elastocal.league.methods import GEOMETRY, Method, entered, fitted_physics
-from elastocal.league.rounds import held_out_rounds, training_rounds
-from elastocal.league.schemas import ENTRIES
+from elastocal_proof.league.entry_columns import entry_columns
+from elastocal_proof.league.methods import GEOMETRY, Method, entered, fitted_physics
+from elastocal_proof.league.rounds import held_out_rounds, training_rounds
+from elastocal_proof.league.schemas import ENTRIES
 
 
 def test_each_observation_has_its_pose_target_and_residual(kuka, config_folder, tmp_path):

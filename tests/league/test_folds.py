@@ -5,7 +5,7 @@ import pytest
 from made_leagues import made_data_set
 
 from elastocal.campaigns.columns import measurements_from
-from elastocal.league.folds import WITHIN, dealt, fold_of_each
+from elastocal_proof.league.folds import WITHIN, dealt, fold_of_each
 
 
 @pytest.fixture(scope="module")

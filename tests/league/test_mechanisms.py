@@ -2,8 +2,8 @@
 
 from types import SimpleNamespace
 
-from elastocal.league.mechanisms import mechanism_columns
-from elastocal.league.schemas import MECHANISMS
+from elastocal_proof.league.mechanisms import mechanism_columns
+from elastocal_proof.league.schemas import MECHANISMS
 
 
 def test_a_fold_without_evidence_has_no_rows():

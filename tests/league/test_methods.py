@@ -5,10 +5,10 @@ import pytest
 from made_leagues import made_data_set
 
 from elastocal.errors import InputError
-from elastocal.league.methods import FRAMES, GEOMETRY, Method, entered, fitted_physics, method_from
-from elastocal.league.rounds import held_out_rounds, training_rounds
 from elastocal.validation.held_out import position_errors
 from elastocal.validation.placing import placed
+from elastocal_proof.league.methods import FRAMES, GEOMETRY, Method, entered, fitted_physics, method_from
+from elastocal_proof.league.rounds import held_out_rounds, training_rounds
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ import pandas as pd
 import pytest
 from made_leagues import made_results
 
-from elastocal.league.methods import Method
-from elastocal.league.pages import league_page
-from elastocal.league.table import league_table
+from elastocal_proof.league.methods import Method
+from elastocal_proof.league.pages import league_page
+from elastocal_proof.league.table import league_table
 
 METHODS = {
     "geometry": Method("geometry", words="geometry"),

@@ -3,7 +3,7 @@
 import pytest
 from made_leagues import made_data_set
 
-from elastocal.league.rounds import held_out_rounds, training_rounds
+from elastocal_proof.league.rounds import held_out_rounds, training_rounds
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from elastocal.league import schemas
-from elastocal.league.folds import WITHIN
+from elastocal_proof.league import schemas
+from elastocal_proof.league.folds import WITHIN
 
 
 @pytest.mark.parametrize("schema", [schemas.FOLDS, schemas.FITS, schemas.MECHANISMS, schemas.ENTRIES])

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 from made_leagues import made_entries, made_results
 
-from elastocal.league.methods import Method
-from elastocal.league.table import Result, cost_table, league_table, mechanism_table
+from elastocal_proof.league.methods import Method
+from elastocal_proof.league.table import Result, cost_table, league_table, mechanism_table
 
 ROBOTS = {"A robot": ["one"], "Another": ["two"]}
 

@@ -14,7 +14,7 @@ except ImportError:
 else:
     # By name, for without MuJoCo not even the names could be had.
     arms, campaigns, robots, sizing = (
-        import_module(f"elastocal.plant.{name}") for name in ("arm", "campaigns", "physical_robot", "sizing")
+        import_module(f"elastocal_proof.plant.{name}") for name in ("arm", "campaigns", "physical_robot", "sizing")
     )
 
 

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from support import OTHER_CHAINS, refused
 
-from elastocal.plant.arm import arm_from_document, arm_from_file, link_frames, turned
+from elastocal_proof.plant.arm import arm_from_document, arm_from_file, link_frames, turned
 
 CHAIN = "Tz(l1) Rz(q1) Tx(-l2) [A] Rx(90deg) Ty(0.5) Ry(-q2) Tz(0.3) [B]"
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal.plant.arm import arm_from_file, turned
-from elastocal.plant.bad_rows import HELD_POINT, KINDS, LARGEST, SMALLEST, possible_kinds, with_bad_rows
-from elastocal.plant.campaigns import Design, measured_table, schedule_of
-from elastocal.plant.physical_robot import specimen
-from elastocal.plant.tracker import rotation_vector
+from elastocal_proof.plant.arm import arm_from_file, turned
+from elastocal_proof.plant.bad_rows import HELD_POINT, KINDS, LARGEST, SMALLEST, possible_kinds, with_bad_rows
+from elastocal_proof.plant.campaigns import Design, measured_table, schedule_of
+from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.tracker import rotation_vector
 
 DESIGN = Design(poses=20, held_out=6, ladder=(0.0, 1.0), repeats=2, repeated_poses=3, points=("3DoF", "flange"), covariates=())
 READ = {"x", "y", "z", "rx", "ry", "rz"}

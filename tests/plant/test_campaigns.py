@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.plant.campaigns import Design, continued, measured_table, schedule_of
-from elastocal.plant.defects import Defect, drawn_defect, with_defects
-from elastocal.plant.tracker import Tracker
+from elastocal_proof.plant.campaigns import Design, continued, measured_table, schedule_of
+from elastocal_proof.plant.defects import Defect, drawn_defect, with_defects
+from elastocal_proof.plant.tracker import Tracker
 
 
 def test_the_default_design_is_a_ladder_at_thirty_poses_with_repeats_on_ten(fanuc_arm):

@@ -15,11 +15,11 @@ from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.links import extended_chain, spring_compliance
 from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.robot import Link, Tube
-from elastocal.plant.arm import arm_from_document, arm_from_file, link_frames
-from elastocal.plant.campaigns import usual_force_N
-from elastocal.plant.statics import generalized_forces
-from elastocal.plant.structure import Structure, TaperedTube
-from elastocal.plant.weights import declared_masses, on_stretches
+from elastocal_proof.plant.arm import arm_from_document, arm_from_file, link_frames
+from elastocal_proof.plant.campaigns import usual_force_N
+from elastocal_proof.plant.statics import generalized_forces
+from elastocal_proof.plant.structure import Structure, TaperedTube
+from elastocal_proof.plant.weights import declared_masses, on_stretches
 
 
 def deflections(arm, angles, wrench, **more):

@@ -12,10 +12,10 @@ from elastocal.errors import InputError
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.sites import sites_of
-from elastocal.plant.campaigns import schedule_of
-from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
-from elastocal.plant.physical_robot import seen_poses, specimen
-from elastocal.plant.tracker import rotation_vector
+from elastocal_proof.plant.campaigns import schedule_of
+from elastocal_proof.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
+from elastocal_proof.plant.physical_robot import seen_poses, specimen
+from elastocal_proof.plant.tracker import rotation_vector
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
 FOREIGN = sorted(set(KINDS) - set(NAMED))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.plant.drives import (
+from elastocal_proof.plant.drives import (
     CablePull,
     PoseError,
     Repeatability,

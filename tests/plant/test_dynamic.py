@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal.plant.defects import Defect, with_defects
-from elastocal.plant.dynamic import _unloaded, dynamic_table, moving_angles
-from elastocal.plant.physical_robot import seen_poses
-from elastocal.plant.tracker import Tracker
+from elastocal_proof.plant.defects import Defect, with_defects
+from elastocal_proof.plant.dynamic import _unloaded, dynamic_table, moving_angles
+from elastocal_proof.plant.physical_robot import seen_poses
+from elastocal_proof.plant.tracker import Tracker
 
 SILENT = Tracker(sigma_m=0.0, sigma_rad=0.0)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.plant.gears import (
+from elastocal_proof.plant.gears import (
     AngleDependentStiffness,
     Asymmetric,
     BoucWen,

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from elastocal.plant.load_cell import LoadCell
+from elastocal_proof.plant.load_cell import LoadCell
 
 
 @pytest.fixture

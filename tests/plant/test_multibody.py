@@ -9,9 +9,9 @@ import pytest
 from scipy.integrate import quad
 from support import refused
 
-from elastocal.plant.arm import arm_from_document
-from elastocal.plant.multibody import machine_of
-from elastocal.plant.structure import Compensator, Mass, Structure, TaperedTube
+from elastocal_proof.plant.arm import arm_from_document
+from elastocal_proof.plant.multibody import machine_of
+from elastocal_proof.plant.structure import Compensator, Mass, Structure, TaperedTube
 
 
 def arm_of(chain, joints=2):

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.plant.campaigns import schedule_of
-from elastocal.plant.drives import WrongRatio, ZeroOffset
-from elastocal.plant.gears import Asymmetric
-from elastocal.plant.load_cell import LoadCell
-from elastocal.plant.multibody import machine_of
-from elastocal.plant.physical_robot import Warmth, at_rest, driven, seen_poses, specimen
-from elastocal.plant.tracker import EccentricNest, rotation_vector
-from elastocal.plant.weights import declared_masses, on_stretches
+from elastocal_proof.plant.campaigns import schedule_of
+from elastocal_proof.plant.drives import WrongRatio, ZeroOffset
+from elastocal_proof.plant.gears import Asymmetric
+from elastocal_proof.plant.load_cell import LoadCell
+from elastocal_proof.plant.multibody import machine_of
+from elastocal_proof.plant.physical_robot import Warmth, at_rest, driven, seen_poses, specimen
+from elastocal_proof.plant.tracker import EccentricNest, rotation_vector
+from elastocal_proof.plant.weights import declared_masses, on_stretches
 
 
 def test_castings_warm_up_behind_the_thermometer_and_reach_it():

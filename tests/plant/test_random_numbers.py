@@ -3,7 +3,7 @@
 import numpy as np
 
 from elastocal import random_streams
-from elastocal.plant.random_numbers import stream
+from elastocal_proof.plant.random_numbers import stream
 
 # Sealed records of earlier runs hold what follows from these.
 PINNED = {

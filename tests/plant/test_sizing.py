@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.plant.campaigns import Design, schedule_of
-from elastocal.plant.defects import KINDS, Defect, drawn_defect, with_defects
-from elastocal.plant.sizing import Yardstick, size_for
-from elastocal.plant.tracker import Move
-from elastocal.plant.weights import declared_masses, on_stretches
+from elastocal_proof.plant.campaigns import Design, schedule_of
+from elastocal_proof.plant.defects import KINDS, Defect, drawn_defect, with_defects
+from elastocal_proof.plant.sizing import Yardstick, size_for
+from elastocal_proof.plant.tracker import Move
+from elastocal_proof.plant.weights import declared_masses, on_stretches
 
 
 @pytest.mark.parametrize("target", [10.0, 200.0])

@@ -10,10 +10,10 @@ import pytest
 from arms_at_rest import STATES, angles_and_wrenches, at_rest, loading_of
 from scipy.optimize import brentq
 
-from elastocal.plant.arm import arm_from_document
-from elastocal.plant.multibody import machine_of
-from elastocal.plant.statics import Loading, equilibrium, generalized_forces, places
-from elastocal.plant.structure import Compensator, Mass, Structure, TaperedTube
+from elastocal_proof.plant.arm import arm_from_document
+from elastocal_proof.plant.multibody import machine_of
+from elastocal_proof.plant.statics import Loading, equilibrium, generalized_forces, places
+from elastocal_proof.plant.structure import Compensator, Mass, Structure, TaperedTube
 
 
 def test_weight_turns_the_joints_as_pinocchio_says(arm):

@@ -3,9 +3,9 @@
 import numpy as np
 from arms_at_rest import angles_and_wrenches, at_rest, loading_of
 
-from elastocal.plant.multibody import machine_of
-from elastocal.plant.statics import generalized_forces
-from elastocal.plant.structure import Compensator, Mass, Structure, TaperedTube
+from elastocal_proof.plant.multibody import machine_of
+from elastocal_proof.plant.statics import generalized_forces
+from elastocal_proof.plant.structure import Compensator, Mass, Structure, TaperedTube
 
 
 def test_by_default_an_arm_has_drives_and_gears_alone_and_no_weight(fanuc_arm):

@@ -4,8 +4,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from elastocal.plant.arm import turned
-from elastocal.plant.tracker import Drift, EccentricNest, Move, Tracker, misplaced_base, rotation_vector
+from elastocal_proof.plant.arm import turned
+from elastocal_proof.plant.tracker import Drift, EccentricNest, Move, Tracker, misplaced_base, rotation_vector
 
 
 @pytest.fixture

@@ -8,11 +8,11 @@ import pytest
 from analysed_robots import ROBOTS
 from arms_at_rest import STATES, angles_and_wrenches
 
-from elastocal.plant.arm import LinkMass, arm_from_document, arm_from_file, link_frames
-from elastocal.plant.multibody import machine_of
-from elastocal.plant.random_numbers import stream
-from elastocal.plant.structure import Mass, Structure
-from elastocal.plant.weights import (
+from elastocal_proof.plant.arm import LinkMass, arm_from_document, arm_from_file, link_frames
+from elastocal_proof.plant.multibody import machine_of
+from elastocal_proof.plant.random_numbers import stream
+from elastocal_proof.plant.structure import Mass, Structure
+from elastocal_proof.plant.weights import (
     allowed_centre_std_m,
     centre_std_m,
     declared_masses,

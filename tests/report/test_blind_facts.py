@@ -8,8 +8,8 @@ from made_blind_documents import oracle, silence, truth
 from made_blind_facts import MANIFEST, MEASURED, PROOF, facts_of, tables
 from scipy.stats import beta
 
-from elastocal.blind.confusion import CLASS_WITHOUT
-from elastocal.report.blind_facts import blind_facts
+from elastocal_proof.blind.confusion import CLASS_WITHOUT
+from elastocal_proof.report.blind_facts import blind_facts
 
 
 @pytest.fixture(scope="module")

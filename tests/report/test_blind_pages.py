@@ -7,7 +7,7 @@ from made_blind_documents import oracle, silence, truth
 from made_blind_facts import MEASURED, PROOF, facts_of
 from matplotlib.image import imread
 
-from elastocal.report.blind_pages import write_blind_report
+from elastocal_proof.report.blind_pages import write_blind_report
 
 FIGURES = ("targets", "power", "reliability", "confusion", "errors", "coverage", "sweep")
 MARGIN_OF_PAGE = 20 / 210

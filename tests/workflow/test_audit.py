@@ -10,9 +10,9 @@ from durations import HUNG_S
 from made_proofs import audited_proofs, made_proofs
 from planted_errors import BLIND, CAMPAIGN, CAMPAIGNS, PLANTED, PLANTED_IN_PROOFS
 
-from elastocal.audit.audited import Audited
-from elastocal.audit.files import OF_EVERY_FILE
-from elastocal.audit.whole import CHECKS, audit, checks_of
+from elastocal_proof.audit.audited import Audited
+from elastocal_proof.audit.files import OF_EVERY_FILE
+from elastocal_proof.audit.whole import CHECKS, audit, checks_of
 
 # Of these few data sets and replicates enough that what is planted in a share of a file is in the sample.
 ROWS = 12

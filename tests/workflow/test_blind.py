@@ -65,9 +65,9 @@ def test_every_table_and_figure_is_there(scored):
 
 
 EDITS = {
-    "the scores": ("src/elastocal/blind/scores.py", {"score_cases", "compile_blind_report"}),
-    "the targets": ("src/elastocal/blind/targets.py", {"score_cases", "draw_blind_targets", "compile_blind_report"}),
-    "the oracle": ("src/elastocal/blind/oracle.py", {"oracle_cases", "score_cases"}),
+    "the scores": ("src/elastocal_proof/blind/scores.py", {"score_cases", "compile_blind_report"}),
+    "the targets": ("src/elastocal_proof/blind/targets.py", {"score_cases", "draw_blind_targets", "compile_blind_report"}),
+    "the oracle": ("src/elastocal_proof/blind/oracle.py", {"oracle_cases", "score_cases"}),
 }
 
 
@@ -81,7 +81,7 @@ def test_edit_reruns_scores_and_no_diagnosis_of(edit, copy):
 
 
 def test_a_figure_reruns_itself_and_the_report(copy):
-    copy.edit("src/elastocal/figures/blind_errors.py")
+    copy.edit("src/elastocal_proof/figures/blind_errors.py")
     assert rules(copy.planned(*BLIND)) == {"draw_blind_errors", "compile_blind_report", "blind"}
 
 
@@ -90,7 +90,7 @@ def test_a_truth_that_was_edited_ends_in_one_line_with_its_file(copy, module):
     truth = copy.files(f"{SEALED}/*.json")[0]
     copy.append(truth, "\n")
     # It is not sealed anew: what reads it next refuses it.
-    copy.edit(f"src/elastocal/blind/{module}.py")
+    copy.edit(f"src/elastocal_proof/blind/{module}.py")
     ended = copy.snakemake("-j1", *BLIND)
     assert ended.returncode != 0
     said = [line for line in ended.stderr.splitlines() if line.startswith(truth)]

@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.blind.rehearsal import hidden_robot, hidden_words, with_misplaced_base
-from elastocal.blind.rehearsal_files import fill_sheet, lose_beam, measured_errors, write_milling_path
 from elastocal.campaigns.measurements import CSV
 from elastocal.campaigns.reading import read_descriptions, read_robot
 from elastocal.errors import InputError
+from elastocal_proof.blind.rehearsal import hidden_robot, hidden_words, with_misplaced_base
+from elastocal_proof.blind.rehearsal_files import fill_sheet, lose_beam, measured_errors, write_milling_path
 
 ROBOTS = Path("config/robots")
 

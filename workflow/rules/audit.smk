@@ -4,7 +4,7 @@
 hold, reports/audit.txt; where one does not, it ends with an error. Files of other targets, such as blind, are audited where they are.
 """
 
-from elastocal.audit.targets import finished
+from elastocal_proof.audit.targets import finished
 
 
 rule audit_files:

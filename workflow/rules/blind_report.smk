@@ -178,7 +178,7 @@ rule compile_blind_report:
         sweep=rules.score_sweep.output.table,
         manifest=rules.seal_cases.output.manifest,
         figures=[*expand("reports/blind/figures/{figure}.pdf", figure=BLIND_FIGURES), rules.score_sweep.output.pdf],
-        pages=[placed(PACKAGES / "elastocal" / "report" / name) for name in ("blind.typ", "sheet.typ")],
+        pages=[placed(PACKAGES / file) for file in ("elastocal_proof/report/blind.typ", "elastocal/report/sheet.typ")],
         sources=sources("compile_blind_report.py"),
     output:
         report=shown("reports/blind/blind.pdf", "blind", "Blind proof", shows="The report of the blind proof", kind="report"),

@@ -10,14 +10,14 @@ from grimp.exceptions import SourceSyntaxError
 
 from elastocal.errors import InputError
 
-PACKAGE = "elastocal"
+PACKAGES = ("elastocal", "elastocal_proof")
 
 
 def closure(script: Path, source: Path) -> list[Path]:
     """Source files that a script imports, directly or not.
 
-    `script`: imports modules of the package and of its own folder. `source`: folder of the package. Returns sorted, without the
-    script itself. Raises `InputError`: a source file that is no Python, such as an effect that is being written.
+    `script`: imports modules of the packages and of its own folder. `source`: folder of the packages. Returns sorted, without
+    the script itself. Raises `InputError`: a source file that is no Python, such as an effect that is being written.
     """
     files, left, modules = set(), [script], set()
     while left:
@@ -28,18 +28,18 @@ def closure(script: Path, source: Path) -> list[Path]:
     modules |= {found for name in modules for found in _upstream(name)}
     # With a module come the packages above it.
     names = {package for name in modules for package in accumulate(name.split("."), "{}.{}".format)}
-    return sorted(files - {script} | {_file(name, source) for name in names if name.split(".")[0] == PACKAGE})
+    return sorted(files - {script} | {_file(name, source) for name in names if name.split(".")[0] in PACKAGES})
 
 
 @cache
 def _graph() -> grimp.ImportGraph:
     # What is imported for annotations alone changes no result.
     try:
-        graph = grimp.build_graph(PACKAGE, include_external_packages=True, exclude_type_checking_imports=True, cache_dir=None)
+        graph = grimp.build_graph(*PACKAGES, include_external_packages=True, exclude_type_checking_imports=True, cache_dir=None)
     except SourceSyntaxError as error:
         raise _no_python(error.filename, error) from None
     # A catalogue looks up the modules beside it by itself.
-    for catalogue in graph.find_modules_that_directly_import(f"{PACKAGE}.io.modules"):
+    for catalogue in graph.find_modules_that_directly_import("elastocal.io.modules"):
         for module in graph.find_children(catalogue.rpartition(".")[0]):
             if module != catalogue:
                 graph.add_import(importer=catalogue, imported=module)

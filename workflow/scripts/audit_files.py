@@ -5,12 +5,12 @@ from pathlib import Path
 from job import Job, origin_of, run
 
 from elastocal import __version__
-from elastocal.audit.audited import Audited
-from elastocal.audit.page import page
-from elastocal.audit.targets import OTHERS
-from elastocal.audit.whole import as_table, audit
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import write_csv
+from elastocal_proof.audit.audited import Audited
+from elastocal_proof.audit.page import page
+from elastocal_proof.audit.targets import OTHERS
+from elastocal_proof.audit.whole import as_table, audit
 
 
 def audit_files(job: Job) -> None:

@@ -6,9 +6,9 @@ from job import Job, run
 
 import pandas as pd
 
-from elastocal.blind.carrying_out import carry_out
-from elastocal.blind.cases import SIZES, cases_of
 from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal_proof.blind.carrying_out import carry_out
+from elastocal_proof.blind.cases import SIZES, cases_of
 
 
 def carry_out_follow_ups(job: Job) -> None:

@@ -4,11 +4,11 @@ from pathlib import Path
 
 from job import Job, run
 
-from elastocal.blind import schemas
-from elastocal.blind.closed_loop import cases, closed_loop
 from elastocal.campaigns.reading import read_robot
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
+from elastocal_proof.blind import schemas
+from elastocal_proof.blind.closed_loop import cases, closed_loop
 
 
 def close_loop(job: Job) -> None:

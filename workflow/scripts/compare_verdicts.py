@@ -4,10 +4,10 @@ from pathlib import Path
 
 from job import Job, run
 
-from elastocal.blind import schemas
-from elastocal.blind.bad_rows import compare_verdicts, draw_seeds
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
+from elastocal_proof.blind import schemas
+from elastocal_proof.blind.bad_rows import compare_verdicts, draw_seeds
 
 
 def compare(job: Job) -> None:

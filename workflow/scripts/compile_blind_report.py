@@ -6,8 +6,8 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.report.blind_facts import blind_facts
-from elastocal.report.blind_pages import write_blind_report
+from elastocal_proof.report.blind_facts import blind_facts
+from elastocal_proof.report.blind_pages import write_blind_report
 
 TABLES = ("summary", "settings", "power", "undetectable", "confusion", "cases", "follow_up", "sweep")
 

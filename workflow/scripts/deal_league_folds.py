@@ -6,11 +6,11 @@ from elastocal.campaigns.columns import columns_of
 from elastocal.io.json_files import write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
-from elastocal.league.folds import dealt
-from elastocal.league.schemas import FOLDS
 from elastocal.loop.loading import load_whole_campaign
 from elastocal.loop.schemas import measurements
 from elastocal.random_streams import stream
+from elastocal_proof.league.folds import dealt
+from elastocal_proof.league.schemas import FOLDS
 
 
 def deal_league_folds(job: Job) -> None:

@@ -6,9 +6,9 @@ from typing import Any
 
 from job import Job, run
 
-from elastocal.blind.follow_up import diagnosed_anew
 from elastocal.io.json_files import write_json
 from elastocal.loop.whole import diagnosed
+from elastocal_proof.blind.follow_up import diagnosed_anew
 
 
 def diagnose_follow_ups(job: Job) -> None:

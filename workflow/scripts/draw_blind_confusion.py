@@ -4,8 +4,8 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.blind_power import confusion_map
 from elastocal.figures.style import save
+from elastocal_proof.figures.blind_power import confusion_map
 
 
 def draw_blind_confusion(job: Job) -> None:

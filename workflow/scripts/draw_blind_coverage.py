@@ -4,8 +4,8 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.blind_rates import coverage_by_effect
 from elastocal.figures.style import save
+from elastocal_proof.figures.blind_rates import coverage_by_effect
 
 
 def draw_blind_coverage(job: Job) -> None:

@@ -4,8 +4,8 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.blind_errors import errors_against_oracle
 from elastocal.figures.style import save
+from elastocal_proof.figures.blind_errors import errors_against_oracle
 
 
 def draw_blind_errors(job: Job) -> None:

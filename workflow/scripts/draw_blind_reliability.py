@@ -4,8 +4,8 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.blind_reliability import reliability_diagram
 from elastocal.figures.style import save
+from elastocal_proof.figures.blind_reliability import reliability_diagram
 
 
 def draw_blind_reliability(job: Job) -> None:

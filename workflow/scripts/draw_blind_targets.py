@@ -4,8 +4,8 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.blind_rates import rates_and_targets
 from elastocal.figures.style import save
+from elastocal_proof.figures.blind_rates import rates_and_targets
 
 
 def draw_blind_targets(job: Job) -> None:

@@ -4,8 +4,8 @@ from job import Job, run
 
 import pandas as pd
 
-from elastocal.audit.whole import require_all
 from elastocal.io.atomic_writes import write_text
+from elastocal_proof.audit.whole import require_all
 
 
 def judge_audit(job: Job) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from job import Job, run
 
-from elastocal.blind.cases import SIZES, block_of, cases_of, make_case
+from elastocal_proof.blind.cases import SIZES, block_of, cases_of, make_case
 
 
 def make_cases(job: Job) -> None:

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from job import Job, run
 
-from elastocal.blind.ground_truth import load_ground_truth
-from elastocal.blind.oracle import oracle
 from elastocal.io.json_files import read_json, write_json
+from elastocal_proof.blind.ground_truth import load_ground_truth
+from elastocal_proof.blind.oracle import oracle
 
 
 def oracle_cases(job: Job) -> None:

@@ -6,15 +6,15 @@ from job import Job, run
 
 import pandas as pd
 
-from elastocal.blind.calibration import reliability, statements
-from elastocal.blind.case_rows import case_row
-from elastocal.blind.confusion import confused
-from elastocal.blind.coverage import covered, intervals_of
-from elastocal.blind.ground_truth import load_ground_truth
-from elastocal.blind.power import powers, undetectable
-from elastocal.blind.targets import by_setting, summarized
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
+from elastocal_proof.blind.calibration import reliability, statements
+from elastocal_proof.blind.case_rows import case_row
+from elastocal_proof.blind.confusion import confused
+from elastocal_proof.blind.coverage import covered, intervals_of
+from elastocal_proof.blind.ground_truth import load_ground_truth
+from elastocal_proof.blind.power import powers, undetectable
+from elastocal_proof.blind.targets import by_setting, summarized
 
 
 def score_cases(job: Job) -> None:

@@ -6,7 +6,9 @@ from job import Job, run
 
 import pandas as pd
 
-from elastocal.blind.follow_up_scores import (
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import read_json
+from elastocal_proof.blind.follow_up_scores import (
     followed,
     poses_needed,
     promised,
@@ -15,9 +17,7 @@ from elastocal.blind.follow_up_scores import (
     with_one_effect,
     with_prospects,
 )
-from elastocal.blind.ground_truth import load_ground_truth
-from elastocal.io.data_frames import write_csv
-from elastocal.io.json_files import read_json
+from elastocal_proof.blind.ground_truth import load_ground_truth
 
 
 def score_follow_ups(job: Job) -> None:

@@ -4,12 +4,12 @@ from pathlib import Path
 
 from job import Job, origin_of, run
 
-from elastocal.blind.ground_truth import load_ground_truth
-from elastocal.blind.sweep import against_angle, swept
 from elastocal.figures.style import save
-from elastocal.figures.sweep import sweep
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
+from elastocal_proof.blind.ground_truth import load_ground_truth
+from elastocal_proof.blind.sweep import against_angle, swept
+from elastocal_proof.figures.sweep import sweep
 
 
 def score_sweep(job: Job) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from job import Job, run
 
-from elastocal.blind.cases import write_manifest
+from elastocal_proof.blind.cases import write_manifest
 
 
 def seal_cases(job: Job) -> None:

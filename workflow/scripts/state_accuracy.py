@@ -6,9 +6,9 @@ from job import Job, run
 
 import pandas as pd
 
-from elastocal.blind.closed_loop import cases
-from elastocal.blind.stated_accuracy import stated_accuracy
 from elastocal.io.data_frames import write_csv
+from elastocal_proof.blind.closed_loop import cases
+from elastocal_proof.blind.stated_accuracy import stated_accuracy
 
 
 def state_accuracy(job: Job) -> None:

@@ -2,9 +2,9 @@
 
 from job import Job, run
 
-from elastocal.blind import schemas
-from elastocal.blind.bad_rows_summary import judge_cases, summarize
 from elastocal.io.data_frames import read_frame, write_csv
+from elastocal_proof.blind import schemas
+from elastocal_proof.blind.bad_rows_summary import judge_cases, summarize
 
 
 def summarize_bad_rows(job: Job) -> None:

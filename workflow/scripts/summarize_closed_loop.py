@@ -4,12 +4,12 @@ from pathlib import Path
 
 from job import Job, origin_of, run
 
-from elastocal.blind import schemas
-from elastocal.blind.closed_loop_summary import case_errors, goals, summary
 from elastocal.campaigns.reading import read_robot
-from elastocal.figures.closed_loop import closed_loop
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_frame, write_csv
+from elastocal_proof.blind import schemas
+from elastocal_proof.blind.closed_loop_summary import case_errors, goals, summary
+from elastocal_proof.figures.closed_loop import closed_loop
 
 
 def summarize_closed_loop(job: Job) -> None:

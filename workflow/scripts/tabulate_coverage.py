@@ -4,8 +4,8 @@ from job import Job, run
 
 import pandas as pd
 
-from elastocal.blind.stated_accuracy import coverage
 from elastocal.io.data_frames import write_csv
+from elastocal_proof.blind.stated_accuracy import coverage
 
 
 def tabulate_coverage(job: Job) -> None:

@@ -7,15 +7,15 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.league import league_picture, mechanism_picture
 from elastocal.figures.style import save
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_frame, write_csv
-from elastocal.league.folds import RANDOM
-from elastocal.league.methods import Method
-from elastocal.league.pages import league_page
-from elastocal.league.schemas import ENTRIES, MECHANISMS
-from elastocal.league.table import Result, cost_table, league_table, mechanism_table
+from elastocal_proof.figures.league import league_picture, mechanism_picture
+from elastocal_proof.league.folds import RANDOM
+from elastocal_proof.league.methods import Method
+from elastocal_proof.league.pages import league_page
+from elastocal_proof.league.schemas import ENTRIES, MECHANISMS
+from elastocal_proof.league.table import Result, cost_table, league_table, mechanism_table
 
 
 def timing(folder: str, *names: str) -> dict[str, float]:

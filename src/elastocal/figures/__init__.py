@@ -1,4 +1,4 @@
-"""Figures of study, loop and blind proof: tables in, PDF out.
+"""Figures of study and loop: tables in, PDF out.
 
-Imports tables' contents and names from `study`, `diagnosis` and `blind`; computes nothing.
+Imports tables' contents and names from `study` and `diagnosis`; computes nothing.
 """

@@ -1,4 +1,4 @@
 """Reports as PDF: facts and sentences for the Typst templates that stand beside them.
 
-Imports what it reports on: `study`, `diagnosis`, `effects`, `blind`.
+Imports what it reports on: `study`, `diagnosis`, `effects`.
 """

@@ -1,4 +1,4 @@
-"""A typst document of this folder to a PDF, with the data and pictures that it reads beside it."""
+"""A typst document to a PDF, with the data and pictures that it reads beside it."""
 
 from __future__ import annotations
 
@@ -21,18 +21,25 @@ if TYPE_CHECKING:
 
 
 def compile_document(
-    path: str | Path, document: str, data: Mapping[str, Any], figures: Iterable[str] = (), origin: Origin | None = None
+    path: str | Path,
+    document: str,
+    data: Mapping[str, Any],
+    figures: Iterable[str] = (),
+    origin: Origin | None = None,
+    package: str = __package__,
 ) -> None:
     """Compile a document; the PDF appears whole or not at all.
 
-    `path`: the PDF. `document`: file name of the document in this folder. `data`: JSON-serialisable contents of the files
+    `path`: the PDF. `document`: file name of the document. `data`: JSON-serialisable contents of the files
     ``<name>.json`` that the document reads. `figures`: PDF files; the document finds them by their names. `origin`: what the
-    document shows in its foot and has in its metadata: the contents of ``origin.json``, empty without.
+    document shows in its foot and has in its metadata: the contents of ``origin.json``, empty without. `package`: has the
+    document.
     """
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / document
-        # A document imports what it shares with the others.
-        for each in resources.files("elastocal.report").iterdir():
+        # A document imports what it shares with the others, which stands here.
+        beside = (each for name in {__package__, package} for each in resources.files(name).iterdir())
+        for each in beside:
             if each.name.endswith(".typ"):
                 Path(folder, each.name).write_text(each.read_text(encoding="utf-8"), encoding="utf-8")
         if not source.is_file():

@@ -7,9 +7,9 @@ from made_surveys import made_candidates, made_survey
 
 from elastocal.application.planning.plan import planned
 from elastocal.application.planning.sheet import REPEATED_POSES, REPEATS, campaign_document, sheet
-from elastocal.blind.rehearsal import filled_sheet, hidden_robot
 from elastocal.campaigns.measurements import TICK
 from elastocal.campaigns.reading import read_campaign
+from elastocal_proof.blind.rehearsal import filled_sheet, hidden_robot
 
 
 def made():

@@ -1,0 +1,157 @@
+"""The analyst's folder, and the sealed ground truth outside of it. A campaign's format is a contract of both sides."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+import yaml
+
+from elastocal.campaigns.writing import write_campaign
+from elastocal.io.atomic_writes import write_text
+from elastocal_proof.plant.campaigns import Design, measured_table
+from elastocal_proof.plant.dynamic import DYNAMIC, dynamic_table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from elastocal_proof.plant.arm import Arm, LinkMass
+    from elastocal_proof.plant.bad_rows import BadReading
+    from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
+
+    Table = dict[str, np.ndarray]
+    Slip = Callable[[Table], tuple[Table, list[BadReading]]]
+
+ROBOT_FILE = "robot.yaml"
+
+
+def robot_document(
+    document: Mapping[str, Any], arm: Arm, declared: Sequence[LinkMass], gravity_m_s2: Iterable[float]
+) -> dict[str, Any]:
+    """Contents of the campaign's own robot file.
+
+    `document`: of the robot file of which this is a specimen. `declared`: weights as they are declared to the analyst; where
+    there are none, the file has no masses.
+    """
+    described = {
+        key: value for key, value in document.items() if key not in ("masses", "gravity_m_s2", "compensator", "payload_kg")
+    }
+    if declared:
+        described["masses"] = [
+            {"link": m.link, "mass_kg": m.mass_kg, "centre_m": list(m.centre_m), "relative_std": m.relative_std}
+            for m in declared
+        ]
+    described |= {
+        "gravity_m_s2": list(gravity_m_s2),
+        "payload_kg": round(arm.payload_kg, 1),
+        "gear_ratio": list(arm.gear_ratio),
+    }
+    if arm.compensated:
+        described["compensator"] = document.get("compensator", {"joint": 2, "kind": "spring"})
+    return described
+
+
+def campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
+    """Contents of campaign.yaml; nothing in it depends on the defects."""
+    document = {
+        "campaign": name,
+        "robot": ROBOT_FILE,
+        "measured": design.measured,
+        "frame": design.frame,
+        "targets": {f"{point}": {"point": point, "offset_m": [0, 0, 0]} for point in design.targets_on(arm)},
+        "compliance": "identify",
+        "declared": list(design.declared),
+        "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
+    }
+    if design.declared_noise is not None:
+        document["noise"] = dict(zip(("position_m", "orientation_rad"), design.declared_noise, strict=True))
+    return document
+
+
+def write_blind_campaign(
+    folder: str | Path,
+    name: str,
+    robot_file: str | Path,
+    robot: PhysicalRobot,
+    design: Design,
+    schedule: Schedule,
+    declared: Sequence[LinkMass] = (),
+    kind: str = "parquet",
+    slipped: Slip | None = None,
+) -> dict[str, Any]:
+    """Measure, and write what the analyst gets.
+
+    `folder`: the campaign's own. `name`: of the campaign; must not give the ground truth away. `robot_file`: of which the robot
+    is a specimen. `declared`: weights as they are declared to the analyst. `kind`: one of "parquet", "csv". `slipped`: from a
+    measured table to the same with what went wrong in the file, and a list of that. Returns how the data were made, for the
+    ground truth of the case.
+    """
+    table, outliers = measured_table(robot, design, schedule)
+    table, slips = slipped(table) if slipped else (table, [])
+    write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, kind)
+    write_robot(folder, robot_file, robot, declared)
+    return {
+        "campaign": name,
+        "robot": Path(robot_file).stem,
+        "seed": schedule.seed,
+        "design": asdict(design),
+        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
+        "masses": [asdict(mass) for mass in robot.structure.masses],
+        "declared_masses": [asdict(mass) for mass in declared],
+        "noise": {name: getattr(robot.tracker, name) for name in ("sigma_m", "sigma_m_per_m", "sigma_rad")},
+        "outliers": [list(outlier) for outlier in outliers],
+        "measurements": len(table["pose"]),
+        "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
+    } | ({"bad_rows": [asdict(slip) for slip in slips]} if slipped else {})
+
+
+def write_dynamic_campaign(
+    folder: str | Path,
+    name: str,
+    robot_file: str | Path,
+    robot: PhysicalRobot,
+    measurements: int,
+    seed: int,
+    declared: Sequence[LinkMass] = (),
+) -> None:
+    """Measure a moving arm, and write what the analyst gets: for benchmarks of many measurements.
+
+    `folder`, `name`, `robot_file`, `robot`, `declared`: as in `write_blind_campaign`. `measurements`: at 1,000 a second,
+    without a load.
+    """
+    document = campaign_document(name, robot.arm, DYNAMIC) | {
+        "compliance": "nominal",
+        "declared": ["joint_offset", "link_geometry"],
+        "noise": {"position_m": robot.tracker.sigma_m},
+        "holdout": {"fraction": 0.3, "seed": 1},
+    }
+    write_campaign(folder, document, dynamic_table(robot, measurements, seed), robot.arm.joints, "parquet")
+    write_robot(folder, robot_file, robot, declared)
+
+
+def write_robot(folder: str | Path, robot_file: str | Path, robot: PhysicalRobot, declared: Sequence[LinkMass]) -> None:
+    """Write the campaign's own robot file; see `robot_document`."""
+    nominal = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
+    document = robot_document(nominal, robot.arm, declared, robot.structure.gravity_m_s2)
+    write_text(Path(folder) / ROBOT_FILE, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))
+
+
+def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str | Path) -> str:
+    """Seal the ground truth of a case: sorted JSON, outside of the campaign's folder.
+
+    Returns SHA-256 of the file, to be published before any diagnosis. Raises `ValueError`: the file would lie in the campaign's
+    folder.
+    """
+    path, folder = Path(path), Path(campaign_folder)
+    if folder.resolve() in path.resolve().parents:
+        raise ValueError(f"{path}: the ground truth must not lie in the campaign's folder {folder}")
+    text = json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, text)
+    return hashlib.sha256(text.encode()).hexdigest()

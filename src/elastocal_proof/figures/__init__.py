@@ -1,0 +1,1 @@
+"""Figures of blind proof, closed loop and league: tables in, PDF out; computes nothing."""
