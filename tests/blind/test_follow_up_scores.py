@@ -21,7 +21,7 @@ def entry(case, arm, poses, verdict):
     return {"campaign": case, "arm": arm, "poses": poses, "verdict": verdict}
 
 
-def sealed(case, *effects, robot="gp180", group="single"):
+def sealed(case, *effects, robot="m900ib700", group="single"):
     document = truth(*effects, group=group)
     return document | {"campaign": case, "case": document["case"] | {"robot": robot}}
 

@@ -77,3 +77,30 @@ def test_a_pair_is_named_and_what_hardly_shows_is_not_detected(cases, few):
     found = limit(both, ROBOTS)
     assert found["right"] and found["mechanisms"] == [SOME[0], SOME[2]]
     assert not limit(replace(single, levels=(0.5,)), ROBOTS)["detected"]
+
+
+def test_a_sixth_of_the_cases_that_targets_compare_with_is_in_the_sample(monkeypatch):
+    monkeypatch.setattr(module, "limit", lambda case, robots_folder: {"right": True})
+
+    def in_sample(seed, group="single", level=50.0, of="retained"):
+        truth = {
+            "case": {
+                "key": "k",
+                "group": group,
+                "robot": "kuka",
+                "effects": ["payload"],
+                "levels": [level],
+                "setting": "usual",
+                "seed": seed,
+                "alternative": "",
+            },
+            "defects": [{"of": of}],
+        }
+        return module.limit_of_sample(truth, ROBOTS) is not None
+
+    drawn = sum(in_sample(seed) for seed in range(600))
+    # Of a binomial distribution, 99.9 %.
+    assert 70 <= drawn <= 131
+    chosen = next(seed for seed in range(100) if in_sample(seed))
+    assert in_sample(chosen, "pair", 200.0) and in_sample(chosen, level=25.0)
+    assert not any((in_sample(chosen, level=200.0), in_sample(chosen, "outside"), in_sample(chosen, of="raw")))

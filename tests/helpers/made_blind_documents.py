@@ -7,7 +7,7 @@ from elastocal_proof.blind.case_rows import case_row
 JOINTS = 6
 
 
-def truth(*places, group="single", level=50.0, robot="gp180", setting="usual", **changes):
+def truth(*places, group="single", level=50.0, robot="m900ib700", setting="usual", **changes):
     """A sealed document; a place is an effect with its joints, such as ("joint_offset", 3)."""
     defects = [
         {
@@ -79,5 +79,5 @@ def oracle(p_value=1e-6, rms=1e-4):
 
 
 def frame(*entries):
-    """Rows of cases.csv of (ground truth, verdict, oracle)."""
+    """Rows of cases.csv of (ground truth, verdict, oracle), with a limit behind them where there is one."""
     return pd.DataFrame([case_row(*entry) for entry in entries])

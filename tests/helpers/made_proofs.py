@@ -93,7 +93,7 @@ def _cases():
             *places,
             group=group,
             level=level,
-            robot="kuka" if number % 5 == 0 else "gp180",
+            robot="kuka" if number % 5 == 0 else "m900ib700",
             setting="force_3kN" if group == "setting" else "usual",
             campaign=f"case_{number:03}",
         )

@@ -2,7 +2,7 @@
 
 
 def truth(*effects, group="single", level=50.0):
-    case = {"group": group, "robot": "gp180", "setting": "usual", "effects": effects, "levels": [level] * len(effects)}
+    case = {"group": group, "robot": "m900ib700", "setting": "usual", "effects": effects, "levels": [level] * len(effects)}
     return {"campaign": "case_x", "case": case}
 
 

@@ -7,6 +7,7 @@ from elastocal_proof.plant.gears import (
     AngleDependentStiffness,
     Asymmetric,
     BoucWen,
+    CableTransmission,
     CompensatorStiffness,
     Coupling,
     DeadBand,
@@ -136,3 +137,10 @@ def test_a_gear_softens_with_the_temperature_over_twenty_degrees():
     law = WarmSoftening(1, 1e-6, 0.01)
     np.testing.assert_allclose(turn(law, [100.0], temperature=30.0), 1e-5)
     np.testing.assert_allclose(turn(law, [100.0], temperature=20.0), 0.0)
+
+
+def test_a_cable_yields_as_its_free_length_and_to_the_tension_of_the_joint_whose_pulley_it_passes():
+    law = CableTransmission(1, 1e-6, 0.5, 2)
+    np.testing.assert_allclose(turn(law, [100.0, -100.0], angle=[np.pi / 2, 0.0]), [1.25e-4, -1e-4])
+    behind = states([100.0], joint=2)
+    np.testing.assert_allclose(law(behind)[0], [0.0, 5e-5, 0.0])

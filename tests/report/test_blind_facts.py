@@ -37,7 +37,7 @@ def test_targets_are_reached_or_missed_with_their_figures(facts):
 
 
 def test_robots_of_the_proof_and_of_tuning_are_kept_apart(facts):
-    assert facts["robots"] == {"proof": "gp180", "tuned": "kuka"} and facts["proof"]
+    assert facts["robots"] == {"proof": "m900ib700", "tuned": "kuka"} and facts["proof"]
     assert {row[0]: row[1] for row in facts["targets"]["tuned"]}["detected at 50"] == "1 of 1"
 
 
@@ -88,12 +88,12 @@ def test_near_relatives_are_worded_for_all_pairs_together(tmp_path):
 
 def test_cases_are_counted_by_group_and_robot_with_their_sum(facts):
     counts = facts["counts"]
-    assert counts["heads"] == ["cases", "gp180", "kuka"]
+    assert counts["heads"] == ["cases", "kuka", "m900ib700"]
     assert counts["rows"] == [
-        ["no effect", "3", "0"],
-        ["one effect of the catalogue", "3", "1"],
-        ["one effect outside of the catalogue", "1", "0"],
-        ["all", "7", "1"],
+        ["no effect", "0", "3"],
+        ["one effect of the catalogue", "1", "3"],
+        ["one effect outside of the catalogue", "0", "1"],
+        ["all", "1", "7"],
     ]
 
 

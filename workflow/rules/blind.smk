@@ -7,7 +7,7 @@ oracle_cases, score_cases and score_follow_ups.
 
 BLIND_BLOCKS = {"smoke": 1, "quick": 10, "development": 20, "full": 60}[config["blind"]]
 # Those of the proof among them are used by the size full alone.
-BLIND_ROBOTS = ["kuka", "fanuc", "abb", "iiwa14", "gp180"]
+BLIND_ROBOTS = ["kuka", "fanuc", "abb", "iiwa14", "gp180", "panda", "m900ib700"]
 BLIND = [f"{config['blind']}_{number}" for number in range(1, BLIND_BLOCKS + 1)]
 
 

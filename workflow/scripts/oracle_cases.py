@@ -1,4 +1,4 @@
-"""What the oracle does on a block of blind cases, once they are diagnosed."""
+"""What the oracle and the best analyst do on a block of blind cases, once they are diagnosed."""
 
 from pathlib import Path
 
@@ -6,6 +6,7 @@ from job import Job, run
 
 from elastocal.io.json_files import read_json, write_json
 from elastocal_proof.blind.ground_truth import load_ground_truth
+from elastocal_proof.blind.limit import limit_of_sample
 from elastocal_proof.blind.oracle import oracle
 
 
@@ -14,7 +15,8 @@ def oracle_cases(job: Job) -> None:
     verdicts = {verdict["campaign"]: verdict for verdict in read_json(job.input.verdicts)}
     found = {}
     for name, truth in truths.items():
-        found[name] = oracle(truth, verdicts[name], f"{job.input.blind}/{name}", job.params.robots, job.params.seed)
+        informed = oracle(truth, verdicts[name], f"{job.input.blind}/{name}", job.params.robots, job.params.seed)
+        found[name] = {"oracle": informed, "limit": limit_of_sample(truth, job.params.robots)}
     write_json(job.output.oracle, found, allow_nan=False)
 
 

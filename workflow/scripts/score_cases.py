@@ -23,7 +23,7 @@ def score_cases(job: Job) -> None:
     )
     verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
     oracles = {name: found for path in job.input.oracles for name, found in read_json(path).items()}
-    cases = pd.DataFrame([case_row(truth, verdicts[name], oracles[name]) for name, truth in truths.items()])
+    cases = pd.DataFrame([case_row(truth, verdicts[name], **oracles[name]) for name, truth in truths.items()])
     intervals = pd.DataFrame([row for name, truth in truths.items() for row in intervals_of(truth, verdicts[name])])
     stated = statements((truth, verdicts[name]) for name, truth in truths.items())
     write_csv(job.output.cases, cases)

@@ -29,10 +29,16 @@ _ERRORS += ("worse", "warned", "worse_unwarned", "adopted", "worse_adopted")
 _COVARIATES = {need for kind in KINDS.values() for need in kind.needs}
 
 
-def case_row(truth: Mapping[str, Any], verdict: Mapping[str, Any], oracle: Mapping[str, Any] | None) -> dict[str, Any]:
+def case_row(
+    truth: Mapping[str, Any],
+    verdict: Mapping[str, Any],
+    oracle: Mapping[str, Any] | None,
+    limit: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
     """Everything that the scores count of a case.
 
-    `truth`: a sealed document. `verdict`: as verdict.json. Returns one row of cases.csv.
+    `truth`: a sealed document. `verdict`: as verdict.json. `oracle`, `limit`: of `oracle.oracle` and `limit.limit`, where the
+    case has one. Returns one row of cases.csv.
     """
     defects, unrecorded = truth["defects"], _COVARIATES - set(truth["design"]["covariates"])
     return (
@@ -47,6 +53,7 @@ def case_row(truth: Mapping[str, Any], verdict: Mapping[str, Any], oracle: Mappi
         | _size(truth)
         | _errors(verdict)
         | _of_oracle(oracle)
+        | {f"limit_{name}": np.nan if limit is None else float(limit[name]) for name in ("detected", "right")}
     )
 
 

@@ -32,16 +32,19 @@ ROBOT_FILE = "robot.yaml"
 
 
 def robot_document(
-    document: Mapping[str, Any], arm: Arm, declared: Sequence[LinkMass], gravity_m_s2: Iterable[float]
+    document: Mapping[str, Any],
+    arm: Arm,
+    declared: Sequence[LinkMass],
+    gravity_m_s2: Iterable[float],
+    undeclared: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Contents of the campaign's own robot file.
 
     `document`: of the robot file of which this is a specimen. `declared`: weights as they are declared to the analyst; where
-    there are none, the file has no masses.
+    there are none, the file has no masses. `undeclared`: keys that it lacks.
     """
-    described = {
-        key: value for key, value in document.items() if key not in ("masses", "gravity_m_s2", "compensator", "payload_kg")
-    }
+    absent = ("masses", "gravity_m_s2", "compensator", "payload_kg", *undeclared)
+    described = {key: value for key, value in document.items() if key not in absent}
     if declared:
         described["masses"] = [
             {"link": m.link, "mass_kg": m.mass_kg, "centre_m": list(m.centre_m), "relative_std": m.relative_std}
@@ -95,7 +98,7 @@ def write_blind_campaign(
     table, outliers = measured_table(robot, design, schedule)
     table, slips = slipped(table) if slipped else (table, [])
     write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, kind)
-    write_robot(folder, robot_file, robot, declared)
+    write_robot(folder, robot_file, robot, declared, design.undeclared)
     return {
         "campaign": name,
         "robot": Path(robot_file).stem,
@@ -135,10 +138,16 @@ def write_dynamic_campaign(
     write_robot(folder, robot_file, robot, declared)
 
 
-def write_robot(folder: str | Path, robot_file: str | Path, robot: PhysicalRobot, declared: Sequence[LinkMass]) -> None:
+def write_robot(
+    folder: str | Path,
+    robot_file: str | Path,
+    robot: PhysicalRobot,
+    declared: Sequence[LinkMass],
+    undeclared: Sequence[str] = (),
+) -> None:
     """Write the campaign's own robot file; see `robot_document`."""
     nominal = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
-    document = robot_document(nominal, robot.arm, declared, robot.structure.gravity_m_s2)
+    document = robot_document(nominal, robot.arm, declared, robot.structure.gravity_m_s2, undeclared)
     write_text(Path(folder) / ROBOT_FILE, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))
 
 

@@ -56,14 +56,12 @@ def _at_most(share: float) -> Target:
 _TARGETS: dict[_Key | None, Target] = {
     ("false alarms", 0.0): Target("upper limit below 4 %", 0.0, 0.04, below=0.04),
     ("false alarms", "hard"): _at_most(0.06),
-    ("detected", 25.0): _at_least(0.82),
     ("detected", 50.0): _at_least(0.98),
     ("held", 50.0): _at_least(0.97),
     ("named", 200.0): _at_least(0.95),
     (SEVERAL_JOINTS, 200.0): _at_least(0.95),
     (GEAR_GRAVITY, 200.0): _at_least(0.90),
-    ("pair", 200.0): Target("at least 88 %, lower limit above 85 %", 0.88, 1.0, above=0.85),
-    ("pair", 50.0): _at_least(0.80),
+    ("over the limit", None): Target("at least 95 % of the limit", 0.95, np.inf),
     ("outside", 200.0): _at_most(0.08),
     ("calibration", None): _at_most(0.03),
     ("credible", None): _at_least(0.95),
@@ -89,7 +87,13 @@ def summarized(cases: pd.DataFrame, intervals: pd.DataFrame, statements: pd.Data
         if len(mine):
             of_these = intervals[intervals.robots == robots] if len(intervals) else intervals
             probable = statements[statements.robots == robots]
-            found = (_of_cases(mine), _of_statements(probable, seed), _of_errors(mine, seed), _of_intervals(of_these))
+            found = (
+                _of_cases(mine),
+                _over_the_limit(mine, seed),
+                _of_statements(probable, seed),
+                _of_errors(mine, seed),
+                _of_intervals(of_these),
+            )
             rows += [{"robots": robots} | row for part in found for row in part]
     return pd.DataFrame(rows)
 
@@ -152,6 +156,24 @@ def _of_cases(cases: pd.DataFrame) -> Iterator[dict[str, Any]]:
         yield _rated(f"both of two effects, or classes with them, at {level:g} each", part.holds_truth, None)
 
 
+def _over_the_limit(cases: pd.DataFrame, seed: int) -> Iterator[dict[str, Any]]:
+    """What is found beside what the best analyst finds of the same cases."""
+    sampled = cases[cases.limit_right.notna()]
+    for group, level, ours, best, words in (
+        ("single", 25.0, "detected", "limit_detected", "detected at 25"),
+        ("single", 50.0, "named_right", "limit_right", "right name alone at 50"),
+        ("pair", 50.0, "exact", "limit_right", "both of two effects at 50 each"),
+        ("pair", 200.0, "exact", "limit_right", "both of two effects at 200 each"),
+    ):
+        part = sampled[(sampled.group == group) & (sampled.level == level)]
+        yield _rated(f"{words}, by the best analyst", part[best] == 1.0, None)
+        hits = part[ours].to_numpy(float), part[best].to_numpy(float)
+        low, high = _bootstrapped(hits, _ratio_of_sums, stream(seed, "blind", f"{words} over the limit", 0))
+        value = float(_ratio_of_sums(*hits)) if len(part) else np.nan
+        row = {"hits": None, "cases": len(part), "rate": value, "low": low, "high": high}
+        yield _named(f"{words}, over the best analyst's, on the same cases", row, ("over the limit", None))
+
+
 def _of_errors(cases: pd.DataFrame, seed: int) -> Iterator[dict[str, Any]]:
     known = cases[cases.group.isin(["single", "pair"]) & cases.detected]
     ratio = (known.after_rms_m / known.oracle_rms_m).to_numpy()
@@ -166,8 +188,8 @@ def _of_errors(cases: pd.DataFrame, seed: int) -> Iterator[dict[str, Any]]:
     for level, part in single.groupby("level"):
         before, after, best = (part[name].to_numpy() ** 2 for name in ("before_rms_m", "after_rms_m", "oracle_rms_m"))
         removed, removable = before - after, before - best
-        low, high = _bootstrapped((removed, removable), _share, stream(seed, "blind", f"removed at {level:g}", 0))
-        row = {"hits": None, "cases": len(part), "rate": float(_share(removed, removable)), "low": low, "high": high}
+        low, high = _bootstrapped((removed, removable), _ratio_of_sums, stream(seed, "blind", f"removed at {level:g}", 0))
+        row = {"hits": None, "cases": len(part), "rate": float(_ratio_of_sums(removed, removable)), "low": low, "high": high}
         yield _named(f"share of the oracle's fall of the held-out mean square that is reached, at {level:g}", row, None)
     adopted = cases[cases.adopted]
     yield _rated("effect adopted and held-out RMS worse by over two standard errors", adopted.worse, ("worse", None))
@@ -210,7 +232,7 @@ def _named(name: str, row: dict[str, Any], target: _Key | None) -> dict[str, Any
     return {"quantity": name} | row | {"target": aim.words, "target_low": aim.low, "target_high": aim.high, "holds": holds}
 
 
-def _share(removed: np.ndarray, removable: np.ndarray, axis: int = -1) -> np.ndarray:
+def _ratio_of_sums(removed: np.ndarray, removable: np.ndarray, axis: int = -1) -> np.ndarray:
     removable = removable.sum(axis=axis)
     # Where knowing the effect does not help there is nothing to reach.
     return removed.sum(axis=axis) / np.where(removable > 0, removable, np.nan)

@@ -35,7 +35,8 @@ class Design:
     `points`: measuring points with a target each, or `FLANGE`; empty for all. `covariates`: which of `COVARIATES` are written
     down. `declared_noise` (float, float): standard deviations that the campaign claims, m and rad; right or wrong. `declared`:
     effects that the campaign says its model has. `measured`: one of "pose", "position". `frame`: one of "base", "tracker".
-    `reach`: share of the joint limits, about their middle, that poses are drawn from.
+    `reach`: share of the joint limits, about their middle, that poses are drawn from. `undeclared`: keys of the robot file that
+    the analyst's lacks.
     """
 
     poses: int = 30
@@ -55,6 +56,7 @@ class Design:
     measured: str = "pose"
     frame: str = "base"
     reach: float = 1.0
+    undeclared: tuple[str, ...] = ()
 
     def targets_on(self, arm: Arm) -> tuple[str, ...]:
         """Names of the measuring points that have a target."""

@@ -540,6 +540,15 @@ def _cable_pull(robot: PhysicalRobot, joints: list[int], size: float, draws: np.
     return _with_drive(robot, drives.CablePull(joint, (joint - 1, joint), size * draws.choice([-1.0, 1.0]))), {}
 
 
+@_register(
+    OUTSIDE + "cable_transmission", "rad/(N m)", 1e-7, lambda arm: [(j,) for j in range(2, arm.joints)], scale=(1.0, 0.0)
+)
+def _cable_transmission(robot: PhysicalRobot, joints: list[int], size: float, draws: np.random.Generator) -> _Applied:
+    """A joint driven by cables, which pass the pulley of the joint behind it."""
+    winding = draws.uniform(0.4, 0.8) * draws.choice([-1.0, 1.0])
+    return _with_gear(robot, gears.CableTransmission(joints[0], size, winding, joints[0] + 1)), {}
+
+
 @_register(OUTSIDE + "asymmetric_gear", "rad/(N m)^2", 1e-10, _each_joint, scale=(1.0, -1.0))
 def _asymmetric_gear(robot: PhysicalRobot, joints: list[int], size: float, draws: np.random.Generator) -> _Applied:
     return _with_gear(robot, gears.Asymmetric(joints[0], size * draws.choice([-1.0, 1.0]))), {}

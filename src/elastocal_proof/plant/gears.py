@@ -202,6 +202,25 @@ class Asymmetric(_AtJoint):
 
 
 @dataclass(frozen=True)
+class CableTransmission(_AtJoint):
+    """Cables from the motor over the joint before: theta = s (tau (1 + f q / pi) + tau_o / 2).
+
+    They yield to the tension of their joint as their free length, which falls or grows by a share f as it winds, and to that of
+    the neighbour o whose pulley they pass.
+
+    `softness`: s, rad/(N m). `winding`: f. `other`: o, from 0.
+    """
+
+    softness: float
+    winding: float
+    other: int
+
+    def turn(self, states: GearStates, torque: np.ndarray) -> np.ndarray:
+        free = 1.0 + self.winding * states.angle[:, self.joint] / np.pi
+        return self.softness * (torque * free + 0.5 * states.torque[:, self.other])
+
+
+@dataclass(frozen=True)
 class WarmSoftening(_AtJoint):
     """A gear that softens as it warms: theta = c r (T - 20 °C) tau.
 
