@@ -125,7 +125,7 @@ def _blind(folder):
         lines.append(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n")
     (folder / "reports/blind/manifest.sha256").write_text("".join(lines), encoding="utf-8")
     (folder / "results/blind/some_1.json").write_text(json.dumps([said for _, said, _ in entries]), encoding="utf-8")
-    known = {document["campaign"]: found for document, _, found in entries}
+    known = {document["campaign"]: {"oracle": found, "limit": None} for document, _, found in entries}
     (folder / "results/blind/oracle/some_1.json").write_text(json.dumps(known), encoding="utf-8")
     cases = pd.DataFrame([case_row(*entry) for entry in entries])
     spans = pd.DataFrame([row for document, said, _ in entries for row in intervals_of(document, said)])

@@ -62,7 +62,7 @@ def cases(run: Audited, file: str) -> Iterator[Finding]:
     listed, rows = _manifest(run), []
     for path in paths:
         if path.name in listed:
-            verdict, oracle = verdicts[path.stem], oracles[path.stem]
+            verdict, (oracle, limit) = verdicts[path.stem], (oracles[path.stem][name] for name in ("oracle", "limit"))
             names = ("before_rms_m", "after_rms_m", "reduction", "reduction_std_error", "oracle_p_value", "oracle_rms_m")
             row = judge(json.loads(path.read_text("utf-8")), verdict) | {"case": path.stem} | dict.fromkeys(names, np.nan)
             if (held_out := verdict["heldout"]) is not None:
@@ -71,6 +71,7 @@ def cases(run: Audited, file: str) -> Iterator[Finding]:
                 row["reduction_std_error"] = held_out["reduction_std_error"]
             if oracle is not None:
                 row |= {"oracle_p_value": oracle["p_value"], "oracle_rms_m": oracle["heldout"]["rms_m"]}
+            row |= {f"limit_{name}": np.nan if limit is None else float(limit[name]) for name in ("detected", "right")}
             rows.append(row)
     # Joints are words, such as 2-3, although one alone looks like a number.
     stated = pd.read_csv(run.folder / file, dtype={"joints": str})
@@ -137,7 +138,7 @@ def _target(row: Mapping[Any, Any]) -> dict[str, Any]:
     shares = [float(number) / 100 for number in re.findall(r"[\d.]+", words)] or [np.nan]
     low, high = 0.0, shares[0]
     if "at least" in words or not words:
-        low, high = shares[0], 1.0 if words else np.nan
+        low, high = shares[0], np.inf if "of the limit" in words else 1.0 if words else np.nan
     elif "within" in words or " to " in words:
         low, high = (0.0, 1 + shares[0]) if "within" in words else tuple(shares)
     holds = low <= row["rate"] <= high

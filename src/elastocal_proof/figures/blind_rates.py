@@ -29,7 +29,7 @@ _COMPARABLE = {
 }
 _AIM = "#cfe8d5"
 _LINE = 40
-_PER_CENT = 100.0
+_PER_CENT, _FARTHEST = 100.0, 10.0
 
 
 class _Aim(NamedTuple):
@@ -73,10 +73,12 @@ def rates_and_targets(summary: pd.DataFrame) -> Figure:
     aimed = summary[summary.target.notna() & (summary.target != "")]
     ratio = aimed.quantity.str.contains("over the oracle")
     names = [list(dict.fromkeys(part.quantity)) for part in (aimed[~ratio], aimed[ratio])]
+    # Shares of what the best analyst finds may exceed all of it.
+    largest = max(102.0, 1.05 * _PER_CENT * np.nanmax(aimed[~ratio].high.to_numpy(float), initial=0.0))
     heights = [max(len(part), 1) for part in names]
     figure, axes = panels(2, 1, 32 + 7.4 * sum(heights), height_ratios=heights)
     _dots(axes[0, 0], aimed[~ratio], names[0], lambda value: _PER_CENT * value)
-    axes[0, 0].set(xlim=(-2, 102), xlabel="share of cases (%)")
+    axes[0, 0].set(xlim=(-2, largest), xlabel="share of cases, or of what the best analyst finds (%)")
     _dots(axes[1, 0], aimed[ratio], names[1], lambda value: _PER_CENT * (value - 1.0))
     farthest = np.nanmax(np.abs(_PER_CENT * (aimed[ratio][["rate", "low", "high"]].to_numpy(float) - 1.0)), initial=6.0)
     axes[1, 0].set(xlim=(-1.1 * farthest, 1.1 * farthest), xlabel="held-out RMS above the oracle's (%)")
@@ -147,7 +149,8 @@ def _dots(axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[fl
     robots = [key for key in LOOKS if key in set(rows.robots)]
     for aim in _rows(_Aim, rows.drop_duplicates("quantity")):
         place: float = names.index(aim.quantity)
-        low, high = (scaled(value) for value in (aim.target_low, aim.target_high))
+        # A target without an upper end goes as far as anything is drawn.
+        low, high = scaled(aim.target_low), scaled(min(aim.target_high, _FARTHEST))
         # A target of a single value is a line that can be seen.
         axis.barh(place, max(high - low, 0.8), left=low - (0.4 if high == low else 0.0), height=0.86, color=_AIM, zorder=0)
     for number, key in enumerate(robots):
