@@ -13,7 +13,7 @@ import json, sys
 opened = []
 sys.addaudithook(lambda event, details: opened.append(str(details[0])) if event == "open" else None)
 from elastocal_proof.blind.follow_up import diagnosed_anew
-from elastocal.loop.proposed import proposed
+from elastocal_proof.blind.proposed import proposed
 from elastocal.loop.whole import diagnosed
 folder, again, robots = sys.argv[1:]
 verdict = diagnosed(folder, robots, 1)

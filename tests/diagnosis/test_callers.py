@@ -15,8 +15,9 @@ from elastocal.diagnosis import judge as judging
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.proposal import NOTHING_AMBIGUOUS, without_poses
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop import proposed, whole
+from elastocal.loop import whole
 from elastocal.loop.whole import cases_in, diagnosed
+from elastocal_proof.blind import proposed
 from elastocal_proof.blind.follow_up import ARMS, POSES, folder_name
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,7 +26,7 @@ SEED = 1
 # Where a campaign is diagnosed, and the test below that has its verdict.
 CALLERS = {
     "src/elastocal/loop/whole.py": "the one call",
-    "src/elastocal/loop/proposed.py": "the next experiment",
+    "src/elastocal_proof/blind/proposed.py": "the next experiment",
     "src/elastocal_proof/blind/follow_up.py": "follow-ups",
     "src/elastocal_proof/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
     "src/elastocal_proof/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",

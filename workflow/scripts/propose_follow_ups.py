@@ -6,8 +6,8 @@ import pandas as pd
 
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
-from elastocal.loop.proposed import proposed
 from elastocal_proof.blind.follow_up import LADDER, MOST, POSES, followed_up
+from elastocal_proof.blind.proposed import proposed
 
 
 def propose_follow_ups(job: Job) -> None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
 OTHER = "other"
-CREDIBLE = 0.95
+_CREDIBLE = 0.95
 _BINS = 10
 _RESAMPLES = 2000
 _COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "stated", "top", "correct"]
@@ -83,7 +83,7 @@ def credible(ranked: Sequence[tuple[frozenset[str], float]]) -> list[tuple[froze
     `ranked` (frozenset, float): the most probable first. Returns (frozenset, float).
     """
     reached = np.cumsum([probability for _, probability in ranked])
-    return list(ranked[: int(np.searchsorted(reached, CREDIBLE)) + 1])
+    return list(ranked[: int(np.searchsorted(reached, _CREDIBLE)) + 1])
 
 
 def statements(entries: Iterable[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> pd.DataFrame:

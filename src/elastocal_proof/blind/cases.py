@@ -43,11 +43,11 @@ ROBOTS = (*TUNED, *PROOF)
 _WITHOUT_COMPENSATOR: dict[str, tuple[str, ...]] = dict.fromkeys(
     ("iiwa14", "panda"), ("compensator_torque", "compensator_stiffness")
 )
-LEVELS = (10.0, 25.0, 50.0, 200.0)
+_LEVELS = (10.0, 25.0, 50.0, 200.0)
 NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))
 FOREIGN = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
 # What hides the weight of the links from the analyst: a robot file that declares none, of an arm that has no other weight.
-WEIGHT = "link_weight"
+_WEIGHT = "link_weight"
 SEVERAL_JOINTS, GEAR_GRAVITY, MOVED, UNDECLARED = "several_joints", "gear_gravity", "moved", "undeclared"
 # Mechanisms that come at several joints at once, as a bad mastering or one make of gears does.
 WIDESPREAD = (
@@ -125,7 +125,7 @@ SWEEP_PAIRS = (
     ("compensator_stiffness", "joint_dependent_stiffness"),
     ("link_geometry", "thermal_growth"),
 )
-SWEEP_LEVEL = 50.0
+_SWEEP_LEVEL = 50.0
 # Of which the proof counts false alarms by the hundred.
 HARD = (
     "pose_common_15urad",
@@ -191,7 +191,7 @@ class Counts:
     outside: int
     pair: int
     setting: int
-    levels: tuple[float, ...] = LEVELS
+    levels: tuple[float, ...] = _LEVELS
     outside_levels: tuple[float, ...] = (50.0, 200.0)
     pair_levels: tuple[float, ...] = (50.0, 200.0)
     robots: tuple[str, ...] = field(default=ROBOTS)
@@ -313,7 +313,7 @@ def cases_of(counts: Counts, seed: int) -> list[Case]:
         for setting, level, number in product(("usual", "without_time_and_temperature"), (_HIGH, _KNOCKED), range(share.moved)):
             add(MOVED, (_MOVED_SETUP,), (level,), setting, number)
         for number in range(share.undeclared):
-            add(UNDECLARED, (WEIGHT,), (_HEAVY,), "usual", number)
+            add(UNDECLARED, (_WEIGHT,), (_HEAVY,), "usual", number)
         for level in share.pair_levels:
             for number in range(share.pair):
                 add("pair", _drawn_pair(seed, robot, level, number), (level, level), "usual", number)
@@ -329,7 +329,7 @@ def cases_of(counts: Counts, seed: int) -> list[Case]:
         for effect, alternative in (*SWEEP_PAIRS, *(pair[::-1] for pair in SWEEP_PAIRS)):
             for design in SWEEP_DESIGNS:
                 for number in range(share.sweep):
-                    add("sweep", (effect,), (SWEEP_LEVEL,), design, number, alternative)
+                    add("sweep", (effect,), (_SWEEP_LEVEL,), design, number, alternative)
     return sorted(found, key=lambda case: case.name)
 
 
@@ -386,7 +386,7 @@ def declared_of(case: Case, arm: Arm) -> tuple[LinkMass, ...]:
 
 
 def _weighs(case: Case) -> bool:
-    return WEIGHT not in case.effects and _setting(case).get("weighs", True)
+    return _WEIGHT not in case.effects and _setting(case).get("weighs", True)
 
 
 def defects_of(case: Case, robot: PhysicalRobot, design: Design) -> list[_Sized]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 PAIR = "pair"
 # Groups of which the settings are a column of their own: their cases are of another kind than a single effect's.
-APART = ("sweep", SEVERAL_JOINTS, GEAR_GRAVITY, MOVED, UNDECLARED)
+_APART = ("sweep", SEVERAL_JOINTS, GEAR_GRAVITY, MOVED, UNDECLARED)
 CLASS_WITH, CLASS_WITHOUT = "class with the truth", "class without the truth"
 FAULT = "named: fault of the data"
 WORDS = (CLASS_WITH, CLASS_WITHOUT, SEVERAL, UNEXPLAINED, NOT_TESTABLE, ADEQUATE)
@@ -31,7 +31,7 @@ def confused(cases: pd.DataFrame) -> pd.DataFrame:
     names = [*effects()]
     entries = zip(cases["verdict"], cases["found"], cases["holds_truth"], strict=True)
     verdicts = [_column(verdict, found, holds_truth, names) for verdict, found, holds_truth in entries]
-    setting = cases.setting.where(cases.setting == "usual", "hard").where(~cases.group.isin(APART), cases.group)
+    setting = cases.setting.where(cases.setting == "usual", "hard").where(~cases.group.isin(_APART), cases.group)
     truth = cases.truth.where(cases.group != PAIR, PAIR)
     table = pd.crosstab([cases.robots, setting, truth, cases.level], pd.Series(verdicts, cases.index, name="stated"))
     return table.reindex(columns=[*names, FAULT, *WORDS], fill_value=0).reset_index().rename(columns={"setting": "settings"})

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 NONE = "none"
 SILENT = (ADEQUATE, NOT_TESTABLE)
 # The effect by which a diagnosis says that the base is not where it is declared.
-MISPLACED = "base_placement"
+_MISPLACED = "base_placement"
 
 
 def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
 
 def wrong_setup(truth: Mapping[str, Any]) -> set[str]:
     """Mechanisms of the set-up that a case has beside what it is about: right to find, and no fault not to name."""
-    return {MISPLACED} if "misplaced" in truth else set()
+    return {_MISPLACED} if "misplaced" in truth else set()
 
 
 def judged_apart_from_setup(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> tuple[str, list[Mapping[str, Any]]]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PANELS = {
+_PANELS = {
     "oracle_detected": "the oracle\ndetects",
     "detected": "detected",
     "held": "right name, alone\nor in a class",
@@ -43,9 +43,9 @@ def power_map(power: pd.DataFrame) -> Figure:
     at_largest = single[single.level == max(levels)].set_index("effect")["named"]
     effects = sorted((name for name in at_largest.index if name != _ALL), key=lambda name: (-at_largest[name], name))
     effects += [name for name in (_ALL,) if name in set(single.effect)]
-    figure, axes = panels(1, len(PANELS), 34 + 4.6 * len(effects), sharey=True)
+    figure, axes = panels(1, len(_PANELS), 34 + 4.6 * len(effects), sharey=True)
     table = single.set_index(["effect", "level"])
-    for axis, (column, title) in zip(axes[0], PANELS.items(), strict=True):
+    for axis, (column, title) in zip(axes[0], _PANELS.items(), strict=True):
         shares = np.array([[_at(table, effect, level, column) for level in levels] for effect in effects])
         _heat(axis, shares, 6.5)
         axis.set(xticks=range(len(levels)), yticks=range(len(effects)), title=title, xlabel="non-centrality")

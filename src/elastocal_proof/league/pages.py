@@ -47,7 +47,7 @@ def league_page(
     for split, title in _TITLES.items():
         mine = table[table["split"] == split]
         if len(mine):
-            parts += [f"## {title}", _winners(mine, words), folded(_ERRORS, error_table(mine, words))]
+            parts += [f"## {title}", _winners(mine, words), folded(_ERRORS, _error_table(mine, words))]
     parts += ["## Intervals", _coverage_sentence(table, words), folded(_COVERED, _coverage(table, words))]
     parts += ["## Published figures", _published(published, table)]
     parts += ["## Mechanisms", folded(_FOUND, _mechanisms(mechanisms))]
@@ -78,7 +78,7 @@ def _coverage_sentence(table: pd.DataFrame, words: Mapping[str, str]) -> str:
     return f"Median over data sets and splits: {'; '.join(each)}."
 
 
-def error_table(table: pd.DataFrame, words: Mapping[str, str]) -> str:
+def _error_table(table: pd.DataFrame, words: Mapping[str, str]) -> str:
     """Errors of all methods on one split, a row for each data set, as Markdown.
 
     `table`: rows of `table.league_table` of one split. `words`: methods by what they are called.

@@ -6,8 +6,8 @@ from made_folders import made_folder
 
 from elastocal.campaigns.reading import read_campaign
 from elastocal.diagnosis.proposal import Proposal, without_poses
-from elastocal.loop import proposed as module
-from elastocal.loop.proposed import proposed
+from elastocal_proof.blind import proposed as module
+from elastocal_proof.blind.proposed import proposed
 
 
 def made_proposal(joints, poses, ladder, draws):
