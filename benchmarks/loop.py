@@ -12,7 +12,7 @@ from common import ROOT, Row, beside_yardstick, interleaved, load_robot
 from copies import copy_study, snakemake
 
 from elastocal.campaigns.public_data import FOLDER_VARIABLE
-from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
@@ -102,5 +102,5 @@ def _campaign(folder: Path, poses: int) -> Path:
         "holdout": {"fraction": 0.3, "seed": 1},
     }
     shutil.rmtree(folder, ignore_errors=True)
-    write_campaign(folder, document, simulated_measurements(robot, plan, 1, "bench"), robot.joints)
+    write_campaign(folder, document, draw_measurements(robot, plan, 1, "bench"), robot.joints)
     return folder

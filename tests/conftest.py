@@ -71,3 +71,14 @@ def strategies():
 def config(config_folder):
     """The repository's own configuration."""
     return read_document(config_folder.parent / "config.yaml")
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory):
+    """A checkout with the diagnosed campaign ``made`` in it."""
+    # Imports the whole loop, which few tests need.
+    from certified import certified_checkout
+
+    top = tmp_path_factory.mktemp("checkout")
+    certified_checkout(top)
+    return top

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from elastocal.counting import counted, grouped
+from elastocal.counting import counted, grouped, plural, spell_count
 
 # A count in a message, of what may be one and is not a limit, with its noun written by hand.
 _BY_HAND = re.compile(
@@ -15,6 +15,11 @@ _BY_HAND = re.compile(
 def test_one_thing_is_no_plural_and_thousands_are_grouped():
     assert counted(1, "row") == "1 row" and counted(0, "row") == "0 rows" and counted(2, "entry", "entries") == "2 entries"
     assert counted(12000, "pose") == "12\u2009000 poses" and grouped(-1234567) == "-1\u2009234\u2009567"
+
+
+def test_small_numbers_are_words_and_a_noun_agrees_without_its_number():
+    assert [spell_count(number, "reflector") for number in (1, 3, 4)] == ["one reflector", "three reflectors", "4 reflectors"]
+    assert plural("joint", 1) == "joint" and plural("joint", 2) == "joints" and plural("entry", 2, "entries") == "entries"
 
 
 def test_messages_of_bad_input_and_of_commands_write_no_plural_by_hand():

@@ -11,7 +11,7 @@ from gallery import anchor, thumbnail, thumbnails
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.effects.catalogue import effects
-from elastocal.figures.effect_signatures import offered_candidates, signature
+from elastocal.figures.effect_signatures import list_candidates, signature
 
 from docstrings import with_plain_references
 
@@ -101,7 +101,7 @@ def _section(effect: Effect) -> str:
 
 
 def _table(effect: Effect) -> str:
-    candidate, count = signature(effect.NAME, ROBOT).candidate, len(offered_candidates(effect.NAME, ROBOT))
+    candidate, count = signature(effect.NAME, ROBOT).candidate, len(list_candidates(effect.NAME, ROBOT))
     rows = [
         "".join(
             (

@@ -18,10 +18,10 @@ INTERFACE = {
         "elastocal.mechanics.kinematics": ("poses", "poses_and_jacobians"),
         "elastocal.mechanics.elastostatics": ("generalized_forces",),
     },
-    "Simulate a campaign": {"elastocal.campaigns.simulation": ("Plan", "simulated_measurements")},
+    "Simulate a campaign": {"elastocal.campaigns.simulation": ("Plan", "draw_measurements")},
     "Plan measurements": {
         "elastocal.application.planning.survey": ("Survey",),
-        "elastocal.application.planning.plan": ("allowed_candidates", "planned"),
+        "elastocal.application.planning.plan": ("find_allowed_candidates", "choose_plan"),
     },
     "Diagnose": {
         "elastocal.diagnosis.diagnose": ("diagnose",),
@@ -29,9 +29,9 @@ INTERFACE = {
         "elastocal.effects.catalogue": ("effects",),
     },
     "Use a calibrated robot": {
-        "elastocal.application.forward_model": ("ForwardModel", "calibrated_in"),
-        "elastocal.application.calibrated": ("calibrated_from", "forward", "prediction_covariance"),
-        "elastocal.application.compensation": ("corrected",),
+        "elastocal.application.forward_model": ("ForwardModel", "read_calibrated"),
+        "elastocal.application.calibrated": ("calibrate_by_fit", "forward", "prediction_covariance"),
+        "elastocal.application.compensation": ("find_joint_targets",),
     },
     "Judge predictions": {"elastocal.validation.held_out": ("position_errors", "intervals")},
     "Identify compliances as in the study": {"elastocal.study.identification": ("identify", "covariance")},

@@ -14,9 +14,9 @@ from elastocal.application.accuracy import (
     accuracy_from,
     accuracy_sentence,
     before_m,
-    predicted,
+    predict_errors,
+    remove_rigid_motion,
     scope_from,
-    without_rigid_motion,
 )
 from elastocal.application.calibrated import NEUTRAL, forward
 from elastocal.application.scope import scope_of
@@ -25,7 +25,7 @@ from elastocal.fitting.parameters import stepped
 STATES = replace(made_states(6, 60), wrench=np.zeros((60, 6)))
 
 
-def scoped(calibrated, unknown_base):
+def set_scope(calibrated, unknown_base):
     model = replace(calibrated.model, fitted_frames=unknown_base)
     return replace(calibrated, scope=scope_of(calibrated, model, calibrated.estimate, calibrated.covariance, STATES))
 
@@ -42,22 +42,22 @@ def turned(fanuc):
 def test_what_a_placement_of_the_base_takes_up_is_an_error_in_the_base_frame_alone(turned):
     angles = np.random.default_rng(2).uniform(-1, 1, (1, 6))
     position, _ = forward(turned, angles)
-    base, robot = (predicted(scoped(turned, unknown), angles, NEUTRAL) for unknown in (False, True))
+    base, robot = (predict_errors(set_scope(turned, unknown), angles, NEUTRAL) for unknown in (False, True))
     assert base.error_m[0] == pytest.approx(1e-3 * np.linalg.norm(position[0, :2]), rel=1e-3)
     assert robot.error_m[0] < 1e-3 * base.error_m[0]
     assert (base.accuracy("").frame, robot.accuracy("").frame) == (BASE, ROBOT)
 
 
 def test_one_pose_has_the_error_that_it_has_among_others(fanuc):
-    calibrated = scoped(made_calibrated(fanuc, *USUAL), True)
+    calibrated = set_scope(made_calibrated(fanuc, *USUAL), True)
     angles = np.random.default_rng(2).uniform(-1, 1, (30, 6))
-    alone, among = (predicted(calibrated, some, NEUTRAL).error_m for some in (angles[:1], angles))
+    alone, among = (predict_errors(calibrated, some, NEUTRAL).error_m for some in (angles[:1], angles))
     assert alone[0] == pytest.approx(among[0], rel=1e-12)
 
 
 def test_what_is_said_of_each_pose_needs_no_drawn_robots(fanuc):
-    calibrated, angles = scoped(made_calibrated(fanuc, *USUAL), True), np.random.default_rng(2).uniform(-1, 1, (5, 6))
-    drawn, bare = (predicted(calibrated, angles, NEUTRAL, draws) for draws in (30, 0))
+    calibrated, angles = set_scope(made_calibrated(fanuc, *USUAL), True), np.random.default_rng(2).uniform(-1, 1, (5, 6))
+    drawn, bare = (predict_errors(calibrated, angles, NEUTRAL, draws) for draws in (30, 0))
     for name in ("parameters_m", "repeated_m", "std_rad", "error_m", "bound_m"):
         np.testing.assert_array_equal(getattr(drawn, name), getattr(bare, name))
     assert (len(drawn.rms_m), len(bare.rms_m)) == (30, 0)
@@ -66,9 +66,9 @@ def test_what_is_said_of_each_pose_needs_no_drawn_robots(fanuc):
 @pytest.mark.parametrize("unknown_base", [False, True])
 def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unknown_base):
     """Of 300 robots; 92 to 98 % are within two and a half standard errors."""
-    calibrated = scoped(made_calibrated(fanuc, *USUAL), unknown_base)
+    calibrated = set_scope(made_calibrated(fanuc, *USUAL), unknown_base)
     angles = calibrated.robot.reported_angles(STATES.joint_angles)
-    stated = predicted(calibrated, angles, NEUTRAL).accuracy("")
+    stated = predict_errors(calibrated, angles, NEUTRAL).accuracy("")
     position, _ = forward(calibrated, angles)
     draws, root = np.random.default_rng(3), np.linalg.cholesky(calibrated.covariance)
     rms, worst = [], []
@@ -76,7 +76,7 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unkno
         step = root @ draws.standard_normal(len(root))
         other = replace(calibrated, estimate=stepped(calibrated.model, calibrated.estimate, step))
         off = forward(other, angles)[0] - position
-        distance = np.linalg.norm(without_rigid_motion(off, position) if unknown_base else off, axis=1)
+        distance = np.linalg.norm(remove_rigid_motion(off, position) if unknown_base else off, axis=1)
         rms.append(np.sqrt((distance**2).mean()))
         worst.append(distance.max())
     assert np.sqrt(np.mean(np.square(rms))) == pytest.approx(stated.rms_m, rel=0.05)
@@ -87,8 +87,8 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unkno
 def test_joints_and_poses_add_what_each_has_of_its_own(turned):
     angles = np.random.default_rng(2).uniform(-1, 1, (5, 6))
     noise = replace(turned.noise, joint_rad=np.full(6, 3e-5), pose_rad=4e-5)
-    more = predicted(replace(turned, noise=noise), angles, NEUTRAL)
-    only = predicted(replace(turned, noise=replace(noise, joint_rad=np.full(6, 5e-5), pose_rad=0.0)), angles, NEUTRAL)
+    more = predict_errors(replace(turned, noise=noise), angles, NEUTRAL)
+    only = predict_errors(replace(turned, noise=replace(noise, joint_rad=np.full(6, 5e-5), pose_rad=0.0)), angles, NEUTRAL)
     np.testing.assert_allclose(more.repeated_m, only.repeated_m, rtol=1e-12)
     assert (more.error_m > more.parameters_m).all()
     assert more.accuracy("").repeated_m == pytest.approx(np.sqrt((more.repeated_m**2).mean()))
@@ -96,8 +96,8 @@ def test_joints_and_poses_add_what_each_has_of_its_own(turned):
 
 def test_what_the_form_of_the_model_leaves_open_is_in_every_figure(turned):
     angles = np.random.default_rng(2).uniform(-1, 1, (5, 6))
-    known = scoped(turned, True)
-    found = predicted(replace(known, scope=replace(known.scope, form_m=1e-3)), angles, NEUTRAL)
+    known = set_scope(turned, True)
+    found = predict_errors(replace(known, scope=replace(known.scope, form_m=1e-3)), angles, NEUTRAL)
     assert found.accuracy("").rms_m == pytest.approx(1e-3, rel=0.01)
     assert found.accuracy("").rms_bound_m > 1e-3 and found.accuracy("").worst_m > 1e-3 and (found.bound_m > 1e-3).all()
     assert "form of the model" in accuracy_sentence(found.accuracy("some poses"))
@@ -111,15 +111,15 @@ def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_know
     position, rotation = forward(value, angles)
     nominal = Rotation.from_rotvec([0.0, 0.0, -1e-3]).as_matrix()
     off = np.concatenate([position @ nominal.T - position, np.tile([0.0, 0.0, -1e-3], (60, 1))], axis=1)
-    known, unknown = (before_m(scoped(value, each), position, rotation, off) for each in (False, True))
+    known, unknown = (before_m(set_scope(value, each), position, rotation, off) for each in (False, True))
     np.testing.assert_allclose(known, 1e-3 * np.linalg.norm(position[:, :2], axis=1), rtol=1e-2)
     # What is left are springs, of which `off` knows nothing.
     assert np.sqrt((unknown**2).mean()) < np.sqrt((known**2).mean())
 
 
 def test_statements_and_scopes_come_back_from_json(turned):
-    known = scoped(turned, True)
-    accuracy = predicted(known, np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
+    known = set_scope(turned, True)
+    accuracy = predict_errors(known, np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
     assert accuracy_from(accuracy.document()) == accuracy
     back = scope_from(known.scope.document())
     np.testing.assert_array_equal(back.absorbed, known.scope.absorbed)
@@ -129,7 +129,7 @@ def test_statements_and_scopes_come_back_from_json(turned):
 
 
 def test_a_sentence_says_whose_how_large_how_sure_and_what_became_of_the_noise(turned):
-    found = accuracy_sentence(predicted(scoped(turned, True), np.zeros((3, 6)), NEUTRAL).accuracy("the targets"))
+    found = accuracy_sentence(predict_errors(set_scope(turned, True), np.zeros((3, 6)), NEUTRAL).accuracy("the targets"))
     for words in (
         "Predicted",
         "robot's own frame",

@@ -12,8 +12,8 @@ from synthetic import NOISE, made_estimate, made_states, seen_exactly
 from elastocal.application.calibrated import (
     OperatingConditions,
     assumptions,
-    calibrated_from,
-    calibrated_of,
+    calibrate_by_fit,
+    calibrate_by_model,
     forward,
     moves_robot,
     observations_of,
@@ -40,7 +40,7 @@ def test_what_belongs_to_the_instruments_and_the_set_up_is_left_out_with_its_cov
     counts = [len(effect.parameters) + len(effect.shapes) for effect in model.effects]
     root = rng.standard_normal((sum(counts), sum(counts)))
     estimate = plain_estimate(model, [rng.standard_normal(len(effect.parameters)) for effect in model.effects])
-    found = calibrated_of(fanuc, model, estimate, root @ root.T, NOISE)
+    found = calibrate_by_model(fanuc, model, estimate, root @ root.T, NOISE)
     assert [effect.key for effect in found.model.effects] == ["joint_compliance", "joint_offset@2", "lost_motion@3"]
     np.testing.assert_array_equal(found.estimate.coefficients[1], estimate.coefficients[2])
     np.testing.assert_array_equal(found.estimate.shapes[2], estimate.shapes[5])
@@ -60,7 +60,7 @@ def test_a_fit_with_unknown_frames_and_targets_gives_the_robot_in_its_base(fanuc
     effects = tuple(candidates_on(sites)[key] for key in ("joint_offset@2", "joint_offset@3"))
     model = Model(sites, (Target("A", "6DoF", None),), True, 6, fanuc.compliance, effects)
     true = made_estimate(model)
-    found = calibrated_from(fit(model, seen_exactly(model, true, made_states(6, 40)), NOISE), fanuc)
+    found = calibrate_by_fit(fit(model, seen_exactly(model, true, made_states(6, 40)), NOISE), fanuc)
     angles = random_angles(np.random.default_rng(0), fanuc.chain, 5)
     position, rotation = forward(found, angles)
     moved = angles.copy()

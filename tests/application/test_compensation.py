@@ -7,7 +7,7 @@ import pytest
 from analysed_robots import analysed
 from made_calibrated import USUAL, made_calibrated
 
-from elastocal.application.accuracy import predicted
+from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import (
     NEUTRAL,
     OperatingConditions,
@@ -16,7 +16,7 @@ from elastocal.application.calibrated import (
     forward,
     nominal_forward,
 )
-from elastocal.application.compensation import OK, OUTSIDE_LIMITS, SINGULAR, UNREACHABLE, corrected
+from elastocal.application.compensation import OK, OUTSIDE_LIMITS, SINGULAR, UNREACHABLE, find_joint_targets
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
 
@@ -25,12 +25,12 @@ EFFECTS = (*(key for key in USUAL if "weight" not in key), "transmission_harmoni
 BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 
 
-def made(name, *keys):
+def make_robot(name, *keys):
     robot = made_calibrated(analysed(name), *keys)
     return replace(robot, noise=replace(robot.noise, joint_rad=np.full(robot.robot.joints, 1e-5)))
 
 
-def drawn(calibrated, count, force=100.0):
+def draw_states(calibrated, count, force=100.0):
     """Reported angles within the limits, and a force and a moment for each."""
     robot, draws = calibrated.robot, np.random.default_rng(2)
     low, high = robot.joint_limits.T
@@ -39,7 +39,7 @@ def drawn(calibrated, count, force=100.0):
     return robot.reported_angles(angles), OperatingConditions(wrench)
 
 
-def settled(robot, angles, operating):
+def settle(robot, angles, operating):
     """As `forward`, with the loads found again until the arm has come to rest."""
     coordinates = coordinates_at_rest(robot, angles, operating)
     for _ in range(5):
@@ -49,23 +49,23 @@ def settled(robot, angles, operating):
 
 @pytest.mark.parametrize("name", ["gp180", "ur10", "fanuc_static", "iiwa14"])
 def test_corrected_targets_bring_the_robot_to_the_wanted_poses(name):
-    robot = made(name, *EFFECTS)
-    angles, operating = drawn(robot, 150)
+    robot = make_robot(name, *EFFECTS)
+    angles, operating = draw_states(robot, 150)
     position, rotation = nominal_forward(robot.robot, angles)
-    found = corrected(robot, position, rotation, operating, angles)
+    found = find_joint_targets(robot, position, rotation, operating, angles)
     good = found.status == OK
     assert good.mean() > 0.9
-    off = pose_differences(position, rotation, *settled(robot, found.joint_angles, operating))[good]
+    off = pose_differences(position, rotation, *settle(robot, found.joint_angles, operating))[good]
     assert np.abs(off).max() < 2e-9
     np.testing.assert_allclose(found.error_after[good], off, atol=2e-9)
     assert np.sqrt((found.error_before[good, :3] ** 2).sum(axis=1).mean()) > 1e-4
 
 
 def test_the_error_before_is_that_of_the_rigid_robots_targets():
-    robot = made("gp180", *EFFECTS)
-    angles, operating = drawn(robot, 20)
+    robot = make_robot("gp180", *EFFECTS)
+    angles, operating = draw_states(robot, 20)
     position, rotation = nominal_forward(robot.robot, angles)
-    found = corrected(robot, position, rotation, operating, angles)
+    found = find_joint_targets(robot, position, rotation, operating, angles)
     np.testing.assert_allclose(nominal_forward(robot.robot, found.uncorrected)[0], position, atol=1e-7)
     missed = pose_differences(position, rotation, *forward(robot, found.uncorrected, operating))
     np.testing.assert_allclose(found.error_before, missed, atol=1e-12)
@@ -73,18 +73,18 @@ def test_the_error_before_is_that_of_the_rigid_robots_targets():
 
 def test_repeatability_is_that_of_the_joints_seen_through_the_jacobian():
     """20,000 draws: standard errors of the distances are 0.4 %."""
-    robot = made("gp180")
-    angles, operating = drawn(robot, 4)
-    found = corrected(robot, *nominal_forward(robot.robot, angles), operating, angles)
+    robot = make_robot("gp180")
+    angles, operating = draw_states(robot, 4)
+    found = find_joint_targets(robot, *nominal_forward(robot.robot, angles), operating, angles)
     draws = np.random.default_rng(1).standard_normal((20000, 6)) * robot.noise.joint_rad
     jacobian = jacobians(robot.robot.chain, robot.robot.model_angles(found.joint_angles), robot.robot.chain.end_effector)
     distances = np.linalg.norm(draws @ jacobian[:, :3].transpose(0, 2, 1), axis=2)
-    stated = predicted(robot, found.joint_angles, operating).repeated_m
+    stated = predict_errors(robot, found.joint_angles, operating).repeated_m
     np.testing.assert_allclose(stated, np.sqrt((distances**2).mean(axis=1)), rtol=0.03)
 
 
 def test_what_cannot_be_corrected_is_named():
-    robot = made("gp180", *EFFECTS)
+    robot = make_robot("gp180", *EFFECTS)
     low, high = robot.robot.joint_limits.T
     angles = np.tile(0.5 * (low + high) + BENT, (4, 1))
     angles[1, 0] = high[0] + 0.2
@@ -93,17 +93,17 @@ def test_what_cannot_be_corrected_is_named():
     reported = robot.robot.reported_angles(angles)
     position, rotation = nominal_forward(robot.robot, reported)
     position[3] *= 5.0
-    found = corrected(robot, position, rotation, NEUTRAL, reported)
+    found = find_joint_targets(robot, position, rotation, NEUTRAL, reported)
     assert found.status.tolist() == [OK, OUTSIDE_LIMITS, SINGULAR, UNREACHABLE]
     assert np.isfinite(found.joint_angles).all()
 
 
 def test_a_path_without_a_start_is_corrected_in_one_posture():
-    robot = made("gp180", *EFFECTS)
+    robot = make_robot("gp180", *EFFECTS)
     angles = robot.robot.joint_limits.mean(axis=1) + BENT + 0.2 * np.linspace(0.0, 1.0, 30)[:, None]
     done = []
     position, rotation = nominal_forward(robot.robot, robot.robot.reported_angles(angles))
-    found = corrected(robot, position, rotation, NEUTRAL, progress=done.append)
+    found = find_joint_targets(robot, position, rotation, NEUTRAL, progress=done.append)
     assert (found.status == OK).all()
     assert np.abs(np.diff(found.joint_angles, axis=0)).max() < 0.05
     assert done == [30]

@@ -12,7 +12,7 @@ from support import refused
 
 from elastocal.application.accuracy import Accuracy
 from elastocal.application.calibrated import OperatingConditions, forward, prediction_covariance
-from elastocal.application.forward_model import KEY, SIDECAR, ForwardModel, calibrated_in, model_document
+from elastocal.application.forward_model import KEY, SIDECAR, ForwardModel, model_document, read_calibrated
 from elastocal.application.sidecar import sidecar
 from elastocal.mechanics.robot import with_rigid_joints
 
@@ -29,7 +29,7 @@ ACCURACY = Accuracy("base", "predicted", 1e-5, 2e-5, 3e-5, 4e-5, "none", 1, "one
 
 
 def through_json(calibrated):
-    return calibrated_in(json.loads(json.dumps(model_document(calibrated), allow_nan=False)), "effects.json")
+    return read_calibrated(json.loads(json.dumps(model_document(calibrated), allow_nan=False)), "effects.json")
 
 
 @pytest.mark.parametrize("name", ["gp180", "fanuc", "iiwa14"])
@@ -70,10 +70,10 @@ def test_effects_that_this_version_does_not_have_are_refused(tmp_path):
     document = model_document(made_calibrated(analysed("kuka"), "joint_offset@2"))
     unknown = document | {"effects": [*document["effects"], {"key": "magic@1", "values": [1.0], "shapes": []}]}
     with refused("effects.json", f"{KEY}.effects[2]", "'magic@1'"):
-        calibrated_in(unknown, "effects.json")
+        read_calibrated(unknown, "effects.json")
     other = document | {"effects": [document["effects"][0], document["effects"][1] | {"values": [1.0, 2.0]}]}
     with refused("effects.json", f"{KEY}.effects[1]", "2 values", "1, as joint_offset@2"):
-        calibrated_in(other, "effects.json")
+        read_calibrated(other, "effects.json")
     (tmp_path / SIDECAR).write_text("{}")
     with refused((tmp_path / SIDECAR).as_posix(), KEY, "elastocal export"):
         ForwardModel.read(tmp_path)

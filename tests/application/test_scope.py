@@ -9,9 +9,9 @@ from made_folders import made_folder, made_table
 from scipy.linalg import block_diag
 from synthetic import made_states
 
-from elastocal.application.accuracy import BASE, ROBOT, predicted
+from elastocal.application.accuracy import BASE, ROBOT, predict_errors
 from elastocal.application.calibrated import moves_robot
-from elastocal.application.scope import calibrated_on, campaign_accuracy, conditions_in, judged_by_held_out, scope_of
+from elastocal.application.scope import calibrate_on_case, campaign_accuracy, conditions_in, judge_by_held_out, scope_of
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
@@ -68,7 +68,7 @@ def test_what_goes_with_a_condition_counts_as_error_where_a_command_does_not_sta
     known, angles = replace(calibrated, scope=scope), calibrated.robot.reported_angles(STATES.joint_angles)
     names, there = [name for name, _, _ in scope.unstated], conditions_in(known, STATES)
     assert names and set(names) <= {"time", "temperature"} and scope.left_out_m == 0.0
-    stated, unstated = (predicted(known, angles, each) for each in (there, replace(there, temperature_c=None)))
+    stated, unstated = (predict_errors(known, angles, each) for each in (there, replace(there, temperature_c=None)))
     assert not stated.accuracy("").left_out and "not given" in unstated.accuracy("").left_out[0]
     assert unstated.accuracy("").left_out_m == pytest.approx(np.linalg.norm([rms for _, rms, _ in scope.unstated]))
     assert unstated.accuracy("").rms_m > stated.accuracy("").rms_m
@@ -95,19 +95,19 @@ def campaign(kuka, tmp_path_factory, config_folder):
     case, held_out = cases_in(folder, config_folder / "robots")
     noise = Noise("declared", 6e-5, 6e-5, np.zeros(6))
     final = fit(case.model, case.observations, noise)
-    return case, held_out, final, calibrated_on(case, final.model, final.estimate, final.covariance, noise)
+    return case, held_out, final, calibrate_on_case(case, final.model, final.estimate, final.covariance, noise)
 
 
 def test_held_out_poses_that_agree_change_nothing(campaign):
     case, held_out, final, calibrated = campaign
-    assert judged_by_held_out(calibrated, final, case, held_out) is calibrated
+    assert judge_by_held_out(calibrated, final, case, held_out) is calibrated
 
 
 def test_held_out_poses_that_were_missed_by_more_raise_what_is_predicted_to_that(campaign):
     case, held_out, final, calibrated = campaign
     seen = held_out.observations
     moved = replace(held_out, observations=replace(seen, position=seen.position + np.array([1e-3, 0.0, 0.0])))
-    found = judged_by_held_out(calibrated, final, case, moved)
+    found = judge_by_held_out(calibrated, final, case, moved)
     stated = campaign_accuracy(found, case.observations.states)
     assert stated.contradicted and stated.rms_m == pytest.approx(1e-3, rel=0.1)
 
@@ -117,12 +117,12 @@ def test_nothing_is_said_where_the_noise_is_the_residual(campaign):
     seen = held_out.observations
     moved = replace(held_out, observations=replace(seen, position=seen.position + np.array([1e-3, 0.0, 0.0])))
     unknown = replace(final, noise=replace(final.noise, source="residual"))
-    assert judged_by_held_out(calibrated, unknown, case, moved) is calibrated
+    assert judge_by_held_out(calibrated, unknown, case, moved) is calibrated
 
 
 def test_repeats_tell_how_well_joints_repeat_though_the_sensor_hides_each(campaign):
     case, _, final, _ = campaign
     noise = replace(final.noise, source="repeats")
-    found = calibrated_on(case, final.model, final.estimate, final.covariance, noise)
+    found = calibrate_on_case(case, final.model, final.estimate, final.covariance, noise)
     # None moves here: what is left possible is what these repeats do not show.
     assert 0.0 < found.noise.joint_rad[0] < 6e-5 and np.ptp(found.noise.joint_rad) == 0.0

@@ -7,18 +7,18 @@ import numpy as np
 from analysed_robots import analysed
 from made_calibrated import made_calibrated
 
-from elastocal.application.accuracy import predicted
+from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import NEUTRAL
-from elastocal.application.sidecar import left_out_m, sidecar
+from elastocal.application.sidecar import find_left_out_m, sidecar
 
 
-def made(*keys):
+def make_calibrated(*keys):
     return made_calibrated(analysed("gp180"), "joint_offset@2", *keys)
 
 
 def test_effects_and_springs_stand_in_it_with_values_and_standard_errors():
-    calibrated = made("lost_motion@2")
-    accuracy = predicted(calibrated, np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
+    calibrated = make_calibrated("lost_motion@2")
+    accuracy = predict_errors(calibrated, np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
     document = json.loads(json.dumps(sidecar(calibrated, "cell7", "2026-11-23", accuracy)))
     assert document["accuracy"]["rms_m"] == accuracy.rms_m and "Predicted" in document["accuracy"]["words"]
     (effect,) = document["effects"]
@@ -32,10 +32,10 @@ def test_effects_and_springs_stand_in_it_with_values_and_standard_errors():
 
 
 def test_what_is_held_has_no_standard_error_and_not_one_of_zero():
-    calibrated = made("lost_motion@2")
+    calibrated = make_calibrated("lost_motion@2")
     held = calibrated.covariance.copy()
     held[[0, -1]] = held[:, [0, -1]] = 0.0
-    accuracy = predicted(calibrated, np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
+    accuracy = predict_errors(calibrated, np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
     document = sidecar(replace(calibrated, covariance=held), "cell7", "2026-11-23", accuracy)
     errors = [p["std_error"] for p in (*document["joint_compliance"], *document["effects"][0]["parameters"])]
     assert errors[0] is None and errors[-1] is None and all(error > 0 for error in errors[1:-1])
@@ -43,5 +43,5 @@ def test_what_is_held_has_no_standard_error_and_not_one_of_zero():
 
 def test_what_is_left_out_moves_the_robot_and_nothing_left_out_does_not():
     angles = np.random.default_rng(1).uniform(-1, 1, (10, 6))
-    assert left_out_m(made("transmission_harmonic@1[orders 1-2]"), angles, NEUTRAL).max() > 1e-6
-    assert (left_out_m(made(), angles, NEUTRAL) == 0.0).all()
+    assert find_left_out_m(make_calibrated("transmission_harmonic@1[orders 1-2]"), angles, NEUTRAL).max() > 1e-6
+    assert (find_left_out_m(make_calibrated(), angles, NEUTRAL) == 0.0).all()

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from made_audits import CONFIGURATION, ROBOT, failed
 
-from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal_proof.audit import campaigns
 from elastocal_proof.audit.audited import WRENCH, Audited
@@ -153,7 +153,7 @@ def drawn(tmp_path):
     (tmp_path / "config/campaigns/cell.yaml").write_text(yaml.safe_dump(source), encoding="utf-8")
     (tmp_path / "config/robots/two.yaml").write_text(yaml.safe_dump(ROBOT), encoding="utf-8")
     plan = Plan(**{name: tuple(value) if isinstance(value, list) else value for name, value in PLAN.items()})
-    columns = simulated_measurements(robot_from_document(ROBOT, "two"), plan, 1, "cell")
+    columns = draw_measurements(robot_from_document(ROBOT, "two"), plan, 1, "cell")
     pd.DataFrame(columns).to_parquet(tmp_path / DRAWN)
     return Audited(tmp_path, CONFIGURATION, {}, {}, 4)
 

@@ -16,7 +16,7 @@ COVARIATES = {
 }
 
 
-def there_and_back(path, columns):
+def write_and_read(path, columns):
     write_table(path, measurements(6), [columns], {})
     return read_table(path, measurements(6))
 
@@ -42,7 +42,7 @@ def two_measurements(**others):
     return Measurements(**{name: None if v is None else np.array(v) for name, v in (parts | others).items()})
 
 
-def listed(columns):
+def list_values(columns):
     return {name: np.asarray(values).tolist() for name, values in columns.items()}
 
 
@@ -52,7 +52,7 @@ def test_every_number_stands_in_the_column_of_its_name():
     expected |= {"fx": [11, 21], "fy": [12, 22], "fz": [13, 23], "mx": [14, 24], "my": [15, 25], "mz": [16, 26]}
     expected |= {"x": [31, 41], "y": [32, 42], "z": [33, 43], "rx": [51, 61], "ry": [52, 62], "rz": [53, 63]}
     expected |= {"approach1": [1, 0], "approach2": [-1, 1], "time_s": [71, 81], "temperature_c": [72, 82], "u95_m": [73, 83]}
-    assert listed(columns_of(two_measurements())) == expected
+    assert list_values(columns_of(two_measurements())) == expected
 
 
 ABSENT = {
@@ -83,7 +83,7 @@ def test_measurements_come_back_as_they_were(measured, covariates, kuka, config_
     before = read_campaign(folder, config_folder / "robots").measurements
     assert (before.rotation_vector is None) == (measured == "position")
     assert (before.approach is None) == (before.time_s is None) == (covariates == "none")
-    after = measurements_from(there_and_back(tmp_path / "r.parquet", columns_of(before)))
+    after = measurements_from(write_and_read(tmp_path / "r.parquet", columns_of(before)))
     for name, values in vars(before).items():
         if values is None:
             assert getattr(after, name) is None, name
@@ -101,7 +101,7 @@ def residuals_of(rows, held_out=False, **others):
 
 
 def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_are_given():
-    columns = listed(residuals_of(6))
+    columns = list_values(residuals_of(6))
     for number, component in enumerate(("dx", "dy", "dz", "rx", "ry", "rz")):
         assert columns[f"before_{component}"] == [100.0 + number, 106.0 + number]
         assert columns[f"after_{component}"] == [200.0 + number, 206.0 + number]

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy.optimize import brentq
 
-from elastocal.campaigns.joint_space import SAME_POSE_RAD, beyond_range, blocks, configurations, repeated
+from elastocal.campaigns.joint_space import SAME_POSE_RAD, beyond_range, blocks, configurations, find_repeated
 
 
 @pytest.mark.parametrize(("poses", "count"), [(20, 4), (21, 4), (9, 4), (30, 7), (5, 5), (6, 1)])
@@ -103,9 +103,9 @@ def test_a_pose_repeats_another_where_no_joint_stands_elsewhere_than_one_pose_ma
     fitted = np.random.default_rng(3).uniform(-2, 2, (30, 6))
     almost, elsewhere = fitted[[4, 17]] + 0.9 * SAME_POSE_RAD, fitted[[4, 17]].copy()
     elsewhere[:, 5] += 1.1 * SAME_POSE_RAD
-    assert repeated(fitted, almost).all() and not repeated(fitted, elsewhere).any()
+    assert find_repeated(fitted, almost).all() and not find_repeated(fitted, elsewhere).any()
     # Each joint at the angle that it had in another pose is a pose of its own.
-    assert not repeated(fitted, np.diag(fitted[:6])[None] * np.ones((1, 6))).any()
+    assert not find_repeated(fitted, np.diag(fitted[:6])[None] * np.ones((1, 6))).any()
 
 
 def test_repeats_of_a_pose_are_one_configuration_in_the_order_of_the_poses():

@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 from support import refused
 
-from elastocal.campaigns.public_data import FOLDER_VARIABLE, PublicFile, fetch, not_at_hand
+from elastocal.campaigns.public_data import FOLDER_VARIABLE, PublicFile, fetch, find_missing
 
 CONTENTS = b"0 1 2\n"
 
@@ -57,7 +57,7 @@ def test_the_address_is_by_commit(registered):
 
 def test_file_of_the_given_folder_is_used_where_it_lies(registered, given, tmp_path):
     assert fetch("mine", {"mine": registered}, tmp_path / "cache") == given
-    assert not_at_hand(["mine"], {"mine": registered}, tmp_path / "cache") is None
+    assert find_missing(["mine"], {"mine": registered}, tmp_path / "cache") is None
     assert not (tmp_path / "cache").exists()
 
 
@@ -95,9 +95,9 @@ def test_unknown_name_is_refused(registered, tmp_path):
 
 def test_what_is_missing_is_named_only_where_a_folder_stands_for_the_network(registered, monkeypatch, tmp_path):
     files = {"mine": registered}
-    assert not_at_hand(["mine"], files, tmp_path / "cache") is None
+    assert find_missing(["mine"], files, tmp_path / "cache") is None
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
-    assert not_at_hand(["mine"], files, tmp_path / "cache") == "mine/values.csv"
+    assert find_missing(["mine"], files, tmp_path / "cache") == "mine/values.csv"
 
 
 def test_what_was_downloaded_before_is_at_hand(registered, served, monkeypatch, tmp_path):
@@ -105,4 +105,4 @@ def test_what_was_downloaded_before_is_at_hand(registered, served, monkeypatch, 
     files = {"mine": registered}
     fetch("mine", files, tmp_path / "cache")
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "empty"))
-    assert not_at_hand(["mine"], files, tmp_path / "cache") is None
+    assert find_missing(["mine"], files, tmp_path / "cache") is None

@@ -161,7 +161,7 @@ def test_all_of_another_campaign_is_the_test_even_where_that_one_holds_out_poses
     assert set(other.measurements.pose.tolist()) == set(range(POSES))
 
 
-def with_sessions(cell):
+def add_session(cell):
     """The same poses again in session 7, and pose 3 of session 0 alone is not there."""
     cell.repeat_as_session_7()
     cell.keep([n for n, at in enumerate(zip(cell.table["session"], cell.table["pose"], strict=True)) if at != (0, 3)])
@@ -169,7 +169,7 @@ def with_sessions(cell):
 
 @pytest.mark.parametrize("of", [1, 2, 3, 4, 7])
 def test_folds_hold_every_pose_of_every_session_once_and_are_of_one_size(cell, of):
-    with_sessions(cell)
+    add_session(cell)
     cell.write()
     folds = [folds_of(cell.folder, cell.robots, number, of)["poses"] for number in range(1, of + 1)]
     there = [(0, pose) for pose in range(POSES) if pose != 3] + [(7, pose) for pose in range(POSES)]
@@ -181,7 +181,7 @@ def test_folds_hold_every_pose_of_every_session_once_and_are_of_one_size(cell, o
 
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_a_fold_is_a_holdout_that_holds_out_just_its_poses(cell, number):
-    with_sessions(cell)
+    add_session(cell)
     cell.write()
     fold = folds_of(cell.folder, cell.robots, number, 3)
     cell.document["holdout"] = fold

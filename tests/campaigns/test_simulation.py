@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.reading import read_campaign
-from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.elastostatics import exact_deflections, generalized_forces
@@ -21,15 +21,15 @@ def angles_of(table, robot):
     return np.column_stack([table[f"q{joint + 1}"] for joint in range(robot.joints)])
 
 
-def at(table, point):
+def select(table, point):
     mask = table["target"] == point
     return {name: values[mask] for name, values in table.items()}
 
 
 def test_without_noise_it_is_the_elastostatics_of_the_reduced_robot(robot):
-    table = simulated_measurements(robot, PLAN, 1, "exact")
+    table = draw_measurements(robot, PLAN, 1, "exact")
     for point in POINTS:
-        part = at(table, point)
+        part = select(table, point)
         angles, wrench = angles_of(part, robot), np.column_stack([part[name] for name in WRENCH_NAMES])
         place = robot.chain.point(point)
         end = poses_and_jacobians(robot.chain, angles, robot.chain.end_effector)[2]
@@ -45,7 +45,7 @@ def test_without_noise_it_is_the_elastostatics_of_the_reduced_robot(robot):
 
 
 def test_wrench_is_that_of_a_force_beside_the_last_point(kuka):
-    table = at(simulated_measurements(kuka, PLAN, 2, "wrench"), "6DoF")
+    table = select(draw_measurements(kuka, PLAN, 2, "wrench"), "6DoF")
     force = np.column_stack([table[name] for name in WRENCH_NAMES[:3]])
     moment = np.column_stack([table[name] for name in WRENCH_NAMES[3:]])
     np.testing.assert_allclose(moment, np.cross(PLAN.offset_m, force), atol=1e-9)
@@ -57,7 +57,7 @@ def test_wrench_is_that_of_a_force_beside_the_last_point(kuka):
 
 
 def test_the_plan_is_kept(kuka):
-    table = at(simulated_measurements(kuka, PLAN, 3, "plan"), "3DoF")
+    table = select(draw_measurements(kuka, PLAN, 3, "plan"), "3DoF")
     visits = list(zip(table["pose"], table["load"], table["repeat"], strict=True))
     assert len(set(visits)) == len(visits) == 2 * (3 + 3 + 1) + 8 * 3
     assert {visit for visit in visits if visit[0] == 1} == {(1, 0, r) for r in range(3)} | {(1, 1, r) for r in range(3)} | {
@@ -74,8 +74,8 @@ def test_the_plan_is_kept(kuka):
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
 def test_noise_is_of_its_size_and_new_at_each_measurement(noise, kuka):
     plan = replace(PLAN, poses=120, noise_m=noise, noise_rad=3 * noise)
-    exact, read = (simulated_measurements(kuka, p, 4, "noise") for p in (PLAN, plan))
-    exact = simulated_measurements(kuka, replace(plan, noise_m=0.0, noise_rad=0.0), 4, "noise")
+    exact, read = (draw_measurements(kuka, p, 4, "noise") for p in (PLAN, plan))
+    exact = draw_measurements(kuka, replace(plan, noise_m=0.0, noise_rad=0.0), 4, "noise")
     off = np.column_stack([read[axis] - exact[axis] for axis in "xyz"])
     names = ("rx", "ry", "rz")
     turned, true = (Rotation.from_rotvec(np.column_stack([table[name] for name in names])) for table in (read, exact))
@@ -86,7 +86,7 @@ def test_noise_is_of_its_size_and_new_at_each_measurement(noise, kuka):
 
 def test_elastic_links_deflect_beyond_the_reduced_robot(kuka, kuka_extended):
     """The extended robot under load is off the reduced one with the same joints, and both are one unloaded."""
-    elastic, stiff = (simulated_measurements(robot, PLAN, 5, "same") for robot in (kuka_extended, kuka))
+    elastic, stiff = (draw_measurements(robot, PLAN, 5, "same") for robot in (kuka_extended, kuka))
     np.testing.assert_array_equal(angles_of(elastic, kuka), angles_of(stiff, kuka))
     off = np.linalg.norm(np.column_stack([elastic[axis] - stiff[axis] for axis in "xyz"]), axis=1)
     loaded = elastic["load"] > 0
@@ -96,15 +96,15 @@ def test_elastic_links_deflect_beyond_the_reduced_robot(kuka, kuka_extended):
 
 def test_numbers_depend_on_seed_and_name_alone(kuka):
     plan = replace(PLAN, noise_m=1e-4, noise_rad=1e-4)
-    one, again = simulated_measurements(kuka, plan, 6, "a"), simulated_measurements(kuka, plan, 6, "a")
+    one, again = draw_measurements(kuka, plan, 6, "a"), draw_measurements(kuka, plan, 6, "a")
     for name in one:
         np.testing.assert_array_equal(one[name], again[name])
     for seed, name in ((7, "a"), (6, "b")):
-        assert (simulated_measurements(kuka, plan, seed, name)["q1"] != one["q1"]).any()
+        assert (draw_measurements(kuka, plan, seed, name)["q1"] != one["q1"]).any()
 
 
 def test_it_makes_a_campaign_that_reads(kuka, tmp_path, config_folder):
-    table = simulated_measurements(kuka, PLAN, 8, "reads")
+    table = draw_measurements(kuka, PLAN, 8, "reads")
     document = {
         "campaign": "reads",
         "robot": "kuka",

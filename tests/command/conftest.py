@@ -1,7 +1,6 @@
 """A command as it is typed."""
 
 import pytest
-from certified import certified_checkout
 from typer.testing import CliRunner
 
 from elastocal.command.main import app
@@ -30,16 +29,8 @@ def refusal():
     return line
 
 
-@pytest.fixture(scope="module")
-def top(tmp_path_factory):
-    """A checkout with the diagnosed campaign ``made`` in it."""
-    found = tmp_path_factory.mktemp("cell")
-    certified_checkout(found)
-    return found
-
-
 @pytest.fixture
-def there(top, monkeypatch):
+def in_checkout(checkout, monkeypatch):
     """That checkout as the working directory."""
-    monkeypatch.chdir(top)
-    return top
+    monkeypatch.chdir(checkout)
+    return checkout

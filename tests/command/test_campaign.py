@@ -10,12 +10,12 @@ from elastocal.command.campaign import diagnosed_campaign
 from elastocal.io.origin import environment
 
 
-def test_robots_are_those_of_the_pipeline_and_results_those_of_the_workplace(top, tmp_path, monkeypatch):
+def test_robots_are_those_of_the_pipeline_and_results_those_of_the_workplace(checkout, tmp_path, monkeypatch):
     (tmp_path / "installed").mkdir()
     (tmp_path / "installed/config").symlink_to(ROBOTS.parent)
     monkeypatch.setattr(campaign, "pipeline", lambda: tmp_path / "installed")
-    monkeypatch.setattr(campaign, "workplace", lambda: top)
-    assert diagnosed_campaign(top / "made").name == "made"
+    monkeypatch.setattr(campaign, "workplace", lambda: checkout)
+    assert diagnosed_campaign(checkout / "made").name == "made"
 
 
 WANTED = {
@@ -27,8 +27,8 @@ WANTED = {
 NOWHERE = {"certificate": ["--compare", "nowhere"], "correct": [], "export": []}
 
 
-def edited_pins(top):
-    (top / "requirements.lock").write_text("numpy==2.0\n", encoding="utf-8")
+def edited_pins(checkout):
+    (checkout / "requirements.lock").write_text("numpy==2.0\n", encoding="utf-8")
     return "requirements.lock none", "requirements.lock "
 
 
@@ -39,17 +39,17 @@ def another_numpy(_):
 
 @pytest.mark.parametrize("change", [edited_pins, another_numpy])
 def test_results_of_another_environment_are_refused_by_every_command_unless_that_is_accepted(
-    there, elastocal, refusal, capsys, change
+    in_checkout, elastocal, refusal, capsys, change
 ):
-    was, now = change(there)
+    was, now = change(in_checkout)
     for command, words in WANTED.items():
         line = refusal(command, "made", *words)
         assert line.startswith(f"made: found results by {was}") and f"those of now, {now}" in line
         assert line.endswith("elastocal diagnose made; or --accept-environment")
-    assert diagnosed_campaign(there / "made", True).name == "made"
-    assert capsys.readouterr().err.startswith(f"warning: {there}/made: found results by {was}")
+    assert diagnosed_campaign(in_checkout / "made", True).name == "made"
+    assert capsys.readouterr().err.startswith(f"warning: {in_checkout}/made: found results by {was}")
     for command, words in WANTED.items():
         result = elastocal(command, "made", *words, *NOWHERE[command], "--accept-environment")
         assert "nowhere" in str(result.exception) or result.exit_code == 0
-    (there / "requirements.lock").unlink(missing_ok=True)
+    (in_checkout / "requirements.lock").unlink(missing_ok=True)
     record_jobs("made", campaign_files("made", ROBOTS))

@@ -19,16 +19,16 @@ from elastocal.campaigns.reading import campaign_files
 
 
 @pytest.fixture
-def run(there, elastocal):
+def run(in_checkout, elastocal):
     return lambda *words: elastocal("certificate", *words)
 
 
 @pytest.fixture(scope="module")
-def issued(top, elastocal):
+def issued(checkout, elastocal):
     """A certificate's command and the folder that it wrote into."""
-    with contextlib.chdir(top):
+    with contextlib.chdir(checkout):
         result = elastocal("certificate", "made", "--tolerance", "0.5mm", "--serial", "7", "--date", "2026-11-20")
-    return result, top / "reports" / "loop" / "made"
+    return result, checkout / "reports" / "loop" / "made"
 
 
 def test_pages_and_document_are_written_beside_the_report(issued):
@@ -41,9 +41,9 @@ def test_pages_and_document_are_written_beside_the_report(issued):
     assert document["conformity"]["decision"] in result.output
 
 
-def test_a_joint_that_slipped_between_two_campaigns_is_seen(run, top, tmp_path):
-    certified_checkout(top, "later", 2e-3)
-    result = run(top / "later", "--tolerance", "0.5mm", "--compare", top / "made", "--output", tmp_path / "out")
+def test_a_joint_that_slipped_between_two_campaigns_is_seen(run, checkout, tmp_path):
+    certified_checkout(checkout, "later", 2e-3)
+    result = run(checkout / "later", "--tolerance", "0.5mm", "--compare", checkout / "made", "--output", tmp_path / "out")
     assert result.exit_code == 0, result.output
     comparison = json.loads((tmp_path / "out" / "certificate.json").read_text())["comparison"]
     assert comparison["p_value"] < 1e-3 and "moves differently than in made" in result.output
@@ -58,13 +58,13 @@ def test_a_joint_that_slipped_between_two_campaigns_is_seen(run, top, tmp_path):
         (["--tolerance", "0.5mm", "--serial", ""], "--serial: found ''; allowed: 1 to 60 characters"),
     ],
 )
-def test_bad_options_end_in_one_line_and_write_nothing(there, refusal, tmp_path, words, message):
+def test_bad_options_end_in_one_line_and_write_nothing(in_checkout, refusal, tmp_path, words, message):
     assert message in refusal("certificate", "made", *words, "--output", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_data_at_fault_get_no_certificate(refusal, top, tmp_path, monkeypatch):
-    shutil.copytree(top, tmp_path / "top", symlinks=True)
+def test_data_at_fault_get_no_certificate(refusal, checkout, tmp_path, monkeypatch):
+    shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(tmp_path / "top")
     path = Path("reports/loop/made/verdict.json")
     verdict = json.loads(path.read_text()) | {"effects": [{"family": "data", "name": "wrong_sign"}], "accuracy": None}
@@ -74,7 +74,7 @@ def test_data_at_fault_get_no_certificate(refusal, top, tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def corrected(top, elastocal, tmp_path_factory):
+def corrected(checkout, elastocal, tmp_path_factory):
     """Targets that `correct` wrote, their folder, and what it said."""
     folder, robot = tmp_path_factory.mktemp("corrected"), analysed("kuka")
     bent = (
@@ -83,7 +83,7 @@ def corrected(top, elastocal, tmp_path_factory):
     position, rotation = nominal_forward(robot, robot.reported_angles(bent))
     pose = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
     pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz"]).to_csv(folder / "path.csv", index=False)
-    with contextlib.chdir(top):
+    with contextlib.chdir(checkout):
         found = elastocal("correct", "made", folder / "path.csv", "--output", folder / "targets.csv")
     assert found.exit_code == 0, found.output
     return folder, found.stderr
@@ -108,10 +108,10 @@ def test_one_campaign_has_one_accuracy_in_correct_and_certificate_to_the_digit(c
 
 @pytest.mark.parametrize(("off_m", "decision", "code"), [(3e-4, "pass", 0), (8e-4, "fail", 1)])
 def test_a_robot_that_was_measured_at_corrected_targets_is_called_so_and_a_fail_exits_with_1(
-    run, top, tmp_path, corrected, off_m, decision, code
+    run, checkout, tmp_path, corrected, off_m, decision, code
 ):
     measured_again(corrected, tmp_path / "after", off_m)
-    result = run(top / "made", "--tolerance", "0.5mm", "--measured", tmp_path / "after", "--output", tmp_path / "out")
+    result = run(checkout / "made", "--tolerance", "0.5mm", "--measured", tmp_path / "after", "--output", tmp_path / "out")
     document = json.loads((tmp_path / "out" / "certificate.json").read_text())
     assert result.exit_code == code and document["conformity"]["decision"] == decision
     assert document["accuracy"]["kind"] == "measured" and document["predicted"]["kind"] == "predicted"
@@ -119,17 +119,19 @@ def test_a_robot_that_was_measured_at_corrected_targets_is_called_so_and_a_fail_
     assert any(name.startswith("after: targets.csv") for name in document["measured_files"])
 
 
-def test_a_prediction_that_fails_exits_with_1(run, top, tmp_path):
-    result = run(top / "made", "--tolerance", "1um", "--output", tmp_path / "out")
+def test_a_prediction_that_fails_exits_with_1(run, checkout, tmp_path):
+    result = run(checkout / "made", "--tolerance", "1um", "--output", tmp_path / "out")
     assert result.exit_code == 1 and result.output.startswith("! fail") and "Nobody has measured" in result.output
 
 
-def test_a_stated_use_is_what_is_judged_and_denies_a_pass_where_it_lies_beyond_what_was_fitted(run, top, corrected, tmp_path):
+def test_a_stated_use_is_what_is_judged_and_denies_a_pass_where_it_lies_beyond_what_was_fitted(
+    run, checkout, corrected, tmp_path
+):
     found = []
     for name, turn in (("path.csv", 0.0), ("heavy.csv", 5e3)):
         path = pd.read_csv(corrected[0] / "path.csv")
         path.assign(fx=0.0, fy=0.0, fz=-turn, mx=0.0, my=0.0, mz=0.0).to_csv(tmp_path / name, index=False)
-        result = run(top / "made", "--tolerance", "1mm", "--use", tmp_path / name, "--output", tmp_path / f"out{turn:.0f}")
+        result = run(checkout / "made", "--tolerance", "1mm", "--use", tmp_path / name, "--output", tmp_path / f"out{turn:.0f}")
         document = json.loads((tmp_path / f"out{turn:.0f}" / "certificate.json").read_text())
         assert document["accuracy"]["poses"] == 20 and document["accuracy"]["region"] == "the poses and loads of its use"
         found.append((result.exit_code, document["conformity"]["shortfalls"]))

@@ -34,8 +34,8 @@ def output(tmp_path):
 
 
 @pytest.fixture
-def words(there, path, output):
-    return "correct", there / "made", path, "--output", output
+def words(in_checkout, path, output):
+    return "correct", in_checkout / "made", path, "--output", output
 
 
 def moved_away(path, rows):
@@ -45,12 +45,12 @@ def moved_away(path, rows):
     table.to_csv(path, index=False)
 
 
-def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses(elastocal, words, output, top, angles):
+def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses(elastocal, words, output, checkout, angles):
     result = elastocal(*words)
     assert result.exit_code == 0, result.stderr
     assert "8 of 8 targets corrected" in result.stderr
     targets = pd.read_csv(output)
-    robot = load_diagnosed(top / "made", ROBOTS, top).calibrated
+    robot = load_diagnosed(checkout / "made", ROBOTS, checkout).calibrated
     reached, _ = forward(robot, targets[[f"q{j}" for j in range(1, 7)]].to_numpy())
     wanted, _ = nominal_forward(robot.robot, angles)
     np.testing.assert_allclose(reached, wanted, atol=1e-7)

@@ -40,18 +40,18 @@ def test_without_a_checkout_the_installed_pipeline_runs_in_the_working_directory
     assert shown.endswith(f" --snakefile {tmp_path}/installed/Snakefile")
 
 
-def shown(terminal):
+def show(terminal):
     text = io.StringIO()
     diagnose.follow(LINES, Console(file=text, force_terminal=terminal, width=120))
     return text.getvalue()
 
 
 def test_without_a_terminal_every_line_stands_as_it_is():
-    assert shown(False) == "".join(LINES)
+    assert show(False) == "".join(LINES)
 
 
 def test_on_a_terminal_jobs_move_a_bar_and_the_verdict_stays():
-    text = shown(True)
+    text = show(True)
     assert "judge_campaign cell7" in text
     assert "1 of 3" in text
     assert "3 jobs" not in text

@@ -10,17 +10,17 @@ from analysed_robots import analysed
 from made_calibrated import made_calibrated
 from made_urdf import joint, link, written
 
-from elastocal.application.calibrated_geometry import folded
+from elastocal.application.calibrated_geometry import fold_effects
 from elastocal.campaigns.reading import read_robot
 from elastocal.command.export import _drop_in
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.exchange.urdf_origins import with_calibrated_origins
+from elastocal.exchange.urdf_origins import write_calibrated_origins
 from elastocal.exchange.urdf_writing import urdf_of
 from elastocal.mechanics.kinematics import poses
 
 
-def test_robot_file_urdf_and_sidecar_hold_what_was_found(there, elastocal, tmp_path):
+def test_robot_file_urdf_and_sidecar_hold_what_was_found(in_checkout, elastocal, tmp_path):
     result = elastocal("export", "made", "--output", tmp_path / "out", "--date", "2026-11-23")
     assert result.exit_code == 0, result.output
     robot = read_robot(tmp_path / "out" / "robot.yaml")
@@ -42,7 +42,9 @@ def test_robot_file_urdf_and_sidecar_hold_what_was_found(there, elastocal, tmp_p
     assert document["effects"] == [] and document["date"] == "2026-11-23" and len(document["joint_compliance"]) == 6
 
 
-def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(there, elastocal, refusal, tmp_path):
+def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(
+    in_checkout, elastocal, refusal, tmp_path
+):
     mine, output = tmp_path / "mine.urdf", tmp_path / "out"
     mine.write_text(urdf_of(analysed("kuka")).replace("<robot ", "<!-- mine --><robot ").replace('effort="1e9"', 'effort="77"'))
     result = elastocal("export", "made", "--urdf", mine, "--output", output)
@@ -71,8 +73,8 @@ def test_what_a_urdf_has_no_place_for_is_stated_in_millimetres(tmp_path):
     angles = np.array([[0.4, -0.3], [1.0, 0.2]])
 
     def lines(*keys):
-        robot = folded(made_calibrated(nominal, *keys, identified=False)).robot
-        drop_in = with_calibrated_origins(path, nominal, robot)
+        robot = fold_effects(made_calibrated(nominal, *keys, identified=False)).robot
+        drop_in = write_calibrated_origins(path, nominal, robot)
         output = tmp_path / "robot.urdf"
         output.write_bytes(drop_in.content)
         return _drop_in(drop_in, output, nominal, robot, angles)

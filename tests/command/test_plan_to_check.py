@@ -42,7 +42,7 @@ def calls(draw):
     return draw(st.sampled_from(sorted(ROBOTS))), words
 
 
-def invoked(*words):
+def run_command(*words):
     """Output of a command, or the line in which it refused."""
     result = CliRunner().invoke(app, [*map(str, words)])
     if isinstance(result.exception, InputError):
@@ -83,16 +83,16 @@ def test_every_plan_is_a_sheet_that_is_checked_once_it_is_filled(call):
     with tempfile.TemporaryDirectory() as place:
         folder, robot = Path(place, "cell"), Path(place, "robot.yaml")
         robot.write_text(ROBOTS[name], encoding="utf-8")
-        planned = invoked("plan", robot, "--folder", folder, "--candidates", 80, "--held-out", 4, *words)
+        planned = run_command("plan", robot, "--folder", folder, "--candidates", 80, "--held-out", 4, *words)
         if isinstance(planned, str):
             assert not folder.exists()
             return
         document = yaml.safe_load((folder / "campaign.yaml").read_text(encoding="utf-8"))
         assert len(document["targets"]) == max(words.count("--target"), 1)
         # Nothing is measured yet.
-        assert "found nothing" in invoked("check", folder)
+        assert "found nothing" in run_command("check", folder)
         fill(folder, 1)
-        assert not isinstance(checked := invoked("check", folder), str), checked
+        assert not isinstance(checked := run_command("check", folder), str), checked
 
 
 def test_a_campaign_of_what_no_joint_moves_is_refused_by_check(tmp_path):
@@ -109,4 +109,4 @@ def test_a_campaign_of_what_no_joint_moves_is_refused_by_check(tmp_path):
         "declared": ["joint_offset", "link_geometry"],
     }
     write_campaign(tmp_path, document | {"holdout": {"fraction": 0.3, "seed": 1}}, table, 1, "csv")
-    assert "no joint moves" in invoked("check", tmp_path)
+    assert "no joint moves" in run_command("check", tmp_path)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from elastocal.exchange.column_names import UNITS, is_name, joints_in, kind_of, recognized, unit_scale, units_of
+from elastocal.exchange.column_names import UNITS, find_joints, is_name, kind_of, recognize_column, unit_scale, units_of
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ from elastocal.exchange.column_names import UNITS, is_name, joints_in, kind_of, 
     ],
 )
 def test_headers_are_recognized(header, name, unit):
-    assert recognized(header) == (name, unit)
+    assert recognize_column(header) == (name, unit)
     assert name is None or is_name(name)
 
 
@@ -60,4 +60,4 @@ def test_every_unit_of_every_kind_has_a_positive_value():
 
 
 def test_joints_are_in_their_order():
-    assert joints_in(["q10", "x", "q2", "qw"]) == ["q2", "q10"]
+    assert find_joints(["q10", "x", "q2", "qw"]) == ["q2", "q10"]

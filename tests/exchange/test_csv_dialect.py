@@ -14,7 +14,7 @@ def is_header(cells):
     return {"x", "y"} <= set(cells)
 
 
-def written(folder, text, encoding="utf-8"):
+def write_text_file(folder, text, encoding="utf-8"):
     path = folder / "table.txt"
     path.write_bytes(text.encode(encoding))
     return path
@@ -27,14 +27,14 @@ def written(folder, text, encoding="utf-8"):
 def test_separator_decimal_mark_encoding_and_header_are_found_out(tmp_path, separator, decimal, encoding):
     mark, point = SEPARATORS[separator], DECIMALS[decimal]
     lines = ["Tracker 7", "# made by hand", "", mark.join("xyn"), mark.join([f"1{point}5", f"-2{point}25e-3", "P1"])]
-    found = read_text_table(written(tmp_path, "\r\n".join(lines), encoding), is_header)
+    found = read_text_table(write_text_file(tmp_path, "\r\n".join(lines), encoding), is_header)
     assert (found.dialect.separator, found.dialect.decimal, found.dialect.header) == (separator, decimal, 4)
     assert found.columns == {"x": ("1.5",), "y": ("-2.25e-3",), "n": ("P1",)}
     assert found.lines == (5,)
 
 
 def test_a_separator_at_the_end_of_rows_and_quotes_are_read(tmp_path):
-    found = read_text_table(written(tmp_path, 'x;y;"a;b"\n1;2;3;\n'), is_header)
+    found = read_text_table(write_text_file(tmp_path, 'x;y;"a;b"\n1;2;3;\n'), is_header)
     assert found.columns == {"x": ("1",), "y": ("2",), "a;b": ("3",)}
 
 
@@ -57,16 +57,16 @@ def test_a_separator_at_the_end_of_rows_and_quotes_are_read(tmp_path):
 )
 def test_what_cannot_be_read_is_refused_with_its_line(tmp_path, text, words):
     with refused((tmp_path / "table.txt").as_posix(), "", *words):
-        read_text_table(written(tmp_path, text), is_header)
+        read_text_table(write_text_file(tmp_path, text), is_header)
 
 
 def test_lines_that_end_in_any_way_are_counted_as_editors_count_them(tmp_path):
-    found = read_text_table(written(tmp_path, "x;y\r1;2\r\n3;4\n\n5;6"), is_header)
+    found = read_text_table(write_text_file(tmp_path, "x;y\r1;2\r\n3;4\n\n5;6"), is_header)
     assert found.lines == (2, 3, 5) and found.columns["y"] == ("2", "4", "6")
 
 
 def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch):
-    path = written(tmp_path, "x;y\n" + "1;2\n" * 200)
+    path = write_text_file(tmp_path, "x;y\n" + "1;2\n" * 200)
     monkeypatch.setattr(csv_dialect, "MOST_LINES", 200)
     with refused(path, "", "201 lines", "at most 200"):
         read_text_table(path, is_header)
@@ -78,7 +78,7 @@ def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch)
 def test_ten_times_as_many_columns_take_about_ten_times_as_long(tmp_path):
     def read(columns):
         with refused(tmp_path / "table.txt", "line 2"):
-            read_text_table(written(tmp_path, ";".join(["x", "y", *map(str, range(columns))]) + "\n1;2\n"), is_header)
+            read_text_table(write_text_file(tmp_path, ";".join(["x", "y", *map(str, range(columns))]) + "\n1;2\n"), is_header)
 
     assert growth(lambda: read(3_000), lambda: read(30_000)) < 20
 
@@ -93,7 +93,7 @@ def test_a_missing_file_is_refused(tmp_path):
     [("x;y;°", "cp1252"), ("x;y;µm größe", "cp1252"), ("x;y;z", "utf-16-le"), ("x;y;°", "utf-16-be"), ("x;y;°", "utf-8")],
 )
 def test_an_encoding_that_can_be_no_other_is_found_out(tmp_path, header, encoding):
-    found = read_text_table(written(tmp_path, f"{header}\n1;2;3\n", encoding), is_header)
+    found = read_text_table(write_text_file(tmp_path, f"{header}\n1;2;3\n", encoding), is_header)
     assert list(found.columns) == header.split(";") and found.dialect.encoding == encoding
 
 
@@ -101,7 +101,7 @@ def test_an_encoding_that_can_be_no_other_is_found_out(tmp_path, header, encodin
     ("header", "encoding"), [("x;y;角度", "gb18030"), ("x;y;角度", "shift_jis"), ("x;y;°", "cp437"), ("x;y;Łódź", "cp1250")]
 )
 def test_another_encoding_is_asked_for_and_read_where_it_is_stated(tmp_path, header, encoding):
-    path = written(tmp_path, f"{header}\n1;2;3\n", encoding)
+    path = write_text_file(tmp_path, f"{header}\n1;2;3\n", encoding)
     with refused(path, "line 1", "not UTF-8", "--encoding cp1252"):
         read_text_table(path, is_header)
     assert list(read_text_table(path, is_header, Dialect(encoding=encoding)).columns) == header.split(";")
@@ -110,11 +110,11 @@ def test_another_encoding_is_asked_for_and_read_where_it_is_stated(tmp_path, hea
 @pytest.mark.parametrize("encoding", ["klingon", "hex", "a\0b", "undefined"])
 def test_a_stated_encoding_that_is_none_is_refused(tmp_path, encoding):
     with refused("--encoding", "", "cp1252"):
-        read_text_table(written(tmp_path, "x;y;°\n1;2;3\n"), is_header, Dialect(encoding=encoding))
+        read_text_table(write_text_file(tmp_path, "x;y;°\n1;2;3\n"), is_header, Dialect(encoding=encoding))
 
 
 def test_a_stated_encoding_that_the_file_does_not_have_is_refused(tmp_path):
-    path = written(tmp_path, "x;y;°\n1;2;3\n", "latin-1")
+    path = write_text_file(tmp_path, "x;y;°\n1;2;3\n", "latin-1")
     with refused(path, "line 1", "not ASCII"):
         read_text_table(path, is_header, Dialect(encoding="ascii"))
 
@@ -123,17 +123,17 @@ def test_a_stated_encoding_that_the_file_does_not_have_is_refused(tmp_path):
 @pytest.mark.parametrize("separator", [",", " ", ";"])
 def test_a_header_behind_a_comment_mark_is_found(tmp_path, mark, separator):
     text = f"{mark}made by hand\n{mark}{separator.join('xyn')}\n{separator.join('123')}\n"
-    found = read_text_table(written(tmp_path, text), is_header)
+    found = read_text_table(write_text_file(tmp_path, text), is_header)
     assert found.columns == {"x": ("1",), "y": ("2",), "n": ("3",)} and found.dialect.header == 2
-    assert read_text_table(written(tmp_path, text), is_header, Dialect(header=2)).columns == found.columns
+    assert read_text_table(write_text_file(tmp_path, text), is_header, Dialect(header=2)).columns == found.columns
 
 
 def test_two_headers_behind_comment_marks_are_a_question_and_a_plain_one_goes_before(tmp_path):
     text = "# x;y;n\n# n;y;x\n1;2;3\n"
     with refused(tmp_path / "table.txt", "line 1 and line 2", "--header LINE"):
-        read_text_table(written(tmp_path, text), is_header)
-    assert read_text_table(written(tmp_path, text), is_header, Dialect(header=2)).columns["x"] == ("3",)
-    found = read_text_table(written(tmp_path, "# x;y;n\nn;x;y\n1;2;3\n#4;5;6\n"), is_header)
+        read_text_table(write_text_file(tmp_path, text), is_header)
+    assert read_text_table(write_text_file(tmp_path, text), is_header, Dialect(header=2)).columns["x"] == ("3",)
+    found = read_text_table(write_text_file(tmp_path, "# x;y;n\nn;x;y\n1;2;3\n#4;5;6\n"), is_header)
     assert found.columns["x"] == ("2",)
     assert found.left_out == ("1 line above the header", "1 line of comments below the header")
 
@@ -143,19 +143,19 @@ def test_two_headers_behind_comment_marks_are_a_question_and_a_plain_one_goes_be
     ["x,y,,\n1,2,,\n,,,\n", ",x,,y\n,1,,2\n", "x,y\n1,2,,,\n", "x;y;\n1;2;\n;;\n\n", "\ufeffx;y\n1;2;;\n"],
 )
 def test_nameless_columns_and_rows_that_are_empty_throughout_are_left_out(tmp_path, text):
-    assert read_text_table(written(tmp_path, text), is_header).columns == {"x": ("1",), "y": ("2",)}
+    assert read_text_table(write_text_file(tmp_path, text), is_header).columns == {"x": ("1",), "y": ("2",)}
 
 
 def test_a_nameless_column_with_values_is_called_by_its_place(tmp_path):
-    found = read_text_table(written(tmp_path, ",x,y\n0,1,2\n,3,4\n"), is_header)
+    found = read_text_table(write_text_file(tmp_path, ",x,y\n0,1,2\n,3,4\n"), is_header)
     assert found.columns == {"column 1": ("0", ""), "x": ("1", "3"), "y": ("2", "4")}
     for text in ("x,y\n1,2,3\n", "x,y\n1,2,,3\n"):
         with refused(tmp_path / "table.txt", "line 2", "one for each column"):
-            read_text_table(written(tmp_path, text), is_header)
+            read_text_table(write_text_file(tmp_path, text), is_header)
 
 
 def test_columns_to_ignore_are_left_out_whatever_they_hold(tmp_path):
-    path = written(tmp_path, "x;y;n;n\n1,5;2;1.5;1.2.3\n")
+    path = write_text_file(tmp_path, "x;y;n;n\n1,5;2;1.5;1.2.3\n")
     with refused(path, "line 1", "'n' twice", "--ignore 'n'"):
         read_text_table(path, is_header)
     assert read_text_table(path, is_header, ignored=["n"]).columns == {"x": ("1.5",), "y": ("2",)}
@@ -179,20 +179,20 @@ GROUPED = {
 @pytest.mark.parametrize("cell", GROUPED)
 def test_marks_between_thousands_are_asked_for(tmp_path, cell):
     thousands, number = GROUPED[cell]
-    path = written(tmp_path, f"x;y\n{cell};2\n")
+    path = write_text_file(tmp_path, f"x;y\n{cell};2\n")
     with refused(path, "line 2", repr(cell), "--thousands"):
         read_text_table(path, is_header)
     assert read_text_table(path, is_header, Dialect(thousands=thousands)).columns["x"] == (number,)
 
 
 def test_three_digits_behind_each_comma_may_be_either_and_anything_else_tells(tmp_path):
-    path = written(tmp_path, "x;y\n1,234;22,500\n")
+    path = write_text_file(tmp_path, "x;y\n1,234;22,500\n")
     with refused(path, "line 2", "'1,234'", "--decimal comma", "--thousands comma"):
         read_text_table(path, is_header)
     assert read_text_table(path, is_header, Dialect(decimal="comma")).columns["x"] == ("1.234",)
-    assert read_text_table(written(tmp_path, "x;y\n1,234;0,500\n"), is_header).columns["x"] == ("1.234",)
+    assert read_text_table(write_text_file(tmp_path, "x;y\n1,234;0,500\n"), is_header).columns["x"] == ("1.234",)
     # In quotes between commas it may be either too.
-    path = written(tmp_path, 'x,y\n"1,5",2\n')
+    path = write_text_file(tmp_path, 'x,y\n"1,5",2\n')
     with refused(path, "line 2", "'1,5'", "--decimal comma"):
         read_text_table(path, is_header)
     with refused("--thousands", "", "decimal mark too"):

@@ -26,7 +26,7 @@ from elastocal.mechanics.sites import sites_of
 PLAIN = DhOptions("deg", "m")
 
 
-def written(folder, rows, header="theta_offset,d,a,alpha,type,lower,upper"):
+def write(folder, rows, header="theta_offset,d,a,alpha,type,lower,upper"):
     path = folder / "arm.csv"
     path.write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n", encoding="utf-8")
     return path
@@ -60,7 +60,7 @@ tables = st.lists(st.tuples(angle, length, length, angle, st.sampled_from("RPF")
 def test_any_table_is_where_its_notation_puts_it_and_weighs_there(tmp_path_factory, rows, modified):
     header = "theta_offset,d,a,alpha,type,lower,upper,mass_kg,cx,cy,cz"
     weighed = [(*row, -1, 1, 1.5 + number, 0.1, -0.02 * number, 0.05) for number, row in enumerate(rows)]
-    path = written(tmp_path_factory.mktemp("dh"), weighed, header)
+    path = write(tmp_path_factory.mktemp("dh"), weighed, header)
     robot = robot_from_document(yaml.safe_load(robot_text(robot_from_dh(path, modified, DhOptions("rad", "m")))))
     states = made_states(robot.joints, 4, seed=1)
     position, rotation = poses(robot.chain, states.joint_angles, robot.chain.end_effector)
@@ -85,7 +85,7 @@ def test_the_ur_of_this_project_is_its_table(tmp_path, config_folder):
     lengths = read_document(config_folder / "robots" / "ur10.yaml")["lengths_m"]
     names = (("d1", None, 90), (None, "a2", 0), (None, "a3", 0), ("d4", None, 90), ("d5", None, -90), ("d6", None, 0))
     rows = [(0, lengths.get(d, 0), lengths.get(a, 0), alpha, "R", "", "") for d, a, alpha in names]
-    robot = robot_from_dh(written(tmp_path, rows), options=PLAIN).robot
+    robot = robot_from_dh(write(tmp_path, rows), options=PLAIN).robot
     known = robot_from_document(read_document(config_folder / "robots" / "ur10.yaml"))
     q = np.random.default_rng(0).uniform(-3, 3, (5, 6))
     for one, other in zip(
@@ -109,7 +109,7 @@ def test_the_example_of_the_docstring_is_a_ur5e(tmp_path):
 
 def test_limits_compliances_names_and_points_come_along(tmp_path):
     header = "joint,d,a,alpha,type,lower,upper,compliance_urad_per_Nm,point"
-    path = written(tmp_path, [("rail", 0, 0, 90, "P", 0, 2, 0.02, ""), ("arm", 1, 1, 0, "R", "", "", 5, "elbow at")], header)
+    path = write(tmp_path, [("rail", 0, 0, 90, "P", 0, 2, 0.02, ""), ("arm", 1, 1, 0, "R", "", "", 5, "elbow at")], header)
     result = robot_from_dh(path, options=PLAIN, name="two")
     assert result.document["joint_names"] == ["rail", "arm"] and result.document["name"] == "two"
     assert result.document["joint_limits_deg"] == [[0.0, 2.0], [-360.0, 360.0]]
@@ -128,7 +128,7 @@ def test_limits_compliances_names_and_points_come_along(tmp_path):
     ],
 )
 def test_what_makes_no_robot_is_refused(tmp_path, header, rows, key, words):
-    path = written(tmp_path, rows, header)
+    path = write(tmp_path, rows, header)
     with refused(path, key, *words):
         robot_from_dh(path, options=PLAIN)
 
@@ -157,7 +157,7 @@ def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(tmp_pa
         (*row, "R", -1, 1, 2.0, *centre, "wrist" if number == 4 else "")
         for number, (row, centre) in enumerate(zip(rows, centres, strict=True))
     ]
-    path = written(tmp_path, weighed, DH_HEADER)
+    path = write(tmp_path, weighed, DH_HEADER)
     result = robot_from_dh(path, modified, DhOptions("rad", "m"))
     robot = robot_from_document(yaml.safe_load(robot_text(result)))
     assert sum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T") < 2.5
@@ -183,7 +183,7 @@ def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(tmp_pa
 
 def test_lengths_that_do_not_cancel_are_still_refused(tmp_path):
     rows = [(0, 300, 0, 90, "R", "", ""), (0, -300, 0, 0, "R", "", "")]
-    with refused(written(tmp_path, rows), "chain", "metres"):
+    with refused(write(tmp_path, rows), "chain", "metres"):
         robot_from_dh(tmp_path / "arm.csv", options=PLAIN)
 
 

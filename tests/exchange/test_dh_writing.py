@@ -10,7 +10,7 @@ from imported_tables import UR5E
 from made_calibrated import USUAL, made_calibrated
 from support import refused, robot_of
 
-from elastocal.application.calibrated_geometry import folded
+from elastocal.application.calibrated_geometry import fold_effects
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.dh_writing import PARAMETERS, dh_deltas, dh_frames, dh_rows, dh_table
 from elastocal.mechanics.kinematics import poses
@@ -47,7 +47,7 @@ def test_the_table_of_every_robot_reads_back_to_its_poses(name, tmp_path):
 @pytest.mark.parametrize("name", ["fanuc", "kuka", "iiwa14"])
 def test_a_calibrated_robot_reads_back_and_its_deltas_are_as_small_as_its_errors(name, tmp_path):
     nominal = analysed(name)
-    robot = folded(made_calibrated(nominal, *USUAL[:-2])).robot
+    robot = fold_effects(made_calibrated(nominal, *USUAL[:-2])).robot
     assert_same(robot, read_back(robot, tmp_path, nominal))
     deltas = dh_deltas(nominal, robot)
     assert list(deltas["row"]) == ["base", *(f"q{j}" for j in range(1, nominal.joints + 1)), nominal.chain.end_effector.name]

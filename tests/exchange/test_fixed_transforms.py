@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from elastocal.exchange.fixed_transforms import (
     axis_rotation,
     displacement_words,
+    express_axis,
     rotation_about,
     shift_word,
     turn_word,
-    turned_axis,
     yaw_pitch_roll,
 )
 from elastocal.mechanics.chain import parse_chain
@@ -46,7 +46,7 @@ def test_nothing_is_left_out_and_signs_stand_before_numbers():
 
 @pytest.mark.parametrize("axis", [(0, 0, 2.0), (0, -1, 0), (1, 1e-15, 0)])
 def test_an_axis_of_the_frame_is_itself(axis):
-    before, letter, sign, after = turned_axis(np.array(axis))
+    before, letter, sign, after = express_axis(np.array(axis))
     assert before == after == [] and letter == "xyz"[int(np.argmax(np.abs(axis)))] and (sign == "-") == (min(axis) < 0)
     np.testing.assert_array_equal(axis_rotation(np.array(axis)), np.eye(3))
 
@@ -54,7 +54,7 @@ def test_an_axis_of_the_frame_is_itself(axis):
 @given(st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 1e-3), st.floats(-3, 3))
 def test_a_turn_about_any_axis_is_between_a_rotation_and_its_inverse(axis, turn):
     unit = np.array(axis) / np.linalg.norm(axis)
-    before, letter, sign, after = turned_axis(np.array(axis))
+    before, letter, sign, after = express_axis(np.array(axis))
     chain = parse_chain(" ".join([*before, f"R{letter}({sign}q1)", *after, "[E]"]), {}, "x")
     rotation = poses(chain, np.array([[turn]]), chain.end_effector)[1][0]
     np.testing.assert_allclose(rotation, pin.exp3(turn * unit), rtol=0, atol=1e-11)

@@ -9,7 +9,9 @@ from elastocal.exchange.measurement_table import read_measurement_table
 
 def test_options_read_back_as_they_were(tmp_path):
     (tmp_path / "t.csv").write_text("x")
-    options = ImportOptions("tab", "comma", 3, {"q1": "Achse 1 [°]"}, {"q1": "°"}, "euler:ZYX", "smr", "by-robot", True)
+    options = ImportOptions(
+        *("tab", "comma", 3, None, None, {"q1": "Achse 1 [°]"}, {"q1": "°"}, "euler:ZYX", "smr", "by-robot", True)
+    )
     (tmp_path / "import.yaml").write_text(import_options_text(options, tmp_path / "t.csv"), encoding="utf-8")
     assert read_import_options(tmp_path / "import.yaml") == options
 

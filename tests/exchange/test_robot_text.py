@@ -4,7 +4,7 @@ import pytest
 import yaml
 from support import refused
 
-from elastocal.exchange.robot_text import imported, refuse_existing, robot_text, summary, write_robot
+from elastocal.exchange.robot_text import check_imported, refuse_existing, robot_text, summary, write_robot
 
 DOCUMENT = {
     "masses": [{"link": 1, "mass_kg": 2.0, "centre_m": [1e-5, 0.0, 0.5], "relative_std": 0.2}],
@@ -18,7 +18,7 @@ DOCUMENT = {
 @pytest.fixture
 def result(tmp_path):
     (tmp_path / "x.urdf").write_text("something")
-    return imported(DOCUMENT, tmp_path / "x.urdf", "by hand", ["masses are guessed"])
+    return check_imported(DOCUMENT, tmp_path / "x.urdf", "by hand", ["masses are guessed"])
 
 
 def test_the_text_gives_back_the_document(result):
@@ -38,7 +38,7 @@ def test_the_head_says_where_it_came_from_and_what_it_lacks(result):
 def test_the_name_of_a_file_cannot_leave_the_comment(tmp_path):
     path = tmp_path / "a\nname: other\n.urdf"
     path.write_text("")
-    text = robot_text(imported(DOCUMENT, path, "by hand", ()))
+    text = robot_text(check_imported(DOCUMENT, path, "by hand", ()))
     assert yaml.safe_load(text) == DOCUMENT
 
 
@@ -53,7 +53,7 @@ def test_what_a_robot_file_may_not_say_is_refused_by_the_other_file(tmp_path):
     path = tmp_path / "x.csv"
     path.write_text("")
     with refused(path, "chain", "metres"):
-        imported(DOCUMENT | {"chain": "Tz(500) Rz(q1) Tz(q2) [flange]"}, path, "by hand", ())
+        check_imported(DOCUMENT | {"chain": "Tz(500) Rz(q1) Tz(q2) [flange]"}, path, "by hand", ())
 
 
 def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):

@@ -23,7 +23,7 @@ ORIGINS = {
 }
 
 
-def written(folder, links, **beside):
+def write(folder, links, **beside):
     path = folder / "calib.yaml"
     path.write_text(
         yaml.safe_dump(
@@ -36,7 +36,7 @@ def written(folder, links, **beside):
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
-    path = written(tmp_path, {name: ORIGINS[name] for name in PARTS[::order]}, hash="calib_7")
+    path = write(tmp_path, {name: ORIGINS[name] for name in PARTS[::order]}, hash="calib_7")
     result = robot_from_dh(path, name="ur5")
     robot = robot_from_document(yaml.safe_load(robot_text(result)))
     assert robot.joint_names == (
@@ -60,7 +60,7 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
 
 
 def test_links_of_another_robot_keep_their_order_and_names(tmp_path):
-    assert robot_from_dh(written(tmp_path, {"lower": ORIGINS["forearm"], "fore": ORIGINS["wrist_1"]})).robot.joint_names == (
+    assert robot_from_dh(write(tmp_path, {"lower": ORIGINS["forearm"], "fore": ORIGINS["wrist_1"]})).robot.joint_names == (
         "lower",
         "fore",
     )
@@ -90,4 +90,4 @@ def test_what_is_no_kinematics_is_refused(tmp_path, document, key, words):
 
 def test_no_notation_of_tables_goes_with_it(tmp_path):
     with refused("--modified", "", "kinematics"):
-        robot_from_dh(written(tmp_path, ORIGINS), modified=True)
+        robot_from_dh(write(tmp_path, ORIGINS), modified=True)

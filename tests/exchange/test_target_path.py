@@ -11,14 +11,14 @@ HEADER = "x,y,z,rx,ry,rz"
 ROWS = ["1.0,0.2,0.5,0.1,0.2,0.3", "1.1,0.2,0.5,0.0,0.0,0.0"]
 
 
-def written(folder, header=HEADER, rows=ROWS):
+def write_path(folder, header=HEADER, rows=ROWS):
     path = folder / "path.csv"
     path.write_text("\n".join([header, *rows]) + "\n")
     return path
 
 
 def test_poses_are_read_and_what_is_not_there_is_none(tmp_path):
-    found = read_target_path(written(tmp_path), 6)
+    found = read_target_path(write_path(tmp_path), 6)
     np.testing.assert_array_equal(found.position, [[1.0, 0.2, 0.5], [1.1, 0.2, 0.5]])
     np.testing.assert_allclose(Rotation.from_matrix(found.rotation[0]).as_rotvec(), [0.1, 0.2, 0.3])
     assert found.start is None and found.wrench is None and found.time_s is None
@@ -27,7 +27,7 @@ def test_poses_are_read_and_what_is_not_there_is_none(tmp_path):
 
 def test_loads_starts_and_covariates_are_read_where_they_are(tmp_path):
     header = HEADER + ",fx,fy,fz,mx,my,mz,q1,q2,temperature_c"
-    found = read_target_path(written(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2,21" for row in ROWS]), 2)
+    found = read_target_path(write_path(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2,21" for row in ROWS]), 2)
     np.testing.assert_array_equal(found.wrench[1], [1, 2, 3, 4, 5, 6])
     np.testing.assert_array_equal(found.start[0], [0.1, 0.2])
     np.testing.assert_array_equal(found.temperature_c, [21, 21])
@@ -54,7 +54,7 @@ def test_loads_starts_and_covariates_are_read_where_they_are(tmp_path):
 )
 def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
     with refused((tmp_path / "path.csv").as_posix(), key, *words):
-        read_target_path(written(tmp_path, header, [row]), 2)
+        read_target_path(write_path(tmp_path, header, [row]), 2)
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path):

@@ -51,7 +51,7 @@ def test_links_that_make_no_chain_are_refused(tmp_path, base, tip, points, key, 
         chain(tmp_path, base, tip, points)
 
 
-def mimicking(**of):
+def make_mimics(**of):
     """Three joints; which mimics what, with multiplier and offset."""
     kinds = {"j2": "revolute", "other": "revolute"} | of.pop("kinds", {})
     parts = [link(name) for name in ("base", "arm", "fore", "hand", "beside")]
@@ -74,11 +74,11 @@ def mimicking(**of):
 )
 def test_couplings_that_the_notation_cannot_say_are_refused(tmp_path, of, key, words):
     with refused("made.urdf", key, *words):
-        chain(tmp_path, parts=mimicking(**of))
+        chain(tmp_path, parts=make_mimics(**of))
 
 
 def test_a_joint_may_mimic_one_behind_it_and_one_that_mimics(tmp_path):
-    path = written(tmp_path, *mimicking(j1=("j3", -1.0, 0.2), j2=("j1", -1.0, 0.4)))
+    path = written(tmp_path, *make_mimics(j1=("j3", -1.0, 0.2), j2=("j1", -1.0, 0.4)))
     robot = robot_from_urdf(path, "base", "hand").robot
     assert robot.joint_names == ("j3",)
 

@@ -14,10 +14,10 @@ from made_calibrated import made_calibrated
 from made_urdf import assert_same_poses, joint, link, segments, written
 from support import refused
 
-from elastocal.application.calibrated_geometry import folded
+from elastocal.application.calibrated_geometry import fold_effects
 from elastocal.effects.catalogue import candidates_on
 from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.exchange.urdf_origins import with_calibrated_origins
+from elastocal.exchange.urdf_origins import write_calibrated_origins
 from elastocal.exchange.urdf_reading import read_urdf
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.sites import sites_of
@@ -87,27 +87,27 @@ def cell(tmp_path):
     path = tmp_path / "cell.urdf"
     path.write_bytes(text().replace("\n", "\r\n").encode())
     robot = robot_from_urdf(path, "world_mount", "tool0").robot
-    return path, robot, folded(made_calibrated(robot, *KEYS, identified=False, seed=4)).robot
+    return path, robot, fold_effects(made_calibrated(robot, *KEYS, identified=False, seed=4)).robot
 
 
-def exported(cell):
+def export_arm(cell):
     path, robot, calibrated = cell
-    found = with_calibrated_origins(path, robot, calibrated)
+    found = write_calibrated_origins(path, robot, calibrated)
     output = path.with_name("robot.urdf")
     output.write_bytes(found.content)
     return output, found
 
 
-def without_origins(content):
+def strip_origins(content):
     """Joint origins of the model are taken out, the others stay."""
     return re.sub(rb"(</?(joint|link)[^>]*>(?:<!--.*?-->)?)\s*<origin[^>]*>(</origin>)?\s*", rb"\1", content)
 
 
 def test_every_byte_but_those_of_joint_origins_is_as_it_was(cell):
-    output, found = exported(cell)
+    output, found = export_arm(cell)
     before, after = cell[0].read_bytes(), output.read_bytes()
     assert before != after and found.changed == 9 and (found.base, found.tip) == ("world_mount", "tool0")
-    assert without_origins(after) == without_origins(before)
+    assert strip_origins(after) == strip_origins(before)
     for kept in (
         b"9 9 9",
         b"5 5 5",
@@ -119,7 +119,7 @@ def test_every_byte_but_those_of_joint_origins_is_as_it_was(cell):
 
 
 def test_it_moves_as_the_calibrated_robot_in_pinocchio_and_mujoco(cell):
-    output, _ = exported(cell)
+    output, _ = export_arm(cell)
     _, robot, calibrated = cell
     angles = np.random.default_rng(1).uniform(-1.2, 1.2, (6, 8))
     position, rotation = poses(calibrated.chain, calibrated.model_angles(angles), calibrated.chain.end_effector)
@@ -140,7 +140,7 @@ def test_it_moves_as_the_calibrated_robot_in_pinocchio_and_mujoco(cell):
 
 
 def test_names_meshes_inertias_limits_and_mimic_are_as_they_were_in_both(cell):
-    output, _ = exported(cell)
+    output, _ = export_arm(cell)
     one, other = (mujoco.MjModel.from_xml_path(str(path)) for path in (cell[0], output))
     assert one.nmesh == other.nmesh > 0 and one.names == other.names and one.neq == other.neq
     for part in ("mesh_vert", "geom_dataid", "geom_size", "jnt_range", "jnt_actfrcrange", "jnt_type", "dof_damping"):
@@ -168,14 +168,14 @@ def test_a_joint_that_mimics_one_of_the_chain_takes_its_offset_too(tmp_path):
     path = written(tmp_path, *parts)
     robot = robot_from_urdf(path, "a", "e").robot
     keys = ("joint_offset@1", "joint_offset@2", "link_geometry@1", "link_geometry@2")
-    calibrated = folded(made_calibrated(robot, *keys, identified=False)).robot
-    output, _ = exported((path, robot, calibrated))
+    calibrated = fold_effects(made_calibrated(robot, *keys, identified=False)).robot
+    output, _ = export_arm((path, robot, calibrated))
     assert_same_poses(calibrated, output, "a", "e", lambda values: {"three": 0.3 - values["one"]})
 
 
 def test_what_changes_nothing_gives_the_file_back_to_the_byte(cell):
     path, robot, _ = cell
-    same = with_calibrated_origins(path, robot, robot)
+    same = write_calibrated_origins(path, robot, robot)
     assert same.content == path.read_bytes() and same.changed == 0
 
 
@@ -183,8 +183,8 @@ def test_a_controller_that_counts_otherwise_keeps_the_joint_values_of_the_urdf(c
     path, robot, calibrated = cell
     sense = np.diag([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
     turned = [replace(r, reported_matrix=sense, reported_offset=r.reported_offset + 0.2) for r in (robot, calibrated)]
-    expected = with_calibrated_origins(path, robot, calibrated).content
-    assert with_calibrated_origins(path, *turned).content == expected
+    expected = write_calibrated_origins(path, robot, calibrated).content
+    assert write_calibrated_origins(path, *turned).content == expected
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_another_robots_file_is_refused_by_the_joint_that_differs(cell, old, new
     other = path.with_name("other.urdf")
     other.write_text(text().replace(old, new), encoding="utf-8")
     with refused(other, *words, "imported"):
-        with_calibrated_origins(other, robot, calibrated)
+        write_calibrated_origins(other, robot, calibrated)
 
 
 def test_a_file_in_utf_16_is_refused(cell):
@@ -210,7 +210,7 @@ def test_a_file_in_utf_16_is_refused(cell):
     other = path.with_name("other.urdf")
     other.write_bytes(text().replace("utf-8", "utf-16").encode("utf-16"))
     with refused(other, "UTF-16", "UTF-8"):
-        with_calibrated_origins(other, robot, calibrated)
+        write_calibrated_origins(other, robot, calibrated)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "iso-8859-1"])
@@ -218,14 +218,13 @@ def test_other_encodings_stay_what_they_are(cell, encoding):
     path, robot, calibrated = cell
     other = path.with_name("other.urdf")
     other.write_bytes(text().replace('encoding="utf-8"', f'encoding="{encoding.removesuffix("-sig")}"').encode(encoding))
-    found = with_calibrated_origins(other, robot, calibrated)
+    found = write_calibrated_origins(other, robot, calibrated)
     assert (
-        without_origins(found.content) == without_origins(other.read_bytes())
-        and "geprüft".encode(encoding)[-7:] in found.content
+        strip_origins(found.content) == strip_origins(other.read_bytes()) and "geprüft".encode(encoding)[-7:] in found.content
     )
     usual = path.with_name("usual.urdf")
     usual.write_bytes(found.content)
-    both = [read_urdf(p).joints for p in (usual, exported(cell)[0])]
+    both = [read_urdf(p).joints for p in (usual, export_arm(cell)[0])]
     for mine, theirs in zip(*both, strict=True):
         np.testing.assert_array_equal(mine.origin, theirs.origin)
 
@@ -243,5 +242,5 @@ def test_any_chain_moves_as_its_calibrated_robot(tmp_path_factory, parts, seed):
     keys = [*(f"joint_offset@{place}" for place in places), *(f"link_geometry@{place}" for place in places)]
     known = candidates_on(sites_of(robot))
     made = made_calibrated(robot, *(key for key in keys if key in known), identified=False, seed=seed)
-    calibrated = folded(made).robot
-    assert_same_poses(calibrated, exported((path, robot, calibrated))[0], "l0", "tip", count=3, within=1e-8)
+    calibrated = fold_effects(made).robot
+    assert_same_poses(calibrated, export_arm((path, robot, calibrated))[0], "l0", "tip", count=3, within=1e-8)

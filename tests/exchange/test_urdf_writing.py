@@ -13,13 +13,13 @@ from elastocal.mechanics.kinematics import poses
 ROBOTS = ("gp180", "iiwa14", "ur10", "fanuc_static", "abb", "wam", "kuka")
 
 
-def written(folder, robot):
+def write_urdf(folder, robot):
     path = folder / "arm.urdf"
     path.write_text(urdf_of(robot, "made for a test"))
     return path
 
 
-def drawn(robot):
+def draw_angles(robot):
     low, high = robot.joint_limits.T
     return low + (high - low) * np.random.default_rng(2).random((12, robot.joints))
 
@@ -29,8 +29,8 @@ def test_read_back_it_is_the_robot_that_the_controller_moves(tmp_path, name):
     robot = analysed(name)
     end = robot.chain.end_effector
     others = [point.name for point in robot.chain.points[:-1]]
-    back = robot_from_urdf(written(tmp_path, robot), "base", end.name, others).robot
-    angles = drawn(robot)
+    back = robot_from_urdf(write_urdf(tmp_path, robot), "base", end.name, others).robot
+    angles = draw_angles(robot)
     own = np.abs(robot.reported_matrix).tolist() == np.eye(robot.joints).tolist()
     values = robot.reported_angles(angles) if own else angles
     for point in robot.chain.points:
@@ -43,7 +43,7 @@ def test_read_back_it_is_the_robot_that_the_controller_moves(tmp_path, name):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_mujoco_loads_it_and_no_joint_is_without_effort_or_speed(tmp_path, name):
     robot = analysed(name)
-    path = written(tmp_path, robot)
+    path = write_urdf(tmp_path, robot)
     model, by_pinocchio = mujoco.MjModel.from_xml_path(str(path)), Pinocchio(path).model
     assert model.nv >= robot.joints and (model.body_inertia[1:] > 0).all()
     assert (by_pinocchio.effortLimit > 0).all() and (by_pinocchio.velocityLimit > 0).all()
@@ -54,7 +54,7 @@ def test_mujoco_loads_it_and_no_joint_is_without_effort_or_speed(tmp_path, name)
 def test_pinocchio_reads_it_too(tmp_path):
     robot = analysed("fanuc_static")
     names = [f"joint_{j}" for j in range(1, 7)]
-    assert_same_poses(robot, written(tmp_path, robot), "base", robot.chain.end_effector.name, names=names)
+    assert_same_poses(robot, write_urdf(tmp_path, robot), "base", robot.chain.end_effector.name, names=names)
 
 
 def test_a_controller_that_couples_joints_is_said_in_a_comment(tmp_path):

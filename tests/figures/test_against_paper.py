@@ -19,7 +19,7 @@ PRINTED = pd.DataFrame(
 )
 
 
-def drawn(axis, marker):
+def find_points(axis, marker):
     """Points with a marker: x, row, and whether they are filled with the colour of a difference."""
     return [
         (float(x), float(y), to_hex(line.get_markerfacecolor()).upper() == PALETTE[1])
@@ -36,9 +36,9 @@ def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
     assert row_labels(figure.axes[0]) == ["6DoF"]
     k_sigma, dev, _ = figure.axes[:3]
     # After Holm's correction the first differs and the second does not.
-    assert drawn(k_sigma, "D") == [(1.5, 0.0, True)] and drawn(dev, "D") == [(1.0, 0.0, False)]
-    assert [x for x, *_ in drawn(dev, "o")] == [1.2] and [x for x, *_ in drawn(dev, "|")] == [1.22]
-    assert drawn(figure.axes[5], "D") == [(30.0, 0.0, False)]
+    assert find_points(k_sigma, "D") == [(1.5, 0.0, True)] and find_points(dev, "D") == [(1.0, 0.0, False)]
+    assert [x for x, *_ in find_points(dev, "o")] == [1.2] and [x for x, *_ in find_points(dev, "|")] == [1.22]
+    assert find_points(figure.axes[5], "D") == [(30.0, 0.0, False)]
 
 
 def test_the_legend_says_what_is_the_papers_and_what_is_expected():

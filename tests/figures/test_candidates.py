@@ -15,9 +15,9 @@ from elastocal.figures import candidates as drawn
 from elastocal.figures.candidates import (
     angle_matrix,
     confounding,
-    leading,
     name_in_pairs,
     probabilities,
+    rank_candidates,
     short_name,
     shortlist,
 )
@@ -74,8 +74,8 @@ def test_factors_below_and_above_one_stand_on_both_sides_of_zero():
 def test_each_candidate_stands_once_at_its_best_shape():
     table = candidate_table()
     table["candidate"][3] = table["candidate"][1]
-    assert 3 not in leading(table) and 1 in leading(table)
-    assert leading(table)[0] == 0
+    assert 3 not in rank_candidates(table) and 1 in rank_candidates(table)
+    assert rank_candidates(table)[0] == 0
 
 
 def test_confounding_annotates_every_pair_and_marks_what_was_found():

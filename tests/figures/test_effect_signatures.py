@@ -5,7 +5,7 @@ import pytest
 from analysed_robots import analysed
 
 from elastocal.effects.catalogue import effects
-from elastocal.figures.effect_signatures import offered_candidates, signature, signature_figure
+from elastocal.figures.effect_signatures import list_candidates, signature, signature_figure
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def test_every_effect_of_the_catalogue_displaces_the_reflector_somewhere(name, a
     assert all(np.isfinite(each).all() and each.shape[1] == 3 for each in moved)
     # By more than a tracker's noise and by less than would be seen without one.
     assert 5e-3 < max(np.abs(each).max() for each in moved) < 50
-    assert shown.candidate.key in {candidate.key for candidate in offered_candidates(name, arm)}
+    assert shown.candidate.key in {candidate.key for candidate in list_candidates(name, arm)}
 
 
 def test_an_offset_needs_neither_load_nor_time(arm):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from analysed_robots import analysed
 
-from elastocal.figures.arm_view import as_seen
+from elastocal.figures.arm_view import project_view
 from elastocal.figures.hero import arm_with_errors
 
 
@@ -28,7 +28,7 @@ def test_each_panel_has_its_errors_and_their_rms(table):
         (arrows,) = [found for found in axis.collections if found.get_gid() == stage]
         off = np.column_stack([table[f"{stage}_d{each}"] for each in "xyz"])[::3]
         drawn = np.column_stack([arrows.U, arrows.V])
-        times = np.linalg.norm(drawn) / np.linalg.norm(as_seen(off))
-        np.testing.assert_allclose(drawn, times * as_seen(off), atol=1e-12)
+        times = np.linalg.norm(drawn) / np.linalg.norm(project_view(off))
+        np.testing.assert_allclose(drawn, times * project_view(off), atol=1e-12)
         assert times == pytest.approx(400)
     assert "4 held-out poses" in figure.get_supxlabel() and "400 times" in figure.get_supxlabel()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drawn_schemes import CHAINS, from_chain, from_file
 
-from elastocal.figures.scheme_layout import DRAWING_MM, Joint, Point, Segment, laid_out, projected, view_of
+from elastocal.figures.scheme_layout import DRAWING_MM, Joint, Point, Segment, lay_out, project_on_paper, view_of
 from elastocal.figures.scheme_sheet import SYMBOL_RADIUS_MM
 from elastocal.mechanics.robot import with_target_offset
 
@@ -20,7 +20,7 @@ def drawn(request):
     """A robot with its items and the direction on paper of what recedes."""
     name = request.param
     if name not in LAID_OUT:
-        LAID_OUT[name] = laid_out(ROBOTS[name].chain)
+        LAID_OUT[name] = lay_out(ROBOTS[name].chain)
     return ROBOTS[name], *LAID_OUT[name]
 
 
@@ -59,7 +59,7 @@ def test_links_do_not_cross(drawn):
     ],
 )
 def test_a_robot_is_drawn_at_a_scale_at_which_it_fits_the_drawing(name):
-    items, _ = laid_out(ROBOTS[name].chain)
+    items, _ = lay_out(ROBOTS[name].chain)
     places = [place for item in of(Segment, items) for place in (item.start, item.end)]
     assert (np.ptp(places, axis=0) <= DRAWING_MM).all()
 
@@ -67,7 +67,7 @@ def test_a_robot_is_drawn_at_a_scale_at_which_it_fits_the_drawing(name):
 def test_a_link_points_where_its_direction_is_projected(drawn):
     _, items, depth = drawn
     for segment in of(Segment, items):
-        shown, expected = segment.end - segment.start, projected(segment.direction, depth)
+        shown, expected = segment.end - segment.start, project_on_paper(segment.direction, depth)
         np.testing.assert_allclose(shown / np.linalg.norm(shown), expected / np.linalg.norm(expected))
         assert np.linalg.norm(segment.direction) == pytest.approx(1)
 
@@ -104,7 +104,7 @@ def test_a_longer_link_is_not_drawn_shorter_than_one_that_carries_as_many_joints
     _, items, depth = drawn
     size = {0: [], 1: [], 2: []}
     for segment in of(Segment, items):
-        drawn_mm = np.linalg.norm(segment.end - segment.start) / np.linalg.norm(projected(segment.direction, depth))
+        drawn_mm = np.linalg.norm(segment.end - segment.start) / np.linalg.norm(project_on_paper(segment.direction, depth))
         size[len(segment.carried)].append((segment.length_m, round(drawn_mm, 6)))
     for pairs in size.values():
         assert [drawn_mm for _, drawn_mm in sorted(pairs)] == sorted(drawn_mm for _, drawn_mm in pairs)
@@ -112,10 +112,10 @@ def test_a_longer_link_is_not_drawn_shorter_than_one_that_carries_as_many_joints
 
 def test_measuring_points_stand_at_their_place_on_the_arm_and_only_an_offset_moves_them():
     robot = ROBOTS["kuka"]
-    points = of(Point, LAID_OUT.get("kuka", laid_out(robot.chain))[0])
+    points = of(Point, LAID_OUT.get("kuka", lay_out(robot.chain))[0])
     assert [point.name for point in points] == [point.name for point in robot.chain.points]
     assert all(np.allclose(point.place, point.node) for point in points)
-    moved = of(Point, laid_out(with_target_offset(robot, (0.0, 0.1, 0.05)).chain)[0])
+    moved = of(Point, lay_out(with_target_offset(robot, (0.0, 0.1, 0.05)).chain)[0])
     assert all(np.linalg.norm(point.place - point.node) > 5 for point in moved if np.linalg.norm(point.offset))
     assert [point for point in moved if np.linalg.norm(point.offset)]
 
@@ -130,5 +130,5 @@ def test_the_view_is_that_in_which_most_joints_point_into_the_paper(name, right)
 
 def test_what_lies_in_the_plane_of_the_paper_keeps_its_place():
     depth = np.array([0.5, 0.25])
-    np.testing.assert_array_equal(projected(np.array([3.0, 4.0, 0.0]), depth), [3, 4])
-    np.testing.assert_array_equal(projected(np.array([3.0, 4.0, -2.0]), depth), [2, 3.5])
+    np.testing.assert_array_equal(project_on_paper(np.array([3.0, 4.0, 0.0]), depth), [3, 4])
+    np.testing.assert_array_equal(project_on_paper(np.array([3.0, 4.0, -2.0]), depth), [2, 3.5])

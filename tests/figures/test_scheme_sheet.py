@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from elastocal.figures.scheme_sheet import LEGEND_ROW_MM, MARGIN_MM, WIDTH_MM, Sheet, filled_rows, subscripted
+from elastocal.figures.scheme_sheet import LEGEND_ROW_MM, MARGIN_MM, WIDTH_MM, Sheet, fill_rows, write_subscript
 
 UP = np.array([0.0, 1.0])
 PLACE = np.zeros(2)
@@ -27,18 +27,18 @@ def overlaps(one, other):
 
 
 def test_a_subscript_of_two_digits_stays_below():
-    assert subscripted("q", 12) == "$q_{12}$"
+    assert write_subscript("q", 12) == "$q_{12}$"
 
 
 def test_rows_fill_one_after_another():
-    assert filled_rows([4, 4, 4, 11, 1], 10, gap=2) == [[0, 1], [2], [3], [4]]
-    assert filled_rows([4, 4, 2], 10, gap=0) == [[0, 1, 2]]
+    assert fill_rows([4, 4, 4, 11, 1], 10, gap=2) == [[0, 1], [2], [3], [4]]
+    assert fill_rows([4, 4, 2], 10, gap=0) == [[0, 1, 2]]
 
 
 @settings(max_examples=20)
 @given(st.lists(st.floats(0.1, 12), min_size=1, max_size=12), st.floats(0, 3))
 def test_no_row_is_too_wide_and_none_has_room_for_the_next(widths, gap):
-    rows = filled_rows(widths, 10.0, gap)
+    rows = fill_rows(widths, 10.0, gap)
     assert [index for row in rows for index in row] == list(range(len(widths)))
 
     def width(row):

@@ -22,7 +22,7 @@ DICHROMATS = {
 XYZ_OF_RGB = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
 
 
-def lab_as_seen(colour, eye):
+def simulate_lab(colour, eye):
     """CIELAB of an sRGB colour as a dichromat sees it."""
     value = np.array(to_rgb(colour))
     linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
@@ -31,7 +31,7 @@ def lab_as_seen(colour, eye):
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
-def saved(figure, folder, name="figure"):
+def save_both(figure, folder, name="figure"):
     pdf, png = folder / f"{name}.pdf", folder / f"{name}.png"
     save(figure, pdf.as_posix(), png.as_posix())
     return pdf, png
@@ -68,7 +68,7 @@ def test_the_first_eight_lines_differ_in_colour_and_the_ninth_begins_anew():
 
 @pytest.mark.parametrize("eye", DICHROMATS.values(), ids=DICHROMATS)
 def test_colour_blind_readers_see_eight_different_colours(eye):
-    seen = [lab_as_seen(colour, np.array(eye)) for colour in PALETTE]
+    seen = [simulate_lab(colour, np.array(eye)) for colour in PALETTE]
     # A difference of 2.3 is just noticeable side by side (Mahy et al. 1994); lines of a plot need several times that.
     assert min(np.linalg.norm(one - other) for one, other in combinations(seen, 2)) > 10
 
@@ -78,7 +78,7 @@ def test_the_same_figure_gives_the_same_bytes_without_a_date(tmp_path):
     for name in "ab":
         figure, axes = panels(1, 1, 30)
         axes[0, 0].plot([1, 2], [3, 4])
-        files.append(saved(figure, tmp_path, name))
+        files.append(save_both(figure, tmp_path, name))
     for one, other in zip(*files, strict=True):
         assert one.read_bytes() == other.read_bytes()
     assert b"CreationDate" not in files[0][0].read_bytes()
@@ -86,7 +86,7 @@ def test_the_same_figure_gives_the_same_bytes_without_a_date(tmp_path):
 
 
 def test_pictures_have_150_dots_an_inch_and_fonts_of_the_pdf_are_true_type(tmp_path):
-    pdf, png = saved(panels(1, 1, 25.4)[0], tmp_path)
+    pdf, png = save_both(panels(1, 1, 25.4)[0], tmp_path)
     assert imread(png).shape[:2] == (150, int(150 * WIDTH_MM / 25.4))
     assert b"/Type3" not in pdf.read_bytes() and b"/CIDFontType2" in pdf.read_bytes()
 
@@ -96,7 +96,7 @@ def test_a_figure_that_cannot_be_drawn_leaves_the_earlier_file_as_it_was(tmp_pat
     figure = Figure()
     figure.text(0.5, 0.5, r"$\unknowncommand$")
     with pytest.raises(ValueError):
-        saved(figure, tmp_path)
+        save_both(figure, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["figure.pdf"]
     assert (tmp_path / "figure.pdf").read_text(encoding="utf-8") == "earlier"
 

@@ -16,7 +16,7 @@ from elastocal.campaigns.reading import campaign_files, read_campaign, read_robo
 from elastocal.campaigns.sources import campaign_sources
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.chain import parse_chain
-from elastocal.study.configuration import check_study, with_overrides
+from elastocal.study.configuration import check_study, override
 from elastocal.study.strategies import check_strategy, strategy_from_document
 
 CONFIG = REPOSITORY / "config"
@@ -99,7 +99,7 @@ def test_configurations(place, content):
     SCALARS.map(str) | VALUES.map(lambda value: json.dumps(value, default=str)) | st.text(max_size=30),
 )
 def test_changes_on_the_command_line(key, text):
-    holds(lambda: check_study(with_overrides(STUDY, [f"{key}={text}"]), CONFIG, "config.yaml"))
+    holds(lambda: check_study(override(STUDY, [f"{key}={text}"]), CONFIG, "config.yaml"))
 
 
 @given(st.data())

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from synthetic import NOISE
 
-from elastocal.application.calibrated import calibrated_of
+from elastocal.application.calibrated import calibrate_by_model
 from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.joint_compliance import candidate as joint_compliance
@@ -51,4 +51,4 @@ def made_calibrated(robot, *keys, seed=0, size=0.3, relative_std=0.02, identifie
     mixed = np.eye(len(sizes)) + 0.3 * rng.standard_normal((len(sizes), len(sizes))) / max(len(sizes), 1) ** 0.5
     root = relative_std * sizes[:, None] * mixed
     noise = noise or replace(NOISE, joint_rad=np.zeros(robot.joints))
-    return calibrated_of(robot, model, estimate, root @ root.T, noise)
+    return calibrate_by_model(robot, model, estimate, root @ root.T, noise)

@@ -34,12 +34,6 @@ POSITIONS = {
 ROTATIONS = ("none", "vector", "quaternion", "matrix", "homogeneous", "euler:ZYX", "euler:xyz", "euler:ZYZ")
 TIMES = ("none", "s", "ms", "epoch ms", "iso", "clock", "german")
 UNIT_STYLES = ("bracket", "parenthesis", "ending", "row", "none")
-DIMENSIONS = {
-    "joints": 8, "rail": 2, "joint names": len(JOINTS) + 2, "positions": len(POSITIONS), "targets and their table": 5,
-    "rotation": len(ROTATIONS), "time": len(TIMES), "units": len(UNIT_STYLES), "length": 3, "angle": 3, "force": 3,
-    "separator": 5, "decimal": 2, "thousands": 2, "quotes": 2, "encoding": 5, "line ends": 3, "preamble": 4, "comment mark": 4,
-    "poses": 3, "beside": 2, "order": 2,
-}  # fmt: skip
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.campaigns.writing import write_campaign
 
 PLAN = Plan(("3DoF", "6DoF"), 14, 800.0, (0, 1), (0.0, 0.5, 0.0), 2, 4, 6e-5, 6e-5)
@@ -26,7 +26,7 @@ def made_document(name, **changes):
 
 def made_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
     """Measurements of a robot whose third joint stands beyond what it reports, in no order."""
-    table = simulated_measurements(robot, plan, seed, name)
+    table = draw_measurements(robot, plan, seed, name)
     table["q3"] = table["q3"] - offset_of_joint_3
     order = np.random.default_rng(seed).permutation(len(table["pose"]))
     return {column: np.asarray(values)[order] for column, values in table.items()}

@@ -4,8 +4,7 @@ import pandas as pd
 from made_metrics import LENGTHS
 from made_study_blocks import PAPER
 
-from elastocal.study.interpretation import Interpretation, Size
-from elastocal.study.steps.in_memory import StudyInMemory
+from elastocal.study.steps.in_memory import Interpretation, Size, StudyInMemory
 from elastocal.study.steps.repeat import repeated_blocks
 
 USUAL = Interpretation(PAPER, 6, "end_effector", "stiffness", "averaged_model")

@@ -5,7 +5,7 @@ from support import PinocchioPoint, without_tool
 
 from elastocal.study.simulation import Loading
 from elastocal.study.steps.design import design_blocks
-from elastocal.study.steps.evaluate import evaluated, judge_from
+from elastocal.study.steps.evaluate import evaluate_strategy, judge_from
 from elastocal.study.steps.identify import identified_blocks, paired_blocks
 from elastocal.study.steps.measure import measured_blocks
 from elastocal.study.steps.simulate import experiment_blocks, ideal_blocks
@@ -62,7 +62,7 @@ def judge(robot, at="end_effector"):
 def evaluated_in_one_block(table, scores, fixed_joints, method, replicates, lengths):
     sets = int(table["data_set"].max()) + 1
     *counts, tests = weight_blocks("kuka", 1, sets, CONFIGURATIONS_OF_THE_TEST, replicates)
-    return evaluated([table], counts, tests, scores, fixed_joints, method, "averaged_model", lengths)
+    return evaluate_strategy([table], counts, tests, scores, fixed_joints, method, "averaged_model", lengths)
 
 
 def pinocchio_regressors(chain, block, name, at="end_effector", rows=6):

@@ -4,34 +4,9 @@ import numpy as np
 import pandas as pd
 
 from elastocal.report.answers import answers
-from elastocal.report.decision_answers import (
-    break_even_rows,
-    claim_rows,
-    cost_facts,
-    few_rows,
-    joint_rows,
-    kind_rows,
-    measured_rows,
-    simulated_design_rows,
-    smallest_designs,
-    stiffness_rows,
-    study_facts,
-)
-from elastocal.report.metric_answers import METRIC_NAMES, metric_summary, score_rows, staged_rows
-from elastocal.report.question_answers import (
-    budget_rows,
-    design_facts,
-    geometry_rows,
-    ladder_rows,
-    needed_rows,
-    observability_rows,
-    place_facts,
-    stated,
-    strategy_rows,
-    summaries,
-    tube_rows,
-    weighting_rows,
-)
+from elastocal.report.metric_answers import METRIC_NAMES
+from elastocal.report.question_answers import stated
+from elastocal.report.study_questions import Asked, answer_questions
 from elastocal.study.strategies import Stage, Strategy
 
 TITLES = {"kuka": "Kuka", "fanuc": "Fanuc"}
@@ -290,38 +265,16 @@ def stiffness():
 
 def question_facts():
     """Facts of the research questions from these tables."""
-    robots = [*TITLES]
+    tables = {
+        **{"claims": claims(), "joint": joint(), "studies": measured(), "break_even": break_even(), "costs": costs()},
+        **{"simulated": simulated(), "few": few(), "kinds": kinds(), "stiffness": stiffness(), "ladder": ladder()},
+        **{"budget": budget(), "pairs": pairs(), "needed": needed(), "designs": designs(), "places": places()},
+        **{"scores": strategy_scores(), "score_pairs": score_pairs(), "tubes": tubes(), "observability": observability()},
+        **{"geometry": geometry(), "weighting": weighting()},
+    }
     strategies = [Strategy("6DoF", (Stage(("6DoF",), tuple(range(6))),))]
-    return {
+    return answer_questions(tables, Asked(TITLES, strategies, *STRATEGIES, 20, 60.0, "full_turn")) | {
         "citation": {"authors": "the developers", "date": "2026-11-25", "version": "0.1.0", "license": "MIT"},
-        "accuracy_um": "60",
-        "claims": claim_rows(claims(), TITLES),
-        "joint": joint_rows(joint()),
-        "table4": measured_rows(measured(), TITLES),
-        "over_studies": [{"title": title} | study_facts(measured(), robot, *STRATEGIES) for robot, title in TITLES.items()],
-        "break_even": break_even_rows(break_even(), 60.0, TITLES),
-        "costs": cost_facts(costs(), TITLES),
-        "simulated": simulated_design_rows(simulated(), 20, TITLES),
-        "smallest": smallest_designs(simulated(), 60.0, TITLES),
-        "few": few_rows(few(), TITLES),
-        "kinds": kind_rows(kinds(), 20, TITLES),
-        "stiffness": stiffness_rows(stiffness(), TITLES),
-        "strategies": strategy_rows(strategies),
-        "ladder": ladder_rows(ladder()),
-        "budget": budget_rows(budget(), pairs(), 20, robots),
-        "needed": needed_rows(needed(), 60.0, robots),
-        "designs": {kind: design_facts(some, 20, 60.0, TITLES) for kind, some in designs().groupby("joint_range")},
-        "joint_range": "full_turn",
-        "places": place_facts(places(), TITLES),
-        "scores": score_rows(strategy_scores(), robots),
-        "staged": staged_rows(strategy_scores(), robots),
-        "metrics": metric_summary(score_pairs(), TITLES),
-        "metric_names": METRIC_NAMES,
-        "tubes": tube_rows(tubes()),
-        "observability": observability_rows(observability(), robots),
-        "summaries": summaries(ladder(), pairs(), observability()),
-        "geometry": geometry_rows(geometry(), robots),
-        "weighting": weighting_rows(weighting(), robots),
         "titles": TITLES,
         "names": TITLES,
         "full_names": [*TITLES.values()],

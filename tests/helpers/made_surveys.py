@@ -4,7 +4,7 @@ import numpy as np
 from analysed_robots import analysed
 
 from elastocal.application.planning.cell import Cell
-from elastocal.application.planning.plan import Loads, allowed_candidates
+from elastocal.application.planning.plan import Loads, find_allowed_candidates
 from elastocal.application.planning.survey import Survey
 from elastocal.campaigns.campaign import Target
 
@@ -27,4 +27,4 @@ def made_rows(count=40, numbers=6, parameters=5, seed=1):
 
 def made_candidates(survey, count=200, cell=OPEN, loads=PULL):
     """Configurations that a cell allows."""
-    return allowed_candidates(survey, cell, loads, count, 1)
+    return find_allowed_candidates(survey, cell, loads, count, 1)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import yaml
 
-from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -27,7 +27,7 @@ def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
     lengths = {name: value + 1e-3 * draws.standard_normal() for name, value in SERVICE_ARM["lengths_m"].items()}
     true = replace(robot_from_document(SERVICE_ARM | {"lengths_m": lengths}), compliance=np.zeros(8))
     plan = Plan(("8DoF",), poses, 0.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-3, 1e-3)
-    table = simulated_measurements(true, plan, seed, "service")
+    table = draw_measurements(true, plan, seed, "service")
     zeros = 0.2 * _PLAY * draws.standard_normal(8)
     for joint in range(8):
         table[f"q{joint + 1}"] = table[f"q{joint + 1}"] + zeros[joint] + _PLAY[joint] * draws.standard_normal(poses)

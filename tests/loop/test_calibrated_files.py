@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from analysed_robots import ROBOTS
-from certified import ENGINE, certified_checkout
+from certified import ENGINE
 from support import refused
 
-from elastocal.application.calibrated import calibrated_from
+from elastocal.application.calibrated import calibrate_by_fit
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
 from elastocal.io.sources import source_digest
@@ -21,26 +21,19 @@ from elastocal.loop.diagnosis_tables import diagnosis_from
 from elastocal.loop.schemas import STEPS
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    top = tmp_path_factory.mktemp("calibrated")
-    certified_checkout(top)
-    return top
-
-
 @pytest.fixture
-def changed(made, tmp_path):
+def changed(checkout, tmp_path):
     """A copy, to be changed."""
-    shutil.copytree(made, tmp_path / "top", symlinks=True)
+    shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     return tmp_path / "top"
 
 
-def test_the_robot_is_that_of_the_final_fit(made):
-    found = load_diagnosed(made / "made", ROBOTS, made)
-    tables = made / "results/loop/made"
+def test_the_robot_is_that_of_the_final_fit(checkout):
+    found = load_diagnosed(checkout / "made", ROBOTS, checkout)
+    tables = checkout / "results/loop/made"
     steps = read_table(tables / "steps.parquet", STEPS)
     again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"), steps)
-    expected = calibrated_from(again.final, found.case.campaign.robot)
+    expected = calibrate_by_fit(again.final, found.case.campaign.robot)
     assert [e.key for e in found.calibrated.model.effects] == ["joint_compliance", "joint_offset@3"]
     for mine, theirs in zip(found.calibrated.estimate.coefficients, expected.estimate.coefficients, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=1e-6)
@@ -51,25 +44,25 @@ def test_the_robot_is_that_of_the_final_fit(made):
     assert found.calibrated.scope.form_m == found.verdict["accuracy"]["form_m"]
 
 
-def test_it_says_what_code_data_and_environment_made_it(made):
-    origin = load_diagnosed(made / "made", ROBOTS, made).origin
+def test_it_says_what_code_data_and_environment_made_it(checkout):
+    origin = load_diagnosed(checkout / "made", ROBOTS, checkout).origin
 
     def digest(value):
         return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
-    files = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in (made / "made").iterdir()}
+    files = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in (checkout / "made").iterdir()}
     files["kuka.yaml"] = hashlib.sha256((ROBOTS / "kuka.yaml").read_bytes()).hexdigest()
     assert origin == {
         "commit": "c0ffee",
-        "code_sha256": digest({ENGINE: source_digest(made / ENGINE)}),
+        "code_sha256": digest({ENGINE: source_digest(checkout / ENGINE)}),
         "data_sha256": digest(sorted(files.items())),
-        "environment": environment(made),
+        "environment": environment(checkout),
     }
 
 
-def test_the_folder_may_have_moved(made, tmp_path):
-    shutil.copytree(made / "made", tmp_path / "elsewhere")
-    assert load_diagnosed(tmp_path / "elsewhere", ROBOTS, made).name == "made"
+def test_the_folder_may_have_moved(checkout, tmp_path):
+    shutil.copytree(checkout / "made", tmp_path / "elsewhere")
+    assert load_diagnosed(tmp_path / "elsewhere", ROBOTS, checkout).name == "made"
 
 
 def another_seed(folder):
@@ -97,24 +90,24 @@ def another_table(folder):
 @pytest.mark.parametrize(
     "change", [another_seed, no_measurements, another_table, *(moved_row(row) for row in range(0, 60, 12))]
 )
-def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(made, tmp_path, change):
-    shutil.copytree(made / "made", tmp_path / "changed")
+def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(checkout, tmp_path, change):
+    shutil.copytree(checkout / "made", tmp_path / "changed")
     change(tmp_path / "changed")
     with refused((tmp_path / "changed").as_posix(), "", "changes since its diagnosis", "elastocal diagnose"):
-        load_diagnosed(tmp_path / "changed", ROBOTS, made)
+        load_diagnosed(tmp_path / "changed", ROBOTS, checkout)
 
 
-def test_a_robot_file_that_has_changed_since_is_refused(made, tmp_path):
+def test_a_robot_file_that_has_changed_since_is_refused(checkout, tmp_path):
     shutil.copytree(ROBOTS, tmp_path / "robots")
     with open(tmp_path / "robots/kuka.yaml", "a", encoding="utf-8") as file:
         file.write("# edited\n")
-    with refused(made / "made", "", "changes since its diagnosis", "elastocal diagnose"):
-        load_diagnosed(made / "made", tmp_path / "robots", made)
+    with refused(checkout / "made", "", "changes since its diagnosis", "elastocal diagnose"):
+        load_diagnosed(checkout / "made", tmp_path / "robots", checkout)
 
 
-def test_a_campaign_that_was_never_diagnosed_is_refused(made, tmp_path):
-    with refused(made / "made", "", "no diagnosis of it in ", tmp_path.as_posix(), "elastocal diagnose"):
-        load_diagnosed(made / "made", ROBOTS, tmp_path)
+def test_a_campaign_that_was_never_diagnosed_is_refused(checkout, tmp_path):
+    with refused(checkout / "made", "", "no diagnosis of it in ", tmp_path.as_posix(), "elastocal diagnose"):
+        load_diagnosed(checkout / "made", ROBOTS, tmp_path)
 
 
 def test_results_of_another_engine_are_refused(changed):

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS
-from certified import certified_checkout
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.loop.calibrated_files import load_diagnosed
@@ -17,20 +16,13 @@ WANTED = Wanted(2e-4, 0.05, "SN 7", "2026-11-23", 1)
 
 
 @pytest.fixture(scope="module")
-def top(tmp_path_factory):
-    found = tmp_path_factory.mktemp("certified")
-    certified_checkout(found)
-    return found
+def diagnosed(checkout):
+    return load_diagnosed(checkout / "made", ROBOTS, checkout)
 
 
 @pytest.fixture(scope="module")
-def diagnosed(top):
-    return load_diagnosed(top / "made", ROBOTS, top)
-
-
-@pytest.fixture(scope="module")
-def found(top, diagnosed):
-    return certificate(top / "made", ROBOTS, diagnosed, WANTED, diagnosed)
+def found(checkout, diagnosed):
+    return certificate(checkout / "made", ROBOTS, diagnosed, WANTED, diagnosed)
 
 
 def test_one_accuracy_stands_in_headline_budget_and_report(found, diagnosed):
@@ -46,17 +38,17 @@ def test_one_accuracy_stands_in_headline_budget_and_report(found, diagnosed):
     assert document["held_out"][-1]["max_m_low"] is None
 
 
-def test_a_certificate_passes_below_and_fails_above_what_is_predicted(found, top, diagnosed):
+def test_a_certificate_passes_below_and_fails_above_what_is_predicted(found, checkout, diagnosed):
     limits = (0.2, 2.0)
     wanted = [replace(WANTED, tolerance_m=share * found[0]["accuracy"]["rms_m"]) for share in limits]
-    found = [certificate(top / "made", ROBOTS, diagnosed, each)[0]["conformity"]["decision"] for each in wanted]
+    found = [certificate(checkout / "made", ROBOTS, diagnosed, each)[0]["conformity"]["decision"] for each in wanted]
     assert found == ["fail", "pass"]
 
 
-def test_it_states_what_it_is_of(found, top, diagnosed):
+def test_it_states_what_it_is_of(found, checkout, diagnosed):
     document = found[0]
     assert (document["serial"], document["date"], document["campaign"]) == ("SN 7", "2026-11-23", "made")
-    assert document["files"]["campaign.yaml"] == hashlib.sha256((top / "made" / "campaign.yaml").read_bytes()).hexdigest()
+    assert document["files"]["campaign.yaml"] == hashlib.sha256((checkout / "made" / "campaign.yaml").read_bytes()).hexdigest()
     assert document["origin"] == diagnosed.origin and document["origin"]["commit"] == "c0ffee"
     assert set(document["versions"]) == {"elastocal", "numpy", "scipy", "python"}
     json.dumps(document, allow_nan=False)
@@ -83,6 +75,6 @@ def test_a_campaign_compared_with_itself_has_not_changed(found):
     assert comparison["changes"][0]["before"] == comparison["changes"][0]["after"]
 
 
-def test_the_same_seed_gives_the_same_certificate(found, top, diagnosed):
-    again, _ = certificate(top / "made", ROBOTS, diagnosed, WANTED, diagnosed)
+def test_the_same_seed_gives_the_same_certificate(found, checkout, diagnosed):
+    again, _ = certificate(checkout / "made", ROBOTS, diagnosed, WANTED, diagnosed)
     assert again == found[0]

@@ -13,7 +13,6 @@ import pandas as pd
 import pytest
 import yaml
 from analysed_robots import ROBOTS, analysed
-from certified import certified_checkout
 from durations import HUNG_S
 from made_urdf import joint, link, written
 from scipy.spatial.transform import Rotation
@@ -57,10 +56,9 @@ WHOLE = {"plan of a campaign": "cell"}
 
 
 @pytest.fixture(scope="module")
-def checkout(tmp_path_factory):
+def checkout(checkout):
     """A checkout with what the commands read: a diagnosed campaign, a planned one, one to fill, robots and tables."""
-    top = tmp_path_factory.mktemp("checkout")
-    certified_checkout(top)
+    top = checkout
     (top / "out").mkdir()
     shutil.copy(ROBOTS / "ur10.yaml", top / "arm.yaml")
     (top / "arm.csv").write_text("d_m,a_m,alpha_deg\n0.1,0.4,90\n")

@@ -4,14 +4,14 @@ import numpy as np
 from drawn_figures import empty_pictures
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.plan import planned
+from elastocal.application.planning.plan import choose_plan
 from elastocal.application.planning.sheet import sheet
 from elastocal.report.plan_pages import plan_facts, write_plan_sheet
 
 
 def made():
     survey = made_survey()
-    plan = planned(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, "D", 1)
     return survey, plan, sheet(survey, plan)
 
 

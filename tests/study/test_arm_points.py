@@ -18,7 +18,7 @@ def place_of(joints, side, share=0.5, radius=0.1):
     return found[int(share * 4) - 1] if len(found) > 1 else found[0]
 
 
-def seen(place, angles, tracker, radius=0.1):
+def look(place, angles, tracker, radius=0.1):
     return [bool(each[0]) for each in in_sight(CHAIN, np.array([angles]), place, tracker, radius, ACCEPTANCE)]
 
 
@@ -38,17 +38,17 @@ def test_a_link_no_longer_than_its_radius_has_no_place():
 
 def test_a_target_that_looks_away_is_not_seen_and_one_askance_only_if_somebody_turns_it():
     ahead, aside = (0.5, 5.0, 0.5), (5.0, 5.0, 0.5)
-    assert seen(place_of(1, "+y"), [0, 0], ahead) == [True, True]
-    assert seen(place_of(1, "-y"), [0, 0], ahead) == [False, False]
+    assert look(place_of(1, "+y"), [0, 0], ahead) == [True, True]
+    assert look(place_of(1, "-y"), [0, 0], ahead) == [False, False]
     # 45 degrees off its axis; the second link is stretched out and lies below the beam.
-    assert seen(place_of(1, "+y"), [0, 0], aside) == [True, False]
+    assert look(place_of(1, "+y"), [0, 0], aside) == [True, False]
 
 
 def test_a_link_in_between_hides_a_target():
     # The forearm folded back over the side of the upper arm that looks to the tracker.
     folded = [0.0, np.radians(160)]
-    assert seen(place_of(1, "+y", 0.75), folded, (0.6, 5.0, 0.5), radius=0.05) == [False, False]
-    assert seen(place_of(1, "+y", 0.25), folded, (0.1, 5.0, 0.5), radius=0.05)[0]
+    assert look(place_of(1, "+y", 0.75), folded, (0.6, 5.0, 0.5), radius=0.05) == [False, False]
+    assert look(place_of(1, "+y", 0.25), folded, (0.1, 5.0, 0.5), radius=0.05)[0]
 
 
 def test_distances_of_segments_are_the_least_over_both():

@@ -58,7 +58,7 @@ def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference(
     assert table.ours[[5, 6]].isna().all() and table.z[[0, 5, 6]].isna().all()
 
 
-def compared(results, *printed):
+def compare(results, *printed):
     return comparison_table(pd.DataFrame([printed], columns=PRINTED), results).iloc[0]
 
 
@@ -67,7 +67,7 @@ def results():
     return ours(metrics_of("A", 40.0), replicates_of("A", 40.0))
 
 
-def with_extended(results):
+def add_extended(results):
     extended = {
         "strategy": ["3+6DoF comb", "6DoF", "6DoF after 3DoF"],
         "residual_mean_um": [310.0, 350.0, 290.0],
@@ -79,7 +79,7 @@ def with_extended(results):
 
 
 def test_an_input_of_the_study_is_shown_and_not_scored(results):
-    row = compared(results, "1", "arm", "", "c1", "um_per_N", 0.6)
+    row = compare(results, "1", "arm", "", "c1", "um_per_N", 0.6)
     assert (row.paper, row.ours, row.interpretation) == (0.6, 0.54, "R1: an input")
     assert np.isnan(row.z)
 
@@ -95,7 +95,7 @@ def test_an_input_of_the_study_is_shown_and_not_scored(results):
 def test_only_the_figure_that_the_tube_was_chosen_for_says_so(results, robot, quantity, words):
     columns = {"robot": [robot], "mean_mm": [1.0], "mean_mm_std_error": [0.1], "std_mm": [0.5], "std_mm_std_error": [0.2]}
     results = replace(results, tables=results.tables | {"table2": pd.DataFrame(columns)})
-    row = compared(results, "2", robot, "", quantity, "mm", 0.7)
+    row = compare(results, "2", robot, "", quantity, "mm", 0.7)
     assert row.interpretation == words
     assert row.z == pytest.approx(3.0 if quantity == "deviation_mean" else -1.0)
 
@@ -104,17 +104,17 @@ def test_k_sigma_of_a_strategy_without_a_fixed_joints_is_that_of_all_joints(resu
     table = results.tables["table4"].copy()
     for suffix in ("", "_std_error"):
         table[f"k_sigma_20_percent_fixed_joints{suffix}"] = table[f"k_sigma_20_percent{suffix}"]
-    row = compared(replace(results, tables=results.tables | {"table4": table}), "4", "arm", "A", "k_sigma_20", "percent", 1.0)
+    row = compare(replace(results, tables=results.tables | {"table4": table}), "4", "arm", "A", "k_sigma_20", "percent", 1.0)
     assert (row.ours, row.interpretation) == (pytest.approx(2.0), "R7")
 
 
 def test_the_bound_of_the_residual_stands_beside_the_largest_of_all_strategies(results):
-    row = compared(with_extended(results), "text", "", "", "residual_deviation_upper_bound", "um", 366.0)
+    row = compare(add_extended(results), "text", "", "", "residual_deviation_upper_bound", "um", 366.0)
     assert (row.ours, row.mc_std, row.z) == (350.0, 4.0, -4.0)
 
 
 def test_the_share_with_elastic_links_is_that_of_the_whole_pose(results):
-    row = compared(with_extended(results), "text", "", "", "share_compensated_with_link_elasticity", "percent", 91.0)
+    row = compare(add_extended(results), "text", "", "", "share_compensated_with_link_elasticity", "percent", 91.0)
     assert (row.ours, row.mc_std, row.z, row.interpretation) == (90.0, 0.5, -2.0, "R11, strategy 6DoF")
 
 
@@ -122,7 +122,7 @@ def test_the_share_with_elastic_joints_alone_is_one_less_what_is_left_of_the_def
     results = replace(
         results, metrics=metrics_of("6DoF", 400.0, "kuka"), replicates=replicates_of("6DoF", 400.0, "kuka", (-0.1, 0.0, 0.1))
     )
-    row = compared(results, "text", "", "", "share_compensated_joint_elasticity_only", "percent", 97.6)
+    row = compare(results, "text", "", "", "share_compensated_joint_elasticity_only", "percent", 97.6)
     # 400 / 20 = 20 um of 1 mm; replicates of 18, 20 and 22 um.
     assert (row.ours, row.mc_std, row.z) == (pytest.approx(98.0), pytest.approx(0.2), pytest.approx(2.0))
 
@@ -137,14 +137,14 @@ def test_the_smallest_ratio_is_of_the_robot_that_gains_least_from_its_best_strat
     )
     table = table4(metrics, replicates, ["arm", "other"], ["6DoF", "A", "B"], 200.0, 20, 1.0, 2.0)
     results = replace(results, tables=results.tables | {"table4": table}, metrics=metrics, replicates=replicates)
-    row = compared(results, "text", "", "", "best_over_6DoF_dev_ratio_min", "", 1.5)
+    row = compare(results, "text", "", "", "best_over_6DoF_dev_ratio_min", "", 1.5)
     # 40 / 20 for the arm by A, 40 / 25 for the other one by B.
     assert row.ours == pytest.approx(1.6)
     assert row.mc_std == pytest.approx(np.std([1.6 * 0.9 / 1.1, 1.6, 1.6 * 1.1 / 0.9], ddof=1))
 
 
 def test_a_robot_that_was_not_studied_has_an_empty_row_and_no_score(results):
-    row = compared(results, "3", "nobody", "6DoF", "c1", "um_per_N", 0.5)
+    row = compare(results, "3", "nobody", "6DoF", "c1", "um_per_N", 0.5)
     assert row.paper == 0.5 and np.isnan([row.ours, row.mc_std, row.z]).all()
-    share = compared(results, "text", "", "", "share_compensated_joint_elasticity_only", "percent", 97.6)
+    share = compare(results, "text", "", "", "share_compensated_joint_elasticity_only", "percent", 97.6)
     assert np.isnan([share.ours, share.z]).all()

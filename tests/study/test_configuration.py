@@ -5,7 +5,7 @@ from copy import deepcopy
 import pytest
 from support import changed, refused
 
-from elastocal.study.configuration import check_study, rows_read, with_overrides
+from elastocal.study.configuration import check_study, override, rows_read
 
 
 def test_the_repository_passes(config, config_folder):
@@ -169,17 +169,17 @@ def test_two_strategies_of_one_name_are_refused(other_config, other_folder):
 
 
 def test_what_the_command_line_changes_is_read_as_in_the_file(config, config_folder):
-    changed = with_overrides(
+    changed = override(
         config, ["seed=7", "evaluation={studies: 3, lengths: [5, 20]}", "switched={R4_tool_axes: {offset_frame: base}}"]
     )
     assert changed["seed"] == 7 and config["seed"] == 1
     assert changed["evaluation"] == config["evaluation"] | {"studies": 3, "lengths": [5, 20]}
     assert changed["switched"] == config["switched"] | {"R4_tool_axes": {"offset_frame": "base"}}
     check_study(changed, config_folder, "config.yaml")
-    assert with_overrides(config, []) == config
+    assert override(config, []) == config
 
 
 def test_what_the_command_line_spoils_is_said_to_come_from_there(config):
     for text in ("[1", "1_0", "!!int 3"):
         with refused("--config evaluation", "line"):
-            with_overrides(config, [f"evaluation={text}"])
+            override(config, [f"evaluation={text}"])

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from elastocal.study.costs import break_even_table, configurations_needed, cost_table, needed_by_set
+from elastocal.study.costs import break_even_table, configurations_needed, cost_table, find_needed_by_set
 
 POINT_SETS = {"one": ["A"], "two": ["A", "B"], "useless": ["A", "A"]}
 LENGTHS = np.arange(1, 101)
@@ -60,5 +60,5 @@ def test_the_cheapest_set_changes_at_its_break_even(weights):
 
 def test_a_set_that_was_not_measured_is_left_out(weights):
     some = frame()
-    found = needed_by_set(some[some.points != "two"], POINT_SETS, 60.0, weights["arm"])
+    found = find_needed_by_set(some[some.points != "two"], POINT_SETS, 60.0, weights["arm"])
     assert set(found) == {"one", "useless"} and found["one"].shape == (21,)

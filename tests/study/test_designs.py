@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from elastocal.study.designs import CONTINUOUS, RANDOM, worths
+from elastocal.study.designs import CONTINUOUS, RANDOM, rate_designs
 
 
 @pytest.fixture(scope="module")
 def found():
     rng = np.random.default_rng(1)
     rows = 30 * rng.standard_normal((300, 6, 4)) * np.array([1.0, 2.0, 0.5, 1.0])
-    return worths(rows, 1e-3 * rng.standard_normal((50, 3, 4)), [3, 8], np.random.default_rng(2))
+    return rate_designs(rows, 1e-3 * rng.standard_normal((50, 3, 4)), [3, 8], np.random.default_rng(2))
 
 
 def worth(found, kind, size):

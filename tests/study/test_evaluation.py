@@ -12,8 +12,8 @@ from elastocal.study.evaluation import (
     accuracy_sums,
     accuracy_table,
     average,
+    find_length,
     metrics_table,
-    reached_length,
     replicates_table,
 )
 from elastocal.study.metrics import make_judge, mean_deviation, position_errors
@@ -227,15 +227,15 @@ def test_exact_estimates_have_no_error_and_no_standard_error(judge):
 
 def test_length_that_reaches_a_limit_comes_with_the_spread_of_the_replicates():
     values, replicates = np.array([3.0, 0.9, 0.5]), np.array([[3.0, 0.9, 0.5], [3.0, 2.0, 0.5], [0.9, 0.9, 0.5]])
-    length, error = reached_length(values, replicates, 1.0)
+    length, error = find_length(values, replicates, 1.0)
     assert length == 2.0 and error == pytest.approx(np.std([2, 3, 1], ddof=1))
 
 
 def test_replicates_that_do_not_reach_the_limit_are_continued_and_not_left_out():
     values, replicates = np.array([3.0, 0.9, 0.5]), np.array([[3.0, 0.9, 0.5], [3.0, 2.0, 1.5], [9.0, 4.0, -2.0]])
-    length, error = reached_length(values, replicates, 1.0)
+    length, error = find_length(values, replicates, 1.0)
     assert length == 2.0 and error == pytest.approx(np.std([2, 4.5, 6], ddof=1))
-    assert reached_length(values, replicates, 0.1)[0] == np.inf
+    assert find_length(values, replicates, 0.1)[0] == np.inf
 
 
 @pytest.mark.parametrize(
@@ -247,5 +247,5 @@ def test_a_limit_other_than_one_is_reached_by_the_same_rules(limit, length, leng
     replicates = np.array([[3.0, 0.9, 0.5], [3.0, 2.6, 0.55], [2.0, 0.9, -0.6]])
     if limit < 0.5:
         replicates[:, 2] = 0.5, 0.75, -1.0
-    found, error = reached_length(values, replicates, limit)
+    found, error = find_length(values, replicates, limit)
     assert found == length and error == pytest.approx(np.std(lengths, ddof=1))

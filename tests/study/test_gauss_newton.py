@@ -47,7 +47,7 @@ class Data:
         return identify(strategy, measurements, self.robot.joints).compliance[-1]
 
 
-def off(found, robot):
+def find_distance(found, robot):
     return np.abs(found / robot.compliance[:, None] - 1).max()
 
 
@@ -59,8 +59,8 @@ def test_true_compliances_are_recovered_where_equation_11_is_off(robot, strategi
         assert found.shape == (len(lengths), 6, SETS)
         # Differences of poses round at 1e-15 m, a thousand-millionth of a deflection is 1e-12 m; one configuration alone is
         # ill-conditioned by up to 1e4.
-        assert max(off(one, robot) for one in found[1:]) < 1e-9 and off(found[0], robot) < 1e-8
-        assert off(data.linear(strategy), robot) > 1e-5
+        assert max(find_distance(one, robot) for one in found[1:]) < 1e-9 and find_distance(found[0], robot) < 1e-8
+        assert find_distance(data.linear(strategy), robot) > 1e-5
 
 
 def test_strategies_that_differ_by_their_start_alone_agree_to_rounding(robot, strategies):
@@ -99,7 +99,7 @@ def test_noisy_estimates_are_those_of_a_general_least_squares_solver(kuka, strat
 def test_positions_of_a_target_off_the_axis_give_every_joint(robot, strategies):
     data = Data(with_target_offset(robot, (0.1, 0.05, 0.2)), rows=3)
     for strategy in strategies.values():
-        assert off(data.solved(strategy)[0], robot) < 1e-8
+        assert find_distance(data.solved(strategy)[0], robot) < 1e-8
 
 
 def test_a_small_load_leaves_nothing_for_the_exact_kinematics_to_add(kuka, strategies):
@@ -123,7 +123,7 @@ def test_other_robots_than_those_with_six_joints_are_solved():
         robot = robot_of(OTHER_CHAINS[name])
         joints = tuple(range(robot.joints))
         strategy = Strategy("all at the end", (Stage((robot.chain.end_effector.name,), joints),))
-        assert off(Data(robot).solved(strategy)[0], robot) < 1e-8
+        assert find_distance(Data(robot).solved(strategy)[0], robot) < 1e-8
 
 
 def test_later_stages_hold_what_earlier_ones_found(kuka, strategies):

@@ -23,7 +23,7 @@ from elastocal.study.identification import (
     prefix_triangles,
 )
 from elastocal.study.simulation import true_deflections
-from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+from elastocal.study.strategies import Stage, Strategy, drop_forgotten_stages
 
 SETS, CONFIGURATIONS = 3, 5
 NAMES = [
@@ -99,8 +99,8 @@ def plain(strategy, matrix, measured, joints=6):
     for stage in strategy.stages:
         rows = np.concatenate([matrix[name].reshape(-1, joints) for name in stage.points])
         right = np.concatenate([measured[name].ravel() for name in stage.points])
-        held, identified = list(stage.held), list(stage.identified)
-        right = right - rows[:, held] @ compliance[held]
+        fixed, identified = list(stage.fixed), list(stage.identified)
+        right = right - rows[:, fixed] @ compliance[fixed]
         compliance[identified] = np.linalg.lstsq(rows[:, identified], right, rcond=None)[0]
     return compliance
 
@@ -318,7 +318,7 @@ def test_prefix_information_is_the_sum_over_the_first_configurations():
 @pytest.mark.parametrize("name", ["6DoF-after-3DoF", "6DoF-after-3+3DoF"])
 def test_stages_before_one_that_identifies_every_joint_leave_no_trace(name, kuka, strategies):
     measurements = Data(kuka).measurements()
-    lasting = without_forgotten_stages(strategies[name], kuka.joints)
+    lasting = drop_forgotten_stages(strategies[name], kuka.joints)
     whole, short = (estimate_compliance(s, measurements, kuka.joints)[0] for s in (strategies[name], lasting))
     np.testing.assert_array_equal(short, whole)
 

@@ -6,7 +6,7 @@ from made_studies import studies_of
 from scipy import stats
 from statsmodels.api import OLS
 
-from elastocal.study.printed import Predicted, holm, predicted
+from elastocal.study.printed import Predicted, holm, predict_scatter
 
 VALUES = np.array([1.0, 1.2, 0.8, 1.1, 0.9])
 
@@ -39,21 +39,23 @@ def test_the_figures_of_tables_3_and_4_are_found_with_their_units():
     frame = studies_of()
     expected = {"c1": 22.0, "k_sigma_20": 0.55, "dev_20": 1.1}
     for quantity, mean in expected.items():
-        assert predicted(frame, "arm", "A", quantity, 20).mean == pytest.approx(mean)
-    assert predicted(frame, "arm", "A", "k_sigma_20", 20, fixed_joints=False).mean == pytest.approx(1.1)
-    lengths = predicted(frame, "arm", "A", "n_dev_2_um", 20)
+        assert predict_scatter(frame, "arm", "A", quantity, 20).mean == pytest.approx(mean)
+    assert predict_scatter(frame, "arm", "A", "k_sigma_20", 20, fixed_joints=False).mean == pytest.approx(1.1)
+    lengths = predict_scatter(frame, "arm", "A", "n_dev_2_um", 20)
     assert lengths.logarithmic and lengths.mean == pytest.approx((10 * 11 * 12) ** (1 / 3))
     # In configurations, as far as a logarithm is straight.
     assert lengths.std == pytest.approx(1.0, rel=0.02)
 
 
 def test_a_length_beyond_the_longest_is_continued():
-    assert predicted(studies_of(biases=(300.0, 500.0)), "arm", "A", "n_dev_2_um", 20).mean == pytest.approx((150 * 250) ** 0.5)
+    assert predict_scatter(studies_of(biases=(300.0, 500.0)), "arm", "A", "n_dev_2_um", 20).mean == pytest.approx(
+        (150 * 250) ** 0.5
+    )
 
 
 @pytest.mark.parametrize(("robot", "strategy", "quantity"), [("other", "A", "c1"), ("arm", "B", "c1"), ("arm", "A", "ratio")])
 def test_what_the_studies_do_not_have_is_not_predicted(robot, strategy, quantity):
-    assert predicted(studies_of(), robot, strategy, quantity, 20) is None
+    assert predict_scatter(studies_of(), robot, strategy, quantity, 20) is None
 
 
 def test_holm_corrects_for_those_that_are_there():

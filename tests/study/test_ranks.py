@@ -31,7 +31,7 @@ def uses_of(strategy, size, seed=1, tests=50):
     )
 
 
-def averaged(strategy, k_sigma, fixed):
+def average(strategy, k_sigma, fixed):
     values = {"k_sigma": k_sigma, "k_sigma_fixed_joints": fixed, "deviation": 1e-6 * k_sigma}
     metrics = pd.DataFrame([{"strategy": strategy, "length": LENGTH} | values])
     drawn = [{"strategy": strategy, "length": LENGTH, "replicate": n + 1} for n in range(50)]
@@ -44,7 +44,7 @@ def averaged(strategy, k_sigma, fixed):
 def found():
     """Strategy B leaves 1.5 times the error of A; C is A under another name; only the fixed joints of B look better."""
     uses = pd.concat([uses_of("A", 50.0), uses_of("B", 75.0), uses_of("C", 50.0)])
-    both = [averaged("A", 4.0, 4.0), averaged("B", 6.0, 2.0), averaged("C", 4.0, 4.0)]
+    both = [average("A", 4.0, 4.0), average("B", 6.0, 2.0), average("C", 4.0, 4.0)]
     metrics, replicates = (pd.concat(parts) for parts in zip(*both, strict=True))
     return {"arm": scores(uses, metrics, replicates, LENGTH)}
 
@@ -73,14 +73,14 @@ def test_only_the_metric_that_puts_them_in_the_other_order_reverses(found):
 @pytest.mark.parametrize("metric", [REFERENCE, "mean_um", "pooled_p95_um"])
 def test_intervals_of_ratios_hold_the_ratio_of_the_population(metric):
     """Two independent strategies of ratio 1.5: 95 % of 200 intervals hold it; fewer than 90 % by chance in 1 of 1000 tries."""
-    held = 0
+    covered = 0
     for seed in range(200):
         one, other = uses_of("A", 75.0, 2 * seed), uses_of("B", 50.0, 2 * seed + 1)
-        metrics, replicates = (pd.concat(parts) for parts in zip(averaged("A", 1, 1), averaged("B", 1, 1), strict=True))
+        metrics, replicates = (pd.concat(parts) for parts in zip(average("A", 1, 1), average("B", 1, 1), strict=True))
         by = scores(pd.concat([one, other]), metrics, replicates, LENGTH)[metric]
         _, low, high = by["A"].ratio(by["B"])
-        held += low < 1.5 < high
-    assert held / 200 > 0.90
+        covered += low < 1.5 < high
+    assert covered / 200 > 0.90
 
 
 def test_pairing_takes_out_what_strategies_share():
@@ -91,5 +91,5 @@ def test_pairing_takes_out_what_strategies_share():
 
 def test_metrics_at_places_that_a_robot_does_not_reach_are_left_out():
     uses = uses_of("A", 50.0).assign(iso_9283=np.nan)
-    found = scores(uses, *averaged("A", 4.0, 4.0), LENGTH)
+    found = scores(uses, *average("A", 4.0, 4.0), LENGTH)
     assert "iso_9283_um" not in found and {REFERENCE, "path_rms_um"} < set(found)

@@ -15,41 +15,41 @@ from elastocal.study.simulation import Loading, measurement_noise, random_experi
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
 
 
-def drawn(robot, loading=PAPER, seed=1, key="kuka", purpose="identification", data_sets=range(4), configurations=5):
+def draw(robot, loading=PAPER, seed=1, key="kuka", purpose="identification", data_sets=range(4), configurations=5):
     return random_experiments(robot.chain, robot.joint_limits, seed, key, loading, purpose, data_sets, configurations)
 
 
 def test_experiments_have_the_axes_set_configuration_component(kuka):
-    loads = drawn(kuka)
+    loads = draw(kuka)
     assert loads.joint_angles.shape == (4, 5, 6) and loads.wrench.shape == (4, 5, 6)
 
 
 def test_first_configurations_do_not_depend_on_how_many_there_are(kuka):
-    few, many = drawn(kuka, configurations=3), drawn(kuka, configurations=50)
+    few, many = draw(kuka, configurations=3), draw(kuka, configurations=50)
     np.testing.assert_array_equal(few.joint_angles, many.joint_angles[:, :3])
     np.testing.assert_array_equal(few.wrench, many.wrench[:, :3])
 
 
 def test_a_data_set_does_not_depend_on_the_others(kuka):
-    some, all_of_them = drawn(kuka, data_sets=[3, 1]), drawn(kuka)
+    some, all_of_them = draw(kuka, data_sets=[3, 1]), draw(kuka)
     np.testing.assert_array_equal(some.joint_angles, all_of_them.joint_angles[[3, 1]])
     np.testing.assert_array_equal(some.wrench, all_of_them.wrench[[3, 1]])
 
 
 @pytest.mark.parametrize("change", [{"seed": 2}, {"key": "fanuc"}, {"purpose": "test"}, {"data_sets": range(4, 8)}])
 def test_another_seed_robot_purpose_or_set_gives_other_experiments(kuka, change):
-    loads, others = drawn(kuka), drawn(kuka, **change)
+    loads, others = draw(kuka), draw(kuka, **change)
     assert not np.isin(loads.joint_angles, others.joint_angles).any()
     assert not np.isin(loads.wrench[..., :3], others.wrench[..., :3]).any()
 
 
 def test_forces_have_the_given_norm(kuka):
-    force = drawn(kuka, configurations=200).wrench[..., :3]
+    force = draw(kuka, configurations=200).wrench[..., :3]
     np.testing.assert_allclose(np.linalg.norm(force, axis=-1), 1000.0, rtol=1e-14)
 
 
 def test_forces_are_uniform_on_the_sphere(kuka):
-    direction = drawn(kuka, data_sets=range(20), configurations=1000).wrench[..., :3].reshape(-1, 3) / 1000
+    direction = draw(kuka, data_sets=range(20), configurations=1000).wrench[..., :3].reshape(-1, 3) / 1000
     five_sigma = 5 / np.sqrt(len(direction))
     # Kolmogorov-Smirnov at 1e-4: of 20,000 it sees a distribution that is off by 0.025 anywhere with a power of 0.99.
     # Each component of a direction uniform on the sphere is uniform in [-1, 1] (Archimedes).
@@ -61,7 +61,7 @@ def test_forces_are_uniform_on_the_sphere(kuka):
 
 
 def test_joint_angles_are_uniform_over_the_full_turn(kuka):
-    angles = drawn(kuka, data_sets=range(10), configurations=500).joint_angles.reshape(-1, 6)
+    angles = draw(kuka, data_sets=range(10), configurations=500).joint_angles.reshape(-1, 6)
     # Of 5,000 it sees 0.05 anywhere with a power of 0.99.
     for joint in angles.T:
         assert kstest(joint, "uniform", (-np.pi, 2 * np.pi)).pvalue > 1e-4
@@ -69,21 +69,21 @@ def test_joint_angles_are_uniform_over_the_full_turn(kuka):
 
 def test_joint_angles_are_uniform_within_the_limits(fanuc):
     loading = replace(PAPER, joint_range="limits")
-    angles = drawn(fanuc, loading, data_sets=range(10), configurations=500).joint_angles.reshape(-1, 6)
+    angles = draw(fanuc, loading, data_sets=range(10), configurations=500).joint_angles.reshape(-1, 6)
     for joint, (low, high) in zip(angles.T, fanuc.joint_limits, strict=True):
         assert kstest(joint, "uniform", (low, high - low)).pvalue > 1e-4
         assert low <= joint.min() and joint.max() <= high
 
 
 def test_offset_in_the_base_frame_gives_the_moment_of_that_lever(kuka):
-    wrench = drawn(kuka).wrench
+    wrench = draw(kuka).wrench
     lever = np.array([0.0, 0.5, 0.0])
     np.testing.assert_allclose(wrench[..., 3:], np.cross(lever, wrench[..., :3]), rtol=0, atol=1e-10)
     assert (wrench[..., 4] == 0).all()
 
 
 def test_offset_in_the_tool_frame_turns_with_the_tool(kuka):
-    base, tool = drawn(kuka), drawn(kuka, replace(PAPER, offset_frame="tool"))
+    base, tool = draw(kuka), draw(kuka, replace(PAPER, offset_frame="tool"))
     np.testing.assert_array_equal(tool.joint_angles, base.joint_angles)
     np.testing.assert_array_equal(tool.wrench[..., :3], base.wrench[..., :3])
     rotation = poses(kuka.chain, tool.joint_angles, kuka.chain.end_effector)[1]

@@ -3,7 +3,7 @@
 import pytest
 from support import chain_of, refused
 
-from elastocal.study.strategies import check_strategy, strategy_from_document, without_forgotten_stages
+from elastocal.study.strategies import check_strategy, drop_forgotten_stages, strategy_from_document
 
 FIXED_JOINTS = {
     "6DoF": (0, 1, 2, 3, 4, 5),
@@ -45,7 +45,7 @@ def test_points_are_those_that_the_paper_measures_each_once(strategies, name):
 
 
 def test_a_stage_that_identifies_every_joint_forgets_those_before_it(strategies):
-    left = {name: without_forgotten_stages(strategy, 6).stages for name, strategy in strategies.items()}
+    left = {name: drop_forgotten_stages(strategy, 6).stages for name, strategy in strategies.items()}
     assert left.pop("6DoF-after-3DoF") == left.pop("6DoF-after-3+3DoF") == strategies["6DoF"].stages
     assert left == {name: strategies[name].stages for name in left}
 
@@ -58,7 +58,7 @@ def test_both_robots_can_carry_out_every_strategy(strategies, robot):
 def test_joints_count_from_one_in_the_file_and_from_zero_inside():
     strategy = strategy_from_document({"name": "x", "stages": [{"points": ["A"], "joints": [2, 3], "held": [1]}]})
     (stage,) = strategy.stages
-    assert (stage.points, stage.identified, stage.held) == (("A",), (1, 2), (0,))
+    assert (stage.points, stage.identified, stage.fixed) == (("A",), (1, 2), (0,))
 
 
 STAGED = [{"points": ["A"], "joints": [1, 2]}, {"points": ["B"], "joints": [3], "held": [1, 2]}]

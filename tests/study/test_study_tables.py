@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from made_studies import studies_of
 
-from elastocal.study.printed import predicted
+from elastocal.study.printed import predict_scatter
 from elastocal.study.study_tables import expectations_table, interpretations_table, measured_table
 
 PRINTED = pd.DataFrame(
@@ -30,7 +30,7 @@ def test_expectations_stand_beside_studies_and_the_paper():
     assert table.studies_std.tolist() == pytest.approx([0.1, 0.05, 0.1])
     # The paper's count is taken for that of the fixed joints.
     np.testing.assert_array_equal(table.paper, [np.nan, 0.6, 1.0])
-    assert table.p_value[2] == pytest.approx(predicted(studies_of(), "arm", "A", "dev_20", 20).p_value(1.0))
+    assert table.p_value[2] == pytest.approx(predict_scatter(studies_of(), "arm", "A", "dev_20", 20).p_value(1.0))
 
 
 def test_an_interpretation_that_predicts_the_paper_worse_has_the_lower_likelihood():
@@ -42,7 +42,8 @@ def test_an_interpretation_that_predicts_the_paper_worse_has_the_lower_likelihoo
     groups = ["log_likelihood_table_3", "log_likelihood_k_sigma", "log_likelihood_dev", "log_likelihood_lengths"]
     assert other[groups].sum() == pytest.approx(other.log_likelihood)
     by_hand = [
-        predicted(frame, "arm", "A", "dev_20", 20).log_density(1.0) for frame in (SHIFTED["R4_other"], SHIFTED["as_configured"])
+        predict_scatter(frame, "arm", "A", "dev_20", 20).log_density(1.0)
+        for frame in (SHIFTED["R4_other"], SHIFTED["as_configured"])
     ]
     assert other.log_likelihood_dev == pytest.approx(by_hand[0] - by_hand[1])
     assert (usual.dev_20_um_arm, other.k_sigma_20_percent_arm) == pytest.approx((1.1, 121.3 / 60))
@@ -58,7 +59,7 @@ def test_the_error_of_a_likelihood_is_the_jackknife_over_studies_of():
     left = []
     for number in (1, 2, 3):
         some = [frame[frame.study != number] for frame in (SHIFTED["R4_other"], SHIFTED["as_configured"])]
-        densities = [predicted(frame, "arm", "A", "dev_20", 20).log_density(1.0) for frame in some]
+        densities = [predict_scatter(frame, "arm", "A", "dev_20", 20).log_density(1.0) for frame in some]
         left.append(densities[0] - densities[1])
     assert found.log_likelihood_std_error == pytest.approx(np.sqrt(2 / 3 * ((left - np.mean(left)) ** 2).sum()))
 

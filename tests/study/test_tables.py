@@ -7,13 +7,13 @@ from made_metrics import metrics_of, replicates_of
 
 from elastocal.study.tables import (
     deviation_ratio,
+    merge_errors,
     per_dataset_table,
     share_compensated,
     solver_summary,
     table2,
     table4,
-    with_errors_merged,
-    worded,
+    word_value,
 )
 
 
@@ -28,7 +28,7 @@ def test_lengths_of_table4_are_those_at_which_a_bias_that_falls_as_one_over_the_
 def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law_it_follows():
     table = table4(metrics_of("A", 200.0), replicates_of("A", 200.0), ["arm"], ["A"], 200.0, 20, 1.0, 1.0).iloc[0]
     assert np.isinf(table.n_k_sigma_1_percent) and table.n_k_sigma_1_percent_std_error == pytest.approx(20.0)
-    assert with_errors_merged(table.to_frame().T.infer_objects()).n_k_sigma_1_percent.iloc[0] == "not reached"
+    assert merge_errors(table.to_frame().T.infer_objects()).n_k_sigma_1_percent.iloc[0] == "not reached"
 
 
 def test_lengths_of_table4_are_those_of_its_own_limits_each_between_two_lengths():
@@ -110,4 +110,4 @@ def test_solver_summary_pairs_the_strategies_that_are_the_same_estimator():
     ],
 )
 def test_values_are_worded_with_two_digits_of_their_error(value, error, text):
-    assert worded(value, error) == text
+    assert word_value(value, error) == text

@@ -11,7 +11,7 @@ from pathlib import Path
 from elastocal.campaigns.campaign import DOCUMENT, targets_from
 from elastocal.campaigns.measurements import CSV, write_measurements
 from elastocal.campaigns.reading import read_descriptions, read_robot
-from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.errors import InputError
 
 LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
@@ -22,7 +22,7 @@ def measure(folder: Path, robot_file: Path, seed: int) -> None:
     robot = read_robot(robot_file)
     targets = targets_from(document["targets"], robot.chain, (folder / DOCUMENT).as_posix())
     plan = Plan(tuple(target.point for target in targets), 30, 1000.0, LADDER, (0.0, 0.5, 0.0), 4, 10, 6e-5, 6e-5)
-    table = simulated_measurements(robot, plan, seed, document["campaign"])
+    table = draw_measurements(robot, plan, seed, document["campaign"])
     names = {target.point: target.name for target in targets}
     table["target"] = [names[point] for point in table["target"]]
     path = folder / CSV

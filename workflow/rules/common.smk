@@ -14,13 +14,14 @@ from snakemake.iocontainers import Wildcards
 from elastocal.campaigns.importers.catalogue import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
+from elastocal.counting import spell_count
 from elastocal.errors import InputError
 from elastocal.io.origin import Origin, configuration_sha256, environment
 from elastocal.io.provenance import SOURCES_DIGEST
 from elastocal.io.records import checksum
 from elastocal.io.sources import keep_source_digests, source_digest
 from elastocal.report.outcome import outcome
-from elastocal.study.configuration import check_study, rows_read, with_overrides
+from elastocal.study.configuration import check_study, rows_read, override
 
 ROOT = Path(workflow.basedir)
 sys.path.insert(0, str(ROOT / "workflow" / "rules"))
@@ -55,7 +56,7 @@ gc.freeze()
 CHANGES = [entry for entry in workflow.config_settings.config_args or () if not entry.startswith("campaign=")]
 
 try:
-    config.update(with_overrides(config, CHANGES))
+    config.update(override(config, CHANGES))
     STUDY = check_study(
         config, CONFIG, " with --config ".join(["config.yaml", *(entry.partition("=")[0] for entry in CHANGES)])
     )

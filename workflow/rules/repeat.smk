@@ -7,7 +7,7 @@ reports/tables/interpretations.csv.
 
 # Interpretations by what is measured, as Table 4 is shown.
 MEASURED = {"pose": USUAL} | {
-    {1: "one reflector", 3: "three reflectors"}.get(len(some["reflectors_m"]), f"{len(some['reflectors_m'])} reflectors"): name
+    spell_count(len(some["reflectors_m"]), "reflector"): name
     for name, some in config["switched"].items()
     if "reflectors_m" in some
 }

@@ -6,14 +6,14 @@ import pandas as pd
 
 from elastocal.io.json_files import read_json
 from elastocal.report.pages import write_report
-from elastocal.study.tables import headed_rows
+from elastocal.study.tables import list_rows
 
 TABLES = ("table1", "table2", "table3", "table4", "interpretations")
 
 
 def compile_report(job: Job) -> None:
     facts = read_json(job.input.answers)
-    tables = {name: headed_rows(pd.read_csv(job.input[name])) for name in TABLES}
+    tables = {name: list_rows(pd.read_csv(job.input[name])) for name in TABLES}
     tables["figures"] = job.params.figures
     write_report(job.output.report, facts, tables, [*job.input.figures, job.input.bibliography], origin_of(job))
 

@@ -7,10 +7,10 @@ from elastocal.io.storage import read_blocks, read_table, write_table
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.steps.columns import DEFLECTION_COLUMNS
-from elastocal.study.steps.evaluate import evaluated, judge_from
+from elastocal.study.steps.evaluate import evaluate_strategy, judge_from
 from elastocal.study.steps.identify import identified_blocks, paired_blocks
 from elastocal.study.steps.weights import DATA_SETS, TESTS
-from elastocal.study.strategies import strategy_from_document, without_forgotten_stages
+from elastocal.study.strategies import drop_forgotten_stages, strategy_from_document
 from elastocal.study.table_schemas import DEFLECTIONS, REPLICATES, WEIGHTS, accuracy, design, experiments, identified, metrics
 
 
@@ -24,7 +24,7 @@ def identify(job: Job) -> None:
         {name: read_blocks(job.input.measured, DEFLECTIONS, DEFLECTION_COLUMNS, point=name) for name in strategy.points},
     )
     designs = read_blocks(job.input.design, design(n), ["condition"])
-    solvable = without_forgotten_stages(strategy, n) if settings.start is None else strategy
+    solvable = drop_forgotten_stages(strategy, n) if settings.start is None else strategy
     solved = identified_blocks(blocks, designs, chain, solvable, settings.rows, settings.wrench_at, settings.start)
     write_table(job.output.identified, identified(n), solved, origin)
 
@@ -36,7 +36,7 @@ def identify(job: Job) -> None:
     )
     counts = ["replicate", "count"]
     # Read again, so that any number of data sets is worked off in the same memory.
-    tables = evaluated(
+    tables = evaluate_strategy(
         read_blocks(job.output.identified, identified(n), ["data_set", *(f"c{j + 1}" for j in range(n))]),
         read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS),
         read_table(job.input.weights, WEIGHTS, counts, members=TESTS),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from job import Job, run
 
-from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -23,7 +23,7 @@ def simulate_campaign(job: Job) -> None:
         "declared": [],
         "holdout": {"fraction": 0.3, "seed": 1},
     }
-    table = simulated_measurements(robot, plan, job.params.seed, name)
+    table = draw_measurements(robot, plan, job.params.seed, name)
     write_campaign(Path(job.output.document).parent, document, table, robot.joints)
 
 

@@ -10,42 +10,26 @@ from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_long
 from elastocal.io.documents import read_document
 from elastocal.report.answers import answers
-from elastocal.report.decision_answers import (
-    break_even_rows,
-    claim_rows,
-    cost_facts,
-    few_rows,
-    joint_rows,
-    kind_rows,
-    measured_rows,
-    simulated_design_rows,
-    smallest_designs,
-    stiffness_rows,
-    study_facts,
-)
-from elastocal.report.metric_answers import METRIC_NAMES, metric_summary, score_rows, staged_rows
-from elastocal.report.question_answers import (
-    brief_names,
-    budget_rows,
-    design_facts,
-    geometry_rows,
-    ladder_rows,
-    needed_rows,
-    observability_rows,
-    place_facts,
-    stated,
-    strategy_rows,
-    summaries,
-    tube_rows,
-    weighting_rows,
-)
+from elastocal.report.question_answers import brief_names, stated
+from elastocal.report.study_questions import Asked, answer_questions
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import REPLICATES, metrics
+
+_PLAIN = (
+    *("joint", "studies", "break_even", "costs", "few", "kinds", "stiffness", "budget", "pairs", "needed", "designs"),
+    *("places", "scores", "score_pairs", "tubes", "observability", "geometry", "weighting"),
+)
+# Each table that answers questions, and how it is read: what looks like a number may be none.
+_TABLES = {name: {} for name in _PLAIN} | {
+    "claims": {"keep_default_na": False, "na_values": {"p": [""]}},
+    "ladder": {"dtype": {"link_springs": str}},
+    "simulated": {"dtype": {"unobservable": str}},
+}
 
 
 def state_answers(job: Job) -> None:
     settings = job.params
-    names, length, accuracy = brief_names(settings.names), settings.cells["length"], settings.accuracy_um
+    names = brief_names(settings.names)
     titles = {robot: names[robot] for robot in settings.robots}
     facts = answers(
         comparison=pd.read_csv(job.input.comparison, dtype={"table": str}),
@@ -60,45 +44,14 @@ def state_answers(job: Job) -> None:
         titles=titles,
         cells=settings.cells,
     )
-    ladder, pairs = pd.read_csv(job.input.ladder, dtype={"link_springs": str}), pd.read_csv(job.input.pairs)
-    observability, designs = pd.read_csv(job.input.observability), pd.read_csv(job.input.designs)
-    scores = pd.read_csv(job.input.scores)
-    simulated, measured = pd.read_csv(job.input.simulated, dtype={"unobservable": str}), pd.read_csv(job.input.studies)
+    strategies = [strategy_from_document(document) for document in settings.strategies]
+    classical, length = settings.cells["classical_strategy"], settings.cells["length"]
+    asked = Asked(titles, strategies, classical, settings.best, length, settings.accuracy_um, settings.joint_range)
     citation = read_document(job.input.citation)
     cited = {"date": str(citation["date-released"]), "version": citation["version"], "license": citation["license"]}
+    facts |= {"citation": {"authors": ", ".join(each["name"] for each in citation["authors"])} | cited}
+    facts |= answer_questions({name: pd.read_csv(getattr(job.input, name), **how) for name, how in _TABLES.items()}, asked)
     facts |= {
-        "citation": {"authors": ", ".join(each["name"] for each in citation["authors"])} | cited,
-        "accuracy_um": f"{accuracy:g}",
-        "claims": claim_rows(pd.read_csv(job.input.claims, keep_default_na=False, na_values={"p": [""]}), titles),
-        "joint": joint_rows(pd.read_csv(job.input.joint)),
-        "table4": measured_rows(measured, titles),
-        "over_studies": [
-            {"title": title} | study_facts(measured, robot, settings.cells["classical_strategy"], settings.best)
-            for robot, title in titles.items()
-        ],
-        "break_even": break_even_rows(pd.read_csv(job.input.break_even), accuracy, titles),
-        "costs": cost_facts(pd.read_csv(job.input.costs), titles),
-        "simulated": simulated_design_rows(simulated, length, titles),
-        "smallest": smallest_designs(simulated, accuracy, titles),
-        "few": few_rows(pd.read_csv(job.input.few), titles),
-        "kinds": kind_rows(pd.read_csv(job.input.kinds), length, titles),
-        "stiffness": stiffness_rows(pd.read_csv(job.input.stiffness), titles),
-        "strategies": strategy_rows([strategy_from_document(document) for document in settings.strategies]),
-        "ladder": ladder_rows(ladder),
-        "budget": budget_rows(pd.read_csv(job.input.budget), pairs, length, [*titles]),
-        "needed": needed_rows(pd.read_csv(job.input.needed), accuracy, [*titles]),
-        "designs": {kind: design_facts(some, length, accuracy, titles) for kind, some in designs.groupby("joint_range")},
-        "joint_range": settings.joint_range,
-        "places": place_facts(pd.read_csv(job.input.places), titles),
-        "scores": score_rows(scores, [*titles]),
-        "staged": staged_rows(scores, [*titles]),
-        "metrics": metric_summary(pd.read_csv(job.input.score_pairs), titles),
-        "metric_names": METRIC_NAMES,
-        "tubes": tube_rows(pd.read_csv(job.input.tubes)),
-        "observability": observability_rows(observability, [*titles]),
-        "summaries": summaries(ladder, pairs, observability),
-        "geometry": geometry_rows(pd.read_csv(job.input.geometry), [*titles]),
-        "weighting": weighting_rows(pd.read_csv(job.input.weighting), [*titles]),
         "titles": titles,
         "names": names,
         "full_names": [settings.names[robot] for robot in titles],

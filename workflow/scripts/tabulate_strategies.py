@@ -4,7 +4,7 @@ from job import Job, run
 
 from elastocal.io.data_frames import read_long, write_csv
 from elastocal.study.table_schemas import REPLICATES, metrics
-from elastocal.study.tables import table4, with_slugs
+from elastocal.study.tables import add_slugs, table4
 
 
 def tabulate_strategies(job: Job) -> None:
@@ -16,7 +16,7 @@ def tabulate_strategies(job: Job) -> None:
         [*settings.strategies],
         **settings.cells,
     )
-    write_csv(job.output.table, with_slugs(table, settings.strategies))
+    write_csv(job.output.table, add_slugs(table, settings.strategies))
 
 
 run(tabulate_strategies, snakemake)

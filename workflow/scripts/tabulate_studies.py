@@ -10,7 +10,7 @@ from elastocal.io.data_frames import read_studies, write_csv
 from elastocal.study.joint_test import joint_table
 from elastocal.study.study_tables import measured_table
 from elastocal.study.table_schemas import repeated
-from elastocal.study.tables import with_slugs
+from elastocal.study.tables import add_slugs
 
 
 def tabulate_studies(job: Job) -> None:
@@ -21,7 +21,7 @@ def tabulate_studies(job: Job) -> None:
         for name in settings.measured
     }
     by_kind = {settings.measured[name]: frame for name, frame in studies.items()}
-    write_csv(job.output.table, with_slugs(measured_table(by_kind, settings.length, settings.limits), settings.slugs))
+    write_csv(job.output.table, add_slugs(measured_table(by_kind, settings.length, settings.limits), settings.slugs))
     write_csv(job.output.joint, joint_table(studies[settings.usual], reference, settings.length))
 
 

@@ -165,7 +165,7 @@ class Prediction:
         )
 
 
-def predicted(
+def predict_errors(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions, draws: int = _DRAWS
 ) -> Prediction:
     """Predicted errors of the corrected robot where it is commanded to joint angles (N, n).
@@ -254,7 +254,7 @@ def placement(scope: Scope, position: np.ndarray, rotation: np.ndarray) -> np.nd
     return found
 
 
-def absorbed(columns: np.ndarray, field: np.ndarray, free: np.ndarray) -> np.ndarray:
+def find_absorbed(columns: np.ndarray, field: np.ndarray, free: np.ndarray) -> np.ndarray:
     """How much of the free columns of `placement` takes up most of a field (N, 6, K) of displacements, ndarray (12, K).
 
     Positions decide on all but the constant turn of the end effector, which takes up what is left of orientations.
@@ -268,14 +268,14 @@ def absorbed(columns: np.ndarray, field: np.ndarray, free: np.ndarray) -> np.nda
     return found
 
 
-def less_placement(scope: Scope, position: np.ndarray, rotation: np.ndarray, fields: np.ndarray) -> np.ndarray:
+def subtract_placement(scope: Scope, position: np.ndarray, rotation: np.ndarray, fields: np.ndarray) -> np.ndarray:
     """Displacements (N, 6, K) of poses less what the placement that a scope leaves free takes up of each over these poses."""
     columns = placement(scope, position, rotation)
     free = np.repeat([scope.frame == ROBOT, scope.frame == ROBOT, scope.offset_removed, False], 3)
-    return np.asarray(fields - columns @ absorbed(columns, fields, free))
+    return np.asarray(fields - columns @ find_absorbed(columns, fields, free))
 
 
-def without_rigid_motion(displacement: np.ndarray, position: np.ndarray, rotation: np.ndarray | None = None) -> np.ndarray:
+def remove_rigid_motion(displacement: np.ndarray, position: np.ndarray, rotation: np.ndarray | None = None) -> np.ndarray:
     """Displacements (..., N, 3) less the small rigid motion that explains most of their squares.
 
     With rotations (N, 3, 3) of the end effector less a constant offset there too.
@@ -285,7 +285,7 @@ def without_rigid_motion(displacement: np.ndarray, position: np.ndarray, rotatio
     field = np.moveaxis(displacement.reshape(-1, *displacement.shape[-2:]), 0, -1)
     padded = np.concatenate([field, np.zeros_like(field)], axis=1)
     free = np.repeat([True, True, rotation is not None, False], 3)
-    left = (padded - columns @ absorbed(columns, padded, free))[:, :3]
+    left = (padded - columns @ find_absorbed(columns, padded, free))[:, :3]
     return np.moveaxis(left, -1, 0).reshape(displacement.shape)
 
 
@@ -301,6 +301,11 @@ def quantile_of_length(covariance: np.ndarray) -> np.ndarray:
     safe = np.where(mean > 0.0, mean, 1.0)
     shape = np.where(mean > 0.0, safe**2 / np.where(variance > 0.0, variance, 1.0), 1.5)
     return np.sqrt(gamma.ppf(CONFIDENCE, shape) * mean / shape)
+
+
+def root_mean_square(displacement: np.ndarray) -> float:
+    """Root mean square of the lengths of displacements (N, 3)."""
+    return float(np.sqrt((displacement**2).sum(axis=1).mean()))
 
 
 def accuracy_sentence(accuracy: Accuracy) -> str:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # States at a time: what a walk along all sites makes of them stays in the processor's cache.
 AT_ONCE = 1024
 # °C, at which dimensions are stated (ISO 1).
-REFERENCE_C = 20.0
+_REFERENCE_C = 20.0
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class OperatingConditions:
 NEUTRAL = OperatingConditions()
 
 
-def calibrated_from(fit: Fit, robot: Robot) -> CalibratedRobot:
+def calibrate_by_fit(fit: Fit, robot: Robot) -> CalibratedRobot:
     """A calibrated robot from the final fit of a diagnosis.
 
     Parameters
@@ -93,10 +93,10 @@ def calibrated_from(fit: Fit, robot: Robot) -> CalibratedRobot:
     -------
     CalibratedRobot
     """
-    return calibrated_of(robot, fit.model, fit.estimate, fit.covariance, fit.noise)
+    return calibrate_by_model(robot, fit.model, fit.estimate, fit.covariance, fit.noise)
 
 
-def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
+def calibrate_by_model(robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
     """A calibrated robot from a fitted model.
 
     `covariance` (P, P): of all `parameters` of the model.
@@ -104,7 +104,7 @@ def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np
     kept = [number for number, effect in enumerate(model.effects) if moves_robot(effect)]
     keys = {model.effects[number].key for number in kept}
     rows = np.flatnonzero([owner in keys for owner, _ in parameters(model, estimate)])
-    bare, values = at_end_effector(model, estimate)
+    bare, values = move_to_end_effector(model, estimate)
     bare = replace(bare, effects=tuple(model.effects[number] for number in kept))
     values = replace(
         values,
@@ -114,7 +114,7 @@ def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np
     return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise)
 
 
-def at_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
+def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
     """A model with all its effects whose one target is the end effector's measuring point, in the robot's base frame."""
     end = model.sites.chain.end_effector
     target = Target("end effector", end.name, end.offset_m)
@@ -141,7 +141,7 @@ def assumptions(calibrated: CalibratedRobot, conditions: OperatingConditions) ->
     taken = {
         "approach": (conditions.approach, "no joint's sense of approach is known, and hysteresis is left out"),
         "time": (conditions.time_s, "the time is that of the campaign's first measurement, when nothing had warmed up"),
-        "temperature": (conditions.temperature_c, f"the temperature is {REFERENCE_C:g} °C"),
+        "temperature": (conditions.temperature_c, f"the temperature is {_REFERENCE_C:g} °C"),
     }
     named = {name: ", ".join(e.key for e in calibrated.model.effects if name in e.needs) for name in taken}
     return [
@@ -262,7 +262,7 @@ def states_of(calibrated: CalibratedRobot, reported_angles: np.ndarray, operatin
         repeats=np.ones(count, int),
         approach=np.sign(rows(operating.approach, 0.0, robot.joints) @ robot.reported_matrix.T),
         time_s=rows(operating.time_s, calibrated.model.time_zero_s),
-        temperature_c=rows(operating.temperature_c, REFERENCE_C),
+        temperature_c=rows(operating.temperature_c, _REFERENCE_C),
     )
 
 

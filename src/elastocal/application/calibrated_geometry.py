@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.mechanics.robot import Robot
 
-OFFSET, RATIO, GEOMETRY, SPRINGS = "joint_offset", "transmission_ratio", "link_geometry", "joint_compliance"
-FOLDED = (OFFSET, RATIO, GEOMETRY, SPRINGS, declared_weight.EFFECT)
+_OFFSET, _RATIO, GEOMETRY, SPRINGS = "joint_offset", "transmission_ratio", "link_geometry", "joint_compliance"
+_FOLDED = (_OFFSET, _RATIO, GEOMETRY, SPRINGS, declared_weight.EFFECT)
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Folded:
     left_out: tuple[int, ...]
 
 
-def folded(calibrated: CalibratedRobot) -> Folded:
+def fold_effects(calibrated: CalibratedRobot) -> Folded:
     """Put into the robot what its file can say.
 
     Returns poses of its robot are those of the calibrated one without the effects left out, exactly.
@@ -47,9 +47,9 @@ def folded(calibrated: CalibratedRobot) -> Folded:
     left_out = []
     for number, (effect, values) in enumerate(zip(model.effects, estimate.coefficients, strict=True)):
         joint = effect.joints[0] - 1 if effect.joints else 0
-        if effect.effect == OFFSET:
+        if effect.effect == _OFFSET:
             offset[joint] += values[0]
-        elif effect.effect == RATIO:
+        elif effect.effect == _RATIO:
             for parameter, value in zip(effect.parameters, values, strict=True):
                 ratio[joint, int(parameter.name.removeprefix("per_q")) - 1] += value
         elif effect.effect == GEOMETRY:
@@ -57,13 +57,13 @@ def folded(calibrated: CalibratedRobot) -> Folded:
         elif effect.effect == SPRINGS:
             robot = replace(robot, compliance=values.copy(), compliance_known=True)
         elif effect.effect == declared_weight.EFFECT:
-            robot = _reweighed(robot, values)
+            robot = _reweigh(robot, values)
         else:
             left_out.append(number)
     return Folded(
         replace(
             robot,
-            chain=_with_link_errors(robot.chain, at_ends),
+            chain=_add_link_errors(robot.chain, at_ends),
             links=(),
             reported_matrix=ratio @ robot.reported_matrix,
             reported_offset=ratio @ robot.reported_offset + offset,
@@ -72,7 +72,7 @@ def folded(calibrated: CalibratedRobot) -> Folded:
     )
 
 
-def _reweighed(robot: Robot, corrections: np.ndarray) -> Robot:
+def _reweigh(robot: Robot, corrections: np.ndarray) -> Robot:
     """A robot whose masses and first moments are those that were found."""
     masses = []
     for mass, (heavier, *moment) in zip(robot.masses, corrections.reshape(-1, MASS_PARAMETERS), strict=True):
@@ -82,7 +82,7 @@ def _reweighed(robot: Robot, corrections: np.ndarray) -> Robot:
     return replace(robot, masses=tuple(masses))
 
 
-def _with_link_errors(chain: Chain, at_ends: dict[int, np.ndarray]) -> Chain:
+def _add_link_errors(chain: Chain, at_ends: dict[int, np.ndarray]) -> Chain:
     """A chain with small transforms at the far ends of links, 1 for that behind the first joint."""
     transforms: list[Transform] = []
     moved: dict[int, int] = {}
@@ -90,7 +90,7 @@ def _with_link_errors(chain: Chain, at_ends: dict[int, np.ndarray]) -> Chain:
     for place in range(len(chain.transforms) + 1):
         transform = chain.transforms[place] if place < len(chain.transforms) else None
         ends = transform is None or transform.coordinate is not None
-        if ends and seen in at_ends and not (transform is not None and chain.is_passive(place) and _ended(chain, place)):
+        if ends and seen in at_ends and not (transform is not None and chain.is_passive(place) and _has_ended(chain, place)):
             error = at_ends.pop(seen)
             transforms += [Transform("TR"[axis // 3], axis % 3, float(value)) for axis, value in enumerate(error)]
         moved[place] = len(transforms)
@@ -101,7 +101,7 @@ def _with_link_errors(chain: Chain, at_ends: dict[int, np.ndarray]) -> Chain:
     return Chain(tuple(transforms), points, chain.coordinates)
 
 
-def _ended(chain: Chain, place: int) -> bool:
+def _has_ended(chain: Chain, place: int) -> bool:
     """Whether the link before a place has ended before it, at an earlier passive joint."""
     before = [p for p in range(place) if chain.transforms[p].coordinate is not None]
     return bool(before) and chain.is_passive(before[-1])

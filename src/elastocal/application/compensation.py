@@ -22,7 +22,7 @@ from elastocal.application.calibrated import (
     coordinates_at_rest,
     end_effector,
 )
-from elastocal.application.inverse_kinematics import SOLVED_M, along_path, beyond_limits, reach_m, refined, within_turns
+from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits, reach_m, refine, remove_turns
 from elastocal.exchange.target_path import OK
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
@@ -59,7 +59,7 @@ class Correction:
     status: np.ndarray
 
 
-def corrected(
+def find_joint_targets(
     calibrated: CalibratedRobot,
     position: np.ndarray,
     rotation: np.ndarray,
@@ -80,12 +80,12 @@ def corrected(
         nominal, left = along_path(robot, position, rotation)
     else:
         near = robot.model_angles(start)
-        nominal, left = refined(robot, position, rotation, near)
-        nominal = within_turns(robot, nominal, near)
+        nominal, left = refine(robot, position, rotation, near)
+        nominal = remove_turns(robot, nominal, near)
     slices = [slice(first, first + AT_ONCE) for first in range(0, len(position), AT_ONCE)]
 
     def of(part: slice) -> Correction:
-        return _corrected(calibrated, position[part], rotation[part], operating.part(part), nominal[part], left[part])
+        return _find_chunk_targets(calibrated, position[part], rotation[part], operating.part(part), nominal[part], left[part])
 
     parts = []
     with ThreadPoolExecutor(2) as pool:
@@ -95,7 +95,7 @@ def corrected(
     return Correction(*(np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])))
 
 
-def _corrected(
+def _find_chunk_targets(
     calibrated: CalibratedRobot,
     position: np.ndarray,
     rotation: np.ndarray,
@@ -132,6 +132,6 @@ def _corrected(
     singular[moving] = True
     status = np.full(len(angles), OK, dtype="U14")
     status[singular] = SINGULAR
-    status[beyond_limits(robot, angles).any(axis=1)] = OUTSIDE_LIMITS
+    status[find_beyond_limits(robot, angles).any(axis=1)] = OUTSIDE_LIMITS
     status[~reached] = UNREACHABLE
     return Correction(robot.reported_angles(angles), uncorrected, before, off, status)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.application.accuracy import scope_from
-from elastocal.application.calibrated import NEUTRAL, CalibratedRobot, calibrated_of, forward
-from elastocal.application.compensation import corrected
+from elastocal.application.calibrated import NEUTRAL, CalibratedRobot, calibrate_by_model, forward
+from elastocal.application.compensation import find_joint_targets
 from elastocal.counting import counted
 from elastocal.effects import declared_weight, joint_compliance
 from elastocal.effects.catalogue import candidates_on
@@ -58,7 +58,7 @@ class ForwardModel:
         document = read_json(path)
         if KEY not in document:
             raise InputError(path, KEY, "nothing", "a file of elastocal export")
-        return cls(calibrated_in(document[KEY], path.as_posix()))
+        return cls(read_calibrated(document[KEY], path.as_posix()))
 
     def pose(
         self, joint_angles: Sequence[Sequence[float]] | np.ndarray, operating: OperatingConditions = NEUTRAL
@@ -85,12 +85,12 @@ class ForwardModel:
         operating: OperatingConditions = NEUTRAL,
         start: np.ndarray | None = None,
     ) -> Correction:
-        """Joint angles to command so that the robot comes to rest at wanted poses; as `compensation.corrected`."""
-        return corrected(self.calibrated, position, rotation, operating, start)
+        """Joint angles to command so that the robot comes to rest at wanted poses; as `compensation.find_joint_targets`."""
+        return find_joint_targets(self.calibrated, position, rotation, operating, start)
 
 
 def model_document(calibrated: CalibratedRobot) -> dict[str, Any]:
-    """A calibrated robot as JSON, from which `calibrated_in` makes the same."""
+    """A calibrated robot as JSON, from which `read_calibrated` makes the same."""
     model, estimate = calibrated.model, calibrated.estimate
     values = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
     return {
@@ -105,7 +105,7 @@ def model_document(calibrated: CalibratedRobot) -> dict[str, Any]:
     }
 
 
-def calibrated_in(document: Mapping[str, Any], source: str) -> CalibratedRobot:
+def read_calibrated(document: Mapping[str, Any], source: str) -> CalibratedRobot:
     """A calibrated robot from its document.
 
     Parameters
@@ -152,5 +152,5 @@ def calibrated_in(document: Mapping[str, Any], source: str) -> CalibratedRobot:
     )
     repeated = np.array(document["joint_repeatability"], float)
     noise = Noise("declared", 0.0, 0.0, repeated, pose_rad=float(document["pose_error_rad"]))
-    calibrated = calibrated_of(robot, model, estimate, np.array(document["covariance"], float), noise)
+    calibrated = calibrate_by_model(robot, model, estimate, np.array(document["covariance"], float), noise)
     return replace(calibrated, scope=None if document["scope"] is None else scope_from(document["scope"]))

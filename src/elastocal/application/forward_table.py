@@ -10,10 +10,12 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
+from elastocal.application.accuracy import root_mean_square
 from elastocal.application.calibrated import forward, nominal_forward
 
 if TYPE_CHECKING:
-    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.application.accuracy import root_mean_square
+from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
 
 # Rows in whose neighbourhood the error of interpolation is measured, and of how many neighbours one interpolates.
 _TRIED, _NEIGHBOURS = 256, 60
@@ -32,7 +34,7 @@ def forward_table(calibrated: CalibratedRobot, rows: int, operating: OperatingCo
     """
     low, high = calibrated.robot.joint_limits.T
     points = qmc.Sobol(len(low), rng=np.random.default_rng(seed)).random_base2(int(np.ceil(np.log2(max(rows, 2)))))
-    return _tabulated(calibrated, calibrated.robot.reported_angles(low + points * (high - low)), operating)
+    return _tabulate(calibrated, calibrated.robot.reported_angles(low + points * (high - low)), operating)
 
 
 def interpolation_error_m(
@@ -53,15 +55,11 @@ def interpolation_error_m(
     scale = np.ptp(known, axis=0)
     errors = list(_ERRORS[:3])
     spline = RBFInterpolator(known / scale, table[errors].to_numpy(), min(_NEIGHBOURS, len(known)))
-    true = _tabulated(calibrated, angles, operating)[errors].to_numpy()
-    return _rms(spline(angles / scale) - true), _rms(true)
+    true = _tabulate(calibrated, angles, operating)[errors].to_numpy()
+    return root_mean_square(spline(angles / scale) - true), root_mean_square(true)
 
 
-def _rms(displacement: np.ndarray) -> float:
-    return float(np.sqrt((displacement**2).sum(axis=1).mean()))
-
-
-def _tabulated(calibrated: CalibratedRobot, reported: np.ndarray, operating: OperatingConditions) -> pd.DataFrame:
+def _tabulate(calibrated: CalibratedRobot, reported: np.ndarray, operating: OperatingConditions) -> pd.DataFrame:
     there, turned = forward(calibrated, reported, operating)
     position, rotation = nominal_forward(calibrated.robot, reported)
     angles = {f"q{joint}": column for joint, column in enumerate(reported.T, 1)}

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # Steps after which a start has converged or will not: Newton's method doubles the digits in the last few.
 _STEPS = 60
 # Of the pose error, m and as length at the reach; rounding of poses of some metres is a thousandth of it.
-CONVERGED_M = 1e-10
+_CONVERGED_M = 1e-10
 # Of a solution: beyond it the pose is out of reach.
 SOLVED_M = 1e-7
 # Damping in parts of the largest squared singular value, and by how much a step that fails or succeeds changes it.
@@ -40,7 +40,7 @@ def reach_m(robot: Robot) -> float:
     return max(sum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T"), 1e-3)
 
 
-def refined(robot: Robot, position: np.ndarray, rotation: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def refine(robot: Robot, position: np.ndarray, rotation: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles by damped least squares from one start for each target.
 
     `position`, `rotation` (N, 3), (N, 3, 3): wanted, of the end effector's measuring point, m, base axes. `start` (N, n):
@@ -62,14 +62,14 @@ def refined(robot: Robot, position: np.ndarray, rotation: np.ndarray, start: np.
         angles[rows], error[rows] = trial[rows], left[better]
         step_of[0][rows], step_of[1][rows] = off[better], jacobian[better] * scale[:, None]
         damping[open_rows] = np.maximum(damping[open_rows] * np.where(better, _SHRINKS, _GROWS), _LEAST)
-        open_rows = np.flatnonzero((error > CONVERGED_M) & (damping < 1e6))
+        open_rows = np.flatnonzero((error > _CONVERGED_M) & (damping < 1e6))
         if not len(open_rows):
             break
-        trial[open_rows] = angles[open_rows] + _damped(step_of[1][open_rows], step_of[0][open_rows], damping[open_rows])
+        trial[open_rows] = angles[open_rows] + _step_damped(step_of[1][open_rows], step_of[0][open_rows], damping[open_rows])
     return angles, error
 
 
-def _damped(jacobian: np.ndarray, off: np.ndarray, damping: np.ndarray) -> np.ndarray:
+def _step_damped(jacobian: np.ndarray, off: np.ndarray, damping: np.ndarray) -> np.ndarray:
     """Steps (N, n) by damped least squares in the space of the poses, J' (J J' + d I)^-1 e, no longer than the bound."""
     gram = jacobian @ jacobian.transpose(0, 2, 1)
     size = np.trace(gram, axis1=1, axis2=2)
@@ -79,7 +79,7 @@ def _damped(jacobian: np.ndarray, off: np.ndarray, damping: np.ndarray) -> np.nd
     return step * np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-300))
 
 
-def within_turns(robot: Robot, angles: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
+def remove_turns(robot: Robot, angles: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
     """The same postures with each joint that turns as near as whole turns bring it to somewhere.
 
     `angles` (..., n): of the chain, rad. `near` (..., n): the middle of the limits without. Returns (..., n).
@@ -89,7 +89,7 @@ def within_turns(robot: Robot, angles: np.ndarray, near: np.ndarray | None = Non
     return angles - 2 * np.pi * turns
 
 
-def beyond_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
+def find_beyond_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
     """Whether each joint is outside of its limits, by more than rounding, ndarray of bool (..., n)."""
     low, high = robot.joint_limits.T
     return (angles < low - 1e-9) | (angles > high + 1e-9)
@@ -98,7 +98,7 @@ def beyond_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
 def along_path(robot: Robot, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles for the poses of a path, within the limits where there are such, moving as little as possible.
 
-    `robot`, `position`, `rotation`: as in `refined`. Returns `angles`, `error_m` (N, n), (N,): as by `refined`.
+    `robot`, `position`, `rotation`: as in `refine`. Returns `angles`, `error_m` (N, n), (N,): as by `refine`.
     """
     count, joints = len(position), robot.joints
     low, high = robot.joint_limits.T
@@ -117,16 +117,16 @@ def along_path(robot: Robot, position: np.ndarray, rotation: np.ndarray) -> tupl
 def _solutions(robot: Robot, position: np.ndarray, rotation: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Angles (K, N, n) and what is left (K, N) from starts (K, N, n)."""
     many = len(starts)
-    angles, error = refined(
+    angles, error = refine(
         robot, np.tile(position, (many, 1)), np.tile(rotation, (many, 1, 1)), starts.reshape(-1, robot.joints)
     )
-    return within_turns(robot, angles).reshape(starts.shape), error.reshape(starts.shape[:2])
+    return remove_turns(robot, angles).reshape(starts.shape), error.reshape(starts.shape[:2])
 
 
 def _least_motion(robot: Robot, angles: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Which solution of each row, ndarray (N,): those that leave least, within the limits, and then move the joints least."""
     solved = error <= SOLVED_M
-    outside = beyond_limits(robot, angles).any(axis=-1)
+    outside = find_beyond_limits(robot, angles).any(axis=-1)
     # Far more than a path can be long: first of all the wanted pose, then the limits, then the way.
     cost = np.where(solved, 0.0, 1e6 * (1.0 + error)) + 1e4 * outside
     total, came_from = cost[:, 0], np.zeros(error.shape[::-1], int)

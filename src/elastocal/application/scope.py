@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import BASE, ROBOT, Scope, absorbed, placement, predicted, scope_in
+from elastocal.application.accuracy import BASE, ROBOT, Scope, find_absorbed, placement, predict_errors, scope_in
 from elastocal.application.calibrated import (
     OperatingConditions,
-    at_end_effector,
-    calibrated_of,
+    calibrate_by_model,
     forward,
+    move_to_end_effector,
     moves_robot,
     nominal_forward,
     observations_of,
@@ -45,8 +45,8 @@ _SURE = 0.95
 _SEED = 1
 
 
-def calibrated_on(case: Case, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
-    """A calibrated robot from a model that was fitted to a case, as `calibrated_of`, that knows what its errors mean.
+def calibrate_on_case(case: Case, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
+    """A calibrated robot from a model that was fitted to a case, as `calibrate_by_model`, that knows what its errors mean.
 
     Where the sensor hides how well each joint repeats, all are taken to repeat alike, by what the repeats leave possible.
     """
@@ -54,7 +54,7 @@ def calibrated_on(case: Case, model: Model, estimate: Estimate, covariance: np.n
     if noise.source == "repeats" and not noise.joint_rad.any():
         alike, freedom = hidden_repeatability(model, estimate, case.campaign.measurements)
         noise = replace(noise, joint_rad=np.full(robot.joints, alike))
-    found = calibrated_of(robot, model, estimate, covariance, noise)
+    found = calibrate_by_model(robot, model, estimate, covariance, noise)
     scope = scope_of(found, model, estimate, covariance, case.observations.states)
     return replace(found, scope=replace(scope, repeated_freedom=freedom))
 
@@ -74,7 +74,7 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
     before = pose_differences(*nominal_forward(robot, reported), position, rotation)[..., None]
 
     def size(fields: np.ndarray) -> tuple[float, float]:
-        squares = ((fields - columns @ absorbed(columns, fields, free))[:, :3] ** 2).sum(axis=(1, 2))
+        squares = ((fields - columns @ find_absorbed(columns, fields, free))[:, :3] ** 2).sum(axis=(1, 2))
         return float(np.sqrt(squares.mean())), float(np.sqrt(squares.max()))
 
     unstated = []
@@ -85,8 +85,8 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
     scope = replace(
         scope,
         unstated=tuple(unstated),
-        absorbed=absorbed(columns, pose_sensitivities(calibrated, reported, operating), free),
-        absorbed_before=absorbed(columns, before, free)[:, 0],
+        absorbed=find_absorbed(columns, pose_sensitivities(calibrated, reported, operating), free),
+        absorbed_before=find_absorbed(columns, before, free)[:, 0],
     )
     dropped = tuple(effect.key for effect in model.effects if not moves_robot(effect))
     if not dropped:
@@ -96,7 +96,7 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
         model = replace(model, row_span=(int(states.row.min()), int(states.row.max())))
     rms, worst = 0.0, 0.0
     for some in _epochs(states, model.fitted_frames):
-        found = size(_left_out(model, estimate, covariance, some))
+        found = size(_find_left_out(model, estimate, covariance, some))
         rms, worst = max(rms, found[0]), max(worst, found[1])
     return replace(scope, left_out=dropped, left_out_m=rms, left_out_worst_m=worst)
 
@@ -116,15 +116,15 @@ def campaign_poses(calibrated: CalibratedRobot, states: States) -> tuple[np.ndar
 
 def campaign_accuracy(calibrated: CalibratedRobot, states: States) -> Accuracy:
     """Predicted accuracy over the poses of a campaign: what it says of its robot as a whole."""
-    return predicted(calibrated, *campaign_poses(calibrated, states)).accuracy(REGION)
+    return predict_errors(calibrated, *campaign_poses(calibrated, states)).accuracy(REGION)
 
 
-def with_form(calibrated: CalibratedRobot, form_m: float, contradicted: bool = False) -> CalibratedRobot:
+def set_form(calibrated: CalibratedRobot, form_m: float, contradicted: bool = False) -> CalibratedRobot:
     """A calibrated robot of which it is known how much the form of its model leaves open."""
     return replace(calibrated, scope=replace(scope_in(calibrated), form_m=form_m, contradicted=contradicted))
 
 
-def judged_by_held_out(calibrated: CalibratedRobot, final: Fit, case: Case, held_out: Case) -> CalibratedRobot:
+def judge_by_held_out(calibrated: CalibratedRobot, final: Fit, case: Case, held_out: Case) -> CalibratedRobot:
     """A calibrated robot whose predicted errors are as large as its held-out poses say, where these contradict them.
 
     By the mean square over targets at the end effector: it must be larger than those of robots and of noise that are drawn as
@@ -136,7 +136,7 @@ def judged_by_held_out(calibrated: CalibratedRobot, final: Fit, case: Case, held
     if final.noise.source == "residual" or not mine.any():
         return calibrated
     state = seen.state[mine]
-    found = predicted(calibrated, calibrated.robot.reported_angles(states.joint_angles), conditions_in(calibrated, states))
+    found = predict_errors(calibrated, calibrated.robot.reported_angles(states.joint_angles), conditions_in(calibrated, states))
     sensor = final.noise.position_m**2 / states.repeats[state]
     noise = sensor @ np.random.default_rng(_SEED).chisquare(3, (len(state), len(found.rms_m))) / len(state)
     square = float((position_residuals(*placed(final, case, held_out), seen)[mine] ** 2).sum(axis=1).mean())
@@ -144,7 +144,7 @@ def judged_by_held_out(calibrated: CalibratedRobot, final: Fit, case: Case, held
         return calibrated
     scope = scope_in(calibrated)
     known = (found.error_m[state] ** 2).mean() - scope.form_m**2
-    return with_form(calibrated, float(np.sqrt(square - 3.0 * sensor.mean() - known)), contradicted=True)
+    return set_form(calibrated, float(np.sqrt(square - 3.0 * sensor.mean() - known)), contradicted=True)
 
 
 def _epochs(states: States, placed_anew: bool) -> list[States]:
@@ -155,9 +155,9 @@ def _epochs(states: States, placed_anew: bool) -> list[States]:
     return [states, replace(states, row=row, time_s=time)]
 
 
-def _left_out(model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> np.ndarray:
+def _find_left_out(model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> np.ndarray:
     """What effects that are not commanded do to the end effector, (S, 6, 1 + D): all of it, and a factor of its covariance."""
-    whole = at_end_effector(model, estimate)
+    whole = move_to_end_effector(model, estimate)
     states = replace(states, session=np.zeros_like(states.session))
     kept = [moves_robot(effect) for effect in model.effects]
     values = tuple(value if moves else 0.0 * value for moves, value in zip(kept, estimate.coefficients, strict=True))

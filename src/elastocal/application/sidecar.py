@@ -10,14 +10,14 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.accuracy import accuracy_sentence
 from elastocal.application.calibrated import forward
-from elastocal.application.calibrated_geometry import SPRINGS, folded
+from elastocal.application.calibrated_geometry import SPRINGS, fold_effects
 from elastocal.application.forward_model import model_document
 
 if TYPE_CHECKING:
     from elastocal.application.accuracy import Accuracy
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
 
-CONVENTIONS = {
+_CONVENTIONS = {
     "base": "poses are in the robot's base frame: the frame of the chain before its first transform, as the fit placed it",
     "joint_angles": "q = matrix * reported + offset of the robot file, rad; reported angles are the controller's",
     "links": "errors of link k act at its far end, before joint k + 1: Tx Ty Tz Rx Ry Rz in the frame of the chain there",
@@ -36,7 +36,7 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
     `name`: of the campaign. `date`: of the export, ISO 8601. `accuracy`: of the corrected robot.
     """
     deviations = np.sqrt(np.diag(calibrated.covariance))
-    kept = folded(calibrated).left_out
+    kept = fold_effects(calibrated).left_out
     entries, springs, start = [], [], 0
     for number, effect in enumerate(calibrated.model.effects):
         values = np.concatenate([calibrated.estimate.coefficients[number], calibrated.estimate.shapes[number]])
@@ -57,7 +57,7 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
         "robot": calibrated.robot.name,
         "date": date,
         "elastocal_version": __version__,
-        "conventions": CONVENTIONS,
+        "conventions": _CONVENTIONS,
         "accuracy": accuracy.document() | {"words": accuracy_sentence(accuracy)},
         "joint_compliance": springs,
         "effects": entries,
@@ -65,12 +65,12 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
     }
 
 
-def left_out_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
+def find_left_out_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
     """How far the effects that a robot file cannot hold move the end effector, ndarray (N,), m.
 
     `calibrated`, `reported_angles`, `operating`: as in `calibrated.forward`.
     """
-    kept = set(folded(calibrated).left_out)
+    kept = set(fold_effects(calibrated).left_out)
     values = tuple(0.0 * v if number in kept else v for number, v in enumerate(calibrated.estimate.coefficients))
     bare = replace(calibrated, estimate=replace(calibrated.estimate, coefficients=values))
     positions = [forward(each, reported_angles, operating)[0] for each in (calibrated, bare)]

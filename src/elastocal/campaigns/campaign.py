@@ -113,7 +113,7 @@ class Campaign:
         return f"{line} of {self.table}" if self.table else line
 
 
-def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str) -> Campaign:
+def assemble_campaign(document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str) -> Campaign:
     """A campaign from its parts, which have been checked before.
 
     Nominal compliances that the robot file does not state leave rigid joints.

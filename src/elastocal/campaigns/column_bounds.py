@@ -36,7 +36,7 @@ BOUNDS: Mapping[str, Bound] = {
 }
 
 
-def beyond(name: str, values: np.ndarray) -> int | None:
+def find_beyond(name: str, values: np.ndarray) -> int | None:
     """First of the values of a column (N,) that physics does not allow; None where it allows all of them."""
     bound = BOUNDS.get(name)
     if bound is None:

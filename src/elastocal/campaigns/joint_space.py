@@ -112,7 +112,7 @@ def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndar
     return ((joint_angles < low - margin) | (joint_angles > high + margin)).any(axis=1)
 
 
-def repeated(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
+def find_repeated(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
     """Whether states (S, n) have in every joint the angle of a same one of those fitted (P, n), rad: ndarray of bool (S,)."""
     return np.isfinite(_tree(fitted_angles).query(joint_angles, p=np.inf, distance_upper_bound=SAME_POSE_RAD)[0])
 

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from elastocal.campaigns.column_bounds import BOUNDS, beyond
+from elastocal.campaigns.column_bounds import BOUNDS, find_beyond
 from elastocal.counting import counted
 from elastocal.errors import InputError, steering
 from elastocal.io.atomic_writes import atomic_write
@@ -118,7 +118,7 @@ def _read_csv(path: str, joints: int) -> tuple[Columns, np.ndarray, np.ndarray]:
     # A byte order mark is what spreadsheets write. Bytes that are no UTF-8 become what `_lines` refuses with the line.
     with open(path, encoding="utf-8-sig", errors="surrogateescape", newline="") as file:
         source = _lines(file, path)
-        before, first = next(((number, line) for number, line in enumerate(source) if not _passed_over(line)), (0, ""))
+        before, first = next(((number, line) for number, line in enumerate(source) if not _is_passed_over(line)), (0, ""))
         header = [cell.strip() for cell in next(_split([first], path, before), (0, [""]))[1]]
         if not first:
             raise InputError(path, "", "an empty file", "a header and one row for each measurement of one target")
@@ -139,10 +139,10 @@ def _read_csv(path: str, joints: int) -> tuple[Columns, np.ndarray, np.ndarray]:
             rows += [row for row, _, _ in kept]
             lines += [line for _, line, _ in kept]
             if len(rows) > MOST_MEASUREMENTS:
-                raise _too_many(path, "more")
+                raise _refuse_length(path, "more")
             for name, chunk, column in zip(header, chunks, zip(*(cells for _, _, cells in kept), strict=True), strict=False):
                 chunk.append([sys.intern(cell.strip()) for cell in column] if name in texts else _numbers(column))
-    columns = {name: _joined(chunk) for name, chunk in zip(header, chunks, strict=True)}
+    columns = {name: _join(chunk) for name, chunk in zip(header, chunks, strict=True)}
     return columns, np.array(rows, np.int32), np.array(lines, np.int32)
 
 
@@ -158,7 +158,7 @@ def _lines(file: TextIO, path: str) -> Iterator[str]:
         yield line
 
 
-def _passed_over(line: str) -> bool:
+def _is_passed_over(line: str) -> bool:
     """Whether a line before the header is blank or a comment."""
     return not line.strip() or line.lstrip().startswith(_COMMENT)
 
@@ -179,20 +179,20 @@ def _split(lines: Iterable[str], path: str, before: int) -> Iterator[tuple[int, 
 def _numbers(cells: Sequence[str]) -> np.ndarray | list[str]:
     """Cells as numbers where all of them are, else as they stand in the file."""
     try:
-        values = _as_numbers(cells)
+        values = _read_numbers(cells)
     except ValueError:
         return list(cells)
     return values if np.isfinite(values).all() else list(cells)
 
 
-def _as_numbers(cells: Sequence[Any] | np.ndarray) -> np.ndarray:
+def _read_numbers(cells: Sequence[Any] | np.ndarray) -> np.ndarray:
     """ndarray of float (N,); a ValueError or TypeError where a cell is none. Python takes 1_0 for 10."""
     if not isinstance(cells, np.ndarray) and any(isinstance(cell, str) and "_" in cell for cell in cells):
         raise ValueError
     return np.array(cells, float)
 
 
-def _joined(chunks: Sequence[Any]) -> Sequence[Any] | np.ndarray:
+def _join(chunks: Sequence[Any]) -> Sequence[Any] | np.ndarray:
     if chunks and all(isinstance(chunk, np.ndarray) for chunk in chunks):
         return np.concatenate(chunks)
     return [cell for chunk in chunks for cell in chunk]
@@ -207,7 +207,7 @@ def _read_parquet(path: str, joints: int) -> tuple[Columns, np.ndarray, None]:
         _check_header(path, names)
         check_column_names(names, joints, path)
         if count > MOST_MEASUREMENTS:
-            raise _too_many(path, f"{count}")
+            raise _refuse_length(path, f"{count}")
         # As dictionaries texts take the memory that they take in the file.
         table = pq.read_table(
             path, read_dictionary=[name for name in texts if name in names], page_checksum_verification=True, partitioning=None
@@ -241,7 +241,7 @@ def _check_header(path: str, names: Sequence[str]) -> None:
         seen.add(name)
 
 
-def _too_many(path: str, found: str) -> InputError:
+def _refuse_length(path: str, found: str) -> InputError:
     allowed = f"at most {MOST_MEASUREMENTS} (the mean of a tracker's stream at each pose is one measurement)"
     return InputError(path, "", f"{found} rows of data", allowed)
 
@@ -305,7 +305,7 @@ class MeasurementFile:
         wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
         if wrong.any():
             index = int(np.argmax(wrong))
-            raise self.cell_fault(index, name, shown(self.columns[name][index]), f"an integer, up to {2**31 - 1}")
+            raise self.cell_fault(index, name, show_cell(self.columns[name][index]), f"an integer, up to {2**31 - 1}")
         return values.astype(np.int32)
 
     def texts(self, name: str) -> list[str]:
@@ -321,33 +321,35 @@ class MeasurementFile:
         if wrong.any():
             index = int(np.argmax(wrong))
             allowed = f"{values[index]:.3f}, which is {name}, or a file without the column {beside}"
-            raise self.cell_fault(index, beside, shown(self.columns[beside][index]), allowed)
+            raise self.cell_fault(index, beside, show_cell(self.columns[beside][index]), allowed)
 
     def _column(self, name: str) -> np.ndarray:
         try:
-            values = _as_numbers(self.columns[name])
+            values = _read_numbers(self.columns[name])
         except (ValueError, TypeError):
             index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
-            raise self.cell_fault(index, name, shown(self.columns[name][index]), "a number with a decimal point") from None
+            raise self.cell_fault(index, name, show_cell(self.columns[name][index]), "a number with a decimal point") from None
         # Not a number is no more than anything either.
         sound = np.abs(values) <= LARGEST_NUMBER
         if not sound.all():
             index = int(np.argmin(sound))
-            raise self.cell_fault(index, name, shown(self.columns[name][index]), f"a finite number, up to {LARGEST_NUMBER:g}")
-        if (place := beyond(name, values)) is not None:
-            raise self.cell_fault(place, name, shown(self.columns[name][place]), BOUNDS[name].allowed)
+            raise self.cell_fault(
+                index, name, show_cell(self.columns[name][index]), f"a finite number, up to {LARGEST_NUMBER:g}"
+            )
+        if (place := find_beyond(name, values)) is not None:
+            raise self.cell_fault(place, name, show_cell(self.columns[name][place]), BOUNDS[name].allowed)
         return values
 
 
 def _is_number(cell: Any) -> bool:
     try:
-        _as_numbers([cell])
+        _read_numbers([cell])
     except (ValueError, TypeError):
         return False
     return True
 
 
-def shown(cell: Any) -> str:
+def show_cell(cell: Any) -> str:
     """A cell as an error shows it."""
     text = str(cell).strip().removesuffix(".0") if cell is not None else ""
     return repr(text[:40]) if text else "nothing"

@@ -38,7 +38,7 @@ class PublicFile:
         return f"https://raw.githubusercontent.com/{self.repository}/{self.commit}/{self.path}"
 
 
-def not_at_hand(names: Iterable[str], files: Mapping[str, PublicFile], kept: str | Path) -> str | None:
+def find_missing(names: Iterable[str], files: Mapping[str, PublicFile], kept: str | Path) -> str | None:
     """What of some files is missing where `FOLDER_VARIABLE` stands for a network.
 
     `files`: as in `fetch`. `kept`: folder of what was downloaded before. Returns the first file that is missing, below the
@@ -46,12 +46,12 @@ def not_at_hand(names: Iterable[str], files: Mapping[str, PublicFile], kept: str
     """
     given = os.environ.get(FOLDER_VARIABLE)
     for name in names if given else ():
-        if not (Path(given or "") / files[name].local).is_file() and not (Path(kept) / _kept_as(name, files[name])).is_file():
+        if not (Path(given or "") / files[name].local).is_file() and not (Path(kept) / _name_copy(name, files[name])).is_file():
             return files[name].local
     return None
 
 
-def _kept_as(name: str, file: PublicFile) -> str:
+def _name_copy(name: str, file: PublicFile) -> str:
     return f"{name}{Path(file.path).suffix}"
 
 
@@ -73,7 +73,7 @@ def fetch(name: str, files: Mapping[str, PublicFile], folder: str | Path) -> Pat
         return local
     pooch.get_logger().setLevel(logging.ERROR)
     try:
-        kept = pooch.retrieve(file.address, f"sha256:{file.sha256}", _kept_as(name, file), folder)
+        kept = pooch.retrieve(file.address, f"sha256:{file.sha256}", _name_copy(name, file), folder)
     except ValueError as error:
         raise InputError(file.address, "", f"other contents ({error})", f"SHA-256 {file.sha256}") from None
     except OSError as error:

@@ -18,12 +18,12 @@ from elastocal.campaigns.campaign import (
     Campaign,
     Measurements,
     Target,
-    described_campaign,
+    assemble_campaign,
     targets_from,
 )
 from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, holdout_from, measured_poses, other_folder
 from elastocal.campaigns.measurement_checks import check_angles, check_measurements
-from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, closest_first, read_measurements, shown
+from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, closest_first, read_measurements, show_cell
 from elastocal.campaigns.places import is_file, is_file_in
 from elastocal.counting import counted
 from elastocal.errors import InputError
@@ -71,7 +71,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     _check_noise(document, measurements, robot.joints, source)
     held_out_mask(holdout, measurements, source)
     place = {"table": Path(table.path).name, "header_line": table.header_line}
-    return described_campaign(document | {"holdout": holdout} | place, robot, measurements, source)
+    return assemble_campaign(document | {"holdout": holdout} | place, robot, measurements, source)
 
 
 def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:
@@ -216,7 +216,7 @@ def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target
     for index, label in enumerate(labels):
         if label not in names:
             allowed = f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
-            raise table.cell_fault(index, "target", shown(label), allowed)
+            raise table.cell_fault(index, "target", show_cell(label), allowed)
     approach = None
     if table.has(table.approach):
         senses = table.numbers(table.approach)

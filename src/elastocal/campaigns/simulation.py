@@ -34,7 +34,7 @@ class Plan:
     noise_rad: float
 
 
-def simulated_measurements(robot: Robot, plan: Plan, seed: int, name: str) -> dict[str, np.ndarray]:
+def draw_measurements(robot: Robot, plan: Plan, seed: int, name: str) -> dict[str, np.ndarray]:
     """Measurements of a robot with elastic joints and, where it has them, elastic links.
 
     Springs yield by the virtual joint method, see `mechanics.elastostatics`; poses are exact.

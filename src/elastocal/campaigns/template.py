@@ -33,12 +33,12 @@ def campaign_template(name: str, robot: Robot) -> str:
         "declared": ["joint_offset", "link_geometry"],
         "holdout": {"fraction": 0.3, "seed": 1},
     }
-    return explained("campaign", document)
+    return _explain("campaign", document)
 
 
 def robot_template() -> str:
     """Text of a robot.yaml to replace what is in it."""
-    return explained("robot", _ROBOT)
+    return _explain("robot", _ROBOT)
 
 
 def sheet_template(joints: int) -> str:
@@ -47,7 +47,7 @@ def sheet_template(joints: int) -> str:
     return ",".join(name for name in file_columns(joints) if not name.startswith(optional)) + "\n"
 
 
-def explained(schema: str, document: Mapping[str, Any]) -> str:
+def _explain(schema: str, document: Mapping[str, Any]) -> str:
     """A document as YAML in which each key of its schema is explained; those that it leaves out stand as comments.
 
     `schema`: name of the schema, as in `read_schema`.

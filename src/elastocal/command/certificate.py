@@ -54,7 +54,7 @@ def certificate(
     from elastocal.campaigns.reading import read_descriptions
     from elastocal.exchange.target_path import read_target_path
     from elastocal.figures.certificate import budget_bars, workspace_map
-    from elastocal.figures.style import save
+    from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
     from elastocal.loop.certificate import Wanted
@@ -92,9 +92,7 @@ def certificate(
                     document["budget"], [row[0] for row in facts["budget"]], limit, document["tracker_rms_m"]
                 ),
             }
-            for name, figure in drawn.items():
-                save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")
-            write_certificate(partial / PAGES, facts, [f"{scratch}/{name}.pdf" for name in drawn])
+            write_certificate(partial / PAGES, facts, [*save_all(drawn, scratch).values()])
             write_json(partial / DOCUMENT, document)
     passed, answer = facts["decision"] == "pass", f"{facts['decision']}: {facts['decision_sentences']}"
     print_answer(passed, answer, [str(place / PAGES), str(place / DOCUMENT)], facts["now"], console)

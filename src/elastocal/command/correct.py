@@ -53,9 +53,9 @@ def correct(
     """
     import numpy as np
 
-    from elastocal.application.accuracy import accuracy_sentence, before_m, millimetres, predicted
+    from elastocal.application.accuracy import accuracy_sentence, before_m, millimetres, predict_errors
     from elastocal.application.calibrated import OperatingConditions, assumptions
-    from elastocal.application.compensation import corrected
+    from elastocal.application.compensation import find_joint_targets
     from elastocal.application.scope import campaign_accuracy
     from elastocal.exchange.controllers.protocol import axes_of, check_name, targets_of
     from elastocal.exchange.target_path import OK, read_target_path
@@ -80,7 +80,7 @@ def correct(
     print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         bar = progress.add_task("correcting", total=len(wanted))
-        found = corrected(
+        found = find_joint_targets(
             calibrated,
             wanted.position,
             wanted.rotation,
@@ -99,7 +99,7 @@ def correct(
     beyond = beyond_campaign(
         campaign.case.observations.states, calibrated.robot.model_angles(found.joint_angles), wanted.wrench
     )
-    errors = predicted(calibrated, found.joint_angles, operating)
+    errors = predict_errors(calibrated, found.joint_angles, operating)
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
     files = [table, program] if controller else [table]
     with write_together(output.parent, [file.name for file in files]) as folder_of_all:
@@ -110,7 +110,7 @@ def correct(
     lines, answer = [], f"{grouped(good.sum())} of {counted(len(good), 'target')} corrected"
     if good.any():
         rms = np.sqrt((before[good] ** 2).mean())
-        reachable = predicted(calibrated, found.joint_angles[good], operating.part(good)) if len(bad) else errors
+        reachable = predict_errors(calibrated, found.joint_angles[good], operating.part(good)) if len(bad) else errors
         lines.append(f"Predicted position error without correction, in the same frame: {millimetres(rms)} RMS.")
         lines.append(accuracy_sentence(reachable.accuracy("the targets")))
         lines.append(accuracy_sentence(campaign_accuracy(calibrated, campaign.case.observations.states)))

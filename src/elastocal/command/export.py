@@ -57,10 +57,10 @@ def export(
 
     from elastocal.application.accuracy import accuracy_sentence
     from elastocal.application.calibrated import OperatingConditions
-    from elastocal.application.calibrated_geometry import folded
+    from elastocal.application.calibrated_geometry import fold_effects
     from elastocal.application.scope import campaign_accuracy
-    from elastocal.application.sidecar import left_out_m, sidecar
-    from elastocal.exchange.urdf_origins import with_calibrated_origins
+    from elastocal.application.sidecar import find_left_out_m, sidecar
+    from elastocal.exchange.urdf_origins import write_calibrated_origins
     from elastocal.exchange.urdf_writing import urdf_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.json_files import write_json
@@ -72,8 +72,8 @@ def export(
         raise InputError(urdf, "", "the file that would be replaced", "a URDF outside of --output")
     found = diagnosed_campaign(folder, accept_environment)
     calibrated = found.calibrated
-    robot = folded(calibrated).robot
-    drop_in = None if urdf is None else with_calibrated_origins(urdf, calibrated.robot, robot)
+    robot = fold_effects(calibrated).robot
+    drop_in = None if urdf is None else write_calibrated_origins(urdf, calibrated.robot, robot)
     stated = f"Calibrated by elastocal from the campaign {found.name}."
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
     accuracy = campaign_accuracy(calibrated, found.case.observations.states)
@@ -96,7 +96,7 @@ def export(
     if document["effects"]:
         states = found.case.observations.states
         angles = calibrated.robot.reported_angles(states.joint_angles)
-        off = left_out_m(calibrated, angles, OperatingConditions(states.wrench, None, states.time_s, states.temperature_c))
+        off = find_left_out_m(calibrated, angles, OperatingConditions(states.wrench, None, states.time_s, states.temperature_c))
         names = ", ".join(entry["key"] for entry in document["effects"])
         largest, rms = 1e3 * off.max(), 1e3 * np.sqrt((off**2).mean())
         lines.insert(0, f"! only {SIDECAR} holds {names}: up to {largest:.3f} mm at the measured poses ({rms:.3f} mm RMS)")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.counting import plural
 from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities
@@ -43,7 +44,7 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     """
     joints = [str(entry) for entry in location if not isinstance(entry, str)]
     names = [entry for entry in location if isinstance(entry, str)]
-    where = f"{part_of(mechanism)}{'s' if len(joints) > 1 else ''} {' and '.join(joints)}" if joints else ""
+    where = f"{plural(part_of(mechanism), len(joints))} {' and '.join(joints)}" if joints else ""
     return " ".join(filter(None, [where, *names])) or ("base" if mechanism == OTHER else "")
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from elastocal.counting import plural
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
 
@@ -87,7 +88,7 @@ def at_joints(effect: str, joints: Collection[int]) -> str:
     """Where an effect acts: " of joint 3", or nothing where it is no joint's."""
     if not joints:
         return ""
-    return f" of {part_of(effect)}{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}"
+    return f" of {plural(part_of(effect), len(joints))} {listed(map(str, joints))}"
 
 
 def effect_words(effect: str, locations: Iterable[str] = ()) -> str:

@@ -22,15 +22,15 @@ from elastocal.exchange.column_names import (
     QUATERNION,
     USUAL,
     VECTOR,
+    find_joints,
     is_unit_of_none,
-    joints_in,
     kind_of,
     ordinal_of_joint,
-    recognized,
+    recognize_column,
+    split_unit,
     unit_of_joint,
     unit_scale,
     units_of,
-    without_unit,
 )
 from elastocal.exchange.csv_dialect import TextTable
 from elastocal.exchange.rotations import (
@@ -51,7 +51,7 @@ _OTHER_ANGLES = (("A", "B", "C"), ("W", "P", "R"), ("O", "A", "T"))
 _COUNTED = re.compile(r"(.*?)(name|position)s?[\s_.]?[\[(]?\s*([0-9]{1,2})\s*[\])]?", re.ASCII | re.IGNORECASE)
 
 
-def columns_of(
+def find_columns(
     text: TextTable, mapped: Mapping[str, str], robot: Robot | None
 ) -> tuple[dict[str, str], dict[str, str], list[str]]:
     """Headers by name, those of the options first, the units that headers state, and notes."""
@@ -60,17 +60,19 @@ def columns_of(
         if header not in text.columns:
             raise InputError(text.path, "header", f"no column {header!r}", closest_first(header, list(text.columns)))
         found[name] = header
-    guesses = {header: (name, _unit(text, header, unit)) for header in text.columns for name, unit in [recognized(header)]}
+    guesses = {
+        header: (name, _unit(text, header, unit)) for header in text.columns for name, unit in [recognize_column(header)]
+    }
     by_name = {}
     for joint, called in enumerate((robot and robot.joint_names) or (), 1):
         for header in text.columns:
             is_joint, unit = unit_of_joint(header, called)
             if is_joint:
                 guesses[header], by_name[header] = (f"q{joint}", _unit(text, header, unit)), called
-    for header, name in _joints_by_name(text, (robot and robot.joint_names) or (), {*mapped.values()}).items():
+    for header, name in _find_joints_by_name(text, (robot and robot.joint_names) or (), {*mapped.values()}).items():
         guesses[header], by_name[header] = (name, guesses[header][1]), name
     free = [header for header in text.columns if header not in by_name and guesses[header][0] not in mapped]
-    joints, notes = _counted_joints(text, free, {*mapped.values()})
+    joints, notes = _find_counted_joints(text, free, {*mapped.values()})
     guesses |= {header: (name, guesses[header][1]) for header, name in joints.items()}
     stated: dict[str, str] = {}
     for header, (guess, unit) in guesses.items():
@@ -100,7 +102,7 @@ def _unit(text: TextTable, header: str, stated: str | None) -> str | None:
     return stated or below
 
 
-def _joints_by_name(text: TextTable, joint_names: Sequence[str], mapped: set[str]) -> dict[str, str]:
+def _find_joints_by_name(text: TextTable, joint_names: Sequence[str], mapped: set[str]) -> dict[str, str]:
     """Names of joint angles by the headers of positions beside which columns name the joints.
 
     `joint_names`: as the robot has them; empty where nobody knows. `mapped`: headers that options state. Raises `InputError`:
@@ -108,7 +110,7 @@ def _joints_by_name(text: TextTable, joint_names: Sequence[str], mapped: set[str
     """
     families: dict[tuple[str, str], dict[int, str]] = {}
     for header in text.columns:
-        if match := _COUNTED.fullmatch(without_unit(header)[0]):
+        if match := _COUNTED.fullmatch(split_unit(header)[0]):
             families.setdefault((match[1], match[2].lower()), {})[int(match[3])] = header
     found: dict[str, str] = {}
     for (prefix, kind), names in families.items():
@@ -122,7 +124,7 @@ def _joints_by_name(text: TextTable, joint_names: Sequence[str], mapped: set[str
                 raise InputError(text.path, f"line {line}, column {header}", repr(other), allowed)
             called = text.columns[header][0]
             joint = next((f"q{j}" for j, name in enumerate(joint_names, 1) if unit_of_joint(called, name)[0]), None)
-            joint = joint or (None if joint_names else recognized(called)[0])
+            joint = joint or (None if joint_names else recognize_column(called)[0])
             if joint and re.fullmatch("q[0-9]+", joint):
                 found[positions[number]] = joint
         if not found:
@@ -134,7 +136,7 @@ def _joints_by_name(text: TextTable, joint_names: Sequence[str], mapped: set[str
     return found
 
 
-def _counted_joints(text: TextTable, headers: Sequence[str], mapped: set[str]) -> tuple[dict[str, str], list[str]]:
+def _find_counted_joints(text: TextTable, headers: Sequence[str], mapped: set[str]) -> tuple[dict[str, str], list[str]]:
     """Names of joints that headers count, and notes; what may be a quaternion, or is counted in two ways, is asked for."""
     families: dict[str, dict[int, str]] = {}
     for header in headers:
@@ -182,7 +184,7 @@ def _have_unit_length(text: TextTable, headers: Sequence[str]) -> bool:
     return len(numbers) > 0 and bool((np.abs(np.linalg.norm(numbers, axis=1) - 1.0) <= UNIT_LENGTH).all())
 
 
-def rotation_of(text: TextTable, columns: Mapping[str, str], mapped: Mapping[str, str], notation: str | None) -> str:
+def find_rotation(text: TextTable, columns: Mapping[str, str], mapped: Mapping[str, str], notation: str | None) -> str:
     """Notation of the orientations of a table: the one that is stated, or the one that the names of columns leave.
 
     `columns`: headers by name. `mapped`: those of them that options state. Raises `InputError` where it is ambiguous.
@@ -234,7 +236,7 @@ def check_complete(
         named = f" or as the robot has them: {', '.join(robot.joint_names)}" if robot and robot.joint_names else ""
         allowed = (
             f"columns q1, q2 …{named}, --column q1=NAME, or --robot FILE with joint_names; "
-            f"not yet used: {_not_used(text, columns)}"
+            f"not yet used: {_list_unused(text, columns)}"
         )
         raise InputError(text.path, "header", "no joint angles", allowed)
     if robot and len(angles) > robot.joints:
@@ -244,15 +246,15 @@ def check_complete(
     groups = [[f"q{j}" for j in range(1, last + 1)], needed]
     for group in groups:
         if missing := [name for name in group if name not in columns]:
-            allowed = f"--column {missing[0]}=NAME; not yet used: {_not_used(text, columns)}"
+            allowed = f"--column {missing[0]}=NAME; not yet used: {_list_unused(text, columns)}"
             raise InputError(text.path, "header", f"no column {', '.join(missing)}", allowed)
 
 
-def _not_used(text: TextTable, columns: Mapping[str, str]) -> str:
+def _list_unused(text: TextTable, columns: Mapping[str, str]) -> str:
     return ", ".join(header for header in text.columns if header not in columns.values())[:200] or "none"
 
 
-def units_of_columns(
+def find_units(
     text: TextTable,
     columns: Mapping[str, str],
     wanted: Sequence[str],
@@ -268,7 +270,7 @@ def units_of_columns(
     found: dict[str, str] = {}
     for name in wanted:
         kinds = kind_of(name)
-        if robot and name in joints_in([name]):
+        if robot and name in find_joints([name]):
             # A prismatic joint reports a length.
             kinds = (LENGTH if robot.chain.prismatic[int(name[1:]) - 1] else ANGLE,)
         if kinds == (NONE,):

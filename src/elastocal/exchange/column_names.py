@@ -92,7 +92,7 @@ def is_name(name: str) -> bool:
 
 def unit_scale(unit: str, kinds: Iterable[str]) -> float | None:
     """SI value of one unit, if it is one of some kinds."""
-    plain = _plain_unit(unit)
+    plain = _simplify_unit(unit)
     return next((UNITS[kind][plain] for kind in kinds if plain in UNITS[kind]), None)
 
 
@@ -101,7 +101,7 @@ def units_of(kinds: Iterable[str]) -> list[str]:
     return [unit for kind in kinds for unit in UNITS[kind]]
 
 
-def recognized(header: str) -> tuple[str | None, str | None]:
+def recognize_column(header: str) -> tuple[str | None, str | None]:
     """What a column is, by its header.
 
     A number in brackets is an index, whatever else stands there a unit. Of a topic such as ``/tcp/pose/position/x`` or
@@ -110,8 +110,8 @@ def recognized(header: str) -> tuple[str | None, str | None]:
     Returns `name`: as this module calls columns, None where the header is not known; `unit`: as it stands in the header, None
     where none does.
     """
-    text, unit = without_unit(header)
-    name = _named(text)
+    text, unit = split_unit(header)
+    name = _find_name(text)
     if name is not None and unit is None:
         return name, {"time_s": "s", "temperature_c": "C", "u95_m": "m"}.get(header.lower())
     return name, unit
@@ -119,16 +119,16 @@ def recognized(header: str) -> tuple[str | None, str | None]:
 
 def ordinal_of_joint(header: str) -> tuple[str, int] | None:
     """What a header calls joints and the number of this one, which may be counted from 0; None where it is no joint angle."""
-    matches = (_JOINT.fullmatch(name) for name in _names_in(without_unit(header)[0]))
+    matches = (_JOINT.fullmatch(name) for name in _names_in(split_unit(header)[0]))
     return next(((match[1], int(match[2])) for match in matches if match), None)
 
 
 def unit_of_joint(header: str, joint: str) -> tuple[bool, str | None]:
     """Whether a column has the name of a joint (alone, with a unit, or as a topic has it), and the unit."""
-    if _plain(joint) in _names_in(header):
+    if _simplify(joint) in _names_in(header):
         return True, None
-    text, unit = without_unit(header)
-    return _plain(joint) in _names_in(text), unit
+    text, unit = split_unit(header)
+    return _simplify(joint) in _names_in(text), unit
 
 
 def is_unit_of_none(name: str, unit: str | None) -> bool:
@@ -136,56 +136,60 @@ def is_unit_of_none(name: str, unit: str | None) -> bool:
     return unit not in (None, *_NO_UNIT) and kind_of(name) == (NONE,)
 
 
-def units_in(cells: Sequence[str]) -> list[str] | None:
+def read_units(cells: Sequence[str]) -> list[str] | None:
     """Units of a row that has nothing else, such as ``deg; [mm]; -``, "" for none; None where it has anything else."""
     bare = [re.sub(r"^[\[(](.*)[\])]$", r"\1", cell).strip() for cell in cells]
-    units = ["" if unit in _NO_UNIT else _plain_unit(unit) for unit in bare]
+    units = ["" if unit in _NO_UNIT else _simplify_unit(unit) for unit in bare]
     known = {unit for of_kind in UNITS.values() for unit in of_kind}
     return units if any(units) and known.issuperset(units) else None
 
 
-def joints_in(names: Iterable[str]) -> list[str]:
+def find_joints(names: Iterable[str]) -> list[str]:
     """Names of joint angles among names, from q1 on."""
     numbers = sorted(int(name[1:]) for name in names if re.fullmatch(r"q[0-9]+", name))
     return [f"q{number}" for number in numbers]
 
 
-def recognized_plainly(text: str) -> str | None:
+def recognize_plain_header(text: str) -> str | None:
     """What a header without a unit is by all of it; None where it is not known, or the end of a topic."""
-    return _named_plainly(_plain(text))
+    return _look_up_name(_simplify(text))
 
 
-def without_unit(header: str) -> tuple[str, str | None]:
+def split_unit(header: str) -> tuple[str, str | None]:
     """A header without its unit, and the unit; an index in brackets is a part of the name."""
     index = _INDEX.fullmatch(header)
     if index and index[1]:
         # Of a name with a number an index is one too many.
         header = f"{index[1]}{' index ' if index[1][-1].isdigit() else ''}{index[2]}{index[3]}"
     if bracketed := _BRACKETS.fullmatch(header):
-        return bracketed[1], _plain_unit(bracketed[2]) or None
+        return bracketed[1], _simplify_unit(bracketed[2]) or None
     behind = _BEHIND.fullmatch(header)
-    if _named(header) is None and behind and any(_plain_unit(behind[2]) in units for units in UNITS.values()):
-        name = _named(behind[1])
+    if _find_name(header) is None and behind and any(_simplify_unit(behind[2]) in units for units in UNITS.values()):
+        name = _find_name(behind[1])
         if name is None or unit_scale(behind[2], kind_of(name)) is not None:
-            return behind[1], _plain_unit(behind[2])
+            return behind[1], _simplify_unit(behind[2])
     return header, None
 
 
-def _named(text: str) -> str | None:
-    return next((name for plain in _names_in(text) if (name := _named_plainly(plain)) is not None), None)
+def _find_name(text: str) -> str | None:
+    return next((name for plain in _names_in(text) if (name := _look_up_name(plain)) is not None), None)
 
 
 def _names_in(text: str) -> list[str]:
     """What a header may be called: the whole of it, and of a topic its end."""
-    parts = [plain for part in re.split(r"[/.]", text) if (plain := _plain(part))]
+    parts = [plain for part in re.split(r"[/.]", text) if (plain := _simplify(part))]
     if len(parts) < 2:
-        return [_plain(text)]
+        return [_simplify(text)]
     if parts[-1] in ("position", "pos"):
-        return [_plain(text), parts[-2]]
-    return [_plain(text), parts[-2] + parts[-1], *([parts[-1]] if _JOINT.fullmatch(parts[-1]) and parts[-2] in _ANGLES else [])]
+        return [_simplify(text), parts[-2]]
+    return [
+        _simplify(text),
+        parts[-2] + parts[-1],
+        *([parts[-1]] if _JOINT.fullmatch(parts[-1]) and parts[-2] in _ANGLES else []),
+    ]
 
 
-def _named_plainly(plain: str) -> str | None:
+def _look_up_name(plain: str) -> str | None:
     for pattern, letter in ((_JOINT, "q"), (_APPROACH, "approach")):
         if match := pattern.fullmatch(plain):
             # Joint 0 is somebody's first: whose, an option or the other columns have to say.
@@ -194,9 +198,9 @@ def _named_plainly(plain: str) -> str | None:
     return _KNOWN.get(plain)
 
 
-def _plain(text: str) -> str:
+def _simplify(text: str) -> str:
     return re.sub(r"[^a-z0-9]", "", text.lower())
 
 
-def _plain_unit(unit: str) -> str:
+def _simplify_unit(unit: str) -> str:
     return re.sub(r"[ ·*.⋅]", "", unit).replace("degrees", "deg").replace("degree", "deg")

@@ -93,15 +93,15 @@ def read_text_table(
     `InputError`: a file that cannot be read or has no header, a row of another length, or numbers that may be read in two ways.
     """
     source = Path(path).as_posix()
-    lines, encoding = _lines(path, stated.encoding)
+    lines, encoding = _read_lines(path, stated.encoding)
     filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
     kept = [(number, line) for number, line in filled if not line.lstrip().startswith(_COMMENTS)]
     comments = [(number, line.lstrip().lstrip("#%/").strip()) for number, line in filled if line.lstrip().startswith(_COMMENTS)]
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
-    separator, header, line = _header(kept, comments, is_header, stated, wanted, source)
-    table = [(number, _cells_of(line, separator, source, number)) for number, line in kept if number > header]
-    names, named_above = _names(_cells_of(line, separator, source, header), kept, separator, header)
+    separator, header, line = _find_header(kept, comments, is_header, stated, wanted, source)
+    table = [(number, _split_cells(line, separator, source, number)) for number, line in kept if number > header]
+    names, named_above = _read_names(_split_cells(line, separator, source, header), kept, separator, header)
     rows = [row for row in table if any(row[1])]
     for number, cells in rows:
         # Separators at the end of the rows and not of the header are common.
@@ -133,10 +133,10 @@ def read_text_table(
     if thousands is not None and thousands == stated.decimal:
         raise InputError("--thousands", "", f"{thousands}, the decimal mark too", "two different marks")
     if thousands is not None:
-        columns = {name: tuple(_ungrouped(cell, thousands) for cell in cells) for name, cells in columns.items()}
-    decimal = stated.decimal or _decimal_of(columns, numbers, separator, thousands, source)
+        columns = {name: tuple(_remove_thousands(cell, thousands) for cell in cells) for name, cells in columns.items()}
+    decimal = stated.decimal or _find_decimal(columns, numbers, separator, thousands, source)
     if decimal == "comma":
-        columns = {name: tuple(map(_with_point, cells)) for name, cells in columns.items()}
+        columns = {name: tuple(map(_write_point, cells)) for name, cells in columns.items()}
     unread = (
         (len(table) - len(rows) - bool(units), "row", "of empty cells"),
         (sum(number < header for number, _ in filled) - named_above, "line", "above the header"),
@@ -149,14 +149,14 @@ def read_text_table(
     return TextTable(source, dialect, columns, tuple(numbers), left_out, stated_units)
 
 
-def _names(cells: Sequence[str], kept: Sequence[tuple[int, str]], separator: str, header: int) -> tuple[list[str], bool]:
+def _read_names(cells: Sequence[str], kept: Sequence[tuple[int, str]], separator: str, header: int) -> tuple[list[str], bool]:
     """Names of columns, and whether some are of two lines: those that stand there twice, by what the line above has there."""
     names = [name or f"column {place}" for place, name in enumerate(cells, 1)]
     above = next((line for number, line in reversed(kept) if number < header), "")
     twice = {name for name, times in Counter(names).items() if times > 1}
     if not twice or separator == "space":
         return names, False
-    of, groups = "", _tried_cells(above, separator)
+    of, groups = "", _try_cells(above, separator)
     both = []
     for name, group in zip(names, [*groups, *[""] * (len(names) - len(groups))], strict=False):
         # Of cells that a spreadsheet joined the first one has the text.
@@ -165,7 +165,7 @@ def _names(cells: Sequence[str], kept: Sequence[tuple[int, str]], separator: str
     return (both, True) if len(set(both)) == len(both) else (names, False)
 
 
-def lines_of(text: str, path: str | Path) -> list[str]:
+def _split_lines(text: str, path: str | Path) -> list[str]:
     """Lines of a file's text as editors count them; control characters and marks that turn the order of letters are refused."""
     lines = _ENDS.split(text)
     for number, line in enumerate(lines, 1):
@@ -175,17 +175,17 @@ def lines_of(text: str, path: str | Path) -> list[str]:
     return lines[:-1] if lines[-1] == "" else lines
 
 
-def _lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]:
+def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]:
     content = read_bytes(path, LARGEST_BYTES, "a table with a line for each measurement")
-    text, encoding = _text(content, path, encoding)
-    lines = lines_of(text, path)
+    text, encoding = _decode(content, path, encoding)
+    lines = _split_lines(text, path)
     if len(lines) > MOST_LINES:
         allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
         raise InputError(path, "", counted(len(lines), "line"), allowed)
     return lines, encoding
 
 
-def _text(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, str]:
+def _decode(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, str]:
     """Text of a file and its encoding, found out where it is not stated."""
     if encoding is not None:
         try:
@@ -214,7 +214,7 @@ def _text(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, 
         raise InputError(path, error.key, error.found, allowed) from None
 
 
-def _header(
+def _find_header(
     kept: Sequence[tuple[int, str]],
     comments: Sequence[tuple[int, str]],
     is_header: Callable[[Sequence[str]], bool],
@@ -235,9 +235,9 @@ def _header(
         return next((name for name in tried if is_header(cells(line, name))), None)
 
     for number, line in kept:
-        if separator := separator_of(line, lambda line, name: _cells_of(line, name, source, number)):  # noqa: B023
+        if separator := separator_of(line, lambda line, name: _split_cells(line, name, source, number)):  # noqa: B023
             return separator, number, line
-    found = [(separator, number, line) for number, line in comments if (separator := separator_of(line, _tried_cells))]
+    found = [(separator, number, line) for number, line in comments if (separator := separator_of(line, _try_cells))]
     if len({line for _, _, line in found}) > 1:
         allowed = "--header LINE, the one that names the columns"
         raise InputError(source, f"line {found[0][1]} and line {found[1][1]}", "two headers behind comment marks", allowed)
@@ -247,15 +247,15 @@ def _header(
     raise InputError(source, f"line {kept[0][0]}", repr(first), wanted)
 
 
-def _tried_cells(line: str, separator: str) -> list[str]:
+def _try_cells(line: str, separator: str) -> list[str]:
     """Cells of a comment, in which quotes need not be in pairs."""
     try:
-        return _cells_of(line, separator, "", 0)
+        return _split_cells(line, separator, "", 0)
     except InputError:
         return []
 
 
-def _cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
+def _split_cells(line: str, separator: str, source: str, number: int) -> list[str]:
     """Cells of one line.
 
     `separator`: a name in `SEPARATORS`, or the mark itself. `source`: named in errors. `number`: of the line. Raises
@@ -273,7 +273,7 @@ def _cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
     return [cell.strip() for cell in row]
 
 
-def _decimal_of(
+def _find_decimal(
     columns: dict[str, tuple[str, ...]], lines: Sequence[int], separator: str, thousands: str | None, source: str
 ) -> str:
     """The decimal mark that all numbers have; refused are numbers that may be read in two ways."""
@@ -311,11 +311,11 @@ def _decimal_of(
     return decimal
 
 
-def _ungrouped(cell: str, thousands: str) -> str:
+def _remove_thousands(cell: str, thousands: str) -> str:
     marks = re.escape(THOUSANDS[thousands])
     grouped = re.fullmatch(rf"[+-]?\d{{1,3}}(?:[{marks}]\d{{3}})+(?:[.,]\d*)?", cell, re.ASCII)
     return re.sub(f"[{marks}]", "", cell) if grouped else cell
 
 
-def _with_point(cell: str) -> str:
+def _write_point(cell: str) -> str:
     return cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell

@@ -25,7 +25,7 @@ import numpy as np
 from elastocal.errors import InputError
 from elastocal.exchange.dh_table import AS_STATED, FIXED, PRISMATIC, REVOLUTE, DhOptions, DhRow, read_dh_table
 from elastocal.exchange.fixed_transforms import displacement_words, elementary, shift_word, turn_word
-from elastocal.exchange.robot_text import Imported, imported, mass_entries
+from elastocal.exchange.robot_text import Imported, check_imported, mass_entries
 from elastocal.exchange.ros_kinematics import KINEMATICS, robot_from_kinematics
 from elastocal.exchange.urdf_chain import point_name
 from elastocal.io.documents import read_document
@@ -99,7 +99,7 @@ def robot_from_dh(
     if free := [str(number) for number, row in enumerate(joints, 1) if row.limits is None]:
         notes.append(f"no limits of q{', q'.join(free)}: a turn either way")
     notation = f"{'modified' if modified else 'standard'} Denavit-Hartenberg parameters"
-    return imported(document, path, notation, [*understood, *notes])
+    return check_imported(document, path, notation, [*understood, *notes])
 
 
 def _words(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[str]:

@@ -28,13 +28,14 @@ from typing import Any
 from elastocal.campaigns.measurements import closest_first
 from elastocal.counting import counted
 from elastocal.errors import InputError
-from elastocal.exchange.column_names import units_in, without_unit
+from elastocal.exchange.column_names import read_units, split_unit
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.io.documents import read_document
 from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
 
 _ANGLE_UNITS = {"deg": math.radians(1.0), "rad": 1.0}
 _LENGTH_UNITS = {"m": 1.0, "mm": 1e-3}
+_SIGNS = {"°": "deg"}
 REVOLUTE, PRISMATIC, FIXED = "R", "P", "F"
 _ANGLES, _LENGTHS, _LIMITS = ("theta_offset", "alpha"), ("d", "a", "cx", "cy", "cz"), ("lower", "upper")
 _PLAIN = ("compliance_urad_per_Nm", "mass_kg")
@@ -133,7 +134,7 @@ def _csv_rows(path: str | Path, source: str, options: DhOptions) -> _Rows:
         Dialect(decimal=options.decimal),
         options.ignore,
         wanted="columns d, a and alpha, such as d_m or d_mm",
-        units_in=units_in,
+        units_in=read_units,
     )
     if text.dialect.decimal == "comma" and options.decimal is None:
         raise InputError(source, "", "numbers with commas", "--decimal comma where the comma is the decimal mark, else points")
@@ -146,7 +147,7 @@ def _csv_rows(path: str | Path, source: str, options: DhOptions) -> _Rows:
 
 
 def _has_known_column(cells: Sequence[str]) -> bool:
-    return any(without_unit(cell)[0] in _NEEDED for cell in cells)
+    return any(split_unit(cell)[0] in _NEEDED for cell in cells)
 
 
 def _yaml_rows(path: str | Path, source: str, options: DhOptions) -> _Rows:
@@ -166,32 +167,7 @@ def _meanings(columns: Mapping[str, str], options: DhOptions, source: str) -> di
     """What each column is, by its name and the unit of the row under it."""
     found: dict[str, _Meaning] = {}
     for column, below in columns.items():
-        known = column in (*_PLAIN, *_WORDS)
-        name, stated = (column, None) if known else without_unit(column)
-        stated = {"°": "deg"}.get(stated or "", stated)
-        unit = stated or {"°": "deg"}.get(below, below)
-        if stated and below and unit != {"°": "deg"}.get(below, below):
-            raise InputError(source, "header", f"{column!r} and {below!r} in the row under it", "one unit")
-        if known:
-            meaning = _Meaning(name)
-        elif name not in (*_ANGLES, *_LENGTHS, *_LIMITS):
-            names = ["joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type", "lower_deg", "upper_deg", *_PLAIN]
-            allowed = closest_first(column, [*names, "cx_m", "cy_m", "cz_m", "point"])
-            raise InputError(source, "header", repr(column), f"{allowed}; import dh --ignore {column!r} leaves it out")
-        else:
-            turns, shifts = name in (*_ANGLES, *_LIMITS), name in (*_LENGTHS, *_LIMITS)
-            if unit and not (turns and unit in _ANGLE_UNITS) and not (shifts and unit in _LENGTH_UNITS):
-                units = [*(_ANGLE_UNITS if turns else ()), *(_LENGTH_UNITS if shifts else ())]
-                raise InputError(source, "header", f"{column!r} in {unit}", ", ".join(units))
-            meaning = _Meaning(
-                name,
-                (unit if unit in _ANGLE_UNITS else options.angles or "") if turns else "",
-                (unit if unit in _LENGTH_UNITS else options.lengths or "") if shifts else "",
-            )
-            if not (meaning.angle or meaning.length):
-                option = "--angles deg or rad" if turns else "--lengths m or mm"
-                allowed = f"{option}, or {name}_{'deg' if turns else 'mm'} and such"
-                raise InputError(source, "header", f"no unit of {column!r}", allowed)
+        meaning = _find_meaning(column, below, options, source)
         if any(meaning.name == other.name for other in found.values()):
             raise InputError(source, "header", f"{meaning.name} twice", "each column once")
         found[column] = meaning
@@ -199,6 +175,32 @@ def _meanings(columns: Mapping[str, str], options: DhOptions, source: str) -> di
         if not any(meaning.name == name for meaning in found.values()):
             raise InputError(source, "header", f"no column {name}", "theta_offset, d, a and alpha, such as d_m or d_mm")
     return found
+
+
+def _find_meaning(column: str, below: str, options: DhOptions, source: str) -> _Meaning:
+    if column in (*_PLAIN, *_WORDS):
+        return _Meaning(column)
+    name, stated = split_unit(column)
+    stated, beneath = (_SIGNS.get(unit or "", unit or "") for unit in (stated, below))
+    unit = stated or beneath
+    if stated and beneath and stated != beneath:
+        raise InputError(source, "header", f"{column!r} and {below!r} in the row under it", "one unit")
+    turns, shifts = name in (*_ANGLES, *_LIMITS), name in (*_LENGTHS, *_LIMITS)
+    if not (turns or shifts):
+        names = ["joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type", "lower_deg", "upper_deg", *_PLAIN]
+        allowed = closest_first(column, [*names, "cx_m", "cy_m", "cz_m", "point"])
+        raise InputError(source, "header", repr(column), f"{allowed}; import dh --ignore {column!r} leaves it out")
+    units = [*(_ANGLE_UNITS if turns else ()), *(_LENGTH_UNITS if shifts else ())]
+    if unit and unit not in units:
+        raise InputError(source, "header", f"{column!r} in {unit}", ", ".join(units))
+    angle = unit if unit in _ANGLE_UNITS else options.angles
+    length = unit if unit in _LENGTH_UNITS else options.lengths
+    meaning = _Meaning(name, (turns and angle) or "", (shifts and length) or "")
+    if not (meaning.angle or meaning.length):
+        option = "--angles deg or rad" if turns else "--lengths m or mm"
+        allowed = f"{option}, or {name}_{'deg' if turns else 'mm'} and such"
+        raise InputError(source, "header", f"no unit of {column!r}", allowed)
+    return meaning
 
 
 def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning], source: str) -> DhRow:
@@ -231,9 +233,7 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
             if not value > 0:
                 raise InputError(source, f"{where}, {column}", text(name), "more than 0")
             return value
-        if turns:
-            return value * _ANGLE_UNITS[meaning.angle]
-        return value * _LENGTH_UNITS[meaning.length]
+        return value * (_ANGLE_UNITS[meaning.angle] if turns else _LENGTH_UNITS[meaning.length])
 
     for name in _NEEDED:
         if not text(name):
@@ -248,14 +248,15 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
     if mass is not None and None in centre:
         raise InputError(source, f"{where}, cx, cy, cz", "no centre of the mass", "three numbers, in the frame of the row")
     x, y, z = (part or 0.0 for part in centre)
+    theta, d, a, alpha = (number(name) or 0.0 for name in ("theta_offset", "d", "a", "alpha"))
     return DhRow(
         where,
         text("joint"),
         kind,
-        number("theta_offset") or 0.0,
-        number("d") or 0.0,
-        number("a") or 0.0,
-        number("alpha") or 0.0,
+        theta,
+        d,
+        a,
+        alpha,
         None if low is None or high is None else (low, high),
         number("compliance_urad_per_Nm"),
         mass,

@@ -54,7 +54,7 @@ def dh_rows(robot: Robot) -> list[Row]:
     Returns n + 2 of them. Angles of joints are the controller's where it counts each joint by itself, else those of the chain.
     Raises `InputError`: prismatic or passive joints.
     """
-    return _described(robot, None, robot.counts_each_joint)[0]
+    return _describe(robot, None, robot.counts_each_joint)[0]
 
 
 def dh_frames(robot: Robot) -> np.ndarray:
@@ -77,14 +77,14 @@ def dh_table(robot: Robot, nominal: Robot | None = None) -> pd.DataFrame:
     end = robot.chain.end_effector.name
     for number, row in enumerate(_rows(robot, like, robot.counts_each_joint and like.counts_each_joint)):
         joint = 1 <= number <= robot.joints
-        rows.append(_imported("R" if joint else "F", number if joint else None, (row.theta - turned, row.d, row.a, row.alpha)))
+        rows.append(_write_row("R" if joint else "F", number if joint else None, (row.theta - turned, row.d, row.a, row.alpha)))
         turned = 0.0
         if row.b or row.beta:
             # Ry is Rx between quarter turns, of which the next row takes back the second.
             turned = 0.5 * math.pi
-            rows.append(_imported("F", None, (turned, 0.0, row.b, row.beta)))
+            rows.append(_write_row("F", None, (turned, 0.0, row.b, row.beta)))
     if turned:
-        rows.append(_imported("F", None, (-turned, 0.0, 0.0, 0.0)))
+        rows.append(_write_row("F", None, (-turned, 0.0, 0.0, 0.0)))
     rows[-1]["point"] = end
     return pd.DataFrame(rows)
 
@@ -107,7 +107,7 @@ def dh_deltas(nominal: Robot, calibrated: Robot) -> pd.DataFrame:
     )
 
 
-def _imported(kind: str, joint: int | None, values: Sequence[float]) -> dict[str, Any]:
+def _write_row(kind: str, joint: int | None, values: Sequence[float]) -> dict[str, Any]:
     theta, d, a, alpha = values
     head = {"joint": f"{joint or ''}", "type": kind, "theta_offset_deg": math.degrees(theta)}
     return head | {"d_m": d, "a_m": a, "alpha_deg": math.degrees(alpha), "point": ""}
@@ -115,10 +115,10 @@ def _imported(kind: str, joint: int | None, values: Sequence[float]) -> dict[str
 
 def _rows(robot: Robot, nominal: Robot, own: bool) -> list[Row]:
     """Rows of a robot in the description of another one."""
-    return _described(robot, _described(nominal, None, own)[1], own)[0]
+    return _describe(robot, _describe(nominal, None, own)[1], own)[0]
 
 
-def _described(robot: Robot, kinds: Sequence[_Kind] | None, own: bool) -> tuple[list[Row], list[_Kind]]:
+def _describe(robot: Robot, kinds: Sequence[_Kind] | None, own: bool) -> tuple[list[Row], list[_Kind]]:
     """Rows, and how each pair of axes was described."""
     points, directions, end = _axes(robot, own)
     here, rows, used = np.eye(4), [], []

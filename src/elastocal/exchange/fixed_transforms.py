@@ -22,25 +22,25 @@ def displacement_words(transform: np.ndarray) -> list[str]:
     return [word for word in (*shifts, turn_word("z", yaw), turn_word("y", pitch), turn_word("x", roll)) if word]
 
 
-def turned_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str]]:
+def express_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str]]:
     """A joint's axis as one of the chain's, between a fixed rotation and its inverse where it is oblique.
 
     `axis` (3,): not zero. Returns `before`: words of the rotation that turns z into the axis, empty for x, y and z; `letter`,
     `sign`: of the axis then, and "-" or ""; `after`: words of the rotation back.
     """
-    before, letter, sign = _aligned(axis)
+    before, letter, sign = _find_turns(axis)
     return _words_of(before), letter, sign, _words_of([(name, -angle) for name, angle in reversed(before)])
 
 
 def axis_rotation(axis: np.ndarray) -> np.ndarray:
-    """The fixed rotation before a joint about an axis, as in `turned_axis`, ndarray (3, 3)."""
+    """The fixed rotation before a joint about an axis, as in `express_axis`, ndarray (3, 3)."""
     turn = np.eye(3)
-    for name, angle in _aligned(axis)[0]:
+    for name, angle in _find_turns(axis)[0]:
         turn = turn @ rotation_about(name, math.radians(round(math.degrees(angle), _DECIMALS)))
     return turn
 
 
-def _aligned(axis: np.ndarray) -> tuple[list[tuple[str, float]], str, str]:
+def _find_turns(axis: np.ndarray) -> tuple[list[tuple[str, float]], str, str]:
     unit = np.asarray(axis, float) / np.linalg.norm(axis)
     along = int(np.argmax(np.abs(unit)))
     if np.abs(np.delete(unit, along)).max() < 10.0**-_DECIMALS:

@@ -8,10 +8,10 @@ from typing import Any
 
 import yaml
 
-from elastocal.campaigns.measurements import SHOWN, SHOWN_TO, TICK, file_columns, sheet_columns, shown
+from elastocal.campaigns.measurements import SHOWN, SHOWN_TO, TICK, file_columns, sheet_columns, show_cell
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import LENGTH, POSITION, VECTOR, kind_of
-from elastocal.exchange.csv_dialect import TextTable
+from elastocal.exchange.csv_dialect import Dialect, TextTable
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import plain_number
 
@@ -21,27 +21,22 @@ _MOST_JOINTS = 99
 
 
 @dataclass(frozen=True)
-class ImportOptions:
+class ImportOptions(Dialect):
     """How a table is read; what is None or absent is found out, or refused where it is ambiguous.
 
-    `separator`, `decimal`, `header`, `encoding`, `thousands`: as in `csv_dialect.Dialect`. `ignore`: headers of columns that
-    are left out. `columns`: headers by the names of `column_names`. `units`: units by the same names; ``angles`` and
-    ``lengths`` for all that have no other. `rotation`: notation of `rotations`. `target`: name for all rows where no column has
-    it. `targets`: markers of rows that hold several, by the names of the targets that they are; see `markers`. `wrench`: what
-    the forces act on; those that the robot exerts are turned round. `skip_empty`: whether rows without a position are left out.
+    `ignore`: headers of columns that are left out. `columns`: headers by the names of `column_names`. `units`: units by the
+    same names; ``angles`` and ``lengths`` for all that have no other. `rotation`: notation of `rotations`. `target`: name for
+    all rows where no column has it. `targets`: markers of rows that hold several, by the names of the targets that they are;
+    see `markers`. `wrench`: what the forces act on; those that the robot exerts are turned round. `skip_empty`: whether rows
+    without a position are left out.
     """
 
-    separator: str | None = None
-    decimal: str | None = None
-    header: int | None = None
     columns: Mapping[str, str] | None = None
     units: Mapping[str, str] | None = None
     rotation: str | None = None
     target: str | None = None
     wrench: str = _ON_ROBOT
     skip_empty: bool = False
-    encoding: str | None = None
-    thousands: str | None = None
     ignore: Sequence[str] | None = None
     targets: Mapping[str, str] | None = None
 
@@ -90,7 +85,7 @@ def sheet_options(text: TextTable, options: ImportOptions) -> ImportOptions:
             value, other = plain_number(exact), plain_number(seen)
             if value is not None and other is not None and abs(value / SHOWN[unit] - other) > SHOWN_TO:
                 allowed = f"{value / SHOWN[unit]:.3f}, which is {name}, or a table without the column {header}"
-                raise InputError(text.path, f"line {line}, column {header}", shown(seen), allowed)
+                raise InputError(text.path, f"line {line}, column {header}", show_cell(seen), allowed)
     given = dict(options.units or {})
     for name in (*POSITION, *VECTOR):
         kind, usual = ("lengths", "m") if kind_of(name)[0] == LENGTH else ("angles", "rad")

@@ -17,9 +17,9 @@ from elastocal.exchange.column_names import (
     POSITION,
     QUATERNION,
     VECTOR,
-    recognized,
-    recognized_plainly,
-    without_unit,
+    recognize_column,
+    recognize_plain_header,
+    split_unit,
 )
 from elastocal.exchange.csv_dialect import TextTable
 
@@ -46,7 +46,7 @@ def markers_in(headers: Iterable[str]) -> _Markers:
     """
     found: _Markers = {}
     for header in headers:
-        if part := _marker_and_name(without_unit(header)[0]):
+        if part := _marker_and_name(split_unit(header)[0]):
             found.setdefault(part[0], {}).setdefault(part[1], header)
     return {marker: named for marker, named in found.items() if has_position(named)}
 
@@ -58,26 +58,26 @@ def has_position(names: Collection[str | None]) -> bool:
 
 def _marker_and_name(text: str) -> tuple[str, str] | None:
     """Marker and quantity of a header without its unit; None where it is neither."""
-    if name := recognized_plainly(text):
+    if name := recognize_plain_header(text):
         return ("", name) if name in _OWN else None
     parts, gaps = re.split(_BETWEEN, text), [*re.finditer(_BETWEEN, text)]
     for last in (2, 1):
-        if len(parts) > last and (name := recognized_plainly(" ".join(parts[-last:]))) in _OWN:
-            return _bare(text[: gaps[-last].start()]), name
+        if len(parts) > last and (name := recognize_plain_header(" ".join(parts[-last:]))) in _OWN:
+            return _strip_marker(text[: gaps[-last].start()]), name
     for first in (2, 1):
-        if len(parts) > first and (name := recognized_plainly(" ".join(parts[:first]))) in _OWN:
-            return _bare(text[gaps[first - 1].end() :]), name
+        if len(parts) > first and (name := recognize_plain_header(" ".join(parts[:first]))) in _OWN:
+            return _strip_marker(text[gaps[first - 1].end() :]), name
     match = next((match for pattern in _JOINED if (match := pattern.fullmatch(text))), None)
     return (match["marker"], match["axis"].lower()) if match else None
 
 
-def _bare(marker: str) -> str:
+def _strip_marker(marker: str) -> str:
     while (shorter := _WORDS.sub("", marker)) != marker:
         marker = shorter
     return re.sub(rf"^{_BETWEEN}|{_BETWEEN}$", "", marker)
 
 
-def chosen_markers(
+def choose_markers(
     text: TextTable, target: str | None, targets: Mapping[str, str] | None, mapped: Collection[str]
 ) -> dict[str, str]:
     """Markers of a table by the names of the targets that they are; empty where rows hold one position.
@@ -90,14 +90,16 @@ def chosen_markers(
     if targets:
         for name, marker in targets.items():
             if marker not in markers:
-                known = ", ".join(map(_called, markers)) or "none, each with columns for x, y and z"
+                known = ", ".join(map(_quote_marker, markers)) or "none, each with columns for x, y and z"
                 allowed = f"markers of the table: {known}"
                 raise InputError(text.path, "header", f"no marker {marker!r}, target {name!r}", allowed)
         return dict(targets)
     if has_position(mapped):
         return {}
     usual = [
-        marker for marker, named in markers.items() if all(recognized(named.get(axis, axis))[0] == axis for axis in POSITION)
+        marker
+        for marker, named in markers.items()
+        if all(recognize_column(named.get(axis, axis))[0] == axis for axis in POSITION)
     ]
     if target and target in markers and target not in usual:
         return {target: target}
@@ -107,13 +109,13 @@ def chosen_markers(
         asked = usual if len(usual) > 1 else [*usual, *counted] if usual else [*markers]
         first = next((marker for marker in asked if marker), asked[0])
         options = " ".join(f"--target {marker if marker else f'NAME={marker}'}" for marker in asked[:3])
-        found = f"positions of {', '.join(map(_called, asked[:4]))}{' …' if len(asked) > 4 else ''} in each row"
+        found = f"positions of {', '.join(map(_quote_marker, asked[:4]))}{' …' if len(asked) > 4 else ''} in each row"
         allowed = f"{options} for those that are targets (NAME={first} gives one another name), or --column x=NAME … for one"
         raise InputError(text.path, "header", found, allowed)
     return {}
 
 
-def _called(marker: str) -> str:
+def _quote_marker(marker: str) -> str:
     return repr(marker) if marker else "x, y, z"
 
 
@@ -136,23 +138,23 @@ def one_row_each(
             allowed = f"--ignore {header!r}, or the same of each target"
             raise InputError(text.path, "header", f"{header!r} of {of} alone", allowed)
         for what, header in named.items():
-            units = [text.units.get(each) or recognized(each)[1] or "no unit" for each in (header, other[what])]
+            units = [text.units.get(each) or recognize_column(each)[1] or "no unit" for each in (header, other[what])]
             if units[0] != units[1]:
                 found = f"{header!r} in {units[0]} and {other[what]!r} in {units[1]}"
                 raise InputError(text.path, "header", found, "one unit for what the targets have in common")
     if wrong := next((what for what, header in named.items() if mapped.get(what, header) != header), None):
         raise InputError("--column", wrong, repr(mapped[wrong]), f"{named[wrong]!r}, as {first} has it, or no --target")
     chosen = {header for marker in targets.values() for header in markers[marker].values()}
-    columns = {header: _repeated(cells, len(targets)) for header, cells in text.columns.items() if header not in chosen}
+    columns = {header: _repeat(cells, len(targets)) for header, cells in text.columns.items() if header not in chosen}
     for what, header in named.items():
         each = [text.columns[markers[marker][what]] for marker in targets.values()]
         columns[header] = tuple(cell for cells in zip(*each, strict=True) for cell in cells)
     column = "target" if "target" not in columns else "marker of the row"
     columns[column] = tuple(targets) * len(text.lines)
     notes = [f"{name} has {', '.join(map(repr, markers[marker].values()))}" for name, marker in targets.items()]
-    long = replace(text, columns=columns, lines=_repeated(text.lines, len(targets)))
+    long = replace(text, columns=columns, lines=_repeat(text.lines, len(targets)))
     return long, {**mapped, **named, "target": column}, notes
 
 
-def _repeated(values: Sequence[_Value], times: int) -> tuple[_Value, ...]:
+def _repeat(values: Sequence[_Value], times: int) -> tuple[_Value, ...]:
     return tuple(value for value in values for _ in range(times))

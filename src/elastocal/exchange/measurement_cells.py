@@ -5,10 +5,10 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from elastocal.campaigns.column_bounds import BOUNDS, beyond
-from elastocal.campaigns.measurements import shown
+from elastocal.campaigns.column_bounds import BOUNDS, find_beyond
+from elastocal.campaigns.measurements import show_cell
 from elastocal.errors import InputError
-from elastocal.exchange.column_meanings import units_of_columns
+from elastocal.exchange.column_meanings import find_units
 from elastocal.exchange.column_names import COVARIATES, TIME, UNITS, kind_of, unit_scale
 from elastocal.exchange.csv_dialect import TextTable
 from elastocal.io.texts import A_NUMBER, plain_number
@@ -47,7 +47,7 @@ class CellReader:
         row = self.kept[index]
         header = self.columns[name]
         where = f"line {self.text.lines[row]}, column {header}"
-        return InputError(self.text.path, where, shown(self.text.columns[header][row]), allowed)
+        return InputError(self.text.path, where, show_cell(self.text.columns[header][row]), allowed)
 
     def cells(self, name: str) -> list[str]:
         """list of str (N,)."""
@@ -65,7 +65,7 @@ class CellReader:
                 raise self.fault(numbers.index(None), name, allowed)
             return values
         values = np.array(numbers, float) * UNITS[TIME][self.units[name]]
-        if (index := beyond(name, values)) is not None:
+        if (index := find_beyond(name, values)) is not None:
             raise self.fault(index, name, BOUNDS[name].allowed)
         return values
 
@@ -90,7 +90,7 @@ class CellReader:
             raise self.fault(int(np.argmin(np.isfinite(values))), name, A_NUMBER)
         unit = self.units.get(name)
         values = values if unit is None else values * (unit_scale(unit, kind_of(name)) or 1.0)
-        if (index := beyond(name, values)) is not None:
+        if (index := find_beyond(name, values)) is not None:
             raise self.fault(index, name, BOUNDS[name].allowed)
         return values
 
@@ -119,7 +119,7 @@ def covariates_of(
             unit = stated.get(name) or given.get(name)
             if name == "time_s" and unit is None and (unit := read.unit_of_epoch(name)):
                 notes.append(f"{read.columns[name]!r} taken for {unit} since 1970")
-            read.units |= units_of_columns(read.text, read.columns, [name], stated, {**given, **({name: unit} if unit else {})})
+            read.units |= find_units(read.text, read.columns, [name], stated, {**given, **({name: unit} if unit else {})})
             found[name] = read.times(name) if name == "time_s" else read.numbers(name)
             if unit is None and not text:
                 notes.append(f"{read.columns[name]!r} in {read.units[name]}, as nothing states a unit")

@@ -16,11 +16,11 @@ from scipy.spatial import cKDTree
 from elastocal.campaigns.column_bounds import FARTHEST_RAD
 from elastocal.campaigns.measurements import closest_first, file_columns
 from elastocal.errors import InputError, text_fault
-from elastocal.exchange.column_meanings import check_complete, columns_of, rotation_of, units_of_columns
-from elastocal.exchange.column_names import ANGLE, POSITION, UNITS, VECTOR, is_name, joints_in, recognized, units_in
-from elastocal.exchange.csv_dialect import Dialect, read_text_table
+from elastocal.exchange.column_meanings import check_complete, find_columns, find_rotation, find_units
+from elastocal.exchange.column_names import ANGLE, POSITION, UNITS, VECTOR, find_joints, is_name, read_units, recognize_column
+from elastocal.exchange.csv_dialect import read_text_table
 from elastocal.exchange.import_options import BY_ROBOT, ImportOptions, sheet_options
-from elastocal.exchange.markers import chosen_markers, has_position, markers_in, one_row_each
+from elastocal.exchange.markers import choose_markers, has_position, markers_in, one_row_each
 from elastocal.exchange.measurement_cells import CellReader, covariates_of, rows_with_position
 from elastocal.exchange.rotations import HOMOGENEOUS_MATRICES, QUATERNIONS, columns_of_rotation, rotation_vectors
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -63,29 +63,28 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
             raise InputError("--column", "", repr(name), closest_first(name, [*file_columns(6), "qw", "e1", "r11", "t11"]))
 
     def is_header(cells: Sequence[str]) -> bool:
-        names = {recognized(cell)[0] for cell in cells} | {name for name, header in mapped.items() if header in cells}
+        names = {recognize_column(cell)[0] for cell in cells} | {name for name, header in mapped.items() if header in cells}
         return has_position(names) or bool(markers_in(cells))
 
-    dialect = Dialect(options.separator, options.decimal, options.header, options.encoding, options.thousands)
-    text = read_text_table(path, is_header, dialect, options.ignore or (), units_in=units_in)
+    text = read_text_table(path, is_header, options, options.ignore or (), units_in=read_units)
     options = sheet_options(text, options)
     mapped, notes = dict(options.columns or {}), [f"units in the row under the header: {len(text.units)}"] if text.units else []
-    if targets := chosen_markers(text, options.target, options.targets, mapped):
+    if targets := choose_markers(text, options.target, options.targets, mapped):
         text, mapped, of_targets = one_row_each(text, targets, mapped)
         options, notes = replace(options, target=None, targets=targets), [*notes, *of_targets]
-    columns, stated, counted = columns_of(text, mapped, robot)
+    columns, stated, counted = find_columns(text, mapped, robot)
     notes += counted
-    rotation = rotation_of(text, columns, mapped, options.rotation)
+    rotation = find_rotation(text, columns, mapped, options.rotation)
     position = _TRANSLATION if rotation == HOMOGENEOUS_MATRICES else POSITION
-    angles = joints_in(columns)
+    angles = find_joints(columns)
     orientation = columns_of_rotation(rotation, columns)
     check_complete(text, columns, angles, (*position, *orientation), robot)
     wanted = [*angles, *position, *orientation, *(name for name in WRENCH_NAMES if name in columns)]
-    units = units_of_columns(text, columns, wanted, stated, options.units or {}, robot)
+    units = find_units(text, columns, wanted, stated, options.units or {}, robot)
     read = CellReader(text, columns, units, rows_with_position(text, columns, position, options.skip_empty))
     covariates = covariates_of(read, mapped, stated, options.units or {}, notes)
     notes += _surprises(read, angles, {*stated, *(options.units or {})})
-    table = _numbered(read, angles, mapped)
+    table = _number_poses(read, angles, mapped)
     table |= {name: read.numbers(name) for name in angles}
     table |= _wrench(read, options.wrench)
     table |= {axis: read.numbers(name) for axis, name in zip(POSITION, position, strict=True)}
@@ -157,7 +156,7 @@ def _targets(read: CellReader, name: str | None) -> np.ndarray:
     return np.full(len(read.kept), name)
 
 
-def _numbered(read: CellReader, angles: Sequence[str], mapped: Mapping[str, str]) -> dict[str, np.ndarray]:
+def _number_poses(read: CellReader, angles: Sequence[str], mapped: Mapping[str, str]) -> dict[str, np.ndarray]:
     """Session and pose: labels are numbered; where no column has it, a pose is what has the same joint angles."""
     table: dict[str, Any] = {}
     if "session" in read.columns:
@@ -169,7 +168,7 @@ def _numbered(read: CellReader, angles: Sequence[str], mapped: Mapping[str, str]
         if "pose" not in mapped and "session" not in table:
             _check_poses(read, angles, table["pose"])
     else:
-        table["pose"] = _same(np.column_stack([read.numbers(name) for name in angles]), SAME_POSE)
+        table["pose"] = _number_alike(np.column_stack([read.numbers(name) for name in angles]), SAME_POSE)
     return table
 
 
@@ -201,7 +200,7 @@ def _ordinals(read: CellReader, table: Mapping[str, np.ndarray]) -> dict[str, np
     return {name: states[name].to_numpy() for name in ("load", "repeat")}
 
 
-def _same(values: np.ndarray, within: float) -> np.ndarray:
+def _number_alike(values: np.ndarray, within: float) -> np.ndarray:
     """Number of each row by first appearance, from 1: one for rows that agree to `within`."""
     different, which = np.unique(values, axis=0, return_inverse=True)
     near = cKDTree(different)

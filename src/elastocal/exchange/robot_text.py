@@ -51,7 +51,7 @@ class Imported:
     notes: tuple[str, ...]
 
 
-def imported(document: dict[str, Any], path: str | Path, options: str, notes: Sequence[str]) -> Imported:
+def check_imported(document: dict[str, Any], path: str | Path, options: str, notes: Sequence[str]) -> Imported:
     """Check the contents of a robot file that were made from another file.
 
     `path`: the other file. `options`: how it was read. Raises `InputError` where the robot is none that a robot file may

@@ -14,7 +14,7 @@ import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.exchange.fixed_transforms import displacement_words, origin_transform
-from elastocal.exchange.robot_text import Imported, imported
+from elastocal.exchange.robot_text import Imported, check_imported
 from elastocal.exchange.urdf_chain import point_name
 from elastocal.io.texts import A_NUMBER, plain_number
 
@@ -65,7 +65,7 @@ def robot_from_kinematics(document: Mapping[str, Any], path: str | Path, name: s
         "no limits of any joint: a turn either way",
         "base axes are the controller's (base, not base_link, which is turned half round)",
     ]
-    return imported(contents, path, "the kinematics of a calibrated robot as ROS has them", notes)
+    return check_imported(contents, path, "the kinematics of a calibrated robot as ROS has them", notes)
 
 
 def _transform(origin: object, where: str, source: str) -> np.ndarray:

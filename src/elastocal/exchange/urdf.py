@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.exchange.dh_table import MOST_TURNS
-from elastocal.exchange.robot_text import Imported, imported
+from elastocal.exchange.robot_text import Imported, check_imported
 from elastocal.exchange.urdf_chain import chain_between
 from elastocal.exchange.urdf_reading import Joint, Urdf, read_urdf
 from elastocal.exchange.urdf_weights import RELATIVE_STD, gravity_in_base, weights_of
@@ -68,7 +68,7 @@ def robot_from_urdf(
         notes.append(f"joints that are no part of the chain, left out: {', '.join(beside)}")
     if urdf.left_out:
         notes.append(f"not used: {', '.join(urdf.left_out)}, nor limits of effort and velocity")
-    return imported(document, path, f"the links from {base!r} to {tip!r}", notes)
+    return check_imported(document, path, f"the links from {base!r} to {tip!r}", notes)
 
 
 def _limits(joint: Joint, limits_in: str | None, notes: list[str], source: str) -> list[float]:

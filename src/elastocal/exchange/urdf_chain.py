@@ -18,9 +18,9 @@ from elastocal.exchange.fixed_transforms import (
     axis_rotation,
     displacement_words,
     elementary,
+    express_axis,
     shift_word,
     turn_word,
-    turned_axis,
 )
 from elastocal.exchange.urdf_reading import Joint, Urdf
 
@@ -98,7 +98,7 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
         words += displacement_words(joint.origin)
         place = Carried(place.body, place.transform @ joint.origin, place.behind_passive)
         if joint.name in masters:
-            moved, place = _moved(joint, *masters[joint.name], numbers, place, source)
+            moved, place = _write_joint(joint, *masters[joint.name], numbers, place, source)
             words += moved
         if joint.child in marked:
             words.append(f"[{marked[joint.child]}]")
@@ -112,7 +112,7 @@ def point_name(link: str) -> str:
     return re.sub(r"[\[\]\s]", "_", link)
 
 
-def _moved(
+def _write_joint(
     joint: Joint, master: str, sign: float, offset: float, numbers: dict[str, int], place: Carried, source: str
 ) -> tuple[list[str], Carried]:
     """Words of a joint that moves, and where it carries what is behind it."""
@@ -120,7 +120,7 @@ def _moved(
     if not np.linalg.norm(axis) > _SHORTEST_AXIS:
         raise InputError(source, f"joint {joint.name!r}: axis xyz", " ".join(f"{part:g}" for part in axis), "a direction")
     kind = _MOVING[joint.kind]
-    before, letter, minus, after = turned_axis(axis)
+    before, letter, minus, after = express_axis(axis)
     negative = (minus == "-") != (sign < 0)
     fixed = (turn_word if kind == "R" else shift_word)(letter, -offset if minus else offset)
     passive = master in numbers

@@ -40,7 +40,7 @@ class CorrectedUrdf:
     tip: str
 
 
-def with_calibrated_origins(path: str | Path, nominal: Robot, calibrated: Robot) -> CorrectedUrdf:
+def write_calibrated_origins(path: str | Path, nominal: Robot, calibrated: Robot) -> CorrectedUrdf:
     """A URDF of which `nominal` was imported, with the joint origins of the same robot as `calibrated` has it.
 
     A factor or a coupling of joint values, and an error behind a last joint whose child is the tip, have no place in it.
@@ -53,7 +53,7 @@ def with_calibrated_origins(path: str | Path, nominal: Robot, calibrated: Robot)
         raise InputError(source, "", "UTF-16 or UTF-32", "a URDF in UTF-8, or in another encoding that has ASCII as it is")
     base, tip = _ends_of(urdf, nominal, source)
     origins = _origins(_path(urdf, base, tip), nominal, calibrated)
-    return CorrectedUrdf(_edited(content, origins), len(origins), base, tip)
+    return CorrectedUrdf(_edit(content, origins), len(origins), base, tip)
 
 
 def nominal_chain(urdf: Urdf, base: str, tip: str, source: str) -> tuple[UrdfChain, Chain]:
@@ -149,7 +149,7 @@ def _origins(path: list[Joint], nominal: Robot, calibrated: Robot) -> dict[str, 
     return found
 
 
-def _edited(content: bytes, origins: Mapping[str, np.ndarray]) -> bytes:
+def _edit(content: bytes, origins: Mapping[str, np.ndarray]) -> bytes:
     """The file with other origins: nothing but the values of xyz and rpy is written anew."""
     parts, done = [], 0
     for start, tag, name in _places(content):
@@ -161,7 +161,7 @@ def _edited(content: bytes, origins: Mapping[str, np.ndarray]) -> bytes:
         values = {b"xyz": origin[:3, 3], b"rpy": np.array([roll, pitch, yaw])}
         if tag[1:].split(None, 1)[0].rpartition(b":")[2] == b"origin":
             for attribute, numbers in values.items():
-                tag = _with_attribute(tag, attribute, _words(numbers))
+                tag = _set_attribute(tag, attribute, _words(numbers))
             parts += [content[done:start], tag]
             done = end
         else:
@@ -174,7 +174,7 @@ def _edited(content: bytes, origins: Mapping[str, np.ndarray]) -> bytes:
     return b"".join([*parts, content[done:]])
 
 
-def _with_attribute(tag: bytes, name: bytes, value: bytes) -> bytes:
+def _set_attribute(tag: bytes, name: bytes, value: bytes) -> bytes:
     pattern = re.compile(rb"(\s" + name + rb"\s*=\s*)(?:\"[^\"]*\"|'[^']*')")
     new, count = pattern.subn(lambda found: found[1] + b'"' + value + b'"', tag, count=1)
     return new if count else tag.rstrip() + b' %b="%b"' % (name, value)

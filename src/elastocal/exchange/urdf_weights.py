@@ -39,14 +39,14 @@ def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD)
     `relative_std`: how well they are known.
     """
     moments: dict[int, np.ndarray] = {}
-    held, passive = set(), set()
+    at_zero, passive = set(), set()
     for link in urdf.links:
-        carried = _carried(urdf, link.name, chain) if link.mass else None
+        carried = _find_carrier(urdf, link.name, chain) if link.mass else None
         # What moves beside the column weighs on no joint of the chain.
         if carried is None or (carried[0].body == 0 and carried[1]):
             continue
         place, by = carried
-        held.update(by)
+        at_zero.update(by)
         if place.behind_passive:
             passive.add(link.name)
         moments[place.body] = moments.get(place.body, np.zeros(4)) + link.mass * place.transform @ np.append(link.centre, 1.0)
@@ -54,10 +54,10 @@ def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD)
     if len(moments) >= _FEWEST_ALIKE and len(alike) == 1:
         return Weights([], (f"every link weighs {alike.pop():g} kg: placeholders, which are left out",))
     notes = []
-    if held:
-        notes.append(f"joints beside the chain are held at zero for what they carry: {_named(held)}")
+    if at_zero:
+        notes.append(f"joints beside the chain are held at zero for what they carry: {_list_names(at_zero)}")
     if passive:
-        notes.append(f"behind a passive joint, but weighing as if it did not turn: {_named(passive)}")
+        notes.append(f"behind a passive joint, but weighing as if it did not turn: {_list_names(passive)}")
     if not moments:
         notes.append("no masses: the weight of the links is not known")
     return Weights(mass_entries(moments, relative_std), tuple(notes))
@@ -75,7 +75,7 @@ def gravity_in_base(urdf: Urdf, base: str) -> list[float] | None:
     return None if gravity[2] == -STANDARD_GRAVITY else gravity.tolist()
 
 
-def _carried(urdf: Urdf, link: str, chain: UrdfChain) -> tuple[Carried, list[str]] | None:
+def _find_carrier(urdf: Urdf, link: str, chain: UrdfChain) -> tuple[Carried, list[str]] | None:
     """Where a link is on the chain, and the joints beside the chain that move it; None where the chain does not carry it."""
     above, transform, by, at = parent_joints(urdf), np.eye(4), [], link
     while at not in chain.links:
@@ -90,6 +90,6 @@ def _carried(urdf: Urdf, link: str, chain: UrdfChain) -> tuple[Carried, list[str
     return replace(place, transform=place.transform @ transform), by
 
 
-def _named(names: set[str]) -> str:
+def _list_names(names: set[str]) -> str:
     most = sorted(names)[:4]
     return ", ".join(most) + (f" and {len(names) - len(most)} more" if len(names) > len(most) else "")

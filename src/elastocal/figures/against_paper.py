@@ -8,6 +8,7 @@ import numpy as np
 
 from elastocal.figures.style import PALETTE, note, panels, styled
 from elastocal.study.printed import LEVEL
+from elastocal.study.tables import find_statistics
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -50,7 +51,7 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
                 alpha=0.6,
                 label="further studies, mean ± 2 standard deviations",
             )
-            expected = _expected(expectations, robot, quantity)
+            expected = _read_expected(expectations, robot, quantity)
             axis.plot(expected, [strategies.index(name) for name in expected.index], "|", color="black", markersize=8)
             for differs, colour, name in ((False, "white", "paper"), (True, PALETTE[1], "paper, differs (Holm)")):
                 some = ((cells.p_holm < LEVEL) == differs).to_numpy()
@@ -70,7 +71,7 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
     return figure
 
 
-def _expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Series:
+def _read_expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Series:
     """Expectations of one quantity by strategy; none of lengths."""
     names = {f"{quantity}_percent_fixed_joints", f"{quantity}_um"}
     mine = expectations[(expectations.robot == robot) & expectations.quantity.isin(names) & expectations.paper.notna()]
@@ -86,14 +87,10 @@ def table2_samples(initial: Mapping[str, pd.DataFrame], reference: pd.DataFrame,
     """
     figure, axes = panels(1, 3, 66)
     printed = reference[reference.table == "2"].set_index(["robot", "quantity"]).value
-    quantities = {
-        "mean": lambda frame: frame["mean"],
-        "std": lambda frame: np.sqrt(frame.mean_square - frame["mean"] ** 2),
-        "max": lambda frame: frame.maximum,
-    }
-    for axis, (quantity, of) in zip(axes[0], quantities.items(), strict=True):
-        for index, (robot, frame) in enumerate(initial.items()):
-            low, q1, middle, q3, high = np.percentile(MILLI * of(frame), [1, 25, 50, 75, 99])
+    single = {robot: find_statistics(frame) for robot, frame in initial.items()}
+    for axis, quantity in zip(axes[0], ("mean", "std", "max"), strict=True):
+        for index, (robot, statistics) in enumerate(single.items()):
+            low, q1, middle, q3, high = np.percentile(MILLI * statistics[quantity], [1, 25, 50, 75, 99])
             axis.plot([low, high], [index, index], color=PALETTE[index], linewidth=1)
             axis.plot([q1, q3], [index, index], color=PALETTE[index], linewidth=5, solid_capstyle="butt")
             axis.plot(middle, index, "o", color="white", markersize=3)
@@ -106,5 +103,5 @@ def table2_samples(initial: Mapping[str, pd.DataFrame], reference: pd.DataFrame,
         axis.grid(visible=False, axis="y")
     handles = dict(zip(*reversed(axes[0, 0].get_legend_handles_labels()), strict=True))
     title = "single data sets: 1 to 99 %, quartiles and median"
-    figure.legend(handles.values(), handles.keys(), title=title, loc="outside lower center", title_fontsize=7.5)
+    figure.legend(handles.values(), handles.keys(), title=title, loc="outside lower center")
     return figure

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter
 
 from elastocal.diagnosis.words import in_words
 from elastocal.figures.residuals import MICRO, MILLI
@@ -61,7 +60,7 @@ def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
         axis.set(title=title, xlabel=f"error ({unit})")
         if logarithmic:
             axis.set(xscale="log", xlim=(0.5 * scale * min(known), 1.6 * scale * max(values.max(), trained.max())))
-            axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axis.xaxis.set_major_formatter("{x:g}")
         else:
             axis.set_xlim(0, None)
         axis.grid(visible=False, axis="y")

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.figures.style import PALETTE, label_decades, panels, styled
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,9 +32,7 @@ def campaign_errors(table: pd.DataFrame) -> Figure:
         axis.errorbar(rms, rows, xerr=span, fmt="o", color=color, ms=4, lw=1.2, capsize=2, label=words, zorder=2)
     axis.set_yticks(rows, [name.replace("_", " ") for name in table["campaign"]])
     axis.set_xscale("log")
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.xaxis.set_minor_formatter(NullFormatter())
+    label_decades(axis.xaxis)
     axis.set_xlabel("RMS position error of held-out poses (mm), with 95 % intervals")
     axis.grid(visible=False, axis="y")
     figure.legend(loc="outside lower center", ncols=2)

@@ -35,9 +35,9 @@ def probabilities(stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarr
 
     `stated`: ``probabilities`` of a diagnosis; None where the data are at fault. `table`: columns of the candidates table.
     """
-    order = leading(table)
+    order = rank_candidates(table)
     if stated is None or not len(order):
-        return _nothing_tested(table)
+        return _note_nothing_tested(table)
     sets = stated["sets"][:_HYPOTHESES]
     labels = [textwrap.fill(_capital(words), _LINE) for words in hypotheses_words(sets)]
     values = [entry["probability"] for entry in sets]
@@ -94,10 +94,10 @@ def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]
     `table`: columns of the candidates table. `pairs`: columns of the confounding table.
     """
     known = set(pairs["one"]) | set(pairs["other"])
-    order = [index for index in leading(table) if name_in_pairs(table, index) in known]
+    order = [index for index in rank_candidates(table) if name_in_pairs(table, index) in known]
     shown = shortlist(order, table["chosen"])
     if not shown:
-        return _nothing_tested(table)
+        return _note_nothing_tested(table)
     names = [table["candidate"][index] for index in shown]
     chosen = set(table["candidate"][table["chosen"].astype(bool)])
     angles = angle_matrix([name_in_pairs(table, index) for index in shown], pairs)
@@ -133,7 +133,7 @@ def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]
     return figure
 
 
-def leading(table: Mapping[str, np.ndarray]) -> np.ndarray:
+def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
     """Indices (tested,) of the tested candidates by falling Bayes factor; each at the best value of its shape."""
     tested = np.flatnonzero(np.isfinite(table["log_bayes_factor"]))
     order = tested[np.argsort(-table["log_bayes_factor"][tested], kind="stable")]
@@ -182,7 +182,7 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _nothing_tested(table: Mapping[str, np.ndarray]) -> Figure:
+def _note_nothing_tested(table: Mapping[str, np.ndarray]) -> Figure:
     count = len(set(table["candidate"]))
     if count and set(table["note"]) == {_AT_FAULT}:
         return note("The data are at fault: no cause in the robot was looked for.")
@@ -220,7 +220,7 @@ def _families_legend(figure: Figure, table: Mapping[str, np.ndarray], order: np.
         handles.append(Patch(facecolor="none", edgecolor="black", linewidth=1.3, label="in the most probable model"))
     untestable = len(set(table["candidate"])) - len(order)
     words = f"{len(order)} candidate causes tested; {untestable} more cannot be tested with these measurements"
-    figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4, title_fontsize=7.5)
+    figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4)
 
 
 def _frame(number: int, count: int) -> Rectangle:

@@ -45,7 +45,7 @@ def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], to
     `maps`: one row of panels each. `forces_N`: hanging load of each. `tolerance_m`: drawn as a contour.
     """
     figure, axes = panels(len(maps), 2, 62 * len(maps) + 16, sharex=True, sharey=True)
-    grids = [[_binned(errors, values) for values in (errors.uncorrected_m, errors.corrected_m)] for errors in maps]
+    grids = [[_bin(errors, values) for values in (errors.uncorrected_m, errors.corrected_m)] for errors in maps]
     known = np.concatenate([found[np.isfinite(found)] for pair in grids for found in pair] + [[tolerance_m]])
     scale = LogNorm(_MILLI * known[known > 0].min(), _MILLI * known.max())
     for row, errors, pair, force in zip(axes, maps, grids, forces_N, strict=True):
@@ -77,7 +77,7 @@ def _statistic(errors: WorkspaceErrors, values: np.ndarray, how: Any) -> np.ndar
     return np.asarray(binned_statistic_2d(radius, height, values, how, bins=edges).statistic)
 
 
-def _binned(errors: WorkspaceErrors, values: np.ndarray) -> np.ndarray:
+def _bin(errors: WorkspaceErrors, values: np.ndarray) -> np.ndarray:
     """RMS of values (N,) in each cell with enough poses, (bins, bins); elsewhere not a number."""
     enough = _statistic(errors, values, "count") >= _FEWEST
     return np.where(enough, np.sqrt(_statistic(errors, values**2, "mean")), np.nan)

@@ -73,7 +73,7 @@ def signature(name: str, robot: Robot) -> Signature:
     links weigh is left aside, since the weight of links is an effect only where it is not declared.
     """
     sites = _weightless(robot)
-    offered = offered_candidates(name, robot)
+    offered = list_candidates(name, robot)
     candidate = next((each for each in offered if each.joints[:1] == (_SHOWN_AT,)), offered[0])
     joint = (*candidate.joints, *candidate.turning, _SHOWN_AT)[0]
     limits = np.degrees(robot.joint_limits[joint - 1])
@@ -83,7 +83,7 @@ def signature(name: str, robot: Robot) -> Signature:
     turned = np.tile(np.radians(_POSE_DEG[: robot.joints]), (_SAMPLES, 1))
     turned[:, joint - 1] = np.radians(angle)
 
-    def moved(angles: np.ndarray | None = None, newtons: np.ndarray | float = 0.0, **more: Any) -> np.ndarray:
+    def displace(angles: np.ndarray | None = None, newtons: np.ndarray | float = 0.0, **more: Any) -> np.ndarray:
         return _displacement_mm(candidate, sites, robot.compliance, _states(robot.joints, angles, newtons, **more))
 
     return Signature(
@@ -92,15 +92,15 @@ def signature(name: str, robot: Robot) -> Signature:
         angle,
         force,
         time,
-        moved(turned),
-        moved(turned, _PULL_N),
-        moved(None, force),
-        moved(None, force, approach=-1.0),
-        moved(None, time_h=time),
+        displace(turned),
+        displace(turned, _PULL_N),
+        displace(None, force),
+        displace(None, force, approach=-1.0),
+        displace(None, time_h=time),
     )
 
 
-def offered_candidates(name: str, robot: Robot) -> list[Candidate]:
+def list_candidates(name: str, robot: Robot) -> list[Candidate]:
     """Every way in which an effect can act on the arm of the figures, see `signature`."""
     return effects()[name].candidates(_weightless(robot))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.application.planning.cell import link_points
-from elastocal.figures.arm_view import as_seen, draw_arm
+from elastocal.figures.arm_view import draw_arm, project_view
 from elastocal.figures.style import PALETTE, panels, styled
 
 if TYPE_CHECKING:
@@ -33,14 +33,14 @@ def arm_with_errors(robot: Robot, table: Mapping[str, np.ndarray], heldout: Mapp
     at = np.column_stack([table[axis][seen] for axis in "xyz"])
     arms = link_points(robot, robot.model_angles(np.unique(angles, axis=0))).transpose(1, 0, 2)
     # One arm in full, the one that reaches farthest to a side; the others as thin lines.
-    links = arms[np.argmax(np.abs(as_seen(arms[:, -1])[:, 0]))]
+    links = arms[np.argmax(np.abs(project_view(arms[:, -1])[:, 0]))]
     figure, axes = panels(1, 2, 78, sharex=True, sharey=True)
     for axis, (stage, words, color) in zip(axes[0], _STAGES, strict=True):
         off = np.column_stack([table[f"{stage}_d{each}"][seen] for each in "xyz"])
         for arm in arms:
-            axis.plot(*as_seen(arm).T, color="#dde2e6", lw=1.2, zorder=0)
+            axis.plot(*project_view(arm).T, color="#dde2e6", lw=1.2, zorder=0)
         draw_arm(axis, links, 11)
-        start, tip = as_seen(at), as_seen(at + _TIMES * off)
+        start, tip = project_view(at), project_view(at + _TIMES * off)
         axis.quiver(
             *start.T, *(tip - start).T, angles="xy", scale_units="xy", scale=1, color=color, width=0.005, zorder=3, gid=stage
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Circle, Polygon
 
-from elastocal.figures.scheme_layout import DEPTH_RATIO, PARALLEL, Joint, Point, Segment, laid_out, projected, view_of
+from elastocal.figures.scheme_layout import DEPTH_RATIO, PARALLEL, Joint, Point, Segment, lay_out, project_on_paper, view_of
 from elastocal.figures.scheme_sheet import (
     BLUE,
     BOLD,
@@ -22,7 +22,7 @@ from elastocal.figures.scheme_sheet import (
     SYMBOL_RADIUS_MM,
     TEXT_HEIGHT_MM,
     Sheet,
-    subscripted,
+    write_subscript,
 )
 
 if TYPE_CHECKING:
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
     from elastocal.mechanics.robot import Robot
 
-GREY = "#555555"
-POINT_COLOURS = (ORANGE, GREEN, PINK, RED, SKY, BLUE)
-POINT_MARKERS = "sDo^vP"
-HALF_LENGTH_MM, HALF_WIDTH_MM = 4.2, 2.6
+_GREY = "#555555"
+_POINT_COLOURS = (ORANGE, GREEN, PINK, RED, SKY, BLUE)
+_POINT_MARKERS = "sDo^vP"
+_HALF_LENGTH_MM, _HALF_WIDTH_MM = 4.2, 2.6
 # A link without a length, which only keeps joints apart.
-SEPARATOR = {"lw": 1.2, "ls": (0, (3, 2)), "color": GREY}
+_SEPARATOR = {"lw": 1.2, "ls": (0, (3, 2)), "color": _GREY}
 
 
 def kinematic_scheme(robot: Robot) -> Figure:
@@ -49,7 +49,7 @@ def kinematic_scheme(robot: Robot) -> Figure:
     A joint that turns about its own link is drawn on that link instead of at its end: moved along its axis, it is the same
     joint. So the three joints of a spherical wrist can be seen apart.
     """
-    items, depth = laid_out(robot.chain)
+    items, depth = lay_out(robot.chain)
     segments = [item for item in items if isinstance(item, Segment)]
     joints = [item for item in items if isinstance(item, Joint)]
     points = [item for item in items if isinstance(item, Point)]
@@ -58,7 +58,7 @@ def kinematic_scheme(robot: Robot) -> Figure:
     for segment in segments:
         _draw_segment(sheet, segment)
     for joint in joints:
-        _draw_joint(sheet, joint.place, None if joint.across else projected(joint.axis, depth))
+        _draw_joint(sheet, joint.place, None if joint.across else project_on_paper(joint.axis, depth))
     _draw_points(sheet, points)
     _draw_labels(sheet, segments, joints, points)
     low, high = sheet.taken[:, :2].min(axis=0), sheet.taken[:, 2:].max(axis=0)
@@ -93,7 +93,7 @@ def _draw_base(sheet: Sheet, oblique: bool, view: np.ndarray, depth: np.ndarray)
 
 
 def _draw_segment(sheet: Sheet, segment: Segment) -> None:
-    style = {"lw": 3.0, "color": GREY} if segment.length_m else SEPARATOR
+    style = {"lw": 3.0, "color": _GREY} if segment.length_m else _SEPARATOR
     sheet.line([segment.start, segment.end], zorder=2, **style)
     sheet.take(segment.start, segment.end, 0.8)
 
@@ -107,11 +107,11 @@ def _draw_joint(sheet: Sheet, place: np.ndarray, axis: np.ndarray | None) -> Non
         return
     along = axis / np.linalg.norm(axis)
     side = np.array([-along[1], along[0]])
-    corners = [place + a * HALF_LENGTH_MM * along + b * HALF_WIDTH_MM * side for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    corners = [place + a * _HALF_LENGTH_MM * along + b * _HALF_WIDTH_MM * side for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
     sheet.axes.add_patch(Polygon(corners, fc=JOINT_FACE, ec=BLUE, lw=1.3, zorder=4))
-    ends = place - (HALF_LENGTH_MM + 2.0) * along, place + (HALF_LENGTH_MM + 2.0) * along
+    ends = place - (_HALF_LENGTH_MM + 2.0) * along, place + (_HALF_LENGTH_MM + 2.0) * along
     sheet.line(ends, lw=0.8, color=BLUE, ls=(0, (6, 1.5, 1, 1.5)), zorder=5)
-    sheet.take(place - 1.6 * along, place + 1.6 * along, HALF_WIDTH_MM)
+    sheet.take(place - 1.6 * along, place + 1.6 * along, _HALF_WIDTH_MM)
     sheet.take(*ends, 0.5)
 
 
@@ -128,7 +128,7 @@ def _draw_points(sheet: Sheet, points: Sequence[Point]) -> None:
 
 def _point_style(number: int, smaller: int = 0) -> dict[str, Any]:
     size = max(2.0, 6.5 - 2.5 * smaller)
-    colour, marker = POINT_COLOURS[number % len(POINT_COLOURS)], POINT_MARKERS[number % len(POINT_MARKERS)]
+    colour, marker = _POINT_COLOURS[number % len(_POINT_COLOURS)], _POINT_MARKERS[number % len(_POINT_MARKERS)]
     return {"marker": marker, "ms": size, "mfc": colour, "mec": INK, "mew": 0.6}
 
 
@@ -136,8 +136,8 @@ def _draw_labels(sheet: Sheet, segments: Sequence[Segment], joints: Sequence[Joi
     middle = np.mean([s.start for s in segments] + [s.end for s in segments], axis=0)
     for joint in joints:
         away = _outward(joint.place, middle)
-        reach = (SYMBOL_RADIUS_MM if joint.across else HALF_WIDTH_MM) + 0.3
-        sheet.label(subscripted("q", joint.number), [joint.place], away, (reach, 9.0), f"joint-{joint.number}")
+        reach = (SYMBOL_RADIUS_MM if joint.across else _HALF_WIDTH_MM) + 0.3
+        sheet.label(write_subscript("q", joint.number), [joint.place], away, (reach, 9.0), f"joint-{joint.number}")
     for number, segment in enumerate((s for s in segments if s.label), start=1):
         anchors = _visible_places(segment)
         along = (segment.end - segment.start) / np.linalg.norm(segment.end - segment.start)
@@ -145,7 +145,7 @@ def _draw_labels(sheet: Sheet, segments: Sequence[Segment], joints: Sequence[Joi
         away = side * (1.0 if side @ (anchors[0] - middle) >= 0 else -1.0)
         sheet.label(segment.label, anchors, away, (1.2, 6.0), f"length-{number}")
     for number, point in enumerate(points):
-        colour = POINT_COLOURS[number % len(POINT_COLOURS)]
+        colour = _POINT_COLOURS[number % len(_POINT_COLOURS)]
         sheet.label(point.name, [point.place], _outward(point.place, middle), (8.0, 0.0), f"point-{point.name}", frame=colour)
 
 
@@ -156,7 +156,7 @@ def _draw_mark(sheet: Sheet, number: int, place: np.ndarray) -> None:
 def _visible_places(segment: Segment) -> list[np.ndarray]:
     """Places on a link that no joint covers, those near its middle first."""
     places = [segment.start + part * (segment.end - segment.start) for part in (0.5, 0.6, 0.4, 0.7, 0.3, 0.8, 0.2)]
-    covered = [any(np.linalg.norm(joint.place - place) < HALF_LENGTH_MM for joint in segment.carried) for place in places]
+    covered = [any(np.linalg.norm(joint.place - place) < _HALF_LENGTH_MM for joint in segment.carried) for place in places]
     return [place for place, hidden in zip(places, covered, strict=True) if not hidden] or places
 
 
@@ -178,8 +178,8 @@ def _draw_legend(
         name = f"measuring point {point.name}" if number == 0 else point.name
         entries.append((partial(_draw_mark, sheet, number), 4.0, name))
     if any(not segment.length_m for segment in segments):
-        entries.append((lambda p: sheet.line([(p[0] - 4.0, p[1]), (p[0] + 4.0, p[1])], **SEPARATOR), 9.0, "no length"))
+        entries.append((lambda p: sheet.line([(p[0] - 4.0, p[1]), (p[0] + 4.0, p[1])], **_SEPARATOR), 9.0, "no length"))
     bottom = sheet.legend(entries, middle, top)
     note = "Lengths are not to scale. A joint may be shown moved along its axis."
-    sheet.text((middle, bottom - 3.5), note, color=GREY)
+    sheet.text((middle, bottom - 3.5), note, color=_GREY)
     return bottom - 3.5 - TEXT_HEIGHT_MM / 2

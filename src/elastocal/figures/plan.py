@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import MaxNLocator
 
 from elastocal.application.planning.cell import link_points
-from elastocal.figures.arm_view import as_seen, draw_arm
-from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.figures.arm_view import draw_arm, project_view
+from elastocal.figures.style import PALETTE, label_decades, panels, styled
 from elastocal.mechanics.kinematics import poses
 
 if TYPE_CHECKING:
@@ -82,9 +82,7 @@ def _curves(axis: Axes, plan: Plan) -> None:
     # With too few poses hardly anything is known: nobody measures so few.
     axis.set_ylim(0.5e3 * plan.accuracy_m[-1], _SHOWN_TIMES * 1e3 * plan.accuracy_m[-1])
     axis.set_yscale("log")
-    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.yaxis.set_minor_formatter(NullFormatter())
+    label_decades(axis.yaxis)
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.set_xlabel("poses")
     axis.set_ylabel("position error left, RMS (mm)")
@@ -99,8 +97,8 @@ def pose_pictures(robot: Robot, plan: Plan) -> list[Figure]:
     angles = robot.model_angles(np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles]))
     force = np.concatenate([plan.fitted.force, plan.held_out.force])
     links = link_points(robot, angles).transpose(1, 0, 2)
-    arms = as_seen(links)
-    pull = as_seen(force / max(np.linalg.norm(force, axis=1).max(), 1e-9))
+    arms = project_view(links)
+    pull = project_view(force / max(np.linalg.norm(force, axis=1).max(), 1e-9))
     middle, half = (arms.max((0, 1)) + arms.min((0, 1))) / 2, 0.53 * np.ptp(arms, axis=(0, 1)).max()
     figures = []
     for first in range(0, len(arms), _MOST_ON_PAGE):

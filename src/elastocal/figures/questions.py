@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import NullLocator
 
-from elastocal.figures.style import PALETTE, line_style, note, panels, styled
+from elastocal.figures.style import PALETTE, label_decades, line_style, note, panels, styled
+from elastocal.study.budget_tables import QUANTILE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pandas as pd
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 _DESIGNS = {"random": "random", "A": "A-optimal", "D": "D-optimal", "I": "I-optimal", "bound": "bound of all designs"}
@@ -39,10 +39,10 @@ def ladder(table: pd.DataFrame) -> Figure:
             axis.scatter(springs, cell.rms_um, s=0.9 * cell.chosen_percent, color=PALETTE[index], alpha=0.35, linewidths=0)
         axis.set(title=f"noise {noise:g} µm and µrad", xlabel="link springs in the model", yscale="log")
         axis.set_xticks(range(int(steps.link_springs.astype(int).max()) + 1))
-        _plain(axis.yaxis)
+        label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("RMS error of one data set (µm)")
     title = "configurations in the data set; discs: share of data sets in which cross-validation stops there"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=6, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=6)
     return figure
 
 
@@ -64,7 +64,8 @@ def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figur
             (equal, PALETTE[1], 0.16, f"{2 * length} measurements each"),
         ):
             rows = [labels.index(points) + shift for points in cells.points]
-            axis.errorbar(cells.rms_um, rows, xerr=1.96 * cells.std_error_um, fmt="o", color=colour, markersize=4, label=name)
+            spans = QUANTILE * cells.std_error_um
+            axis.errorbar(cells.rms_um, rows, xerr=spans, fmt="o", color=colour, markersize=4, label=name)
             axis.plot(cells.crlb_rms_um, rows, "|", color="black", markersize=7, label="Cramér-Rao bound")
         axis.set(title=title, xlabel="RMS error of one data set (µm), 95 % intervals", yticks=range(len(labels)))
         axis.set(ylim=(len(labels) - 0.5, -0.5), xlim=(0, None))
@@ -93,11 +94,11 @@ def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) ->
             axis.fill_between(cost, cell.ratio_low, cell.ratio_high, **band)
         axis.set(title=title, xlabel="cost of a configuration (measurements)", xscale="log", yscale="log")
         axis.set_xticks([0.01, 0.1, 1, 10])
-        axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        _plain(axis.yaxis)
+        axis.xaxis.set_major_formatter("{x:g}")
+        label_decades(axis.yaxis)
     axes[0, 0].set_ylabel(f"cost of {accuracy_um:g} µm over that of {labels[0] if labels else ''}")
     title = "points measured in each configuration; bands: 95 % intervals by bootstrap over data sets"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=4, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=4)
     return figure
 
 
@@ -120,10 +121,10 @@ def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, 
         axis.set(title=title, xlabel="configurations", xscale="log", yscale="log")
         axis.set_xticks(sorted(set(table.configurations)), labels=[f"{size}" for size in sorted(set(table.configurations))])
         axis.xaxis.set_minor_locator(NullLocator())
-        _plain(axis.yaxis)
+        label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("bound of the RMS error (µm)")
     title = f"band: 5 to 95 % of random designs; line: {accuracy_um:g} µm"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5)
     return figure
 
 
@@ -145,16 +146,9 @@ def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, 
             axis.errorbar(cells.ratio, rows, xerr=spans, fmt="o", color=PALETTE[index], markersize=3.5, label=strategy)
         axis.axvline(1.0, color="black", linewidth=0.7)
         axis.set(title=title, xscale="log", yticks=range(len(names)), ylim=(len(names) - 0.5, -0.5))
-        _plain(axis.xaxis)
+        label_decades(axis.xaxis)
         axis.grid(visible=False, axis="y")
     axes[0, 0].set_yticklabels([name.replace("k_Σ", r"$k_\Sigma$") for name in names.values()])
     title = "score over that of the first strategy, 95 % intervals"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5)
     return figure
-
-
-def _plain(axis: Axis) -> None:
-    """Numbers as they are on a logarithmic axis, at 2 and 5 between its decades, too."""
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_locator(LogLocator(subs=[2.0, 5.0]))
-    axis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MICRO, MILLI = 1e6, 1e3
-STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
+_STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
 # About the vertical of the base, since what turns with the first joint then stays one component; and along the force, since
 # what gives way does so in its direction.
 COMPONENTS = ("radial", "tangential", "vertical", "along force")
@@ -62,7 +62,7 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
         shares = {stage: [share_explained(bins, part) for part in parts[stage].T] for stage in stages}
         shown = int(np.argmax(shares["before"]))
         for stage in stages:
-            _cloud(axis, values, scale * parts[stage][:, shown], held_out, STAGES[stage][1], bins)
+            _cloud(axis, values, scale * parts[stage][:, shown], held_out, _STAGES[stage][1], bins)
         percent = " → ".join(f"{100 * shares[stage][shown]:.0f}" for stage in stages)
         axis.set_title(f"{COMPONENTS[shown]}: {percent} %", fontsize=7.5, loc="left")
         axis.set(xlabel=label, ylim=limits)
@@ -73,7 +73,7 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
         axis.set_ylabel(f"residual ({unit})")
     above = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
     handles = _legend(stages, bool(held_out.any()))
-    figure.legend(handles=handles, title=above, loc="outside lower center", ncols=4, title_fontsize=7.5, columnspacing=1.4)
+    figure.legend(handles=handles, title=above, loc="outside lower center", ncols=4, columnspacing=1.4)
     figure.set_dpi(_PIXELS_PER_INCH)
     return figure
 
@@ -99,7 +99,7 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
         for order, stage in enumerate(stages):
             tips = at + off[stage][shown][:, seen] * length / largest
             head = {"width": 0.006 - 0.0025 * order, "headwidth": 3.2, "headlength": 4, "headaxislength": 3.6, "minlength": 0.3}
-            arrow = axis.quiver(*at.T, *(tips - at).T, angles="xy", scale_units="xy", scale=1, color=STAGES[stage][1], **head)
+            arrow = axis.quiver(*at.T, *(tips - at).T, angles="xy", scale_units="xy", scale=1, color=_STAGES[stage][1], **head)
             arrow.set(zorder=3 + order, gid=stage)
             axis.update_datalim(tips)
         if arm is not None:
@@ -117,8 +117,8 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
         if cell_m
         else "each arrow: mean of the repeats"
     )
-    handles = [Line2D([], [], color=STAGES[stage][1], linewidth=2, label=STAGES[stage][0]) for stage in stages]
-    figure.legend(handles=handles, title=which, loc="outside lower center", ncols=2, title_fontsize=7.5)
+    handles = [Line2D([], [], color=_STAGES[stage][1], linewidth=2, label=_STAGES[stage][0]) for stage in stages]
+    figure.legend(handles=handles, title=which, loc="outside lower center", ncols=2)
     return figure
 
 
@@ -235,11 +235,11 @@ def middle_of_cells(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray
 def _stages(table: Mapping[str, np.ndarray]) -> tuple[str, ...]:
     """Both stages, or the first alone where nothing was found that changes a residual."""
     same = all(np.allclose(table[f"before_d{axis}"], table[f"after_d{axis}"], rtol=0, atol=1e-9) for axis in "xyz")
-    return tuple(STAGES)[: 1 if same else 2]
+    return tuple(_STAGES)[: 1 if same else 2]
 
 
 def _legend(stages: Iterable[str], with_held_out: bool) -> list[Line2D]:
-    drawn = [STAGES[stage] for stage in stages]
+    drawn = [_STAGES[stage] for stage in stages]
     handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
     handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="fitted measurement"))
     if with_held_out:
@@ -252,7 +252,7 @@ def _states(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.n
     keys = np.column_stack([table[name] for name in ("held_out", "session", "pose", "load", "target")])
     _, state = np.unique(keys, axis=0, return_inverse=True)
     place = _means(state.ravel(), np.column_stack([table[axis] for axis in "xyz"]))
-    off = {stage: np.column_stack([table[f"{stage}_d{axis}"] for axis in "xyz"]) for stage in STAGES}
+    off = {stage: np.column_stack([table[f"{stage}_d{axis}"] for axis in "xyz"]) for stage in _STAGES}
     return place, {stage: _means(state.ravel(), values) for stage, values in off.items()}
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.figures.scheme_sheet import subscripted
+from elastocal.figures.scheme_sheet import write_subscript
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 # Links after the joints that bend run from this heading to that one, in degrees above the horizontal. Headings that only
 # fall, by less than 180 degrees in all, make an arch that cannot meet itself; links that recede can still cross it, so there
-# is a choice of arches and of directions on paper, and links count as apart from ENOUGH_MM on.
-FIRST_HEADING, LAST_HEADINGS = 70.0, (-45.0, -20.0, 5.0, 30.0)
-ENOUGH_MM = 7.0
+# is a choice of arches and of directions on paper, and links count as apart from _ENOUGH_MM on.
+_FIRST_HEADING, _LAST_HEADINGS = 70.0, (-45.0, -20.0, 5.0, 30.0)
+_ENOUGH_MM = 7.0
 DEPTH_RATIO = 0.75
-DEPTH_ANGLES = (*range(45, 66, 5), *range(40, 24, -5), *range(115, 156, 5))
+_DEPTH_ANGLES = (*range(45, 66, 5), *range(40, 24, -5), *range(115, 156, 5))
 # Directions with a larger cosine between them count as parallel.
 PARALLEL = 0.99
 
 # The drawn length of a link: the shortest, more for each joint that is drawn on it, and a part in proportion to its length.
-SHORTEST_MM, CARRIED_MM = 13.0, 7.0
-SCALES_MM = tuple(range(50, -1, -5))
+_SHORTEST_MM, _CARRIED_MM = 13.0, 7.0
+_SCALES_MM = tuple(range(50, -1, -5))
 DRAWING_MM = (100.0, 84.0)
 
 
@@ -68,10 +68,10 @@ class Point:
     place: np.ndarray = field(init=False, repr=False)
 
 
-Item = Segment | Joint | Point
+_Item = Segment | Joint | Point
 
 
-def laid_out(chain: Chain) -> tuple[list[Item], np.ndarray]:
+def lay_out(chain: Chain) -> tuple[list[_Item], np.ndarray]:
     """Everything at its place, and the direction on paper of what recedes.
 
     Places are in millimetres of paper. The kinematic scheme is a side view with the base's z upwards, in an oblique
@@ -82,18 +82,18 @@ def laid_out(chain: Chain) -> tuple[list[Item], np.ndarray]:
     the largest whose drawing is not larger than DRAWING_MM.
     """
     best = -1.0
-    chosen: tuple[list[Item], np.ndarray]
-    for last_heading, angle in product(LAST_HEADINGS, np.radians(DEPTH_ANGLES)):
+    chosen: tuple[list[_Item], np.ndarray]
+    for last_heading, angle in product(_LAST_HEADINGS, np.radians(_DEPTH_ANGLES)):
         items = _spread(_walk(chain, last_heading))
         depth = DEPTH_RATIO * np.array([np.cos(angle), np.sin(angle)])
-        _place(items, SCALES_MM[0], depth)
+        _place(items, _SCALES_MM[0], depth)
         clearance = _clearance(items)
         if clearance > best + 1e-6:
             best, chosen = clearance, (items, depth)
-        if clearance == ENOUGH_MM:
+        if clearance == _ENOUGH_MM:
             break
     items, depth = chosen
-    for scale in SCALES_MM:
+    for scale in _SCALES_MM:
         places = _place(items, scale, depth)
         if (np.ptp(places, axis=0) <= DRAWING_MM).all():
             break
@@ -111,7 +111,7 @@ def view_of(chain: Chain) -> np.ndarray:
     return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 
 
-def projected(vector: np.ndarray, depth: np.ndarray) -> np.ndarray:
+def project_on_paper(vector: np.ndarray, depth: np.ndarray) -> np.ndarray:
     """(right, up, into the paper) on paper, (2,), where `depth` (2,) is what a unit into the paper becomes."""
     return vector[:2] + vector[2] * depth
 
@@ -133,12 +133,12 @@ def _rotation(axis: int, angle: float) -> np.ndarray:
     return matrix
 
 
-def _walk(chain: Chain, last_heading: float) -> list[Item]:
+def _walk(chain: Chain, last_heading: float) -> list[_Item]:
     """Segments, joints and points in the order of the chain, their directions as (right, up, into the paper)."""
     view = view_of(chain)
     frames = [view @ frame for frame in _frames(chain)]
     turns = _turns(chain, frames, last_heading)
-    items: list[Item] = []
+    items: list[_Item] = []
     lengths = 0
     for index in range(len(chain.transforms) + 1):
         frame = _rotation(2, turns[index]) @ frames[index]
@@ -151,7 +151,7 @@ def _walk(chain: Chain, last_heading: float) -> list[Item]:
             items.append(Joint(transform.coordinate + 1, direction))
         elif transform.kind == "T" and transform.constant != 0:
             lengths += 1
-            label = f"{subscripted('l', lengths)} = {_millimetres(transform.constant)} mm"
+            label = f"{write_subscript('l', lengths)} = {_millimetres(transform.constant)} mm"
             items.append(Segment(np.sign(transform.constant) * direction, abs(transform.constant), label))
     return items
 
@@ -177,7 +177,7 @@ def _turns(chain: Chain, frames: Sequence[np.ndarray], last_heading: float) -> l
         vector = max(flat, key=np.linalg.norm)
         if np.linalg.norm(vector) > 0:
             longest[index] = np.arctan2(vector[1], vector[0])
-    wanted = dict(zip(longest, np.radians(np.linspace(FIRST_HEADING, last_heading, len(longest))), strict=True))
+    wanted = dict(zip(longest, np.radians(np.linspace(_FIRST_HEADING, last_heading, len(longest))), strict=True))
     turns = [0.0]
     for index in range(len(chain.transforms)):
         turns.append(wanted[index] - longest[index] if index in wanted else turns[-1])
@@ -191,12 +191,12 @@ def _flat_vector(transform: Transform, frame: np.ndarray) -> np.ndarray:
     return np.round(transform.constant * frame[:2, transform.axis], 9)
 
 
-def _spread(items: list[Item]) -> list[Item]:
+def _spread(items: list[_Item]) -> list[_Item]:
     """Joints that share a place, apart: on the links whose direction is their axis, or with a separator between them."""
-    spread: list[Item] = []
+    spread: list[_Item] = []
     run: list[Joint | Point] = []
     before: Segment | None = None
-    if isinstance(_without_points(items)[0], Joint):
+    if isinstance(_drop_points(items)[0], Joint):
         # A joint in the base's origin would be drawn on the ground.
         items = [Segment(np.array([0.0, 1.0, 0.0]), 0.0), *items]
     for item in [*items, None]:
@@ -209,18 +209,18 @@ def _spread(items: list[Item]) -> list[Item]:
     return spread
 
 
-def _without_points(items: Iterable[Item]) -> list[Segment | Joint]:
+def _drop_points(items: Iterable[_Item]) -> list[Segment | Joint]:
     return [item for item in items if not isinstance(item, Point)]
 
 
-def _spread_run(run: Sequence[Joint | Point], before: Segment | None, after: Segment | None) -> list[Item]:
+def _spread_run(run: Sequence[Joint | Point], before: Segment | None, after: Segment | None) -> list[_Item]:
     """Joints and points between two segments; the first joint may move back along its axis, the last one forward."""
     left = [item for item in run if isinstance(item, Joint)]
     if before and left and _turns_about(left[0], before, alone=len(left) == 1):
         _carry(left.pop(0), before)
     if after and left and _turns_about(left[-1], after, alone=len(left) == 1):
         _carry(left.pop(), after)
-    spread: list[Item] = []
+    spread: list[_Item] = []
     for item in run:
         if before and any(item is joint for joint in left[1:]):
             spread.append(Segment(before.direction, 0.0))
@@ -238,9 +238,9 @@ def _carry(joint: Joint, segment: Segment) -> None:
     segment.carried.append(joint)
 
 
-def _clearance(items: Iterable[Item]) -> float:
-    """Smallest distance between links, up to ENOUGH_MM; of two that meet, between the halves away from there."""
-    segments, nearest = [item for item in items if isinstance(item, Segment)], ENOUGH_MM
+def _clearance(items: Iterable[_Item]) -> float:
+    """Smallest distance between links, up to _ENOUGH_MM; of two that meet, between the halves away from there."""
+    segments, nearest = [item for item in items if isinstance(item, Segment)], _ENOUGH_MM
     for (i, one), (j, other) in combinations(enumerate(segments), 2):
         halves = ((0.0, 0.5), (0.5, 1.0)) if j == i + 1 else ((0.0, 1.0), (0.0, 1.0))
         a, b = _samples(one, *halves[0]), _samples(other, *halves[1])
@@ -252,22 +252,22 @@ def _samples(segment: Segment, first: float, last: float) -> np.ndarray:
     return segment.start + np.linspace(first, last, 25)[:, None] * (segment.end - segment.start)
 
 
-def _place(items: Sequence[Item], scale: float, depth: np.ndarray) -> np.ndarray:
+def _place(items: Sequence[_Item], scale: float, depth: np.ndarray) -> np.ndarray:
     """Places on paper of the base's origin and of everything, in millimetres from that origin."""
     longest = max((item.length_m for item in items if isinstance(item, Segment)), default=0.0)
     here, places = np.zeros(3), [np.zeros(2)]
     for item in items:
-        place = projected(here, depth)
+        place = project_on_paper(here, depth)
         if isinstance(item, Segment):
             item.start = place
             here = here + item.direction * _drawn_length(item, longest, scale)
-            item.end = place = projected(here, depth)
+            item.end = place = project_on_paper(here, depth)
             for number, joint in enumerate(item.carried, start=1):
                 joint.place = item.start + (item.end - item.start) * number / (len(item.carried) + 1)
         elif isinstance(item, Point):
             offset = np.linalg.norm(item.offset)
-            along = item.offset / offset * (SHORTEST_MM + 0.3 * scale) if offset else np.zeros(3)
-            item.node, item.place = place, projected(here + along, depth)
+            along = item.offset / offset * (_SHORTEST_MM + 0.3 * scale) if offset else np.zeros(3)
+            item.node, item.place = place, project_on_paper(here + along, depth)
             place = item.place
         elif item.carrier is None:
             item.place = place
@@ -276,4 +276,4 @@ def _place(items: Sequence[Item], scale: float, depth: np.ndarray) -> np.ndarray
 
 
 def _drawn_length(segment: Segment, longest: float, scale: float) -> float:
-    return SHORTEST_MM + CARRIED_MM * len(segment.carried) + scale * (segment.length_m / longest if longest else 0.0)
+    return _SHORTEST_MM + _CARRIED_MM * len(segment.carried) + scale * (segment.length_m / longest if longest else 0.0)

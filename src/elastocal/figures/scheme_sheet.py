@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 WIDTH_MM = 160.0
 MARGIN_MM = 3.0
-MM_PER_INCH = 25.4
-FONT = FontProperties(family="DejaVu Sans", size=9)
+_MM_PER_INCH = 25.4
+_FONT = FontProperties(family="DejaVu Sans", size=9)
 BOLD = FontProperties(family="DejaVu Sans", size=9, weight="bold")
 TEXT_HEIGHT_MM = 3.6
-LEGEND_ROW_MM, LEGEND_HALF_MM, LEGEND_GAP_MM = 12.0, 4.0, 5.0
+LEGEND_ROW_MM, _LEGEND_HALF_MM, _LEGEND_GAP_MM = 12.0, 4.0, 5.0
 # What a label names reaches about this far from the label's anchor.
 SYMBOL_RADIUS_MM = 3.4
 
@@ -54,7 +54,7 @@ class Sheet:
 
     def text(self, place: Place, text: str, **style: Any) -> Text:
         """A text, centred on its place by default."""
-        style = {"ha": "center", "va": "center", "fontproperties": FONT, "color": INK, "zorder": 8, **style}
+        style = {"ha": "center", "va": "center", "fontproperties": _FONT, "color": INK, "zorder": 8, **style}
         return self.axes.text(place[0], place[1], text, **style)
 
     def label(
@@ -127,15 +127,15 @@ class Sheet:
     def legend(self, entries: Sequence[tuple[Callable[[np.ndarray], Any], float, str]], middle: float, top: float) -> float:
         """Rows of (draw, width of the symbol, text), centred, as many in a row as fit; returns where they end."""
         widths = [symbol + 1.5 + _text_width(text) for _, symbol, text in entries]
-        for row in filled_rows(widths, WIDTH_MM - 2 * MARGIN_MM, gap=LEGEND_GAP_MM):
-            x = middle - (sum(widths[i] for i in row) + LEGEND_GAP_MM * (len(row) - 1)) / 2
+        for row in fill_rows(widths, WIDTH_MM - 2 * MARGIN_MM, gap=_LEGEND_GAP_MM):
+            x = middle - (sum(widths[i] for i in row) + _LEGEND_GAP_MM * (len(row) - 1)) / 2
             for i in row:
                 draw, symbol, text = entries[i]
                 draw(np.array([x + symbol / 2, top]))
                 self.text((x + symbol + 1.5, top), text, ha="left")
-                x += widths[i] + LEGEND_GAP_MM
+                x += widths[i] + _LEGEND_GAP_MM
             top -= LEGEND_ROW_MM
-        return top + LEGEND_ROW_MM - LEGEND_HALF_MM
+        return top + LEGEND_ROW_MM - _LEGEND_HALF_MM
 
     def finish(self, low: Place, high: Place) -> Figure:
         """Cut the sheet to what lies between two corners, centred in the usual width."""
@@ -143,16 +143,16 @@ class Sheet:
         spare = max(0.0, WIDTH_MM - (high - low)[0]) / 2
         low[0], high[0] = low[0] - spare, high[0] + spare
         self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        self.figure.set_size_inches(*((high - low) / MM_PER_INCH))
+        self.figure.set_size_inches(*((high - low) / _MM_PER_INCH))
         return self.figure
 
 
-def subscripted(letter: str, number: int) -> str:
+def write_subscript(letter: str, number: int) -> str:
     """A letter with a number below, as mathematics."""
     return f"${letter}_{{{number}}}$"
 
 
-def filled_rows(widths: Sequence[float], limit: float, gap: float) -> list[list[int]]:
+def fill_rows(widths: Sequence[float], limit: float, gap: float) -> list[list[int]]:
     """Indices of widths that fill rows one after another."""
     rows: list[list[int]] = [[]]
     used = 0.0
@@ -165,7 +165,7 @@ def filled_rows(widths: Sequence[float], limit: float, gap: float) -> list[list[
 
 
 def _text_width(text: str) -> float:
-    return TextPath((0, 0), text, prop=FONT).get_extents().width * MM_PER_INCH / 72
+    return TextPath((0, 0), text, prop=_FONT).get_extents().width * _MM_PER_INCH / 72
 
 
 def _boxes_along(start: np.ndarray, end: np.ndarray, half_width: float) -> np.ndarray:

@@ -20,8 +20,8 @@ from elastocal.figures.scheme_sheet import (
     WIDTH_MM,
     Place,
     Sheet,
-    filled_rows,
-    subscripted,
+    fill_rows,
+    write_subscript,
 )
 
 if TYPE_CHECKING:
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
     from elastocal.mechanics.robot import Robot
 
-THETA = r"\theta"
-LINK_FACE = "#E4E4E4"
-BLOCK_WIDTHS_MM = {"base": 11.0, "link": 11.0, "actuator": 18.0, "elastic link": 24.0, "end-effector": 17.0}
-BLOCK_GAP_MM, LINE_MM, BLOCK_HALF_MM = 3.0, 22.0, 3.6
+_THETA = r"\theta"
+_LINK_FACE = "#E4E4E4"
+_BLOCK_WIDTHS_MM = {"base": 11.0, "link": 11.0, "actuator": 18.0, "elastic link": 24.0, "end-effector": 17.0}
+_BLOCK_GAP_MM, _LINE_MM, _BLOCK_HALF_MM = 3.0, 22.0, 3.6
 
 
 @dataclass(frozen=True)
@@ -68,21 +68,21 @@ def _blocks(robot: Robot, extended: bool) -> list[_Block]:
     for transform in robot.chain.transforms:
         if transform.kind == "T" and transform.constant != 0:
             lengths += 1
-            names.append(subscripted("l", lengths))
+            names.append(write_subscript("l", lengths))
         elif transform.coordinate is not None:
             # All that lies between two joints is one rigid link.
             blocks += [_Block(link, ", ".join(names))] if names else []
             names, number = [], transform.coordinate + 1
-            blocks.append(_Block("actuator", f"{subscripted('q', number)} + {subscripted(THETA, number)}"))
+            blocks.append(_Block("actuator", f"{write_subscript('q', number)} + {write_subscript(_THETA, number)}"))
     blocks += [_Block(link, ", ".join(names))] if names else []
     return [*blocks, _Block("end-effector", "End-\neffector")]
 
 
 def _draw_model(sheet: Sheet, blocks: Sequence[_Block], top: float) -> float:
     """Blocks from left to right, in as many lines as they need; returns the height below them."""
-    widths = [BLOCK_WIDTHS_MM[block.kind] for block in blocks]
+    widths = [_BLOCK_WIDTHS_MM[block.kind] for block in blocks]
     rows, previous = _even_rows(widths), None
-    left = -max(sum(widths[i] + BLOCK_GAP_MM for i in row) for row in rows) / 2
+    left = -max(sum(widths[i] + _BLOCK_GAP_MM for i in row) for row in rows) / 2
     for row in rows:
         x = left
         if previous is not None:
@@ -91,19 +91,19 @@ def _draw_model(sheet: Sheet, blocks: Sequence[_Block], top: float) -> float:
             _draw_block(sheet, blocks[i], x, top)
             x += widths[i]
             if i != row[-1]:
-                sheet.line([(x, top), (x + BLOCK_GAP_MM, top)], lw=1.2)
-            x += BLOCK_GAP_MM
-        previous = np.array([x - BLOCK_GAP_MM, top])
-        top -= LINE_MM
-    return top + LINE_MM - 12.0
+                sheet.line([(x, top), (x + _BLOCK_GAP_MM, top)], lw=1.2)
+            x += _BLOCK_GAP_MM
+        previous = np.array([x - _BLOCK_GAP_MM, top])
+        top -= _LINE_MM
+    return top + _LINE_MM - 12.0
 
 
 def _even_rows(widths: Sequence[float]) -> list[list[int]]:
     """As few rows as possible, the longest of them as short as possible."""
     widest = WIDTH_MM - 2 * MARGIN_MM - 8.0
-    rows = filled_rows(widths, widest, BLOCK_GAP_MM)
+    rows = fill_rows(widths, widest, _BLOCK_GAP_MM)
     for limit in np.arange(widest, max(widths), -1.0):
-        shorter = filled_rows(widths, limit, BLOCK_GAP_MM)
+        shorter = fill_rows(widths, limit, _BLOCK_GAP_MM)
         if len(shorter) > len(rows):
             break
         rows = shorter
@@ -118,28 +118,28 @@ def _draw_return(sheet: Sheet, end: np.ndarray, start: np.ndarray) -> None:
 
 
 def _draw_block(sheet: Sheet, block: _Block, x: float, y: float) -> None:
-    width = BLOCK_WIDTHS_MM[block.kind]
+    width = _BLOCK_WIDTHS_MM[block.kind]
     if block.kind == "base":
         _draw_box(sheet, x, width, y, "white")
         sheet.text((x + width / 2, y), block.label)
         for step in np.arange(x + 1.5, x + width + 0.1, 2.0):
-            sheet.line([(step, y - BLOCK_HALF_MM), (step - 1.6, y - BLOCK_HALF_MM - 1.8)], lw=0.7)
+            sheet.line([(step, y - _BLOCK_HALF_MM), (step - 1.6, y - _BLOCK_HALF_MM - 1.8)], lw=0.7)
     elif block.kind == "end-effector":
-        _draw_box(sheet, x, width, y, "white", BLOCK_HALF_MM + 1.0)
+        _draw_box(sheet, x, width, y, "white", _BLOCK_HALF_MM + 1.0)
         sheet.text((x + width / 2, y), block.label, linespacing=1.0)
     elif block.kind == "actuator":
         _draw_actuator(sheet, x, y)
         _draw_spring(sheet, x + 8.0, x + width, y, ORANGE)
         sheet.text((x + width / 2, y + 6.4), block.label)
     else:
-        _draw_box(sheet, x, BLOCK_WIDTHS_MM["link"], y, LINK_FACE)
-        sheet.text((x + BLOCK_WIDTHS_MM["link"] / 2, y), "Link")
-        sheet.text((x + BLOCK_WIDTHS_MM["link"] / 2, y - 6.2), block.label)
+        _draw_box(sheet, x, _BLOCK_WIDTHS_MM["link"], y, _LINK_FACE)
+        sheet.text((x + _BLOCK_WIDTHS_MM["link"] / 2, y), "Link")
+        sheet.text((x + _BLOCK_WIDTHS_MM["link"] / 2, y - 6.2), block.label)
         if block.kind == "elastic link":
-            _draw_six_springs(sheet, x + BLOCK_WIDTHS_MM["link"], x + width, y)
+            _draw_six_springs(sheet, x + _BLOCK_WIDTHS_MM["link"], x + width, y)
 
 
-def _draw_box(sheet: Sheet, x: float, width: float, y: float, face: str, half: float = BLOCK_HALF_MM) -> None:
+def _draw_box(sheet: Sheet, x: float, width: float, y: float, face: str, half: float = _BLOCK_HALF_MM) -> None:
     corners = [(x, y - half), (x + width, y - half), (x + width, y + half), (x, y + half)]
     sheet.axes.add_patch(Polygon(corners, fc=face, ec=INK, lw=1.0, zorder=3))
 
@@ -160,7 +160,7 @@ def _draw_six_springs(sheet: Sheet, start: float, end: float, y: float) -> None:
     """One spring in a frame that says it stands for six."""
     start += 1.5
     sheet.line([(start - 1.5, y), (start, y)], lw=1.2)
-    box = FancyBboxPatch((start, y - BLOCK_HALF_MM), end - start, 2 * BLOCK_HALF_MM, boxstyle="round,pad=0,rounding_size=1.2")
+    box = FancyBboxPatch((start, y - _BLOCK_HALF_MM), end - start, 2 * _BLOCK_HALF_MM, boxstyle="round,pad=0,rounding_size=1.2")
     box.set(fc="#FBE9DD", ec=RED, lw=1.0, zorder=2.5)
     sheet.axes.add_patch(box)
     _draw_spring(sheet, start, end, y, RED)
@@ -168,10 +168,10 @@ def _draw_six_springs(sheet: Sheet, start: float, end: float, y: float) -> None:
 
 
 def _draw_legend(sheet: Sheet, extended: bool, top: float) -> float:
-    half = BLOCK_WIDTHS_MM["link"] / 2
+    half = _BLOCK_WIDTHS_MM["link"] / 2
 
     def link(place: np.ndarray) -> None:
-        _draw_box(sheet, place[0] - half, 2 * half, place[1], LINK_FACE)
+        _draw_box(sheet, place[0] - half, 2 * half, place[1], _LINK_FACE)
         sheet.text(place, "Link")
 
     entries: list[tuple[Callable[[np.ndarray], Any], float, str]] = [

@@ -6,9 +6,8 @@ import re
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from elastocal.figures.style import PALETTE, line_style, panels, styled
+from elastocal.figures.style import PALETTE, label_decades, line_style, panels, styled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -43,12 +42,12 @@ def noise_impact(metrics: pd.DataFrame, strategy: str, titles: Mapping[str, str]
                 value = MICRO * trusted.deviation
                 axis.fill_between(trusted.length, value / spread, value * spread, color=PALETTE[index], alpha=0.12, linewidth=0)
         column[0].set(title=title, yscale="log", ylim=(1e-4, 3000))
-        column[0].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        column[0].yaxis.set_major_formatter("{x:g}")
         column[1].set(xlabel=_LENGTH, xlim=(1, cells.length.max()), ylim=(0, _LINEAR_UM))
     axes[0, 0].set_ylabel("dev, equation 15 (µm)")
     axes[1, 0].set_ylabel("the same, linear (µm)")
     title = "noise (µm and µrad); bands: a standard error as a factor; thin: some ĉ ≤ 0, or ĉ scatters by over a quarter"
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5)
     return figure
 
 
@@ -70,7 +69,7 @@ def stiffness_errors(
     _printed_marks(axes[0, 1], printed, robot, "k_sigma", order)
     figure.suptitle(title, fontsize=9)
     axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", yscale="log", ylim=(0.3, 40))
-    _plain(axes[0, 0])
+    label_decades(axes[0, 0].yaxis)
     _legend_below(figure, axes, _BANDS)
     return figure
 
@@ -89,7 +88,7 @@ def deviations(
     _limit(axis, limit_um, "µm")
     _printed_marks(axis, printed, robot, "dev", order)
     axis.set(title=title, xlabel=_LENGTH, ylabel="dev, equation 15 (µm)", yscale="log", ylim=(0.5, 80))
-    _plain(axis)
+    label_decades(axis.yaxis)
     _legend_below(figure, axes, _BANDS)
     return figure
 
@@ -107,7 +106,7 @@ def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[s
         for axis, (quantity, scale, name, span) in zip(column, quantities, strict=True):
             mine = studies[studies.robot == robot]
             means = mine.pivot_table(index="length", columns="strategy", values=quantity, observed=True)
-            for index in _distinct(means, order):
+            for index in _find_distinct(means, order):
                 strategy, style = order[index], line_style(index)
                 curves = scale * mine[mine.strategy == strategy].pivot(index="study", columns="length", values=quantity)
                 middle, spread = curves.mean(), curves.std()
@@ -116,7 +115,7 @@ def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[s
             _printed_marks(axis, printed, robot, name, order)
             # A margin on the right, where diamonds at the longest length would be cut in halves.
             axis.set(xscale="log", yscale="log", xlim=(8, 1.05 * studies.length.max()), ylim=span)
-            _plain(axis)
+            label_decades(axis.xaxis, axis.yaxis)
         column[0].set_title(title)
         column[1].set_xlabel(_LENGTH)
     axes[0, 0].set_ylabel(r"$k_\Sigma$ of the fixed joints (%)")
@@ -152,11 +151,11 @@ def bias_and_accuracy(
         _limit(axis, accuracy_um, "µm")
         axis.set(title=title, xlabel=_LENGTH, xscale="log", yscale="log", xlim=(2, 100), ylim=(0.5, 2000))
         for plain in (axis.xaxis, axis.yaxis):
-            plain.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            plain.set_major_formatter("{x:g}")
     axes[0, 0].set_ylabel("end-effector error (µm)")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     note = "bands: from the mean to the 95th percentile of one data set's error"
-    figure.legend(handles, labels, title=note, loc="outside lower center", ncols=len(order), title_fontsize=7.5)
+    figure.legend(handles, labels, title=note, loc="outside lower center", ncols=len(order))
     return figure
 
 
@@ -187,14 +186,14 @@ def accuracy_of_one_data_set(per_dataset: pd.DataFrame, titles: Mapping[str, str
 def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str, scale: float, order: Sequence[str]) -> None:
     # Where the mean of 1/c exists in practice.
     mine = metrics[(metrics.robot == robot) & metrics.trustworthy]
-    for index in _distinct(mine.pivot(index="length", columns="strategy", values=quantity), order):
+    for index in _find_distinct(mine.pivot(index="length", columns="strategy", values=quantity), order):
         cell, style = mine[mine.strategy == order[index]], line_style(index)
         axis.plot(cell.length, scale * cell[quantity], label=order[index], **style)
         _band(axis, cell.length, scale * cell[quantity], scale * cell[f"{quantity}_std_error"], style["color"])
     axis.set_xlim(2, 1.02 * metrics.length.max())
 
 
-def _distinct(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
+def _find_distinct(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
     """Places of the strategies whose curve (a column each) no strategy before them has, to rounding."""
     found: list[int] = []
     for index, name in enumerate(order):
@@ -207,16 +206,7 @@ def _distinct(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
 def _legend_below(figure: Figure, axes: np.ndarray, title: str) -> None:
     """One legend of all panels, each entry once."""
     handles = {label: handle for axis in axes.flat for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    figure.legend([*handles.values()], [*handles], title=title, loc="outside lower center", ncols=4, title_fontsize=7.5)
-
-
-def _plain(axis: Axes) -> None:
-    """Numbers as they are on logarithmic axes."""
-    for each in (axis.xaxis, axis.yaxis):
-        if each.get_scale() == "log":
-            each.set_major_locator(LogLocator(subs=[1.0, 2.0, 5.0]))
-            each.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            each.set_minor_formatter(NullFormatter())
+    figure.legend([*handles.values()], [*handles], title=title, loc="outside lower center", ncols=4)
 
 
 def _printed_marks(axis: Axes, printed: pd.DataFrame, robot: str, quantity: str, order: Sequence[str]) -> None:

@@ -6,11 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from elastocal.io.atomic_writes import atomic_write
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
+    from matplotlib.axis import Axis
     from matplotlib.typing import RcKeyType
 
     from elastocal.io.origin import Origin
@@ -30,6 +34,7 @@ SETTINGS: dict[RcKeyType, Any] = {
     "lines.linewidth": 1.4,
     "legend.frameon": False,
     "legend.fontsize": 7.5,
+    "legend.title_fontsize": 7.5,
     "pdf.fonttype": 42,
 }
 
@@ -60,6 +65,14 @@ def line_style(index: int) -> dict[str, Any]:
     return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index % len(DASHES)]}
 
 
+def label_decades(*axes: Axis) -> None:
+    """Plain numbers on logarithmic axes, at 2 and 5 between the decades, too."""
+    for axis in axes:
+        axis.set_major_locator(LogLocator(subs=[1.0, 2.0, 5.0]))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+
+
 def ink_on(colour: tuple[float, ...]) -> str:
     """Black or white, whichever has the higher contrast on a colour by its relative luminance [1].
 
@@ -88,6 +101,13 @@ def save(figure: Figure, pdf: str, png: str, origin: Origin | None = None) -> No
     for path, options in ((pdf, {"metadata": of_pdf}), (png, {"dpi": 150, "metadata": of_png})):
         with atomic_write(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
+
+
+def save_all(figures: Mapping[str, Figure], folder: str) -> dict[str, str]:
+    """Write figures into a folder; returns the path of the PDF of each, by its name."""
+    for name, figure in figures.items():
+        save(figure, f"{folder}/{name}.pdf", f"{folder}/{name}.png")
+    return {name: f"{folder}/{name}.pdf" for name in figures}
 
 
 @styled

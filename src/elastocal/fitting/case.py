@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.campaign import Campaign, described_campaign
+from elastocal.campaigns.campaign import Campaign, assemble_campaign
 from elastocal.campaigns.columns import measurements_from
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.fitting.model import Model, declared_model
@@ -49,7 +49,7 @@ def case_from(descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]
     """
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
-    campaign = described_campaign(descriptions["campaign"], robot, measurements_from(columns), source)
+    campaign = assemble_campaign(descriptions["campaign"], robot, measurements_from(columns), source)
     sites = sites_of(campaign.robot)
     model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
     candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from elastocal.application.scope import calibrated_on, with_form
+from elastocal.application.scope import calibrate_on_case, set_form
 from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.errors import InputError
 from elastocal.fitting.case import noise_from
@@ -80,7 +80,7 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, top: str | Pat
     model, estimate = step_model(case, facts, steps, last)
     covariance = covariance_from(final_parameters(facts, steps), read_table(tables / CORRELATIONS_TABLE, CORRELATIONS))
     noise = noise_from({"noise": facts["steps"][last]["noise"]})
-    calibrated = calibrated_on(case, model, estimate, covariance, noise)
+    calibrated = calibrate_on_case(case, model, estimate, covariance, noise)
     accuracy = verdict["accuracy"]
     form = (accuracy["form_m"], accuracy["contradicted"]) if accuracy else (facts["document"].get("other_models_m") or 0.0,)
     origin = {
@@ -89,7 +89,7 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, top: str | Pat
         "data_sha256": configuration_sha256(sorted(data)),
         "environment": {name: _listed(job.environment.get(name, "none") for job in jobs) for name in jobs[-1].environment},
     }
-    return Diagnosed(name, case, with_form(calibrated, *form), verdict, pd.read_csv(stated / ERRORS), origin)
+    return Diagnosed(name, case, set_form(calibrated, *form), verdict, pd.read_csv(stated / ERRORS), origin)
 
 
 def _data_of(jobs: Sequence[JobRecord], results: str) -> set[tuple[str, str]]:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.accuracy import predicted
-from elastocal.application.certificate.comparison import compared
+from elastocal.application.accuracy import predict_errors
+from elastocal.application.certificate.comparison import compare_campaigns
 from elastocal.application.certificate.error_budget import error_budget
 from elastocal.application.certificate.repeatability import of_sensor, repeatability
-from elastocal.application.certificate.workspace import drawn_angles, workspace_errors
+from elastocal.application.certificate.workspace import draw_angles, workspace_errors
 from elastocal.application.scope import REGION, campaign_poses
 from elastocal.campaigns.reading import campaign_files
 from elastocal.io.records import checksum
@@ -81,7 +81,7 @@ def certificate(
         return stream(wanted.seed, found.name, f"certificate: {purpose}", 0)
 
     poses = campaign_poses(calibrated, states) if use is None else (use.reported_angles, use.operating)
-    prediction = predicted(calibrated, *poses)
+    prediction = predict_errors(calibrated, *poses)
     accuracy = prediction.accuracy(REGION if use is None else USE)
     decision = predicted_conformity(prediction.rms_m, accuracy.poses, wanted.tolerance_m, wanted.accepted_risk)
     if measured is not None:
@@ -91,7 +91,7 @@ def certificate(
     missing = shortfalls(judged, states, robot, None if use is None else use.outside)
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
-    angles = drawn_angles(calibrated, _POSES, draws("workspace"))
+    angles = draw_angles(calibrated, _POSES, draws("workspace"))
     largest = float(np.linalg.norm(states.wrench[:, :3], axis=1).max())
     forces = [0.0, largest] if largest > 0.0 else [0.0]
     maps = [
@@ -131,7 +131,7 @@ def certificate(
     }
     if other is not None:
         document["comparison"] = {"campaign": other.name} | asdict(
-            compared(other.calibrated, calibrated, angles[:_COMPARED], _DRAWS, draws("comparison"))
+            compare_campaigns(other.calibrated, calibrated, angles[:_COMPARED], _DRAWS, draws("comparison"))
         )
     return document, maps
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.application.accuracy import BASE, CONFIDENCE, MEASURED, ROBOT, Accuracy, absorbed, placement, scope_about
+from elastocal.application.accuracy import BASE, CONFIDENCE, MEASURED, ROBOT, Accuracy, find_absorbed, placement, scope_about
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.measurements import CSV
@@ -142,7 +142,7 @@ def _errors(
     columns = placement(scope, position, rotation)
     for _ in range(_STEPS if free.any() else 0):
         off = position + rotation @ offset - (measured @ turn.T + shift)
-        step = absorbed(columns, np.concatenate([off, np.zeros_like(off)], axis=1)[..., None], free)[:, 0]
+        step = find_absorbed(columns, np.concatenate([off, np.zeros_like(off)], axis=1)[..., None], free)[:, 0]
         small = Rotation.from_rotvec(step[3:6]).as_matrix()
         turn, shift = small @ turn, small @ (shift - scope.origin) + scope.origin + step[:3]
         offset = offset - step[6:9]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.application.scope import calibrated_on, campaign_accuracy
+from elastocal.application.scope import calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.catalogue import faults
 from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
@@ -84,7 +84,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         "accuracy": None,
     }
     if not decisive:
-        fitted = calibrated_on(case, declared.model, declared.estimate, declared.covariance, noise)
+        fitted = calibrate_on_case(case, declared.model, declared.estimate, declared.covariance, noise)
         facts["accuracy"] = campaign_accuracy(fitted, states).document()
     return (
         facts

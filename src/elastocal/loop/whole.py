@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from elastocal.application.certificate.error_budget import effect_costs
-from elastocal.application.scope import calibrated_on, campaign_accuracy, campaign_poses, judged_by_held_out, with_form
+from elastocal.application.scope import calibrate_on_case, campaign_accuracy, campaign_poses, judge_by_held_out, set_form
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
@@ -48,9 +48,9 @@ def diagnosed(folder: str | Path, robots_folder: str | Path, seed: int, settings
 def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
     """The robot that a diagnosis found, with all that is known of its errors: held-out rows without gross ones judge it."""
     case, final = diagnosis.case, diagnosis.final
-    found = calibrated_on(case, final.model, final.estimate, final.covariance, final.noise)
-    found = with_form(found, diagnosis.document["other_models_m"] or 0.0)
-    return judged_by_held_out(found, final, case, held_out)
+    found = calibrate_on_case(case, final.model, final.estimate, final.covariance, final.noise)
+    found = set_form(found, diagnosis.document["other_models_m"] or 0.0)
+    return judge_by_held_out(found, final, case, held_out)
 
 
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:

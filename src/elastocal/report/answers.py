@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.printed import LEVEL
-from elastocal.study.tables import column_head, deviation_ratio, with_errors_merged, worded
+from elastocal.study.tables import column_head, deviation_ratio, merge_errors, word_value
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -62,7 +62,7 @@ def answers(
         "robots": [
             _robot_facts(robot, title, at, single, metrics, replicates, cells, noisiest) for robot, title in titles.items()
         ],
-        "extended": with_errors_merged(extended.drop(columns="robot")).to_dict("records"),
+        "extended": merge_errors(extended.drop(columns="robot")).to_dict("records"),
         "solvers": [
             {
                 "robot": row.robot,
@@ -88,7 +88,7 @@ def _outside_row(row: Any) -> dict[str, str]:
         "robot": row.robot,
         "strategy": row.strategy if isinstance(row.strategy, str) else "",
         "paper": f"{row.paper:g}",
-        "studies": worded(row.studies_mean, row.studies_std),
+        "studies": word_value(row.studies_mean, row.studies_std),
         "p": f"{row.p_value:.2g}",
         "holm": f"{row.p_holm:.2g}",
     }
@@ -112,7 +112,7 @@ def _expectation_row(row: Any) -> dict[str, str]:
 
 
 def _text_row(row: Any) -> dict[str, str]:
-    shown = "not studied" if np.isnan(row.ours) else worded(row.ours, row.mc_std)
+    shown = "not studied" if np.isnan(row.ours) else word_value(row.ours, row.mc_std)
     interpretation = row.interpretation if isinstance(row.interpretation, str) else ""
     return {
         "figure": column_head(row.quantity),
@@ -170,18 +170,18 @@ def _robot_facts(
         "title": title,
         "best": best,
         "worst": worst,
-        "dev_classical": worded(1e6 * averaged.deviation[classical], 1e6 * averaged.deviation_std_error[classical]),
-        "dev_best": worded(1e6 * averaged.deviation[best], 1e6 * averaged.deviation_std_error[best]),
-        "dev_worst": worded(1e6 * averaged.deviation[worst], 1e6 * averaged.deviation_std_error[worst]),
-        "ratio": worded(*ratio),
+        "dev_classical": word_value(1e6 * averaged.deviation[classical], 1e6 * averaged.deviation_std_error[classical]),
+        "dev_best": word_value(1e6 * averaged.deviation[best], 1e6 * averaged.deviation_std_error[best]),
+        "dev_worst": word_value(1e6 * averaged.deviation[worst], 1e6 * averaged.deviation_std_error[worst]),
+        "ratio": word_value(*ratio),
         "share": f"{share[classical]:.1f}",
-        "single_classical": worded(here.mean_um[classical], here.mean_um_std_error[classical]),
-        "single_best": worded(here.mean_um[best], here.mean_um_std_error[best]),
-        "p95_classical": worded(here.p95_um[classical], here.p95_um_std_error[classical]),
-        "p95_best": worded(here.p95_um[best], here.p95_um_std_error[best]),
+        "single_classical": word_value(here.mean_um[classical], here.mean_um_std_error[classical]),
+        "single_best": word_value(here.mean_um[best], here.mean_um_std_error[best]),
+        "p95_classical": word_value(here.p95_um[classical], here.p95_um_std_error[classical]),
+        "p95_best": word_value(here.p95_um[best], here.p95_um_std_error[best]),
         "hidden": f"{here.mean_um[classical] / (1e6 * averaged.deviation[classical]):.1f}",
-        "efficiency_best": worded(100 * here.efficiency[best], 100 * here.efficiency_std_error[best]),
-        "efficiency_worst": worded(100 * here.efficiency.min(), 100 * here.efficiency_std_error[here.efficiency.idxmin()]),
+        "efficiency_best": word_value(100 * here.efficiency[best], 100 * here.efficiency_std_error[best]),
+        "efficiency_worst": word_value(100 * here.efficiency.min(), 100 * here.efficiency_std_error[here.efficiency.idxmin()]),
         "lowest_efficiency": str(here.efficiency.idxmin()),
         "repeatable_classical": _length_for(own, classical),
         "repeatable_best": _length_for(own, best),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.study.steps.simulated_designs import TEST_POSE
-from elastocal.study.tables import worded
+from elastocal.study.tables import word_value
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -131,7 +131,7 @@ def simulated_design_rows(table: pd.DataFrame, length: int, titles: Mapping[str,
             row = {"robot": title, "load": str(load), "gain": f"{by.gain['I']:.2f}"}
             hidden = str(by.unobservable.iloc[0])
             row["unobservable"] = "none" if hidden in ("", "nan") else f"joint {hidden}"
-            row |= {name: worded(by.rms_um[name], by.rms_um_std_error[name]) for name in DESIGN_NAMES}
+            row |= {name: word_value(by.rms_um[name], by.rms_um_std_error[name]) for name in DESIGN_NAMES}
             row |= {"there": f"{by.at_test_pose_um['I']:.0f}; {by.at_test_pose_um[TEST_POSE]:.0f}"}
             rows.append(row)
     return rows
@@ -145,7 +145,7 @@ def smallest_designs(table: pd.DataFrame, accuracy_um: float, titles: Mapping[st
         within = mine[mine.rms_um <= accuracy_um]
         first = within.iloc[0] if len(within) else None
         number = "more than all" if first is None else f"{first.configurations}"
-        rms = "" if first is None else worded(first.rms_um, first.rms_um_std_error)
+        rms = "" if first is None else word_value(first.rms_um, first.rms_um_std_error)
         found.append({"title": title, "configurations": number, "rms": rms})
     return found
 
@@ -183,8 +183,8 @@ def kind_rows(table: pd.DataFrame, length: int, titles: Mapping[str, str]) -> li
             same = cell[cell.configurations == length].iloc[0]
             equal = cell.iloc[int(np.argmin(np.abs(cell.scalars - 6 * length)))]
             row |= {"scalars": f"{same.scalars_per_configuration}", "equal": f"{equal.configurations}"}
-            row[f"{robot} same"] = worded(same.rms_um, same.rms_um_std_error)
-            row[f"{robot} equal"] = worded(equal.rms_um, equal.rms_um_std_error)
+            row[f"{robot} same"] = word_value(same.rms_um, same.rms_um_std_error)
+            row[f"{robot} equal"] = word_value(equal.rms_um, equal.rms_um_std_error)
         rows.append(row)
     return rows
 
@@ -214,7 +214,7 @@ def _cell(row: Any, name: str) -> str:
     value, std = row[name], row[f"{name}_std"]
     if name.startswith("n_"):
         return f"{value:.0f} ± {std:.0f}" if value < 1000 else "over 1000"
-    return worded(value, std)
+    return word_value(value, std)
 
 
 def _cost(value: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from elastocal.counting import counted, grouped
+from elastocal.counting import counted, grouped, plural
 from elastocal.diagnosis.words import alternative_words, listed, parameter_words, physical_name
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
@@ -104,7 +104,7 @@ def _evidence(evidence: Sequence[float | None] | None) -> str:
 
 def _of_data_joints(effect: Mapping[str, Any]) -> str:
     joints = effect["joints"] if effect["family"] == OF_DATA else ()
-    return f" of joint{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}" if joints else ""
+    return f" of {plural('joint', len(joints))} {listed(map(str, joints))}" if joints else ""
 
 
 def _gain(gain: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.study.ranks import REFERENCE
-from elastocal.study.tables import worded
+from elastocal.study.tables import word_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -43,7 +43,7 @@ def score_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, st
                 row[metric] = "–"
                 if metric in cells.index:
                     cell = cells.loc[metric]
-                    row[metric] = f"{worded(cell.value, cell.value_std_error)} ({cell['rank']})"
+                    row[metric] = f"{word_value(cell.value, cell.value_std_error)} ({cell['rank']})"
             rows.append(row)
     return rows
 

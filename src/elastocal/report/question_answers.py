@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.study.question_tables import CHOSEN
-from elastocal.study.tables import worded
+from elastocal.study.tables import word_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -49,8 +49,8 @@ def strategy_rows(strategies: Sequence[Strategy]) -> list[dict[str, str]]:
     for strategy in strategies:
         stages = []
         for stage in strategy.stages:
-            held = f", {_joints(stage.held)} fixed" if stage.held else ""
-            stages.append(f"{' and '.join(stage.points)} → {_joints(stage.identified)}{held}")
+            fixed = f", {_joints(stage.fixed)} fixed" if stage.fixed else ""
+            stages.append(f"{' and '.join(stage.points)} → {_joints(stage.identified)}{fixed}")
         rows.append({"name": strategy.name, "stages": "; then ".join(stages)})
     return rows
 
@@ -69,10 +69,10 @@ def ladder_rows(ladder: pd.DataFrame) -> list[dict[str, str]]:
             {
                 "noise": f"{noise:g}",
                 "length": f"{length}",
-                "joints": worded(by.rms_um["0"], by.rms_um_std_error["0"]),
-                "best": worded(by.rms_um[best], by.rms_um_std_error[best]),
+                "joints": word_value(by.rms_um["0"], by.rms_um_std_error["0"]),
+                "best": word_value(by.rms_um[best], by.rms_um_std_error[best]),
                 "springs": best,
-                "chosen": worded(by.rms_um[CHOSEN], by.rms_um_std_error[CHOSEN]),
+                "chosen": word_value(by.rms_um[CHOSEN], by.rms_um_std_error[CHOSEN]),
             }
         )
     return rows
@@ -250,7 +250,7 @@ def tube_rows(tubes: pd.DataFrame) -> list[dict[str, str]]:
         {
             "diameter": f"{row.diameter_mm:.0f}",
             **{name: f"{row[f'{name}_mm']:.2f} ± {row[f'{name}_mm_between']:.2f}" for name in ("mean", "std", "max")},
-            "left": worded(row.left_um, row.left_um_std_error),
+            "left": word_value(row.left_um, row.left_um_std_error),
         }
         for _, row in tubes.iterrows()
     ]
@@ -289,7 +289,7 @@ def _at(cell: pd.DataFrame, configurations: int) -> str:
     if configurations not in cell.index:
         return ""
     found: Any = cell.loc[configurations]
-    return worded(found.rms_um, found.std_error_um)
+    return word_value(found.rms_um, found.std_error_um)
 
 
 def _length(value: Any) -> str:

@@ -17,7 +17,7 @@ _PAIRED = (
     *("difference_um", "difference_um_std_error", "ratio", "ratio_low", "ratio_high"),
 )
 # Of a normal distribution: 95 % within.
-_QUANTILE = 1.96
+QUANTILE = 1.96
 
 
 def budget_table(frames: Mapping[str, pd.DataFrame], point_sets: Mapping[str, Sequence[str]], length: int) -> pd.DataFrame:
@@ -110,8 +110,8 @@ def lengths_table(
             for accuracy in accuracies_um:
                 found = {
                     "configurations": rms,
-                    "configurations_low": rms - _QUANTILE * error,
-                    "configurations_high": rms + _QUANTILE * error,
+                    "configurations_low": rms - QUANTILE * error,
+                    "configurations_high": rms + QUANTILE * error,
                     "configurations_by_bound": bound,
                 }
                 needed = {name: _first(lengths, MICRO * values <= accuracy) for name, values in found.items()}
@@ -136,7 +136,7 @@ def ratio_of_roots(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float, 
     """
     ratio = float(np.sqrt(ours.mean() / theirs.mean()))
     relative = (ours / ours.mean() - theirs / theirs.mean()) / 2
-    error = _QUANTILE * relative.std(ddof=1) / np.sqrt(len(ours))
+    error = QUANTILE * relative.std(ddof=1) / np.sqrt(len(ours))
     return ratio, ratio * np.exp(-error), ratio * np.exp(error)
 
 

@@ -19,12 +19,12 @@ from elastocal.study.printed import LEVEL, MICRO, Predicted
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-ALL, FIXED, DEV = "k_sigma", "k_sigma_fixed_joints", "deviation"
+_ALL, _FIXED, _DEV = "k_sigma", "k_sigma_fixed_joints", "deviation"
 _BEST, _COMB, _PLAIN = "4-6DoF after 6+3DoF", "3+6DoF comb", "6DoF"
 _SAME = ("6DoF", "6DoF after 3DoF", "6DoF after 3+3DoF")
 # Strategies of Table 4 beside the two best and the classical one.
 _OTHERS = ("4-6DoF after 3DoF", "3-6DoF after 2DoF", "5-6DoF after 4DoF")
-_LIMITS = {ALL: 1.0, FIXED: 1.0, DEV: 2.0}
+_LIMITS = {_ALL: 1.0, _FIXED: 1.0, _DEV: 2.0}
 # A share printed as 80 % may be rounded to the nearest five.
 _ROUNDED = 2.5
 HOLDS, PARTLY, FAILS = "holds", "holds in part", "does not hold"
@@ -54,20 +54,20 @@ class Evidence:
     def curves(self, robot: str, strategy: str, column: str) -> np.ndarray:
         """Scores (studies, lengths): percent, or µm."""
         mine = self.studies[(self.studies.robot == robot) & (self.studies.strategy == strategy)]
-        scale = MICRO if column.startswith(DEV) else 1.0
+        scale = MICRO if column.startswith(_DEV) else 1.0
         return scale * mine.pivot(index="study", columns="length", values=column).to_numpy()
 
     def scores(self, robot: str, strategy: str, column: str) -> np.ndarray:
         """Scores (studies,) at the length of the tables."""
         return self.curves(robot, strategy, column)[:, self.length - 1]
 
-    def reached(self, robot: str, strategy: str, column: str) -> np.ndarray:
+    def find_lengths(self, robot: str, strategy: str, column: str) -> np.ndarray:
         """Configurations (studies,) at which a score reaches its limit of Table 4."""
         return length_to_reach(self.curves(robot, strategy, column), _LIMITS[column])
 
     def figures(self, robot: str, strategy: str, sigma: str) -> np.ndarray:
         """The four figures of Table 4, (4, studies)."""
-        return np.stack([of(robot, strategy, column) for column in (sigma, DEV) for of in (self.scores, self.reached)])
+        return np.stack([of(robot, strategy, column) for column in (sigma, _DEV) for of in (self.scores, self.find_lengths)])
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _both(judge: Callable[[Evidence, str], tuple[str, bool | None, float]]) -> C
     """A claim that equation 14 matters for, judged under both counts of joints; the p value is that of ours."""
 
     def judged(evidence: Evidence) -> Finding:
-        (literal, one, _), (ours, other, p) = (judge(evidence, sigma) for sigma in (ALL, FIXED))
+        (literal, one, _), (ours, other, p) = (judge(evidence, sigma) for sigma in (_ALL, _FIXED))
         verdict = HOLDS if one and other else PARTLY if one or other else FAILS
         return Finding(literal, ours, verdict, p)
 
@@ -129,7 +129,7 @@ def _each(evidence: Evidence, of: Callable[[str], str]) -> str:
 def _two_best(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
     best = np.ones(evidence.studies.study.nunique(), bool)
     for robot in evidence.robots:
-        for column in (sigma, DEV):
+        for column in (sigma, _DEV):
             others = np.min([np.abs(evidence.scores(robot, name, column)) for name in (_PLAIN, *_OTHERS)], axis=0)
             two = np.max([np.abs(evidence.scores(robot, name, column)) for name in (_BEST, _COMB)], axis=0)
             best &= two < others
@@ -139,7 +139,7 @@ def _two_best(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
 
 def _ratio_of_dev(evidence: Evidence) -> Finding:
     kuka = evidence.robots[0]
-    ratio = evidence.scores(kuka, _PLAIN, DEV) / evidence.scores(kuka, _COMB, DEV)
+    ratio = evidence.scores(kuka, _PLAIN, _DEV) / evidence.scores(kuka, _COMB, _DEV)
     p = _number(ratio, 1.86, 0.01)
     return _one(f"dev of 6DoF over comb on {kuka}: {_spread(ratio)}", HOLDS if p > LEVEL else FAILS, p)
 
@@ -164,7 +164,7 @@ def _expected_dev(evidence: Evidence, robot: str, noise: float) -> float:
 
 
 def _below_two(evidence: Evidence) -> Finding:
-    lengths = [evidence.reached(robot, _PLAIN, DEV) for robot in evidence.robots]
+    lengths = [evidence.find_lengths(robot, _PLAIN, _DEV) for robot in evidence.robots]
     text, p = _often(np.all([each < 50 for each in lengths], axis=0))
     means = "; ".join(f"{robot} {np.median(each):.0f}" for robot, each in zip(evidence.robots, lengths, strict=True))
     return _one(f"dev of 6DoF reaches 2 µm at {means} configurations (median), below 50 on both {text}", FAILS, p)
@@ -216,30 +216,30 @@ def _any_metric(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
 
 def _similar(evidence: Evidence) -> Finding:
     text = _each(
-        evidence, lambda robot: f"{np.mean(evidence.scores(robot, _COMB, DEV) / evidence.scores(robot, _BEST, DEV)):.6f}"
+        evidence, lambda robot: f"{np.mean(evidence.scores(robot, _COMB, _DEV) / evidence.scores(robot, _BEST, _DEV)):.6f}"
     )
     return _one(f"one estimator under two names: ratio of dev {text}", HOLDS)
 
 
 def _less_precise(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
     kuka = evidence.robots[0]
-    ratio = evidence.scores(kuka, _COMB, ALL) / evidence.scores(kuka, _BEST, sigma)
+    ratio = evidence.scores(kuka, _COMB, _ALL) / evidence.scores(kuka, _BEST, sigma)
     p = _number(ratio, 2.75, 0.01) if ratio.std() > 1e-6 else 0.0
-    same = "all joints of both" if sigma == ALL else "all six joints against the three fixed"
+    same = "all joints of both" if sigma == _ALL else "all six joints against the three fixed"
     return f"ratio {_spread(ratio)} ({same})", p > LEVEL, p
 
 
 def _depends_on_robot(evidence: Evidence) -> Finding:
     orders = []
     for robot in evidence.robots:
-        orders.append(np.argsort([evidence.scores(robot, name, DEV) for name in (*_OTHERS, _PLAIN)], axis=0))
+        orders.append(np.argsort([evidence.scores(robot, name, _DEV) for name in (*_OTHERS, _PLAIN)], axis=0))
     text, p = _often((orders[0] != orders[1]).any(axis=0))
     return _one(f"their order by dev differs between the robots {text}", PARTLY, p)
 
 
 def _within_thirty(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
     name = _OTHERS[1]
-    kuka, fanuc = (evidence.reached(robot, name, sigma) for robot in evidence.robots)
+    kuka, fanuc = (evidence.find_lengths(robot, name, sigma) for robot in evidence.robots)
     text, p = _often((fanuc <= 30) & (kuka > 30))
     return f"n for 1 %: fanuc {_spread(fanuc, 0)}, kuka {_spread(kuka, 0)}; as claimed {text}", bool(np.median(fanuc) <= 30), p
 
@@ -291,8 +291,8 @@ def _more_points(evidence: Evidence) -> Finding:
 
 def _more_data(evidence: Evidence) -> Finding:
     def at(robot: str) -> str:
-        doubled = evidence.curves(robot, _PLAIN, DEV)[:, 2 * evidence.length - 1] / evidence.scores(robot, _PLAIN, DEV)
-        comb = evidence.scores(robot, _COMB, DEV) / evidence.scores(robot, _PLAIN, DEV)
+        doubled = evidence.curves(robot, _PLAIN, _DEV)[:, 2 * evidence.length - 1] / evidence.scores(robot, _PLAIN, _DEV)
+        comb = evidence.scores(robot, _COMB, _DEV) / evidence.scores(robot, _PLAIN, _DEV)
         return f"comb {_spread(comb)}, twice the configurations {_spread(doubled)} of dev"
 
     return _one(_each(evidence, at), HOLDS)
@@ -330,7 +330,7 @@ def _signed(evidence: Evidence) -> Finding:
 
     literal = f"vectors averaged over data sets, then their norm: {_each(evidence, at)}; the paper prints 8.386 and 7.921"
     return Finding(
-        literal, _each(evidence, lambda robot: f"{_spread(evidence.scores(robot, _PLAIN, DEV), 1)} µm (R7, R8)"), FAILS
+        literal, _each(evidence, lambda robot: f"{_spread(evidence.scores(robot, _PLAIN, _DEV), 1)} µm (R7, R8)"), FAILS
     )
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from elastocal.study.printed import holm, predicted
+from elastocal.study.printed import holm, predict_scatter
 from elastocal.study.tables import MILLI, deviation_ratio, share_compensated
 
 _TABLE2 = {"deviation_mean": "mean_mm", "deviation_std": "std_mm", "deviation_max": "max_mm"}
@@ -74,14 +74,14 @@ def _scatter(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, fl
         values = MILLI * _OF_ONE_SET[figure.quantity](frame).to_numpy()
         below, above = (values <= figure.value).sum(), (values >= figure.value).sum()
         p_value = min(2 * (min(below, above) + 1) / (len(values) + 1), 1.0)
-        return values.mean(), values.std(ddof=1), np.nan if _fitted(figure) else p_value
+        return values.mean(), values.std(ddof=1), np.nan if _is_fitted(figure) else p_value
     found = None
     if figure.table in ("3", "4"):
-        found = predicted(ours.studies, figure.robot, figure.strategy, figure.quantity, ours.length)
+        found = predict_scatter(ours.studies, figure.robot, figure.strategy, figure.quantity, ours.length)
     return (found.mean, found.std, found.p_value(figure.value)) if found else (np.nan, np.nan, np.nan)
 
 
-def _fitted(figure: _PrintedFigure) -> bool:
+def _is_fitted(figure: _PrintedFigure) -> bool:
     """Whether the study has a parameter that was chosen for this figure."""
     return (figure.robot, figure.quantity) == ("kuka_extended", "deviation_mean")
 
@@ -92,7 +92,7 @@ def _table1_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, flo
 
 def _table2_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
     column = _TABLE2[figure.quantity]
-    remark = "R11: the tube was chosen for it" if _fitted(figure) else "R3"
+    remark = "R11: the tube was chosen for it" if _is_fitted(figure) else "R3"
     return *_pair(ours.tables["table2"], column, robot=figure.robot), remark
 
 

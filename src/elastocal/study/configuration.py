@@ -95,7 +95,7 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
     return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()}, few)
 
 
-def with_overrides(config: Mapping[str, Any], entries: Iterable[str]) -> dict[str, Any]:
+def override(config: Mapping[str, Any], entries: Iterable[str]) -> dict[str, Any]:
     """A configuration with keys changed on the command line, numbers read as in the file.
 
     `entries`: ``key=value``; a value that is a mapping changes some keys of a mapping. Raises `InputError`: a value that is no
@@ -103,13 +103,13 @@ def with_overrides(config: Mapping[str, Any], entries: Iterable[str]) -> dict[st
     """
     changed = dict(config)
     for key, _, text in (entry.partition("=") for entry in entries):
-        changed[key] = _merged(changed.get(key), parsed(text, f"--config {key}"))
+        changed[key] = _merge(changed.get(key), parsed(text, f"--config {key}"))
     return changed
 
 
-def _merged(old: Any, new: Any) -> Any:
+def _merge(old: Any, new: Any) -> Any:
     if isinstance(old, dict) and isinstance(new, dict):
-        return old | {key: _merged(old.get(key), value) for key, value in new.items()}
+        return old | {key: _merge(old.get(key), value) for key, value in new.items()}
     return new
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 MICRO = 1e6
 # Costs of a configuration, in measurements, at which curves are given: from none to a robot that is loaded by hand.
-CONFIGURATION_COSTS = (0.0, *np.logspace(-2, 1.5, 43).round(4).tolist())
+_CONFIGURATION_COSTS = (0.0, *np.logspace(-2, 1.5, 43).round(4).tolist())
 
 
 def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
@@ -37,7 +37,7 @@ def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
     return np.where(~above.any(axis=-1), 1.0, np.where(reached, between, np.inf))
 
 
-def needed_by_set(
+def find_needed_by_set(
     frame: pd.DataFrame, point_sets: Mapping[str, Sequence[str]], accuracy_um: float, weights: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Configurations needed by each set of points in each bootstrap replicate, the first of which is no replicate.
@@ -70,7 +70,7 @@ def break_even_table(
     against = next(iter(point_sets))
     for robot, frame in frames.items():
         for accuracy in accuracies_um:
-            needed = needed_by_set(frame, point_sets, accuracy, weights[robot])
+            needed = find_needed_by_set(frame, point_sets, accuracy, weights[robot])
             if against not in needed:
                 continue
             theirs, m = needed[against], len(point_sets[against])
@@ -101,8 +101,8 @@ def cost_table(
     rows = []
     against = next(iter(point_sets))
     for robot, frame in frames.items():
-        needed = needed_by_set(frame, point_sets, accuracy_um, weights[robot])
-        for each in CONFIGURATION_COSTS:
+        needed = find_needed_by_set(frame, point_sets, accuracy_um, weights[robot])
+        for each in _CONFIGURATION_COSTS:
             costs = {points: n * (each + len(point_sets[points])) for points, n in needed.items() if np.isfinite(n[0])}
             cheapest = min(costs, key=lambda points: costs[points][0], default="")
             for points, cost in costs.items():

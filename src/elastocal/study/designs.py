@@ -13,7 +13,7 @@ import numpy as np
 
 from elastocal.application.planning.bound import best_value
 from elastocal.application.planning.criteria import CRITERIA, Criterion, criterion, mean_squares
-from elastocal.application.planning.exchange import exchanged, greedy, matrix_of
+from elastocal.application.planning.exchange import choose_greedily, exchange_candidates, matrix_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +38,7 @@ class Worth:
     high: float
 
 
-def worths(rows: np.ndarray, accuracy_rows: np.ndarray, sizes: Sequence[int], draws: np.random.Generator) -> list[Worth]:
+def rate_designs(rows: np.ndarray, accuracy_rows: np.ndarray, sizes: Sequence[int], draws: np.random.Generator) -> list[Worth]:
     """Random, chosen and best possible designs.
 
     `rows` (N, rows, n): regressors of the candidates over the noise, in plausible sizes of the compliances. `accuracy_rows`
@@ -54,7 +54,7 @@ def worths(rows: np.ndarray, accuracy_rows: np.ndarray, sizes: Sequence[int], dr
         found.append(Worth(RANDOM, size, float(np.sqrt((random**2).mean())), float(low), float(high)))
         for kind in CRITERIA:
             rule = criterion(kind, accuracy_rows)
-            chosen = exchanged(rows, greedy(rows, size, rule), rule)
+            chosen = exchange_candidates(rows, choose_greedily(rows, size, rule), rule)
             error = _error(rows, chosen, exact)
             found.append(Worth(kind, size, error, error, error))
         least = float(np.sqrt(-best_value(rows, size, exact, chosen)))

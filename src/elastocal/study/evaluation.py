@@ -19,7 +19,7 @@ from elastocal.study.metrics import (
     mean_deviation,
     position_errors,
     relative_stiffness_error,
-    scored_parts,
+    split_models,
 )
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def accuracy_sums(compliance: np.ndarray, judge: Judge) -> np.ndarray:
     """
     sets, lengths, _ = compliance.shape
     single = np.empty((sets, lengths, 4))
-    for part in scored_parts(sets, lengths):
+    for part in split_models(sets, lengths):
         single[part] = _scores_of_one_data_set(compliance[part], judge)
     values = np.concatenate([single, ((compliance - judge.reference) / judge.reference) ** 2], axis=-1)
     return np.stack([np.full(values.shape[1:], float(sets)), values.sum(axis=0), (values**2).sum(axis=0)])
@@ -161,7 +161,7 @@ def accuracy_table(sums: np.ndarray, lengths: Sequence[int]) -> dict[str, np.nda
     return table
 
 
-def reached_length(values: np.ndarray, replicate_values: np.ndarray, limit: float) -> tuple[float, float]:
+def find_length(values: np.ndarray, replicate_values: np.ndarray, limit: float) -> tuple[float, float]:
     """First length at which a metric is at most `limit`, with its Monte Carlo standard error.
 
     `values` (lengths,), `replicate_values` (replicates, lengths). Returns `length`, `std_error`: the length is infinite where

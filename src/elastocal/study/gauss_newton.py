@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 STEPS = 30
 # Relative size of the last step but one. Each step is about a thousand times smaller than the one before, down to the rounding
 # of positions of metres against deflections of millimetres, which the condition number magnifies.
-LAST_STEP = 1e-7
+_LAST_STEP = 1e-7
 
 
 def identify_exactly(
@@ -77,20 +77,20 @@ def _solve_stage(
             normal: np.ndarray = np.zeros(())
             right: np.ndarray = np.zeros(())
             for point, joint_angles, torques, measured, unloaded in started:
-                sensitivity, residual = _linearised(chain, point, joint_angles, torques, measured, unloaded, compliance)
+                sensitivity, residual = _linearise(chain, point, joint_angles, torques, measured, unloaded, compliance)
                 sensitivity = sensitivity[..., identified]
                 normal = normal + np.einsum("ksri,ksrj->sij", sensitivity, sensitivity, optimize=True)
                 right = right + np.einsum("ksri,ksr->si", sensitivity, residual, optimize=True)
-            step = _solved(normal, right)
+            step = _solve(normal, right)
             compliance[:, identified] += step
             if settled.all():
                 break
-            settled = np.abs(step).max(axis=1) <= LAST_STEP * np.abs(compliance).max(axis=1)
+            settled = np.abs(step).max(axis=1) <= _LAST_STEP * np.abs(compliance).max(axis=1)
     compliance[~settled] = np.nan
     return compliance
 
 
-def _solved(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _solve(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solutions of the normal equations; not a number where they are singular."""
     usable = np.isfinite(normal).all(axis=(1, 2))
     usable[usable] = np.linalg.cond(normal[usable]) < 1.0 / np.finfo(float).eps
@@ -99,7 +99,7 @@ def _solved(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
     return solution
 
 
-def _linearised(
+def _linearise(
     chain: Chain,
     point: MeasuringPoint,
     joint_angles: np.ndarray,

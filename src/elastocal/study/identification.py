@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+from elastocal.study.strategies import Stage, Strategy, drop_forgotten_stages
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
 # the measurements do not determine the compliances.
-LARGEST_CONDITION = 1e7
+_LARGEST_CONDITION = 1e7
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Prior:
     def triangle(self, stage: Stage) -> np.ndarray:
         """The equations c / std = nominal / std of the joints that a stage identifies, (pivots, columns, sets)."""
         mine, pivots = list(stage.identified), len(stage.identified)
-        found = np.zeros((pivots, pivots + len(stage.held) + 1, self.nominal.shape[1]))
+        found = np.zeros((pivots, pivots + len(stage.fixed) + 1, self.nominal.shape[1]))
         found[range(pivots), range(pivots)] = 1.0 / self.std[mine]
         found[:, -1] = self.nominal[mine] / self.std[mine]
         return found
@@ -97,21 +97,23 @@ def identify(strategy: Strategy, measurements: Mapping[str, Measurements], joint
     compliance, triangles = estimate_compliance(strategy, measurements, joints)
     spread = covariance(strategy, measurements, triangles)
     condition = condition_numbers(strategy, triangles)
-    undetermined = undetermined_prefixes(strategy, measurements, condition)
+    undetermined = find_undetermined_prefixes(strategy, measurements, condition)
     np.moveaxis(compliance, 1, -1)[undetermined] = np.nan
     spread[undetermined] = np.nan
     condition[undetermined] = np.nan
     return Estimates(compliance, spread, condition)
 
 
-def undetermined_prefixes(strategy: Strategy, measurements: Mapping[str, Measurements], condition: np.ndarray) -> np.ndarray:
+def find_undetermined_prefixes(
+    strategy: Strategy, measurements: Mapping[str, Measurements], condition: np.ndarray
+) -> np.ndarray:
     """Which prefixes of which data sets do not determine the compliances: too few measurements, or not the right ones.
 
     `strategy`, `measurements`: as in `identify`. `condition` (configurations, sets): from `condition_numbers`. Returns
     (configurations, sets) of bool.
     """
     rows = next(iter(measurements.values())).regressor.shape[0]
-    undetermined = ~(condition < LARGEST_CONDITION)
+    undetermined = ~(condition < _LARGEST_CONDITION)
     undetermined[: first_solvable_length(strategy, rows) - 1] = True
     return undetermined
 
@@ -124,7 +126,7 @@ def estimate_compliance(
     `strategy`, `measurements`, `joints`: as in `identify`. `prior`: what is known beforehand, as further measurements of each
     stage (ridge regression towards it [1]). Returns `compliance` (configurations, n, sets): rad/(N m); meaningless where a
     prefix is too short, see `first_solvable_length`; `triangles` (configurations, pivots, columns, sets): triangular factor of
-    each stage; columns: joints identified, joints held, right-hand side.
+    each stage; columns: joints identified, joints fixed, right-hand side.
 
     [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
@@ -136,7 +138,7 @@ def estimate_compliance(
         start = None if prior is None else prior.triangle(stage)
         triangle = prefix_triangles(_systems(stage, measurements), configurations, pivots, start)
         right = triangle[:, :, -1]
-        for column, joint in enumerate(stage.held, pivots):
+        for column, joint in enumerate(stage.fixed, pivots):
             right = right - triangle[:, :, column] * compliance[:, None, joint]
         with np.errstate(divide="ignore", invalid="ignore"):
             for row in range(pivots - 1, -1, -1):
@@ -167,7 +169,7 @@ def covariance(strategy: Strategy, measurements: Mapping[str, Measurements], tri
 
     Notes
     -----
-    A stage with triangle R solves R_II c_I = z - R_IH c_H, I the joints identified and H those held, where the reduced
+    A stage with triangle R solves R_II c_I = z - R_IH c_H, I the joints identified and H those fixed, where the reduced
     measurements z = Q^T y have unit covariance. So the estimates are linear in the z of all stages, and what is left is the
     covariance of the z of two stages that share points: R_s^-T (sum of A_s^T A_t over the shared measurements) R_t^-1.
 
@@ -177,7 +179,7 @@ def covariance(strategy: Strategy, measurements: Mapping[str, Measurements], tri
        Economic Statistics 3, 1985.
     """
     joints = next(iter(measurements.values())).regressor.shape[1]
-    stages = without_forgotten_stages(strategy, joints).stages
+    stages = drop_forgotten_stages(strategy, joints).stages
     gains: list[np.ndarray] = []
     inverses: list[np.ndarray] = []
     for stage, triangle in zip(stages, triangles[-len(stages) :], strict=True):
@@ -185,7 +187,7 @@ def covariance(strategy: Strategy, measurements: Mapping[str, Measurements], tri
         inverse = _row_major(inverse_triangles(triangle[:, :, :size]))
         back = inverse @ _row_major(triangle[:, :, size:-1])
         for gain in gains:
-            gain[..., pivots, :] = -back @ gain[..., list(stage.held), :]
+            gain[..., pivots, :] = -back @ gain[..., list(stage.fixed), :]
         gains.append(np.zeros((*inverse.shape[:2], joints, size)))
         gains[-1][..., pivots, :] = inverse
         inverses.append(inverse)
@@ -283,7 +285,7 @@ def cholesky_triangles(information: np.ndarray) -> np.ndarray:
     """Upper triangular Cholesky factors R of symmetric matrices R^T R.
 
     `information` (configurations, m, m, sets): only the upper triangles are read. Returns (configurations, m, m, sets): not a
-    number where a matrix is not positive definite to rounding, see `LARGEST_CONDITION`.
+    number where a matrix is not positive definite to rounding, see `_LARGEST_CONDITION`.
     """
     size = information.shape[1]
     triangle = np.zeros_like(information)
@@ -292,7 +294,7 @@ def cholesky_triangles(information: np.ndarray) -> np.ndarray:
         for above in range(row):
             rest -= triangle[:, above, row, None] * triangle[:, above, row:]
         pivot, diagonal = rest[:, 0], information[:, row, row]
-        pivot[~(pivot > diagonal / LARGEST_CONDITION**2)] = np.nan
+        pivot[~(pivot > diagonal / _LARGEST_CONDITION**2)] = np.nan
         triangle[:, row, row:] = rest / np.sqrt(pivot)[:, None]
     return triangle
 
@@ -312,8 +314,8 @@ def prefix_information(regressor: np.ndarray) -> np.ndarray:
 
 
 def _systems(stage: Stage, measurements: Mapping[str, Measurements]) -> Iterator[np.ndarray]:
-    """Equations of a stage, configuration by configuration; columns: joints identified, joints held, measured deflection."""
-    order = stage.identified + stage.held
+    """Equations of a stage, configuration by configuration; columns: joints identified, joints fixed, measured deflection."""
+    order = stage.identified + stage.fixed
     points = [measurements[name] for name in stage.points]
     rows, _, configurations, sets = points[0].regressor.shape
     system = np.empty((len(points), rows, len(order) + 1, sets))

@@ -11,13 +11,12 @@ how figures depend on one another [2]; of k studies it is no smaller than 1/(k +
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from elastocal.study.printed import LEVEL, Predicted, holm, predicted
+from elastocal.study.printed import LEVEL, Predicted, holm, predict_scatter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,26 +39,26 @@ def _row(studies: pd.DataFrame, printed: pd.DataFrame, length: int, fixed_joints
     found = [
         (scatter, value)
         for (robot, strategy, quantity), value in zip(cells, printed.value, strict=True)
-        if (scatter := predicted(studies, robot, strategy, quantity, length, fixed_joints)) is not None
+        if (scatter := predict_scatter(studies, robot, strategy, quantity, length, fixed_joints)) is not None
     ]
     paper = np.array([scatter.p_value(value) for scatter, value in found])
-    others = np.array([_left_out(scatter) for scatter, _ in found]).T
+    others = np.array([_judge_by_others(scatter) for scatter, _ in found]).T
     row: dict[str, Any] = {"joints": "fixed joints" if fixed_joints else "all joints", "cells": len(paper)}
     if not found:
         paper, others = np.full(1, np.nan), np.full((1, 1), np.nan)
     row |= {"differ": int((holm(paper) < LEVEL).sum()), "studies": len(others)}
-    row |= _ranked("below", int((paper < LEVEL).sum()), (others < LEVEL).sum(axis=1))
-    return row | _ranked("statistic", float(-2 * np.log(paper).sum()), -2 * np.log(others).sum(axis=1))
+    row |= _rank("below", int((paper < LEVEL).sum()), (others < LEVEL).sum(axis=1))
+    return row | _rank("statistic", float(-2 * np.log(paper).sum()), -2 * np.log(others).sum(axis=1))
 
 
-def _left_out(scatter: Predicted) -> list[float]:
+def _judge_by_others(scatter: Predicted) -> list[float]:
     """p value of each study by the others."""
     some = scatter.values  # noqa: PD011 (of a dataclass)
     printed = np.exp(some) if scatter.logarithmic else some
-    return [replace(scatter, values=np.delete(scatter.values, s)).p_value(value) for s, value in enumerate(printed)]
+    return [others.p_value(value) for others, value in zip(scatter.leave_out_each(), printed, strict=True)]
 
 
-def _ranked(name: str, value: float, others: np.ndarray | Sequence[float]) -> dict[str, float]:
+def _rank(name: str, value: float, others: np.ndarray | Sequence[float]) -> dict[str, float]:
     others = np.asarray(others)
     row = {name: value, f"{name}_studies_median": float(np.median(others)), f"{name}_studies_largest": float(others.max())}
     return row | {f"{name}_p": (1 + int((others >= value).sum())) / (1 + len(others))}

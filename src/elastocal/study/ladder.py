@@ -110,18 +110,18 @@ def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
     columns = np.broadcast_to(np.arange(joints), (sets, joints))
     left = np.broadcast_to(np.arange(links), (sets, links))
     order = np.zeros((sets, 0), int)
-    scores, fits = [_left_out(parts, whole, columns)], [_fitted(whole, columns)]
+    scores, fits = [_cross_validate(parts, whole, columns)], [_fit(whole, columns)]
     for _ in range(links):
         tried = [
             np.concatenate([columns, _of_link(left[:, place], joints, elements)], axis=1) for place in range(left.shape[1])
         ]
-        found = np.stack([_left_out(parts, whole, some) for some in tried], axis=1)
+        found = np.stack([_cross_validate(parts, whole, some) for some in tried], axis=1)
         best = np.argmin(found, axis=1)
         order = np.concatenate([order, left[each, best][:, None]], axis=1)
         columns = np.stack(tried)[best, each]
         left = left[np.arange(left.shape[1]) != best[:, None]].reshape(sets, -1)
         scores.append(found[each, best])
-        fits.append(_fitted(whole, columns))
+        fits.append(_fit(whole, columns))
     return Ladder(order, np.stack(scores, axis=1), np.stack(fits, axis=1))
 
 
@@ -129,16 +129,16 @@ def _of_link(link: np.ndarray, joints: int, elements: int) -> np.ndarray:
     return joints + elements * link[:, None] + np.arange(elements)
 
 
-def _left_out(parts: list[Products], whole: Products, columns: np.ndarray) -> np.ndarray:
+def _cross_validate(parts: list[Products], whole: Products, columns: np.ndarray) -> np.ndarray:
     """Sum of squares left in each fold by the fit to the others, (sets,)."""
     total = np.zeros(len(columns))
     for part in parts:
         rest = Products(whole.gram - part.gram, whole.along - part.along, whole.squares - part.squares)
-        total += part.squared_error(_fitted(rest, columns))
+        total += part.squared_error(_fit(rest, columns))
     return total
 
 
-def _fitted(products: Products, columns: np.ndarray) -> np.ndarray:
+def _fit(products: Products, columns: np.ndarray) -> np.ndarray:
     """Least squares with some columns of each data set, zero for the others, (sets, K)."""
     each = np.arange(len(columns))[:, None]
     gram = products.gram[each[..., None], columns[:, :, None], columns[:, None, :]]

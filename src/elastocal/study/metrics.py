@@ -103,7 +103,7 @@ def error_forms(judge: Judge) -> np.ndarray:
     return forms + forms.swapaxes(1, 2)
 
 
-def scored_parts(groups: int, models: int) -> list[slice]:
+def split_models(groups: int, models: int) -> list[slice]:
     """Slices of groups of models, small enough for the errors of one to stay in the cache.
 
     `models`: in each group.
@@ -133,7 +133,7 @@ def mean_deviation(judge: Judge, compliance: np.ndarray, test_weights: np.ndarra
         test_weights = np.ones((len(compliance), len(judge.initial_errors)))
     groups, models, joints = compliance.shape
     means = np.empty((groups, models))
-    for part in scored_parts(groups, models):
+    for part in split_models(groups, models):
         errors = position_errors(judge, compliance[part].reshape(-1, joints)).reshape(-1, models, test_weights.shape[1])
         means[part] = (errors @ test_weights[part, :, None])[..., 0]
     return means / test_weights.sum(axis=1, keepdims=True)

@@ -11,7 +11,7 @@ Holm's procedure [2].
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,22 +55,26 @@ class Predicted:
 
     def p_value(self, printed: float) -> float:
         """Two-sided, of a further study that lies so far out."""
-        standard, _ = self._standardized(printed)
+        standard, _ = self._standardize(printed)
         return float(2 * student.sf(abs(standard), len(self.values) - 1))
 
     def log_density(self, printed: float) -> float:
         """Log predictive density of the printed figure; of lengths, of their logarithm."""
-        standard, scale = self._standardized(printed)
+        standard, scale = self._standardize(printed)
         return float(student.logpdf(standard, len(self.values) - 1) - np.log(scale))
 
-    def _standardized(self, printed: float) -> tuple[float, float]:
+    def leave_out_each(self) -> list[Predicted]:
+        """The same by all studies but one, for each of them."""
+        return [replace(self, values=np.delete(self.values, place)) for place in range(len(self.values))]
+
+    def _standardize(self, printed: float) -> tuple[float, float]:
         digit, value = (self.digit / printed, np.log(printed)) if self.logarithmic else (self.digit, printed)
         count = len(self.values)
         variance = self.values.var(ddof=1) * (1 + 1 / count) + digit**2 / 12
         return float((value - self.values.mean()) / np.sqrt(variance)), float(np.sqrt(variance))
 
 
-def predicted(
+def predict_scatter(
     studies: pd.DataFrame, robot: str, strategy: str, quantity: str, length: int, fixed_joints: bool = True
 ) -> Predicted | None:
     """How one figure of Table 3 or 4 scatters between studies.

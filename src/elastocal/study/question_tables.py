@@ -11,6 +11,7 @@ from scipy.stats import spearmanr
 from elastocal.study.budget_tables import MICRO, ratio_of_roots, root_mean
 from elastocal.study.designs import RANDOM
 from elastocal.study.observability import INDICES
+from elastocal.study.tables import find_statistics
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -137,12 +138,7 @@ def tubes_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     for robot, frame in frames.items():
         for diameter, cell in frame.groupby("diameter", sort=False):
             row: dict[str, Any] = {"robot": robot, "diameter_mm": MILLI * float(str(diameter))}
-            single: dict[str, pd.Series] = {
-                "mean": cell["mean"],
-                "std": (cell.mean_square - cell["mean"] ** 2) ** 0.5,
-                "max": cell.maximum,
-            }
-            for name, values in single.items():
+            for name, values in find_statistics(cell).items():
                 row |= {f"{name}_mm": MILLI * values.mean(), f"{name}_mm_between": MILLI * values.std(ddof=1)}
             left, error = root_mean(cell.left.to_numpy())
             rows.append(row | {"left_um": MICRO * left, "left_um_std_error": MICRO * error})

@@ -17,14 +17,12 @@ import numpy as np
 import pandas as pd
 from scipy.stats import rankdata
 
-from elastocal.study.budget_tables import MICRO
+from elastocal.study.budget_tables import MICRO, QUANTILE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 REFERENCE = "rms_um"
-# Of a normal distribution: 95 % within.
-_QUANTILE = 1.96
 # Scores of strategies that are one estimator agree to rounding.
 _DIGITS = 6
 # Scores of averaged models, with the factor to their units.
@@ -51,7 +49,7 @@ class Score:
     def ratio(self, other: Score) -> tuple[float, float, float]:
         """Ratio to another strategy's score with its 95 % interval, paired."""
         ratio = self.value / other.value
-        error = _QUANTILE * self.spread * (self.relative - other.relative).std(ddof=1)
+        error = QUANTILE * self.spread * (self.relative - other.relative).std(ddof=1)
         return ratio, ratio * np.exp(-error), ratio * np.exp(error)
 
 
@@ -85,7 +83,7 @@ def ranks_table(found: Mapping[str, Mapping[str, Mapping[str, Score]]], classica
     for robot, by_metric in found.items():
         for metric, by_strategy in by_metric.items():
             values = np.array([score.value for score in by_strategy.values()])
-            places = rankdata(_rounded(np.abs(values)), method="min")
+            places = rankdata(_round(np.abs(values)), method="min")
             for (strategy, score), rank in zip(by_strategy.items(), places, strict=True):
                 ratio, low, high = score.ratio(by_strategy[classical])
                 rows.append(
@@ -113,7 +111,7 @@ def pairs_table(found: Mapping[str, Mapping[str, Mapping[str, Score]]]) -> pd.Da
     rows = []
     for robot, by_metric in found.items():
         reference = by_metric[REFERENCE]
-        names = _distinct(reference)
+        names = _find_distinct(reference)
         for metric, by_strategy in by_metric.items():
             for index, strategy in enumerate(names):
                 for other in names[index + 1 :]:
@@ -149,13 +147,13 @@ def _of_single_sets(mine: pd.DataFrame) -> dict[str, Score]:
     return found
 
 
-def _rounded(values: np.ndarray) -> np.ndarray:
+def _round(values: np.ndarray) -> np.ndarray:
     return np.array([float(f"{value:.{_DIGITS}g}") for value in values])
 
 
-def _distinct(by_strategy: Mapping[str, Score]) -> Sequence[str]:
+def _find_distinct(by_strategy: Mapping[str, Score]) -> Sequence[str]:
     """The first name of each estimator."""
     seen: dict[float, str] = {}
     for strategy, score in by_strategy.items():
-        seen.setdefault(float(_rounded(np.array([score.value]))[0]), strategy)
+        seen.setdefault(float(_round(np.array([score.value]))[0]), strategy)
     return [*seen.values()]

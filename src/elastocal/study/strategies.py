@@ -18,13 +18,13 @@ class Stage:
     """One least-squares problem of a strategy.
 
     `points`: measuring points whose measurements it uses, with equal weight. `identified`: joint indices, from 0, that it
-    estimates; estimates of an earlier stage are where an iterative solver starts. `held`: joint indices whose estimates it
+    estimates; estimates of an earlier stage are where an iterative solver starts. `fixed`: joint indices whose estimates it
     takes over from earlier stages.
     """
 
     points: tuple[str, ...]
     identified: tuple[int, ...]
-    held: tuple[int, ...] = ()
+    fixed: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Strategy:
         Not those that the first stage identifies: "4-6DoF after 6+3DoF" identifies all joints there.
         """
         last = self.stages[-1]
-        return last.held or tuple(sorted({joint for stage in self.stages for joint in stage.identified}))
+        return last.fixed or tuple(sorted({joint for stage in self.stages for joint in stage.identified}))
 
 
 def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
@@ -70,7 +70,7 @@ def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
     return Strategy(document["name"], tuple(stages), document.get("prior_std"))
 
 
-def without_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:
+def drop_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:
     """What of a strategy the solution of equation 11 depends on: a stage that identifies every joint forgets those before it.
 
     `joints`: number of joints, n. Returns its points are those of the stages that are left. An iterative solver needs all
@@ -84,7 +84,7 @@ def check_strategy(strategy: Strategy, chain: Chain, source: str) -> None:
     """Refuse a strategy that the chain cannot carry out.
 
     `source`: named in errors. Raises `InputError`: an unknown point or joint; a joint that moves a measured point but is
-    neither identified nor held; a held joint that no earlier stage identified; a joint that no stage identifies.
+    neither identified nor fixed; a fixed joint that no earlier stage identified; a joint that no stage identifies.
     """
     known: set[int] = set()
     names = [p.name for p in chain.points]
@@ -98,10 +98,10 @@ def check_strategy(strategy: Strategy, chain: Chain, source: str) -> None:
             if joint not in moving:
                 allowed = f"joints that move {', '.join(stage.points)}: {_numbers(moving)}"
                 raise InputError(source, f"{where}.joints", f"joint {joint + 1}", allowed)
-        for joint in stage.held:
+        for joint in stage.fixed:
             if joint not in known or joint in stage.identified:
                 raise InputError(source, f"{where}.held", f"joint {joint + 1}", f"joints of earlier stages: {_numbers(known)}")
-        if left := moving - set(stage.identified) - set(stage.held):
+        if left := moving - set(stage.identified) - set(stage.fixed):
             raise InputError(source, where, f"joint {_numbers(left)} in neither list", f"{_numbers(moving)} in joints or held")
         known |= set(stage.identified)
     if left := set(range(chain.coordinates)) - known:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from elastocal.study.metrics import length_to_reach
-from elastocal.study.printed import LEVEL, MICRO, holm, predicted
+from elastocal.study.printed import LEVEL, MICRO, holm, predict_scatter
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -49,7 +48,7 @@ def expectations_table(
                 row |= {"studies": len(values), "studies_mean": values.mean(), "studies_std": values.std(ddof=1)}
                 cell = {"k_sigma_fixed_joints": f"k_sigma_{length}", "deviation": f"dev_{length}"}.get(column, "")
                 row["paper"] = float(printed.get((robot, strategy, cell), np.nan))
-                scatter = predicted(studies, robot, strategy, cell, length) if np.isfinite(row["paper"]) else None
+                scatter = predict_scatter(studies, robot, strategy, cell, length) if np.isfinite(row["paper"]) else None
                 row["p_value"] = scatter.p_value(row["paper"]) if scatter else np.nan
                 rows.append(row)
     names = ["robot", "strategy", "quantity", "expected", "studies", "studies_mean", "studies_std", "paper", "p_value"]
@@ -130,16 +129,12 @@ def _of_interpretation(
     p_values, deleted = [], np.zeros(studies.study.nunique())
     cells = printed[["robot", "strategy", "quantity"]].itertuples(index=False, name=None)
     for (robot, strategy, quantity), value in zip(cells, printed.value, strict=True):
-        scatter = predicted(studies, robot, strategy, quantity, length, fixed_joints)
+        scatter = predict_scatter(studies, robot, strategy, quantity, length, fixed_joints)
         if scatter is not None:
             group = next(group for start, group in _GROUPS.items() if quantity.startswith(start))
             totals[group] += scatter.log_density(value)
             p_values.append(scatter.p_value(value))
-            deleted += [replace(scatter, values=some).log_density(value) for some in _without_each(scatter.values)]
+            deleted += [others.log_density(value) for others in scatter.leave_out_each()]
     row |= {f"log_likelihood_{group}": value for group, value in totals.items()}
     row["log_likelihood"] = sum(totals.values())
     return row | {"cells": len(p_values), "differ": int((holm(np.array(p_values)) < LEVEL).sum())}, deleted
-
-
-def _without_each(values: np.ndarray) -> list[np.ndarray]:
-    return [np.delete(values, place) for place in range(len(values))]

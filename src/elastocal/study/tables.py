@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from elastocal.study.evaluation import reached_length
+from elastocal.study.evaluation import find_length
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -27,7 +27,7 @@ def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
 
     Returns robot, c1.. in µrad/(N m).
     """
-    rows = [{"robot": name} | _numbered("c", MICRO * robot.compliance) for name, robot in robots.items()]
+    rows = [{"robot": name} | _number_columns("c", MICRO * robot.compliance) for name, robot in robots.items()]
     return pd.DataFrame(rows)
 
 
@@ -43,19 +43,19 @@ def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray
         count = weights[robot] @ frame.configurations
         mean = weights[robot] @ (frame.configurations * frame["mean"]) / count
         std = np.sqrt(weights[robot] @ (frame.configurations * frame.mean_square) / count - mean**2)
-        single: dict[str, pd.Series] = {
-            "mean_mm": frame["mean"],
-            "std_mm": pd.Series(np.sqrt(frame.mean_square - frame["mean"] ** 2)),
-            "max_mm": frame.maximum,
-        }
         row: dict[str, str | float] = {"robot": robot}
         for name, values in (("mean_mm", mean), ("std_mm", std)):
             row |= _value_and_error(name, MILLI * values)
         row["max_mm"] = MILLI * frame.maximum.max()
-        for name, values in single.items():
-            row |= {f"{name}_one_set": MILLI * values.mean(), f"{name}_one_set_std": MILLI * values.std(ddof=1)}
+        for name, values in find_statistics(frame).items():
+            row |= {f"{name}_mm_one_set": MILLI * values.mean(), f"{name}_mm_one_set_std": MILLI * values.std(ddof=1)}
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def find_statistics(frame: pd.DataFrame) -> dict[str, pd.Series]:
+    """Mean, standard deviation and largest of the deflections of each data set, m, of the initial table or that of tubes."""
+    return {"mean": frame["mean"], "std": (frame.mean_square - frame["mean"] ** 2) ** 0.5, "max": frame.maximum}
 
 
 def table3(metrics: pd.DataFrame, robots: Iterable[str], strategy: str, noise_um: float, length: int) -> pd.DataFrame:
@@ -102,10 +102,10 @@ def table4(
                 name = f"k_sigma{suffix}"
                 row |= {f"k_sigma_{length}_percent{suffix}": at[name]}
                 row |= {f"k_sigma_{length}_percent{suffix}_std_error": at[f"{name}_std_error"]}
-                reached, error = reached_length(cell[name].to_numpy(), _curves(drawn, name), k_sigma_limit_percent)
+                reached, error = find_length(cell[name].to_numpy(), _curves(drawn, name), k_sigma_limit_percent)
                 row |= {f"n_k_sigma_{limit}{suffix}": reached, f"n_k_sigma_{limit}{suffix}_std_error": error}
             row |= {f"dev_{length}_um": MICRO * at.deviation, f"dev_{length}_um_std_error": MICRO * at.deviation_std_error}
-            reached, error = reached_length(cell.deviation.to_numpy(), _curves(drawn, "deviation"), deviation_limit_um / MICRO)
+            reached, error = find_length(cell.deviation.to_numpy(), _curves(drawn, "deviation"), deviation_limit_um / MICRO)
             row |= {f"n_dev_{deviation_limit_um:g}_um": reached, f"n_dev_{deviation_limit_um:g}_um_std_error": error}
             rows.append(row)
     return pd.DataFrame(rows)
@@ -236,7 +236,7 @@ def solver_summary(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def with_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
+def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
     """A table with the names of the strategies' files, which those of folders are, behind the names of strategies.
 
     `slugs`: names of files by the names of strategies.
@@ -246,7 +246,7 @@ def with_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
     ]
 
 
-def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
+def merge_errors(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
     """The same table for people: each value with its standard error behind a ± sign, an infinite length as "not reached".
 
     `digits`: significant digits of a value without error.
@@ -256,13 +256,13 @@ def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
         if column.endswith("_std_error"):
             continue
         errors = frame.get(f"{column}_std_error", pd.Series(np.nan, frame.index))
-        shown[column] = [worded(value, error, digits) for value, error in zip(frame[column], errors, strict=True)]
+        shown[column] = [word_value(value, error, digits) for value, error in zip(frame[column], errors, strict=True)]
     return pd.DataFrame(shown)
 
 
-def headed_rows(frame: pd.DataFrame) -> list[list[str]]:
+def list_rows(frame: pd.DataFrame) -> list[list[str]]:
     """The table for people as rows of words, its header first, with names of columns that break at blanks."""
-    shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set|strategy_file")])
+    shown = merge_errors(frame.loc[:, ~frame.columns.str.contains("_one_set|strategy_file")])
     return [[column_head(name) for name in shown.columns], *shown.to_numpy().tolist()]
 
 
@@ -288,7 +288,7 @@ _HEADS = (
 )
 
 
-def worded(value: float | str, error: float, digits: int = 3) -> str:
+def word_value(value: float | str, error: float, digits: int = 3) -> str:
     """A value for people, with two digits of its standard error.
 
     `error`: not a number or zero where there is none. `digits`: significant digits of a value without error.
@@ -329,7 +329,7 @@ def _curves(drawn: pd.DataFrame, name: str) -> np.ndarray:
     return drawn.pivot(index="replicate", columns="length", values=name).to_numpy()
 
 
-def _numbered(prefix: str, values: Iterable[float]) -> dict[str, float]:
+def _number_columns(prefix: str, values: Iterable[float]) -> dict[str, float]:
     return {f"{prefix}{j}": float(value) for j, value in enumerate(values, 1)}
 
 

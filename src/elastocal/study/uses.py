@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.inverse_kinematics import SOLVED_M, along_path, beyond_limits
+from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits
 from elastocal.study.experiments import Experiments
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def iso_9283(robot: Robot, centre_m: Sequence[float], edge_m: float, weight_N: f
     """
     reach = 0.5 * edge_m * (1 - 2 * _FROM_ENDS)
     corners = np.array([[0, 0, 0], [-1, -1, -1], [-1, 1, -1], [1, 1, 1], [1, -1, 1]])
-    return _loaded(robot, np.array(centre_m) + reach * corners, np.tile([0.0, 0.0, -weight_N], (5, 1)))
+    return _find_loaded(robot, np.array(centre_m) + reach * corners, np.tile([0.0, 0.0, -weight_N], (5, 1)))
 
 
 def milling_path(robot: Robot, centre_m: Sequence[float], length_m: float, cutting_N: float) -> Experiments | None:
@@ -48,11 +48,11 @@ def milling_path(robot: Robot, centre_m: Sequence[float], length_m: float, cutti
     along = np.array([0.0, 1.0, 0.0])
     position = np.array(centre_m) + length_m * np.linspace(-0.5, 0.5, _PATH_POSES)[:, None] * along
     force = cutting_N * np.sqrt(0.5) * (np.array([0.0, 0.0, 1.0]) - along)
-    return _loaded(robot, position, np.tile(force, (_PATH_POSES, 1)))
+    return _find_loaded(robot, position, np.tile(force, (_PATH_POSES, 1)))
 
 
-def _loaded(robot: Robot, position: np.ndarray, force: np.ndarray) -> Experiments | None:
+def _find_loaded(robot: Robot, position: np.ndarray, force: np.ndarray) -> Experiments | None:
     angles, left = along_path(robot, position, np.broadcast_to(_DOWN, (len(position), 3, 3)))
-    if (left > SOLVED_M).any() or beyond_limits(robot, angles).any():
+    if (left > SOLVED_M).any() or find_beyond_limits(robot, angles).any():
         return None
     return Experiments(angles[None], np.pad(force, ((0, 0), (0, 3)))[None])

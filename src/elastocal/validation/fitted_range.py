@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import blas
 
-from elastocal.campaigns.joint_space import beyond_range, repeated
+from elastocal.campaigns.joint_space import beyond_range, find_repeated
 from elastocal.counting import counted
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
@@ -67,8 +67,8 @@ def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
 
 
 def repeat_warnings(fitted_states: States | Measurements, states: States | Measurements) -> list[str]:
-    """What to say of poses for the test whose configurations were fitted as well, see `joint_space.repeated`; empty of none."""
-    again = repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
+    """What to say of poses for the test whose configurations were fitted as well, see `joint_space.find_repeated`, if any."""
+    again = find_repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
     if not again.any():
         return []
     many = counted(len(again), "validation pose")

@@ -15,6 +15,7 @@ import statsmodels.api as sm
 from scipy.stats import median_abs_deviation
 from statsmodels.stats.multitest import multipletests
 
+from elastocal.counting import spell_count
 from elastocal_proof.audit.findings import Finding, compare, require
 from elastocal_proof.audit.questions import estimate, simulate
 from elastocal_proof.audit.scores import errors_of, judge_on, weights_of
@@ -34,14 +35,12 @@ _LEVEL = 0.05
 # Monte Carlo standard errors: one value in 30,000 is further off by chance.
 _SIGMAS = 4.0
 _VERDICTS = {"holds", "holds in part", "does not hold"}
-# Numbers of reflectors by what a table calls them.
-_COUNTED = {1: "one reflector", 3: "three reflectors"}
 
 
 def table4_studies(run: Audited) -> _Rows:
     length, limits = run.configuration["tables"]["length"], run.configuration["tables"]
     of = {"pose": _USUAL} | {
-        _COUNTED.get(len(some["reflectors_m"]), f"{len(some['reflectors_m'])} reflectors"): name
+        spell_count(len(some["reflectors_m"]), "reflector"): name
         for name, some in run.configuration["switched"].items()
         if "reflectors_m" in some
     }

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import predicted
-from elastocal.application.calibrated import OperatingConditions, calibrated_from, nominal_forward
-from elastocal.application.compensation import corrected
-from elastocal.application.inverse_kinematics import SOLVED_M, beyond_limits, refined
+from elastocal.application.accuracy import predict_errors
+from elastocal.application.calibrated import OperatingConditions, calibrate_by_fit, nominal_forward
+from elastocal.application.compensation import find_joint_targets
+from elastocal.application.inverse_kinematics import SOLVED_M, find_beyond_limits, refine
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import without_gross_errors
 from elastocal.diagnosis.settings import Settings
@@ -123,8 +123,8 @@ def closed_loop(
     operating = OperatingConditions(wanted.wrench)
     rows = []
     models = {
-        GEOMETRY: calibrated_from(_geometry(training, found), replace(robot, masses=())),
-        DECLARED: calibrated_from(found.declared, robot),
+        GEOMETRY: calibrate_by_fit(_geometry(training, found), replace(robot, masses=())),
+        DECLARED: calibrate_by_fit(found.declared, robot),
         FOUND: calibrated_by(found, without_gross_errors(found, held_out)[1]),
     }
     for name in MODELS:
@@ -214,9 +214,9 @@ def bow(robot: Robot, length_m: float, count: int, draws: np.random.Generator) -
         at, turned = nominal_forward(robot, robot.reported_angles(middle))
         position = at + length_m * (share * ahead + share**2 * aside)
         rotation = np.broadcast_to(turned, (count, 3, 3))
-        angles, left = refined(robot, position, rotation, np.repeat(middle, count, axis=0))
+        angles, left = refine(robot, position, rotation, np.repeat(middle, count, axis=0))
         smooth = np.abs(np.diff(angles, axis=0)).max() < 0.1
-        if left.max() < SOLVED_M and not beyond_limits(robot, angles).any() and smooth:
+        if left.max() < SOLVED_M and not find_beyond_limits(robot, angles).any() and smooth:
             return position, rotation, robot.reported_angles(angles)
     raise RuntimeError(f"{robot.name}: no posture in {_TRIES} in which the path lies within the limits")
 
@@ -224,8 +224,8 @@ def bow(robot: Robot, length_m: float, count: int, draws: np.random.Generator) -
 def _by_model(
     calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    found = corrected(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
-    return found.joint_angles, predicted(calibrated, found.joint_angles, operating, draws=0).error_m, found.status == OK
+    found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+    return found.joint_angles, predict_errors(calibrated, found.joint_angles, operating, draws=0).error_m, found.status == OK
 
 
 def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -56,7 +56,8 @@ class Signals:
 
 def limit_of_sample(truth: Mapping[str, Any], robots_folder: str | Path) -> dict[str, Any] | None:
     """As `limit`, of a case that is in the sample; None of others. `truth`: a sealed document."""
-    case = Case(**{name: tuple(value) if isinstance(value, list) else value for name, value in truth["case"].items()})
+    stated = truth["case"]
+    case = Case(**stated | {name: tuple(stated[name]) for name in ("effects", "levels")})
     drawn = stream(case.seed, "sample of the limit").random() < _SHARE
     absorbed = any(defect["of"] == "raw" for defect in truth["defects"])
     if not drawn or absorbed or case.levels[:1] not in {(level,) for level in _SAMPLED.get(case.group, ())}:

@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
-from elastocal.application.accuracy import absorbed, placement, predicted, scope_about
+from elastocal.application.accuracy import find_absorbed, placement, predict_errors, scope_about
 from elastocal.application.calibrated import OperatingConditions
-from elastocal.application.compensation import corrected
+from elastocal.application.compensation import find_joint_targets
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import without_gross_errors
 from elastocal.diagnosis.settings import Settings
@@ -52,7 +52,7 @@ def stated_accuracy(
     calibrated = calibrated_by(found, without_gross_errors(found, held_out)[1])
     wanted = wanted_poses(training.campaign.robot, plant, seed)
     operating = OperatingConditions(wanted.wrench)
-    targets = corrected(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+    targets = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
     good = targets.status == OK
     off = reached(plant, targets.joint_angles, wanted.wrench, seed + 1)[0] - wanted.position
     if frame != "base":
@@ -61,7 +61,7 @@ def stated_accuracy(
     rows = []
     for part, members in PARTS.items():
         mine = good & np.isin(wanted.part, members)
-        prediction = predicted(calibrated, targets.joint_angles[mine], operating.part(mine))
+        prediction = predict_errors(calibrated, targets.joint_angles[mine], operating.part(mine))
         stated, distance = prediction.accuracy(part), np.linalg.norm(off[mine], axis=1)
         decided = predicted_conformity(prediction.rms_m, stated.poses, tolerance, _RISK)
         rows.append(
@@ -108,5 +108,5 @@ def _placed(off: np.ndarray, wanted: Wanted, over: np.ndarray) -> np.ndarray:
     """Errors (N, 3) less the rigid motion that explains most of some of them."""
     columns = placement(scope_about(wanted.position[over]), wanted.position, wanted.rotation)
     field = np.concatenate([off, np.zeros_like(off)], axis=1)[..., None]
-    motion = absorbed(columns[over], field[over], np.repeat([True, True, False, False], 3))
+    motion = find_absorbed(columns[over], field[over], np.repeat([True, True, False, False], 3))
     return (field - columns @ motion)[:, :3, 0]

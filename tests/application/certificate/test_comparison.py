@@ -7,9 +7,9 @@ import pytest
 from made_calibrated import USUAL, made_calibrated
 from scipy.stats import binom
 
-from elastocal.application.accuracy import without_rigid_motion
-from elastocal.application.certificate.comparison import compared
-from elastocal.application.certificate.workspace import drawn_angles
+from elastocal.application.accuracy import remove_rigid_motion
+from elastocal.application.certificate.comparison import compare_campaigns
+from elastocal.application.certificate.workspace import draw_angles
 from elastocal.errors import InputError
 from elastocal.fitting.parameters import stepped
 
@@ -23,8 +23,8 @@ def measured_again(calibrated, rng):
 
 
 def comparison(before, after, seed=0, poses=60):
-    angles = drawn_angles(before, poses, np.random.default_rng(5))
-    return compared(before, after, angles, DRAWS, np.random.default_rng(seed))
+    angles = draw_angles(before, poses, np.random.default_rng(5))
+    return compare_campaigns(before, after, angles, DRAWS, np.random.default_rng(seed))
 
 
 @pytest.fixture(scope="module")
@@ -68,9 +68,9 @@ def test_a_base_that_was_set_up_elsewhere_is_no_change():
     rng = np.random.default_rng(2)
     position = rng.standard_normal((50, 3))
     moved = 1e-4 * np.cross([0.3, -0.2, 0.5], position) + [1e-3, 2e-3, -1e-3]
-    np.testing.assert_allclose(without_rigid_motion(moved, position), 0.0, atol=1e-15)
+    np.testing.assert_allclose(remove_rigid_motion(moved, position), 0.0, atol=1e-15)
     stretched = position * [1e-3, 0, 0]
-    assert np.abs(without_rigid_motion(stretched, position)).max() > 1e-4
+    assert np.abs(remove_rigid_motion(stretched, position)).max() > 1e-4
 
 
 def test_campaigns_that_identify_other_parameters_are_compared_as_a_whole_alone(calibrated, fanuc):

@@ -15,7 +15,7 @@ TARGETS = (Target("A", "6DoF", (0.0, 0.0, 0.0)), Target("B", "3DoF", (0.0, 0.0, 
 NOISE_M = 50e-6
 
 
-def measured(fanuc, poses, repeats, seed=0, rows=3, noise=NOISE_M):
+def measure(fanuc, poses, repeats, seed=0, rows=3, noise=NOISE_M):
     model = made_model(fanuc.chain, TARGETS, rows, fitted_frames=False, compliance=fanuc.compliance)
     return made_measurements(model, np.random.default_rng(seed), poses, repeats, noise, 0.0, 30e-6)
 
@@ -23,7 +23,7 @@ def measured(fanuc, poses, repeats, seed=0, rows=3, noise=NOISE_M):
 @pytest.mark.parametrize("repeats", [2, 4, 30])
 def test_noise_alone_has_the_repeatability_of_a_chi_distribution(fanuc, repeats):
     """3600 lengths: 5 % is three standard errors. Without the degree of freedom, two repeats give 30 % less."""
-    found = repeatability(measured(fanuc, 3600 // repeats, repeats), TARGETS, "6DoF")
+    found = repeatability(measure(fanuc, 3600 // repeats, repeats), TARGETS, "6DoF")
     expected = (chi.mean(3) + 3 * chi.std(3)) * NOISE_M
     # Of two repeats both lengths are the same one.
     assert found.position_m == pytest.approx(expected, rel=0.05)
@@ -34,18 +34,18 @@ def test_noise_alone_has_the_repeatability_of_a_chi_distribution(fanuc, repeats)
 def test_ten_poses_of_four_have_an_interval_that_holds_the_value(fanuc):
     """95 % of 60; 50 or fewer have a probability of 2e-4 there, and of 0.5 where it held 84 %."""
     expected = of_sensor(NOISE_M)
-    found = [repeatability(measured(fanuc, 10, 4, seed), TARGETS, "6DoF").position_interval_m for seed in range(60)]
+    found = [repeatability(measure(fanuc, 10, 4, seed), TARGETS, "6DoF").position_interval_m for seed in range(60)]
     assert sum(low <= expected <= high for low, high in found) > 50
 
 
 def test_orientations_count_where_they_are_measured(fanuc):
-    assert repeatability(measured(fanuc, 10, 4), TARGETS, "6DoF").orientation_rad is None
-    found = repeatability(measured(fanuc, 600, 6, rows=6), TARGETS, "6DoF")
+    assert repeatability(measure(fanuc, 10, 4), TARGETS, "6DoF").orientation_rad is None
+    found = repeatability(measure(fanuc, 600, 6, rows=6), TARGETS, "6DoF")
     assert found.orientation_rad == pytest.approx(of_sensor(30e-6), rel=0.05)
 
 
 def test_only_targets_of_the_end_effector_count_unless_there_is_none(fanuc):
-    data = measured(fanuc, 20, 4)
+    data = measure(fanuc, 20, 4)
     off = (
         np.where((data.target == 1)[:, None], 100.0, 1.0) * 1e-4 * np.random.default_rng(1).standard_normal(data.position.shape)
     )
@@ -55,11 +55,11 @@ def test_only_targets_of_the_end_effector_count_unless_there_is_none(fanuc):
 
 
 def test_without_repeats_nothing_is_known(fanuc):
-    assert repeatability(measured(fanuc, 5, 1), TARGETS, "6DoF") is None
-    assert repeatability(measured(fanuc, 1, 5), TARGETS, "6DoF") is None
+    assert repeatability(measure(fanuc, 5, 1), TARGETS, "6DoF") is None
+    assert repeatability(measure(fanuc, 1, 5), TARGETS, "6DoF") is None
 
 
 def test_where_the_robot_stands_and_how_it_is_turned_does_not_matter(fanuc):
-    data = measured(fanuc, 10, 4)
+    data = measure(fanuc, 10, 4)
     turned = replace(data, position=Rotation.from_rotvec([0.3, 0.2, 0.1]).apply(data.position) + 7.0)
     assert repeatability(turned, TARGETS, "6DoF").position_m == pytest.approx(repeatability(data, TARGETS, "6DoF").position_m)

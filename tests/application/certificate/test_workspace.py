@@ -9,7 +9,7 @@ from scipy.stats import chi, norm
 
 from elastocal.application.accuracy import quantile_of_length
 from elastocal.application.calibrated import NEUTRAL, forward, nominal_forward
-from elastocal.application.certificate.workspace import drawn_angles, workspace_errors
+from elastocal.application.certificate.workspace import draw_angles, workspace_errors
 from elastocal.fitting.parameters import stepped
 
 
@@ -20,7 +20,7 @@ def calibrated(fanuc):
 
 
 def found_for(calibrated, count=300):
-    angles = drawn_angles(calibrated, count, np.random.default_rng(0))
+    angles = draw_angles(calibrated, count, np.random.default_rng(0))
     return workspace_errors(calibrated, angles, np.zeros(6), calibrated.robot.model_angles(angles[: count // 2]))
 
 

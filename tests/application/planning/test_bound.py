@@ -7,7 +7,7 @@ from made_surveys import made_rows
 
 from elastocal.application.planning.bound import best_value, efficiency
 from elastocal.application.planning.criteria import CRITERIA, criterion
-from elastocal.application.planning.exchange import exchanged, greedy, matrix_of
+from elastocal.application.planning.exchange import choose_greedily, exchange_candidates, matrix_of
 
 PLACES = made_rows(7, 3, 5, 2).astype(float)
 
@@ -28,7 +28,7 @@ def best_by_cvxpy(rows, count, rule):
 @pytest.mark.parametrize("kind", CRITERIA)
 def test_the_bound_is_the_optimum_of_the_continuous_design(kind):
     rows, rule = made_rows(20, 3, 5, 4), criterion(kind, PLACES)
-    chosen = exchanged(rows, greedy(rows, 4, rule), rule)
+    chosen = exchange_candidates(rows, choose_greedily(rows, 4, rule), rule)
     bound, best = best_value(rows, 4, rule, chosen), best_by_cvxpy(rows, 4, rule)
     value = rule.value(matrix_of(rows, chosen))
     assert value <= best + 1e-6
@@ -38,7 +38,7 @@ def test_the_bound_is_the_optimum_of_the_continuous_design(kind):
 
 def test_the_best_design_is_efficient_and_a_poor_one_is_not():
     rows, rule = made_rows(20, 3, 5, 4), criterion("D", PLACES)
-    chosen = exchanged(rows, greedy(rows, 4, rule), rule)
+    chosen = exchange_candidates(rows, choose_greedily(rows, 4, rule), rule)
     bound = best_value(rows, 4, rule, chosen)
     assert 0.7 < efficiency(rule, matrix_of(rows, chosen), bound) <= 1.0
     poor = np.argsort(rule.gains(rows, np.eye(5)))[:4]

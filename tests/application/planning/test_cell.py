@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_surveys import made_survey
 
-from elastocal.application.planning.cell import Cell, allowed, link_points
+from elastocal.application.planning.cell import Cell, find_allowed, link_points
 from elastocal.mechanics.kinematics import poses
 
 EVERYWHERE = np.array([[-5.0, 5.0], [-5.0, 5.0], [-5.0, 5.0]])
@@ -28,13 +28,13 @@ def test_the_links_end_where_the_chain_ends(survey, angles):
 
 
 def test_nothing_is_allowed_in_a_box_around_everything_and_all_far_from_it(survey, angles):
-    assert not allowed(Cell((EVERYWHERE,), None, 0.05), survey.robot, survey.targets, angles)["boxes"].any()
-    assert allowed(Cell((EVERYWHERE + 20.0,), None, 0.05), survey.robot, survey.targets, angles)["boxes"].all()
+    assert not find_allowed(Cell((EVERYWHERE,), None, 0.05), survey.robot, survey.targets, angles)["boxes"].any()
+    assert find_allowed(Cell((EVERYWHERE + 20.0,), None, 0.05), survey.robot, survey.targets, angles)["boxes"].all()
 
 
 def test_below_a_floor_no_link_comes(survey, angles):
     floor = np.array([[-9.0, 9.0], [-9.0, 9.0], [-9.0, 0.0]])
-    fine = allowed(Cell((floor,), None, 0.05), survey.robot, survey.targets, angles)["boxes"]
+    fine = find_allowed(Cell((floor,), None, 0.05), survey.robot, survey.targets, angles)["boxes"]
     lowest = link_points(survey.robot, survey.robot.model_angles(angles))[..., 2].min(axis=0)
     assert 0.02 < fine.mean() < 0.98
     np.testing.assert_array_equal(fine, lowest >= 0.05)
@@ -49,6 +49,6 @@ def test_a_target_behind_the_arm_is_hidden_and_one_before_it_is_seen(survey, ang
         if np.linalg.norm(target[number] - elbow[number]) < 0.4:
             continue
         behind = Cell((), elbow[number] - 3.0 * out[number], 0.08)
-        assert not allowed(behind, survey.robot, survey.targets, angles[number : number + 1])["sight"][0]
+        assert not find_allowed(behind, survey.robot, survey.targets, angles[number : number + 1])["sight"][0]
     lone = Cell((), np.array([0.0, 0.0, 500.0]), 1e-6)
-    assert allowed(lone, survey.robot, survey.targets, angles)["sight"].all()
+    assert find_allowed(lone, survey.robot, survey.targets, angles)["sight"].all()

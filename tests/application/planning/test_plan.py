@@ -9,7 +9,14 @@ from made_surveys import OPEN, PULL, made_candidates, made_survey
 from planned_robots import ROBOTS as PLANNED
 
 from elastocal.application.planning.cell import Cell
-from elastocal.application.planning.plan import Candidates, Loads, allowed_candidates, planned, poses_needed, tour
+from elastocal.application.planning.plan import (
+    Candidates,
+    Loads,
+    choose_plan,
+    count_needed_poses,
+    find_allowed_candidates,
+    tour,
+)
 from elastocal.campaigns.campaign import Target
 from elastocal.errors import InputError
 from elastocal.mechanics.robot_file import robot_from_document
@@ -27,14 +34,14 @@ def some(survey):
 
 @pytest.mark.parametrize("kind", ["D", "A", "I"])
 def test_a_plan_is_better_than_random_designs(survey, some, kind):
-    plan = planned(survey, some, 16, 5, kind, 1)
+    plan = choose_plan(survey, some, 16, 5, kind, 1)
     assert plan.accuracy_m[-1] < np.quantile(plan.random_m[:, -1], 0.5)
     assert 0.2 < plan.efficiency <= 1.0
     assert (np.diff(plan.accuracy_m) <= 1e-12).all()
 
 
 def test_held_out_poses_are_none_of_the_fitted(survey, some):
-    plan = planned(survey, some, 16, 5, "D", 1)
+    plan = choose_plan(survey, some, 16, 5, "D", 1)
     both = np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles])
     assert len(np.unique(both, axis=0)) == 21
     assert len(plan.held_out.force) == 5
@@ -46,7 +53,7 @@ def test_candidates_lie_within_the_limits_and_the_loads_pull_or_hang(survey, som
     angles = robot.model_angles(some.joint_angles)
     assert (angles >= low).all() and (angles <= high).all()
     np.testing.assert_allclose(np.linalg.norm(some.force, axis=1), 100.0)
-    hung = allowed_candidates(survey, OPEN, Loads(50.0, False), 20, 1)
+    hung = find_allowed_candidates(survey, OPEN, Loads(50.0, False), 20, 1)
     np.testing.assert_allclose(hung.force, np.tile([0, 0, -50.0], (20, 1)))
     assert Loads(0.0, False).shares == (0.0,) and PULL.shares == (0.0, 1.0, -1.0)
 
@@ -54,20 +61,20 @@ def test_candidates_lie_within_the_limits_and_the_loads_pull_or_hang(survey, som
 def test_a_box_around_the_robot_is_refused(survey):
     everywhere = Cell((np.array([[-5.0, 5.0]] * 3),), None, 0.1)
     with pytest.raises(InputError, match="no room"):
-        allowed_candidates(survey, everywhere, PULL, 50, 1)
+        find_allowed_candidates(survey, everywhere, PULL, 50, 1)
 
 
 def test_a_tracker_inside_of_the_robot_is_refused(survey):
     inside = Cell((), np.array([0.0, 0.0, 0.13]), 0.02)
     with pytest.raises(InputError, match="sees the targets in none"):
-        allowed_candidates(survey, inside, PULL, 50, 1)
+        find_allowed_candidates(survey, inside, PULL, 50, 1)
 
 
 def test_too_few_poses_are_refused_with_how_many_it_takes(survey, some):
     with pytest.raises(InputError, match="at least"):
-        planned(survey, some, 2, 5, "D", 1)
+        choose_plan(survey, some, 2, 5, "D", 1)
     with pytest.raises(InputError, match="more candidates"):
-        planned(survey, some, 598, 5, "D", 1)
+        choose_plan(survey, some, 598, 5, "D", 1)
 
 
 def test_targets_that_no_joint_moves_are_refused(survey, some):
@@ -76,7 +83,7 @@ def test_targets_that_no_joint_moves_are_refused(survey, some):
         still = replace(survey, robot=robot, targets=(target,), shares=(0.0,), unknown_base=False)
         turns = Candidates(np.linspace(-1.0, 1.0, 60)[:, None], np.zeros((60, 3)))
         with pytest.raises(InputError, match="no joint moves"):
-            planned(still, turns, 16, 5, "D", 1)
+            choose_plan(still, turns, 16, 5, "D", 1)
 
 
 def test_a_tour_is_no_longer_than_the_order_in_which_poses_were_drawn():
@@ -92,5 +99,5 @@ def test_a_tour_is_no_longer_than_the_order_in_which_poses_were_drawn():
 
 
 def test_poses_needed_are_the_first_that_are_enough():
-    assert poses_needed(np.array([3.0, 2.0, 1.0]), 2.0) == 2
-    assert poses_needed(np.array([3.0, 2.0, 1.0]), 0.5) is None
+    assert count_needed_poses(np.array([3.0, 2.0, 1.0]), 2.0) == 2
+    assert count_needed_poses(np.array([3.0, 2.0, 1.0]), 0.5) is None

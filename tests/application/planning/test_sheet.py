@@ -5,20 +5,20 @@ import yaml
 from analysed_robots import ROBOTS
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.plan import planned
+from elastocal.application.planning.plan import choose_plan
 from elastocal.application.planning.sheet import REPEATED_POSES, REPEATS, campaign_document, sheet
 from elastocal.campaigns.measurements import TICK
 from elastocal.campaigns.reading import read_campaign
 from elastocal_proof.blind.rehearsal import filled_sheet, hidden_robot
 
 
-def made():
+def make_plan():
     survey = made_survey()
-    return survey, planned(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    return survey, choose_plan(survey, made_candidates(survey, 300), 14, 4, "D", 1)
 
 
 def test_each_state_of_each_pose_is_a_row_and_the_first_poses_are_repeated():
-    survey, plan = made()
+    survey, plan = make_plan()
     table = sheet(survey, plan)
     assert len(table) == 3 * 18 + 2 * (REPEATS - 1) * REPEATED_POSES
     assert table[["x", "y", "z"]].isna().all().all() and "rx" not in table
@@ -27,7 +27,7 @@ def test_each_state_of_each_pose_is_a_row_and_the_first_poses_are_repeated():
 
 
 def test_a_filled_sheet_is_a_campaign_that_holds_out_its_random_poses(tmp_path):
-    survey, plan = made()
+    survey, plan = make_plan()
     document = campaign_document("cell", "ur10", survey, plan)
     (tmp_path / "campaign.yaml").write_text(yaml.safe_dump(document))
     robot, _ = hidden_robot(ROBOTS / "ur10.yaml", 1, ["payload"])
@@ -39,7 +39,7 @@ def test_a_filled_sheet_is_a_campaign_that_holds_out_its_random_poses(tmp_path):
 
 
 def test_angles_of_a_sheet_are_those_that_a_controller_shows_and_each_row_can_be_ticked():
-    survey, plan = made()
+    survey, plan = make_plan()
     table = sheet(survey, plan)
     assert (table[TICK] == "").all()
     for joint in range(1, 7):

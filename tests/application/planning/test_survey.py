@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.survey import accuracy_rows, information, model_of, observed
+from elastocal.application.planning.survey import accuracy_rows, information, model_of, observe
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
@@ -24,7 +24,7 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
         replace(e, parameters=tuple(replace(p, prior_std=p.plausible) for p in e.parameters)) for e in model.effects[1:]
     )
     model = replace(model, effects=(model.effects[0], *effects))
-    seen = observed(survey, some.joint_angles, some.force)
+    seen = observe(survey, some.joint_angles, some.force)
     position, rotation = predict(model, estimate, seen, conditions(model, estimate, seen.states))
     exact = replace(seen, position=position, rotation=None if seen.rotation is None else rotation)
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(6))
@@ -72,6 +72,6 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
 def test_every_target_is_seen_under_every_share_in_the_order_of_the_rows():
     survey = made_survey()
     some = made_candidates(survey, 2)
-    seen = observed(survey, some.joint_angles, some.force)
+    seen = observe(survey, some.joint_angles, some.force)
     assert seen.state.tolist() == [0, 1, 2, 3, 4, 5]
     np.testing.assert_allclose(seen.states.wrench[[1, 2], :3], [some.force[0], -some.force[0]])

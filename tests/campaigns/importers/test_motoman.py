@@ -19,7 +19,7 @@ def rows(poses=POSES, images=3, seed=1):
     return draws.permutation(np.repeat(each, images, axis=0))
 
 
-def written(path, values, name="dataset"):
+def write_mat(path, values, name="dataset"):
     scipy.io.savemat(path, {name: values})
     return path
 
@@ -27,7 +27,7 @@ def written(path, values, name="dataset"):
 def test_each_pose_counts_once_and_those_that_nobody_saw_not_at_all(tmp_path, config_folder):
     values = rows()
     values[values[:, 0] == 4, 19:] = np.nan
-    path = written(tmp_path / "some.mat", values)
+    path = write_mat(tmp_path / "some.mat", values)
     angles, position = motoman.read(path)
     assert len(angles) == POSES - 1
     first = values[np.unique(values[:, 0], return_index=True)[1]]
@@ -42,13 +42,13 @@ def test_each_pose_counts_once_and_those_that_nobody_saw_not_at_all(tmp_path, co
 
 
 def test_the_pose_that_the_source_itself_leaves_out_is_left_out(tmp_path):
-    angles, _ = motoman.read(written(tmp_path / "all.mat", rows(587, images=1)))
+    angles, _ = motoman.read(write_mat(tmp_path / "all.mat", rows(587, images=1)))
     kept = rows(587, images=1)
     kept = kept[np.argsort(kept[:, 0])]
     np.testing.assert_array_equal(angles, np.delete(kept, 12, axis=0)[:, 7:13])
 
 
-def turned(values):
+def turn(values):
     values[:, 6] = 0.5
     return values
 
@@ -57,11 +57,11 @@ def turned(values):
     ("values", "key"),
     [
         (rows()[:, :20], "dataset: found shape"),
-        (turned(rows()), "a turntable at 0.5 rad"),
+        (turn(rows()), "a turntable at 0.5 rad"),
         (np.full((4, 26), np.nan), "no pose with angles and a position"),
     ],
 )
 def test_what_is_wrong_is_refused_in_one_line(tmp_path, values, key):
-    path = written(tmp_path / "wrong.mat", values)
+    path = write_mat(tmp_path / "wrong.mat", values)
     with refused(path, key):
         motoman.read(path)

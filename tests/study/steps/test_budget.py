@@ -5,11 +5,10 @@ import pytest
 from made_studies import USUAL
 from made_study_blocks import deflections_of, experiments_of, identified, judge
 
-from elastocal.study.interpretation import Size
 from elastocal.study.metrics import position_errors
 from elastocal.study.steps.bound import bound_blocks
 from elastocal.study.steps.budget import budget_blocks
-from elastocal.study.steps.in_memory import StudyInMemory
+from elastocal.study.steps.in_memory import Size, StudyInMemory
 
 POINT_SETS = {"6DoF": ["6DoF"], "6DoF twice": ["6DoF", "6DoF"], "3+6DoF": ["3DoF", "6DoF"]}
 SIZE = Size(data_sets=40, configurations=6, tests=30, noise=1e-5)

@@ -15,11 +15,11 @@ from made_study_blocks import (
 )
 
 from elastocal.mechanics.robot import with_target_offset
-from elastocal.study.steps.evaluate import evaluated
+from elastocal.study.steps.evaluate import evaluate_strategy
 from elastocal.study.steps.weights import weight_blocks
 
 
-def same_estimates(robot, factors, sets=12):
+def make_same_estimates(robot, factors, sets=12):
     """The identified table of data sets that all give the same compliances: this factor of the nominal ones at each length."""
     lengths = len(factors)
     table = {"data_set": np.repeat(np.arange(sets), lengths), "length": np.tile(np.arange(1, lengths + 1), sets)}
@@ -37,7 +37,7 @@ def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
 
     scores = judge(kuka)
     whole, parts = (
-        evaluated(cut(table, 4, c), cut(counts, 10, c), tests, scores, (0,), "stiffness", "averaged_model", [2, 4])
+        evaluate_strategy(cut(table, 4, c), cut(counts, 10, c), tests, scores, (0,), "stiffness", "averaged_model", [2, 4])
         for c in ((0, 12), (0, 1, 7, 12))
     )
     for one, other in zip(whole, parts, strict=True):
@@ -57,7 +57,7 @@ def test_exact_estimates_of_a_target_off_the_flange_have_no_error(kuka):
 
 def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
     metrics, replicates, accuracy = evaluated_in_one_block(
-        same_estimates(kuka, (2.0, 1.25)), judge(kuka), (0, 1), "stiffness", 10, [2]
+        make_same_estimates(kuka, (2.0, 1.25)), judge(kuka), (0, 1), "stiffness", 10, [2]
     )
     # k / k0 - 1 = 1 / 1.25 - 1 = -20 % in each of six joints, of which two are fixed in the last stage; twice as soft, -50 %.
     assert metrics["length"].tolist() == [1, 2]
@@ -77,7 +77,7 @@ def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
 
 def test_a_quarter_too_large_leaves_about_a_quarter_of_the_deflection_and_twice_as_large_all_of_it(kuka):
     scores = judge(kuka)
-    metrics, _, accuracy = evaluated_in_one_block(same_estimates(kuka, (2.0, 1.25)), scores, (0,), "stiffness", 10, [1, 2])
+    metrics, _, accuracy = evaluated_in_one_block(make_same_estimates(kuka, (2.0, 1.25)), scores, (0,), "stiffness", 10, [1, 2])
     # The deflection is linear in the compliances to second order in turns of some milliradians.
     np.testing.assert_allclose(metrics["deviation"] / metrics["initial_deviation"], [1.0, 0.25], rtol=0.01)
     np.testing.assert_allclose(accuracy["mean"], metrics["deviation"], rtol=1e-9)
@@ -85,14 +85,14 @@ def test_a_quarter_too_large_leaves_about_a_quarter_of_the_deflection_and_twice_
 
 
 def test_accuracy_is_of_the_lengths_asked_for_and_of_no_others(kuka):
-    table = same_estimates(kuka, (2.0, 1.5, 1.25, 1.1))
+    table = make_same_estimates(kuka, (2.0, 1.5, 1.25, 1.1))
     accuracy = evaluated_in_one_block(table, judge(kuka), (0,), "compliance", 10, [4, 2])[2]
     assert accuracy["length"].tolist() == [4, 2]
     np.testing.assert_allclose(accuracy["relative_error_3"], [10.0, 50.0], rtol=1e-9)
 
 
 def test_one_compliance_that_is_not_positive_makes_a_length_untrustworthy(kuka):
-    table = same_estimates(kuka, (1.0, 1.0), sets=10)
+    table = make_same_estimates(kuka, (1.0, 1.0), sets=10)
     table["c5"][4] *= -1.0
     metrics = evaluated_in_one_block(table, judge(kuka), (0,), "stiffness", 10, [1])[0]
     np.testing.assert_allclose(metrics["nonpositive_share"], [0.1, 0.0])
@@ -108,4 +108,4 @@ def test_initial_errors_are_the_displacements_of_the_end_effector(kuka):
 def test_weights_with_another_number_of_blocks_are_not_used(kuka):
     *counts, tests = weight_blocks("kuka", 1, 12, CONFIGURATIONS_OF_THE_TEST, 10)
     with pytest.raises(ValueError, match="zip"):
-        evaluated([], counts, tests, judge(kuka), (0,), "stiffness", "averaged_model", [1])
+        evaluate_strategy([], counts, tests, judge(kuka), (0,), "stiffness", "averaged_model", [1])

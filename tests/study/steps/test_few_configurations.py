@@ -22,7 +22,7 @@ def both(strategies):
 def test_shrunk_estimates_are_those_of_ridge_regression(kuka, both):
     study = few_of(kuka)
     (plain, shrunk) = list(few_blocks(study, both, [0.2]))
-    measured = study.measured(np.arange(6), ("6DoF",))["6DoF"]
+    measured = study.measure(np.arange(6), ("6DoF",))["6DoF"]
     normal = draw(1, "kuka", "nominal compliances", range(6), lambda stream: stream.standard_normal(6))
     for number in (0, 5):
         for length in (1, 4):

@@ -1,6 +1,6 @@
 """Data sets in memory are those of the pipeline, by number."""
 
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -19,21 +19,21 @@ def study_of(robot):
 
 def test_data_sets_of_studies_follow_on_each_other_without_overlap(kuka):
     """The first study after that of the tables begins where its data sets end."""
-    later = study_of(kuka).measured(np.arange(4, 8), ("6DoF",))["6DoF"]
-    whole = study_of(kuka).measured(np.arange(8), ("6DoF",))["6DoF"]
+    later = study_of(kuka).measure(np.arange(4, 8), ("6DoF",))["6DoF"]
+    whole = study_of(kuka).measure(np.arange(8), ("6DoF",))["6DoF"]
     np.testing.assert_array_equal(later.deflection, whole.deflection[..., 4:])
     assert len(np.unique(whole.deflection[0, 0])) == 8
 
 
 def test_measurements_are_those_of_the_pipelines_steps(kuka):
     (block,) = deflections_of(kuka, experiments_of(kuka, 4, 5), SIZE.noise)["3DoF"]
-    found = study_of(kuka).measured(np.arange(4), ("3DoF",))["3DoF"]
+    found = study_of(kuka).measure(np.arange(4), ("3DoF",))["3DoF"]
     np.testing.assert_allclose(np.moveaxis(found.deflection, (0, 1), (2, 1)), to_deflections(block), rtol=1e-12)
 
 
 def test_another_measurement_of_the_same_configurations_has_noise_of_its_own(kuka):
     study, given = study_of(kuka), (np.arange(4), ("6DoF",))
-    once, again = study.measured(*given)["6DoF"], study.measured(*given, "/again")["6DoF"]
+    once, again = study.measure(*given)["6DoF"], study.measure(*given, "/again")["6DoF"]
     np.testing.assert_array_equal(once.regressor, again.regressor)
     # Of two independent ones: 120 numbers, whose standard deviation has an error of 7 %.
     assert 1.6e-5 > (once.deflection - again.deflection).std() > 1.2e-5
@@ -48,9 +48,15 @@ def test_the_score_sheet_of_the_study_of_the_tables_is_the_pipelines(kuka):
 def test_a_reflector_is_a_target_that_the_point_carries(kuka, point):
     offset, size = (0.1, -0.1, 0.05), replace(SIZE, noise=0.0)
     carried = replace(USUAL, rows=3, reflectors_m=(offset, (0.0, 0.0, 0.0)))
-    found = StudyInMemory(kuka, "kuka", 1, carried, size).measured(np.arange(4), (point,))[point]
+    found = StudyInMemory(kuka, "kuka", 1, carried, size).measure(np.arange(4), (point,))[point]
     alone = StudyInMemory(with_target_offset(kuka, offset), "kuka", 1, replace(USUAL, rows=3), size)
-    expected = alone.measured(np.arange(4), (point,))[point]
+    expected = alone.measure(np.arange(4), (point,))[point]
     np.testing.assert_allclose(found.deflection[:3], expected.deflection, atol=1e-12)
     np.testing.assert_allclose(found.regressor[:3], expected.regressor, rtol=1e-9, atol=1e-9)
     assert found.deflection.shape[0] == 6 and carried.independent_rows == 6
+
+
+@pytest.mark.parametrize(("what", "name"), [(USUAL, "average"), (SIZE, "noise")])
+def test_how_the_paper_is_read_and_how_large_a_study_is_are_frozen(what, name):
+    with pytest.raises(FrozenInstanceError):
+        setattr(what, name, None)

@@ -12,7 +12,7 @@ from elastocal.study.steps.simulate import ideal_blocks
 COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
 
 
-def nothing_deflected(sets, configurations, point="6DoF"):
+def make_zeros(sets, configurations, point="6DoF"):
     columns = index_columns(sets, configurations)
     rows = len(columns["data_set"])
     return {"point": np.full(rows, point, dtype=object)} | columns | {name: np.zeros(rows) for name in COMPONENTS}
@@ -36,7 +36,7 @@ def test_no_noise_leaves_the_ideal_deflections(kuka):
 
 
 def test_noise_has_the_wanted_standard_deviation_in_every_component():
-    (block,) = measured_blocks([nothing_deflected(range(50), 20)], "kuka", 1, 2e-4)
+    (block,) = measured_blocks([make_zeros(range(50), 20)], "kuka", 1, 2e-4)
     # Two-sided at a level of 1e-4 for each of 6 components; 1000 values see a standard deviation off by 15 % with power 0.99.
     low, high = chi2.ppf([0.5e-4, 1 - 0.5e-4], 1000)
     for name in COMPONENTS:
@@ -44,14 +44,14 @@ def test_noise_has_the_wanted_standard_deviation_in_every_component():
 
 
 def test_noise_of_a_data_set_is_the_same_in_whatever_block_it_stands():
-    (whole,) = measured_blocks([nothing_deflected(range(4), 3)], "kuka", 1, 1e-4)
-    parts = list(measured_blocks([nothing_deflected([0], 3), nothing_deflected([1, 2, 3], 3)], "kuka", 1, 1e-4))
+    (whole,) = measured_blocks([make_zeros(range(4), 3)], "kuka", 1, 1e-4)
+    parts = list(measured_blocks([make_zeros([0], 3), make_zeros([1, 2, 3], 3)], "kuka", 1, 1e-4))
     for name in COMPONENTS:
         np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), whole[name])
 
 
 def test_rows_keep_their_numbers_and_the_point_is_written_once():
-    ideal = nothing_deflected([3, 8], 2, "3DoF")
+    ideal = make_zeros([3, 8], 2, "3DoF")
     (block,) = measured_blocks([ideal], "kuka", 1, 1e-4)
     assert block["point"] == "3DoF" and set(block) == set(ideal)
     assert block["data_set"].tolist() == [3, 3, 8, 8] and block["configuration"].tolist() == [0, 1, 0, 1]

@@ -6,7 +6,7 @@ import pytest
 from made_studies import few_of
 
 from elastocal.study.steps.budget import budget_blocks
-from elastocal.study.steps.measurement_kinds import encoded, kind_blocks, one_joint_at_a_time
+from elastocal.study.steps.measurement_kinds import kind_blocks, one_joint_at_a_time, simulate_encoders
 
 REFLECTORS = {"one": [[0.1, 0.0, 0.1]], "three": [[0.1, 0.0, 0.1], [0.1, 0.1, 0.0], [0.1, -0.1, 0.0]]}
 
@@ -40,7 +40,7 @@ def test_one_joint_turns_at_a_time(kuka):
 def test_encoders_see_each_joint_by_itself(kuka):
     study = few_of(kuka)
     sets = np.arange(6)
-    silent = encoded(study, sets, study.experiments(sets), 0.0)
+    silent = simulate_encoders(study, sets, study.experiments(sets), 0.0)
     torques = np.einsum("jjks->jks", silent.regressor)
     np.testing.assert_allclose(silent.deflection, torques * kuka.compliance[:, None, None], rtol=1e-12)
     assert np.count_nonzero(silent.regressor) == torques.size

@@ -6,7 +6,7 @@ from made_studies import blocks_of
 from made_study_blocks import OFFSET, PAPER, deflections_of, evaluated_in_one_block, experiments_of, identified, judge
 
 from elastocal.mechanics.robot import with_target_offset
-from elastocal.study.interpretation import Interpretation
+from elastocal.study.steps.in_memory import Interpretation
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from elastocal.study.steps.identify import paired_blocks
 from elastocal.study.steps.solvers import solver_table
 
 
-def solved(robot, experiments, deflections, strategies, length, rows=6):
+def solve(robot, experiments, deflections, strategies, length, rows=6):
     return list(
         solver_table(paired_blocks(experiments, deflections), robot.chain, strategies, rows, "end_effector", length, 1e-6)
     )
@@ -23,7 +23,7 @@ def estimates(columns, solver):
 def test_gauss_newton_finds_the_compliances_of_exact_data_and_equation_11_those_of_numpy_least_squares(kuka, strategies):
     experiments = experiments_of(kuka, sets=3)
     deflections = deflections_of(kuka, experiments)
-    (found,) = solved(kuka, experiments, {"6DoF": deflections["6DoF"]}, [strategies["6DoF"]], 3)
+    (found,) = solve(kuka, experiments, {"6DoF": deflections["6DoF"]}, [strategies["6DoF"]], 3)
     np.testing.assert_allclose(estimates(found, "gauss_newton"), np.tile(kuka.compliance, (3, 1)), rtol=1e-8)
     regressors = pinocchio_regressors(kuka.chain, experiments[0], "6DoF").reshape(3, 4, 6, 6)[:, :3].reshape(3, 18, 6)
     seen = to_deflections(deflections["6DoF"][0])[:, :3].reshape(3, 18)
@@ -37,10 +37,10 @@ def test_configurations_beyond_the_length_change_nothing(kuka, strategies):
     names = ("3DoF", "6DoF")
     spoiled = {n: [b | {"dx": np.where(b["configuration"] < 2, b["dx"], 1.0)} for b in deflections[n]] for n in names}
     strategy = strategies["4-6DoF-after-3DoF"]
-    (found,), (other,) = (solved(kuka, experiments, {n: by[n] for n in names}, [strategy], 2) for by in (deflections, spoiled))
+    (found,), (other,) = (solve(kuka, experiments, {n: by[n] for n in names}, [strategy], 2) for by in (deflections, spoiled))
     for name in set(found) - {"strategy"}:
         np.testing.assert_array_equal(other[name], found[name])
-    (longer,) = solved(kuka, experiments, spoiled, [strategy], 3)
+    (longer,) = solve(kuka, experiments, spoiled, [strategy], 3)
     assert (np.abs(estimates(longer, "equation_11") / estimates(found, "equation_11") - 1) > 1).any()
 
 
@@ -49,7 +49,7 @@ def test_every_strategy_of_every_block_has_its_rows(kuka, strategies, monkeypatc
     chosen = [strategies[name] for name in ("6DoF", "3+6DoF-comb")]
     experiments = experiments_of(kuka, sets=3)
     deflections = deflections_of(kuka, experiments, noise=1e-4)
-    found = solved(kuka, experiments, {name: deflections[name] for name in ("3DoF", "6DoF")}, chosen, 4)
+    found = solve(kuka, experiments, {name: deflections[name] for name in ("3DoF", "6DoF")}, chosen, 4)
     names = [strategy.name for strategy in chosen]
     assert [block["strategy"] for block in found] == names * 2
     assert [block["data_set"].tolist() for block in found] == [[0, 1], [0, 1], [2], [2]]
@@ -60,7 +60,7 @@ def test_every_strategy_of_every_block_has_its_rows(kuka, strategies, monkeypatc
 def test_a_stage_that_identifies_every_joint_leaves_equation_11_nothing_of_those_before_it(kuka, strategies):
     experiments = experiments_of(kuka, sets=2)
     deflections = {name: deflections_of(kuka, experiments, noise=1e-4)[name] for name in ("3DoF", "6DoF")}
-    alone, after = solved(kuka, experiments, deflections, [strategies["6DoF"], strategies["6DoF-after-3DoF"]], 4)
+    alone, after = solve(kuka, experiments, deflections, [strategies["6DoF"], strategies["6DoF-after-3DoF"]], 4)
     for solver in ("equation_11", "gauss_newton"):
         np.testing.assert_allclose(estimates(after, solver), estimates(alone, solver), rtol=1e-7)
 
@@ -73,7 +73,7 @@ def test_the_solvers_differ_in_proportion_to_the_deflection(kuka, strategies, sh
         (block,) = experiments_of(kuka, sets=2)
         block = block | {name: scale * block[name] for name in ("fx", "fy", "fz", "mx", "my", "mz")}
         deflections = deflections_of(kuka, [block])
-        (found,) = solved(kuka, [block], {"6DoF": deflections["6DoF"]}, [strategies["6DoF"]], 4)
+        (found,) = solve(kuka, [block], {"6DoF": deflections["6DoF"]}, [strategies["6DoF"]], 4)
         differences.append(np.abs(estimates(found, "equation_11") / estimates(found, "gauss_newton") - 1).max())
     assert differences[0] > 1e-5
     assert differences[1] / differences[0] == pytest.approx(share, rel=0.1)

@@ -6,9 +6,8 @@ import pytest
 from made_studies import USUAL
 from made_study_blocks import compliances, deflections_of, experiments_of, identified, judge
 
-from elastocal.study.interpretation import Size
 from elastocal.study.metrics import position_errors
-from elastocal.study.steps.in_memory import StudyInMemory
+from elastocal.study.steps.in_memory import Size, StudyInMemory
 from elastocal.study.steps.uses import use_blocks
 
 USES = {"centre_m": (1.6, 0.0, 1.0), "edge_m": 1.0, "weight_N": 1000, "path_m": 0.5, "cutting_N": 500}

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import norm
 from statsmodels.stats.multitest import multipletests
 
-from elastocal.application.accuracy import without_rigid_motion
+from elastocal.application.accuracy import remove_rigid_motion
 from elastocal.application.calibrated import forward, pose_sensitivities, square_root
 from elastocal.errors import InputError
 from elastocal.fitting.parameters import parameters
@@ -51,7 +51,7 @@ class Comparison:
     changes: tuple[Change, ...]
 
 
-def compared(
+def compare_campaigns(
     before: CalibratedRobot, after: CalibratedRobot, reported_angles: np.ndarray, draws: int, stream: np.random.Generator
 ) -> Comparison:
     """Compare what two campaigns found of one robot.
@@ -67,14 +67,14 @@ def compared(
     if before.robot.chain != after.robot.chain:
         raise InputError("--compare", "", f"another robot, {before.robot.name}", f"a campaign of {after.robot.name}")
     ends = [forward(each, reported_angles)[0] for each in (before, after)]
-    apart = without_rigid_motion(ends[1] - ends[0], ends[0])
+    apart = remove_rigid_motion(ends[1] - ends[0], ends[0])
     distance = np.linalg.norm(apart, axis=-1)
     rms = float(np.sqrt((distance**2).mean()))
     off = np.zeros((draws, *ends[0].shape))
     for each in (before, after):
         moved = pose_sensitivities(each, reported_angles)[:, :3] @ square_root(each.covariance)
         off += np.einsum("nik,dk->dni", moved, stream.standard_normal((draws, moved.shape[-1])))
-    drawn = np.sqrt((without_rigid_motion(off, ends[0]) ** 2).sum(axis=2).mean(axis=1))
+    drawn = np.sqrt((remove_rigid_motion(off, ends[0]) ** 2).sum(axis=2).mean(axis=1))
     p_value = (1.0 + (drawn >= rms).sum()) / (1.0 + draws)
     return Comparison(rms, float(np.median(drawn)), float(p_value), float(distance.max()), _changes(before, after))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import before_m, less_placement, predicted, scope_in
+from elastocal.application.accuracy import before_m, predict_errors, root_mean_square, scope_in, subtract_placement
 from elastocal.application.calibrated import forward, nominal_forward, observations_of, square_root, states_of
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
@@ -50,7 +50,7 @@ def error_budget(
     Lines do not add up: effects may work against each other, and loads meet springs.
 
     `reported_angles` (N, n): rad, as the controller reports them. `draws`: of the parameters, for the intervals. Returns what
-    is missed without any correction; each effect, largest first; what a correction leaves, by `accuracy.predicted`.
+    is missed without any correction; each effect, largest first; what a correction leaves, by `accuracy.predict_errors`.
     """
     model, estimate = calibrated.model, calibrated.estimate
     whole, turned = forward(calibrated, reported_angles, operating)
@@ -67,7 +67,7 @@ def error_budget(
             shares.append(Share(name, rms, *limits))
     shares.sort(key=lambda share: -share.rms_m)
     off = pose_differences(*nominal_forward(calibrated.robot, reported_angles), whole, turned)
-    rest = predicted(calibrated, reported_angles, operating, draws=0)
+    rest = predict_errors(calibrated, reported_angles, operating, draws=0)
     total, *ends = (
         Share(name, float(np.sqrt((length**2).mean())))
         for name, length in (
@@ -92,13 +92,13 @@ def effect_costs(calibrated: CalibratedRobot, reported_angles: np.ndarray, opera
     costs = {}
     for name in dict.fromkeys([*(effect.effect for effect in calibrated.model.effects), SPRINGS]):
         mine = [number for number, effect in enumerate(calibrated.model.effects) if effect.effect == name]
-        other = forward(_without(calibrated, name, mine), reported_angles, operating)
+        other = forward(_leave_out(calibrated, name, mine), reported_angles, operating)
         apart = pose_differences(whole, turned, *other)[..., None]
-        costs[name] = _rms(less_placement(scope_in(calibrated), whole, turned, apart)[:, :3, 0])
+        costs[name] = root_mean_square(subtract_placement(scope_in(calibrated), whole, turned, apart)[:, :3, 0])
     return costs
 
 
-def _without(calibrated: CalibratedRobot, name: str, mine: list[int]) -> CalibratedRobot:
+def _leave_out(calibrated: CalibratedRobot, name: str, mine: list[int]) -> CalibratedRobot:
     values = tuple(0.0 * v if number in mine else v for number, v in enumerate(calibrated.estimate.coefficients))
     model = calibrated.model
     if name == SPRINGS and not mine:
@@ -117,7 +117,7 @@ def _gram(
     model, estimate = calibrated.model, calibrated.estimate
     seen = observations_of(states_of(calibrated, reported_angles, operating))
     line = linearize(model, estimate, seen, conditions(model, estimate, seen.states))
-    columns = less_placement(scope_in(calibrated), *poses, line.sensitivities[..., _linear(calibrated)])[:, :3]
+    columns = subtract_placement(scope_in(calibrated), *poses, line.sensitivities[..., _linear(calibrated)])[:, :3]
     rows = columns.reshape(-1, columns.shape[-1])
     owners = np.repeat(np.arange(len(model.effects)), [len(values) for values in estimate.coefficients])
     return rows.T @ rows / len(reported_angles), owners
@@ -147,7 +147,3 @@ def _limits(
     linear = np.sqrt(max(values @ gram @ values, 0.0))
     low, high = np.quantile(contributions, _ENDS) * (rms / linear if linear > 0.0 else 1.0)
     return float(low), float(high)
-
-
-def _rms(displacement: np.ndarray) -> float:
-    return float(np.sqrt((displacement**2).sum(axis=1).mean()))

@@ -71,13 +71,13 @@ def repeatability(measurements: Measurements, targets: Sequence[Target], point: 
     pose = groups_of(np.column_stack([some.session, some.pose]))[1]
     if pose.max() < 1:
         return None
-    value, interval = _pooled(distance, pose)
+    value, interval = _pool(distance, pose)
     angle = None
     if some.rotation_vector is not None:
         turns = Rotation.from_rotvec(some.rotation_vector)
         off = (turns * turns[_first_of(group)].inv()).as_rotvec()
         middle = np.stack([np.bincount(group, column) for column in off.T], axis=1)[group] / count[group][:, None]
-        angle = _pooled(scale * np.linalg.norm(off - middle, axis=1), pose)[0]
+        angle = _pool(scale * np.linalg.norm(off - middle, axis=1), pose)[0]
     approaches = len(np.unique(np.column_stack([some.session, some.pose, some.load, some.repeat]), axis=0))
     return Repeatability(value, interval, angle, approaches, int(pose.max()) + 1)
 
@@ -93,7 +93,7 @@ def _first_of(group: np.ndarray) -> np.ndarray:
     return first[inverse]
 
 
-def _pooled(distance: np.ndarray, pose: np.ndarray) -> tuple[float, tuple[float, float]]:
+def _pool(distance: np.ndarray, pose: np.ndarray) -> tuple[float, tuple[float, float]]:
     """Mean plus three standard deviations, and its interval by leaving out one pose after the other."""
     count = np.bincount(pose).astype(float)
     sums, squares = np.bincount(pose, distance), np.bincount(pose, distance**2)

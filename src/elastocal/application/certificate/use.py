@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.application.calibrated import OperatingConditions
-from elastocal.application.compensation import corrected
+from elastocal.application.compensation import find_joint_targets
 from elastocal.exchange.target_path import OK
 from elastocal.validation.fitted_range import beyond_campaign
 
@@ -30,6 +30,6 @@ class Use:
 def use_at(calibrated: CalibratedRobot, fitted: States, wanted: TargetPath) -> Use:
     """The use of a robot at wanted poses, each corrected; a pose that it cannot reach lies beyond."""
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
-    found = corrected(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+    found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
     angles = calibrated.robot.model_angles(found.joint_angles)
     return Use(found.joint_angles, operating, beyond_campaign(fitted, angles, wanted.wrench) | (found.status != OK))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import before_m, predicted
+from elastocal.application.accuracy import before_m, predict_errors
 from elastocal.application.calibrated import OperatingConditions, forward, nominal_forward
 from elastocal.campaigns.joint_space import beyond_range
 from elastocal.mechanics.pose_differences import pose_differences
@@ -34,7 +34,7 @@ class WorkspaceErrors:
     outside: np.ndarray
 
 
-def drawn_angles(calibrated: CalibratedRobot, count: int, stream: np.random.Generator) -> np.ndarray:
+def draw_angles(calibrated: CalibratedRobot, count: int, stream: np.random.Generator) -> np.ndarray:
     """Joint angles evenly over the limits, as the controller reports them, rad, ndarray (N, n)."""
     low, high = calibrated.robot.joint_limits.T
     return calibrated.robot.reported_angles(stream.uniform(low, high, (count, len(low))))
@@ -45,7 +45,7 @@ def workspace_errors(
 ) -> WorkspaceErrors:
     """Errors at some poses under one load.
 
-    What a corrected robot misses is what `accuracy.predicted` says of these poses.
+    What a corrected robot misses is what `accuracy.predict_errors` says of these poses.
 
     `reported_angles` (N, n): rad. `wrench` (6,): N, N m, at the last measuring point, base axes. `fitted_angles` (P, n): of the
     campaign, of the chain, rad.
@@ -53,7 +53,7 @@ def workspace_errors(
     operating = OperatingConditions(np.asarray(wrench, float)[None])
     position, rotation = forward(calibrated, reported_angles, operating)
     off = pose_differences(*nominal_forward(calibrated.robot, reported_angles), position, rotation)
-    after = predicted(calibrated, reported_angles, operating, draws=0)
+    after = predict_errors(calibrated, reported_angles, operating, draws=0)
     return WorkspaceErrors(
         reported_angles,
         position,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.planning.exchange import matrix_of, with_prior
+from elastocal.application.planning.exchange import add_prior, matrix_of
 
 if TYPE_CHECKING:
     from elastocal.application.planning.criteria import Criterion
@@ -69,4 +69,4 @@ def _weights(rows: np.ndarray, count: int, criterion: Criterion) -> np.ndarray:
 
 def _matrix(rows: np.ndarray, weights: np.ndarray) -> np.ndarray:
     flat = (np.sqrt(weights)[:, None, None] * rows).reshape(-1, rows.shape[2]).astype(float)
-    return with_prior(flat.T @ flat)
+    return add_prior(flat.T @ flat)

@@ -40,7 +40,7 @@ class Cell:
     radius_m: float
 
 
-def allowed(cell: Cell, robot: Robot, targets: tuple[Target, ...], reported_angles: np.ndarray) -> dict[str, np.ndarray]:
+def find_allowed(cell: Cell, robot: Robot, targets: tuple[Target, ...], reported_angles: np.ndarray) -> dict[str, np.ndarray]:
     """Whether each configuration is allowed, by what might forbid it.
 
     `reported_angles` (N, n): rad. Returns (N,) of bool: "boxes": no link in a box. "sight": the tracker sees every target.
@@ -55,7 +55,7 @@ def allowed(cell: Cell, robot: Robot, targets: tuple[Target, ...], reported_angl
         for target in targets:
             at, turned = poses_of_points(robot.chain, angles, [robot.chain.point(target.point)])
             seen = at[0] + (turned[0] @ np.array(target.offset_m or (0.0, 0.0, 0.0)))
-            found["sight"] &= ~_hidden(links, seen, cell.tracker_m, cell.radius_m)
+            found["sight"] &= ~_find_hidden(links, seen, cell.tracker_m, cell.radius_m)
     return found
 
 
@@ -73,7 +73,7 @@ def link_points(robot: Robot, angles: np.ndarray) -> np.ndarray:
     return np.concatenate([one + share * (other - one) for one, other in pairwise(at)]) if len(at) > 1 else at
 
 
-def _hidden(links: np.ndarray, target: np.ndarray, tracker: np.ndarray, radius: float) -> np.ndarray:
+def _find_hidden(links: np.ndarray, target: np.ndarray, tracker: np.ndarray, radius: float) -> np.ndarray:
     """Whether any link lies in the line of sight, ndarray of bool (N,)."""
     sight = tracker - target
     length = np.linalg.norm(sight, axis=-1)

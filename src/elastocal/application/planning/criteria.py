@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.application.planning.exchange import with_prior
+from elastocal.application.planning.exchange import add_prior
 
 CRITERIA = ("D", "A", "I")
 # Candidates whose small matrices are in memory at a time.
@@ -46,22 +46,22 @@ class Criterion:
         return np.concatenate([self._gains(part, matrix) for part in np.split(rows, range(_AT_ONCE, len(rows), _AT_ONCE))])
 
     def _gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        white = _whitened(rows, matrix)
-        inner = with_prior(white @ white.transpose(0, 2, 1))
+        white = _whiten(rows, matrix)
+        inner = add_prior(white @ white.transpose(0, 2, 1))
         if self.weight is None:
             return np.linalg.slogdet(inner)[1]
-        across = white @ self._whitened_weight(matrix) @ white.transpose(0, 2, 1)
+        across = white @ self._whiten_weight(matrix) @ white.transpose(0, 2, 1)
         return np.trace(np.linalg.solve(inner, across), axis1=1, axis2=2)
 
     def slopes(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
         """Derivatives of the value by the weight of each candidate: tr M^-1 Z' Z, or tr M^-1 C M^-1 Z' Z; ndarray (N,)."""
-        white = _whitened(rows, matrix)
+        white = _whiten(rows, matrix)
         if self.weight is None:
             return (white**2).sum(axis=(1, 2))
-        across = white @ self._whitened_weight(matrix)
+        across = white @ self._whiten_weight(matrix)
         return (across * white).sum(axis=(1, 2))
 
-    def _whitened_weight(self, matrix: np.ndarray) -> np.ndarray:
+    def _whiten_weight(self, matrix: np.ndarray) -> np.ndarray:
         assert self.weight is not None
         inverse = np.linalg.inv(np.linalg.cholesky(matrix))
         return inverse @ self.weight @ inverse.T
@@ -83,7 +83,7 @@ def mean_squares(rows: np.ndarray) -> np.ndarray:
     return flat.T @ flat / len(rows)
 
 
-def _whitened(rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+def _whiten(rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """Rows in which the matrix is I, in double precision: single precision loses the 1 of I + Z Z' to an unknown base."""
     inverse = np.linalg.inv(np.linalg.cholesky(matrix))
     return (rows.reshape(-1, rows.shape[2]) @ inverse.T).reshape(rows.shape)

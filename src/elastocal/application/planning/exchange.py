@@ -22,7 +22,7 @@ _LEAST_GAIN = 1e-6
 _ROUNDING = 1e-12
 
 
-def with_prior(sums: np.ndarray) -> np.ndarray:
+def add_prior(sums: np.ndarray) -> np.ndarray:
     """Sums of products, ndarray (..., P, P), plus I: in place, and positive definite whatever their size.
 
     Where rounding has lost more than the 1, a diagonal element grows by what rounding may have lost.
@@ -35,10 +35,10 @@ def with_prior(sums: np.ndarray) -> np.ndarray:
 def matrix_of(rows: np.ndarray, chosen: np.ndarray | list[int]) -> np.ndarray:
     """Information matrix of some candidates with the prior, ndarray (P, P), in double precision."""
     flat = rows[chosen].reshape(-1, rows.shape[2]).astype(float)
-    return with_prior(flat.T @ flat)
+    return add_prior(flat.T @ flat)
 
 
-def greedy(rows: np.ndarray, count: int, criterion: Criterion) -> list[int]:
+def choose_greedily(rows: np.ndarray, count: int, criterion: Criterion) -> list[int]:
     """Candidates, each that which adds most to those before it.
 
     `rows` (N, k, P).
@@ -51,7 +51,7 @@ def greedy(rows: np.ndarray, count: int, criterion: Criterion) -> list[int]:
     return chosen
 
 
-def exchanged(rows: np.ndarray, chosen: list[int], criterion: Criterion) -> list[int]:
+def exchange_candidates(rows: np.ndarray, chosen: list[int], criterion: Criterion) -> list[int]:
     """A design in which no single candidate of a short list would be better than one that is in it.
 
     `rows` (N, k, P). Returns in the place of each the one that took it.

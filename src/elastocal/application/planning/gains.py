@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.accuracy import without_rigid_motion
+from elastocal.application.accuracy import remove_rigid_motion, root_mean_square
 from elastocal.application.planning.criteria import Criterion, mean_squares
-from elastocal.application.planning.exchange import exchanged, greedy, matrix_of, with_prior
-from elastocal.application.planning.plan import allowed_candidates
-from elastocal.application.planning.survey import accuracy_rows, information, model_of, observed
+from elastocal.application.planning.exchange import add_prior, choose_greedily, exchange_candidates, matrix_of
+from elastocal.application.planning.plan import find_allowed_candidates
+from elastocal.application.planning.survey import accuracy_rows, information, model_of, observe
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
@@ -45,12 +45,12 @@ def gains(survey: Survey, cell: Cell, loads: Loads, poses: int, count: int, seed
     that are off their file, beside plans made with full knowledge of each, the mean and the smallest.
     """
     draws = np.random.default_rng(seed)
-    some = allowed_candidates(survey, cell, loads, count, seed)
+    some = find_allowed_candidates(survey, cell, loads, count, seed)
     rows = information(survey, some.joint_angles, some.force).rows
     places = some.at(draws.permutation(len(rows))[:_PLACES])
     weight = mean_squares(accuracy_rows(survey, places.joint_angles, places.force))
     rule = Criterion(None)
-    chosen = exchanged(rows, greedy(rows, poses, rule), rule)
+    chosen = exchange_candidates(rows, choose_greedily(rows, poses, rule), rule)
     planned = _left(matrix_of(rows, chosen), weight)
     orders = [draws.choice(len(rows), _LONGEST, replace=False) for _ in range(_ORDERS)]
     curves = np.array([_curve(rows, order, weight) for order in orders])
@@ -85,7 +85,7 @@ def _worth_elsewhere(survey: Survey, some: Candidates, chosen: list[int], seed: 
     model, nominal = model_of(survey)
     true = _off(model, nominal, np.random.default_rng(seed))
     rows, rule = information(survey, some.joint_angles, some.force, true).rows, Criterion(None)
-    best = exchanged(rows, greedy(rows, len(chosen), rule), rule)
+    best = exchange_candidates(rows, choose_greedily(rows, len(chosen), rule), rule)
     apart = rule.value(matrix_of(rows, chosen)) - rule.value(matrix_of(rows, best))
     return float(np.exp(apart / rows.shape[2]))
 
@@ -96,7 +96,7 @@ def _left(matrix: np.ndarray, weight: np.ndarray) -> float:
 
 def _curve(rows: np.ndarray, order: np.ndarray, weight: np.ndarray) -> np.ndarray:
     each = rows[order].astype(float)
-    totals = with_prior(np.cumsum(each.transpose(0, 2, 1) @ each, axis=0))
+    totals = add_prior(np.cumsum(each.transpose(0, 2, 1) @ each, axis=0))
     return np.sqrt(np.trace(np.linalg.solve(totals, weight), axis1=1, axis2=2))
 
 
@@ -105,7 +105,7 @@ def _fitted_error(survey: Survey, design: Candidates, places: Candidates, seed: 
     model, nominal = model_of(survey)
     draws = np.random.default_rng(seed)
     true = _off(model, nominal, draws)
-    seen = observed(survey, design.joint_angles, design.force)
+    seen = observe(survey, design.joint_angles, design.force)
     position, rotation = predict(model, true, seen, conditions(model, true, seen.states))
     read = replace(seen, position=position + survey.position_m * draws.standard_normal(position.shape))
     if seen.rotation is not None:
@@ -114,14 +114,14 @@ def _fitted_error(survey: Survey, design: Candidates, places: Candidates, seed: 
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(survey.robot.joints))
     fitted = fit(model, read, noise)
     alone = replace(survey, shares=(1.0,) if survey.loaded else (0.0,))
-    there = observed(alone, places.joint_angles, places.force)
+    there = observe(alone, places.joint_angles, places.force)
     position, rotation = predict(model, true, there, conditions(model, true, there.states))
     found = predict(model, fitted.estimate, there, conditions(model, fitted.estimate, there.states))[0]
     off = found - position
     if survey.unknown_base:
         unknown = survey.targets[0].offset_m is None
-        off = without_rigid_motion(off, position, rotation if unknown else None)
-    return float(np.sqrt((off**2).sum(axis=1).mean()))
+        off = remove_rigid_motion(off, position, rotation if unknown else None)
+    return root_mean_square(off)
 
 
 def _off(model: Model, nominal: Estimate, draws: np.random.Generator) -> Estimate:

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from elastocal.application.planning.bound import best_value, efficiency
-from elastocal.application.planning.cell import allowed
+from elastocal.application.planning.cell import find_allowed
 from elastocal.application.planning.criteria import Criterion, criterion, mean_squares
-from elastocal.application.planning.exchange import exchanged, greedy, matrix_of, with_prior
+from elastocal.application.planning.exchange import add_prior, choose_greedily, exchange_candidates, matrix_of
 from elastocal.application.planning.survey import accuracy_rows, count_parameters, information
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
 from elastocal.counting import counted
@@ -89,7 +89,7 @@ class Plan:
     random_m: np.ndarray
 
 
-def allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int, seed: int) -> Candidates:
+def find_allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int, seed: int) -> Candidates:
     """Configurations within the limits that the cell allows.
 
     `count`: of candidates; fewer where the cell allows fewer. `seed`: of Halton's sequence, scrambled, and of the directions of
@@ -99,7 +99,7 @@ def allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int, see
     low, high = robot.joint_limits.T
     shares = qmc.Halton(robot.joints, seed=seed).random(_DRAWS * count)
     reported = robot.reported_angles(low + (high - low) * shares)
-    fine = allowed(cell, robot, survey.targets, reported)
+    fine = find_allowed(cell, robot, survey.targets, reported)
     good = np.flatnonzero(np.all(list(fine.values()), axis=0))[:count]
     if not len(good):
         least = min(fine, key=lambda name: fine[name].mean())
@@ -110,7 +110,7 @@ def allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int, see
     return Candidates(reported[good], loads.forces(len(good), down, np.random.default_rng(seed)))
 
 
-def planned(survey: Survey, some: Candidates, poses: int, held_out: int, kind: str, seed: int) -> Plan:
+def choose_plan(survey: Survey, some: Candidates, poses: int, held_out: int, kind: str, seed: int) -> Plan:
     """Choose configurations.
 
     `poses`, `held_out`: to fit, and to judge. `kind`: one of "D", "A", "I". Raises `InputError`: fewer candidates than poses,
@@ -132,7 +132,7 @@ def planned(survey: Survey, some: Candidates, poses: int, held_out: int, kind: s
     accuracy = accuracy_rows(survey, places.joint_angles, places.force)
     rule, weight = criterion(kind, accuracy), mean_squares(accuracy)
     # A design by determinants is found fast and good by all criteria: a start for the exchange.
-    chosen = exchanged(rows, greedy(rows, poses, Criterion(None)), rule)
+    chosen = exchange_candidates(rows, choose_greedily(rows, poses, Criterion(None)), rule)
     worth = efficiency(rule, matrix_of(rows, chosen), best_value(rows, poses, rule, chosen))
     rest = np.setdiff1d(np.arange(count), chosen)
     judged = draws.choice(rest, held_out, replace=False)
@@ -152,7 +152,7 @@ def fewest_poses(survey: Survey) -> int:
     return max(-(-count_parameters(survey) // survey.numbers), FEWEST_TRAINING_POSES)
 
 
-def poses_needed(curve_m: np.ndarray, accuracy_m: float) -> int | None:
+def count_needed_poses(curve_m: np.ndarray, accuracy_m: float) -> int | None:
     """Fewest poses whose curve is at or below an accuracy; None where all of them are not enough."""
     enough = np.flatnonzero(curve_m <= accuracy_m)
     return int(enough[0]) + 1 if len(enough) else None
@@ -186,7 +186,7 @@ def tour(joint_angles: np.ndarray, chosen: list[int]) -> list[int]:
 
 def _best_first(rows: np.ndarray, chosen: list[int], weight: np.ndarray) -> list[int]:
     """The chosen in the order in which each lowers the error most."""
-    places = greedy(rows[chosen], len(chosen), Criterion(weight))
+    places = choose_greedily(rows[chosen], len(chosen), Criterion(weight))
     return [chosen[place] for place in places]
 
 
@@ -195,5 +195,5 @@ def _curve(rows: np.ndarray, order: list[int] | np.ndarray, weight: np.ndarray) 
     total, found = np.zeros((rows.shape[2], rows.shape[2])), []
     for place in order:
         total += rows[place].T @ rows[place]
-        found.append(np.sqrt(max(np.trace(np.linalg.solve(with_prior(total.copy()), weight)), 0.0)))
+        found.append(np.sqrt(max(np.trace(np.linalg.solve(add_prior(total.copy()), weight)), 0.0)))
     return np.array(found)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import absorbed, placement, scope_about
+from elastocal.application.accuracy import find_absorbed, placement, scope_about
 from elastocal.application.calibrated import nominal_forward
 from elastocal.campaigns.campaign import Target
 from elastocal.effects import declared_weight
@@ -120,7 +120,7 @@ def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray, 
     found = np.empty((len(reported_angles), numbers, len(named)))
     for start in range(0, len(reported_angles), max(_AT_ONCE // len(survey.shares), 1)):
         part = slice(start, start + max(_AT_ONCE // len(survey.shares), 1))
-        seen = observed(survey, reported_angles[part], force[part])
+        seen = observe(survey, reported_angles[part], force[part])
         line = linearize(model, estimate, seen, conditions(model, estimate, seen.states))
         found[part] = (line.sensitivities * scale).reshape(-1, numbers, len(named))
     return Information(found, [(owner, parameter.name) for owner, parameter in named])
@@ -140,7 +140,7 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     there = [target for target in survey.targets if target.point == end.name]
     model, estimate = model_of(replace(alone, targets=(Target("end effector", end.name, end.offset_m),)))
     bare = replace(model, fitted_frames=False)
-    seen = observed(replace(alone, targets=bare.targets), reported_angles, force)
+    seen = observe(replace(alone, targets=bare.targets), reported_angles, force)
     moved = linearize(bare, estimate, seen, conditions(bare, estimate, seen.states)).sensitivities
     named = parameters(bare, estimate)
     moved = np.concatenate([moved[:, :3], np.zeros_like(moved[:, :3])], axis=1) * [p.plausible for _, p in named]
@@ -148,7 +148,7 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     columns = placement(scope_about(position), position, rotation)
     offset = bool(there) and all(target.offset_m is None for target in there)
     free = np.repeat([survey.unknown_base, survey.unknown_base, offset, False], 3)
-    rows = (moved - columns @ absorbed(columns, moved, free))[:, :3]
+    rows = (moved - columns @ find_absorbed(columns, moved, free))[:, :3]
     # Behind the parameters of base and reflectors.
     every = parameters(*model_of(survey))
     found = np.zeros((len(rows), 3, len(every)))
@@ -156,7 +156,7 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     return found
 
 
-def observed(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Observations:
+def observe(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Observations:
     """Every target under every share of the load of each configuration, in this order."""
     loads, targets = len(survey.shares), len(survey.targets)
     angles = np.repeat(survey.robot.model_angles(reported_angles), loads, axis=0)

@@ -37,7 +37,7 @@ def importer(name: str, source: str | Path) -> Importer:
     check_importer(name, source)
     module = import_module(f"{package.__name__}.{name}")
     if not hasattr(module, "FILES"):
-        raise _unknown(name, source)
+        raise _refuse_name(name, source)
     return cast("Importer", module)
 
 
@@ -47,7 +47,7 @@ def check_importer(name: str, source: str | Path) -> None:
     Raises `InputError`.
     """
     if name not in module_names(package):
-        raise _unknown(name, source)
+        raise _refuse_name(name, source)
 
 
 def importers() -> dict[str, Importer]:
@@ -55,5 +55,5 @@ def importers() -> dict[str, Importer]:
     return {name: cast("Importer", module) for name, module in modules_with("FILES", package).items()}
 
 
-def _unknown(name: str, source: str | Path) -> InputError:
+def _refuse_name(name: str, source: str | Path) -> InputError:
     return InputError(source, "importer", repr(name), ", ".join(importers()))

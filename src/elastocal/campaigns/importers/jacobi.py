@@ -32,12 +32,12 @@ def _file(robot: str, poses: str) -> PublicFile:
 FILES = {f"jacobi_{name}": _file(*name.split("_")) for name in _SHA256}
 TARGET = "SMR"
 # Robots of the source by their number of joints.
-ROBOT_OF_JOINTS = {6: "ur5", 7: "wam"}
-ROBOTS = tuple(ROBOT_OF_JOINTS.values())
+_ROBOT_OF_JOINTS = {6: "ur5", 7: "wam"}
+ROBOTS = tuple(_ROBOT_OF_JOINTS.values())
 # The tracker's maker: 15 um + 6 um/m; its distance is not stated. The least that a measurement scatters: what the joints add
 # is the error common to a pose, which is estimated.
 NOISE = {"position_m": 1.5e-5}
-COMMANDED, DIFFERENCE = ("x_t", "y_t", "z_t"), ("x_dif", "y_dif", "z_dif")
+_COMMANDED, _DIFFERENCE = ("x_t", "y_t", "z_t"), ("x_dif", "y_dif", "z_dif")
 
 
 def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
@@ -49,13 +49,13 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     something that is no number, another number of joints.
     """
     kind = "a file of serial_robots_datasets"
-    cells = read_columns(path, ",", (*COMMANDED, *DIFFERENCE), kind)
+    cells = read_columns(path, ",", (*_COMMANDED, *_DIFFERENCE), kind)
     joints = sum(name.startswith("joint_") for name in cells)
     names = [f"joint_{number + 1}" for number in range(joints)]
-    if joints not in ROBOT_OF_JOINTS or not set(names) <= set(cells):
+    if joints not in _ROBOT_OF_JOINTS or not set(names) <= set(cells):
         found = ", ".join(name for name in cells if name.startswith("joint_")) or "no column joint_1"
-        raise InputError(path, "header", found, f"joint_1 to joint_{' or joint_'.join(map(str, ROBOT_OF_JOINTS))}")
-    angles, commanded, difference = (table(path, cells, columns) for columns in (names, COMMANDED, DIFFERENCE))
+        raise InputError(path, "header", found, f"joint_1 to joint_{' or joint_'.join(map(str, _ROBOT_OF_JOINTS))}")
+    angles, commanded, difference = (table(path, cells, columns) for columns in (names, _COMMANDED, _DIFFERENCE))
     return np.radians(angles), 1e-3 * (commanded + difference)
 
 
@@ -66,4 +66,4 @@ def write_campaign(path: str | Path, folder: str | Path, name: str, holdout: Map
     `InputError`: as in `read`.
     """
     angles, position = read(path)
-    write_reflectors(folder, name, ROBOT_OF_JOINTS[angles.shape[1]], angles, {TARGET: position}, holdout, NOISE)
+    write_reflectors(folder, name, _ROBOT_OF_JOINTS[angles.shape[1]], angles, {TARGET: position}, holdout, NOISE)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.bounds import squared_error_bounds
-from elastocal.study.identification import estimate_compliance, first_solvable_length, prefix_information
+from elastocal.study.identification import prefix_information
 from elastocal.study.metrics import mean_form, mean_square_errors
 from elastocal.study.steps.columns import prefix_index_columns
 from elastocal.study.strategies import Stage, Strategy
@@ -36,16 +36,14 @@ def budget_blocks(study: StudyInMemory, point_sets: Mapping[str, Sequence[str]])
     names = tuple(dict.fromkeys(name for points in point_sets.values() for name in points))
     twice = tuple(name for name in names if any([*points].count(name) > 1 for points in point_sets.values()))
     for sets in study.blocks():
-        measurements = study.measured(sets, names)
-        again = study.measured(sets, twice, _AGAIN) if twice else {}
+        measurements = study.measure(sets, names)
+        again = study.measure(sets, twice, _AGAIN) if twice else {}
         measurements |= {name + _AGAIN: found for name, found in again.items()}
         information = {name: prefix_information(measurements[name].regressor) for name in names}
         for label, points in point_sets.items():
             read = tuple(name + _AGAIN * (name in points[:place]) for place, name in enumerate(points))
             strategy = Strategy(label, (Stage(read, tuple(range(n))),))
-            compliance = estimate_compliance(strategy, measurements, n)[0]
-            compliance[: first_solvable_length(strategy, study.interpretation.independent_rows) - 1] = np.nan
-            squares = mean_square_errors(form, compliance - robot.compliance[:, None])
+            squares = mean_square_errors(form, study.estimate(strategy, measurements) - robot.compliance[:, None])
             bounds = squared_error_bounds(sum((information[name] for name in points), np.zeros(())), form[:-1, :-1])
             columns = prefix_index_columns(sets, len(squares))
             yield {

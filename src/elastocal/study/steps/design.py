@@ -16,7 +16,7 @@ from elastocal.study.identification import (
     condition_numbers,
     covariance,
     estimate_compliance,
-    undetermined_prefixes,
+    find_undetermined_prefixes,
 )
 from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_experiments
 from elastocal.study.table_schemas import covariance_columns
@@ -67,7 +67,7 @@ def design_blocks(
         measurements = {name: Measurements(matrix, silent) for name, matrix in regressors.items()}
         triangles = estimate_compliance(strategy, measurements, chain.coordinates)[1]
         spread, condition = covariance(strategy, measurements, triangles), condition_numbers(strategy, triangles)
-        undetermined = undetermined_prefixes(strategy, measurements, condition)
+        undetermined = find_undetermined_prefixes(strategy, measurements, condition)
         spread[undetermined], condition[undetermined] = np.nan, np.nan
         columns = prefix_index_columns(sets, len(condition))
         for name, i, j in covariance_columns(chain.coordinates):

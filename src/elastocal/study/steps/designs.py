@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.random_streams import stream
-from elastocal.study.designs import worths
+from elastocal.study.designs import rate_designs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +32,7 @@ def design_worths(study: StudyInMemory, candidates: int, sizes: Sequence[int]) -
         drawn = within.experiments([0], candidates, "candidates of designs")
         rows = study.robot.compliance / study.size.noise * within.regressor(drawn)[0, :, : study.interpretation.rows]
         accuracy = study.robot.compliance * within.regressor(within.tests())[0, :, :3]
-        some = worths(rows, accuracy, sizes, stream(study.seed, study.key, "random designs", 0))
+        some = rate_designs(rows, accuracy, sizes, stream(study.seed, study.key, "random designs", 0))
         found += some
         ranges += [joint_range] * len(some)
     return {

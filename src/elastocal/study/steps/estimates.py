@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.study.identification import estimate_compliance, first_solvable_length
-from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+from elastocal.study.strategies import Stage, Strategy, drop_forgotten_stages
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,15 +21,12 @@ def estimates(study: StudyInMemory, strategies: Sequence[Strategy], number: int 
     study. Returns (sets, lengths, n): by the names of the strategies; rad/(N m), not a number where a length does not determine
     them.
     """
-    joints = study.robot.joints
-    stages = {strategy.name: without_forgotten_stages(strategy, joints).stages for strategy in strategies}
+    stages = {strategy.name: drop_forgotten_stages(strategy, study.robot.joints).stages for strategy in strategies}
     points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
     found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
     for sets in study.blocks(number):
-        measurements = study.measured(sets, points)
+        measurements = study.measure(sets, points)
         for estimator in dict.fromkeys(stages.values()):
-            strategy = Strategy("", estimator)
-            compliance = estimate_compliance(strategy, measurements, joints)[0]
-            compliance[: first_solvable_length(strategy, study.interpretation.independent_rows) - 1] = np.nan
+            compliance = study.estimate(Strategy("", estimator), measurements)
             found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
     return {name: found[estimator] for name, estimator in stages.items()}

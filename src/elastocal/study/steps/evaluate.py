@@ -30,7 +30,7 @@ def judge_from(
     return make_judge(robot, to_experiments(test_experiments), to_deflections(test_deflections), wrench_at)
 
 
-def evaluated(
+def evaluate_strategy(
     identified_blocks: Iterable[Mapping[str, np.ndarray]],
     weight_blocks: Iterable[Mapping[str, np.ndarray]],
     test_weights: Mapping[str, np.ndarray],
@@ -49,7 +49,7 @@ def evaluated(
     joints, evaluated_rows = len(judge.reference), np.asarray(lengths) - 1
     sums: list[np.ndarray] = []
 
-    def weighted() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def weigh() -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Estimates with their weights, one pass for both views of them."""
         for block, counts in zip(identified_blocks, weight_blocks, strict=True):
             sets = data_sets(block)
@@ -57,7 +57,7 @@ def evaluated(
             sums.append(accuracy_sums(compliance[:, evaluated_rows], judge))
             yield compliance, to_weights(counts)
 
-    averages = average(weighted(), judge, method, deviation_of, to_weights(test_weights))
+    averages = average(weigh(), judge, method, deviation_of, to_weights(test_weights))
     return (
         metrics_table(averages, judge.reference, fixed_joints),
         replicates_table(averages, judge.reference, fixed_joints),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.random_streams import draw
-from elastocal.study.identification import Prior, estimate_compliance, first_solvable_length
+from elastocal.study.identification import Prior, estimate_compliance
 from elastocal.study.metrics import mean_form, mean_square_errors
 from elastocal.study.steps.columns import prefix_index_columns
 
@@ -37,16 +37,16 @@ def few_blocks(
     ]
     points = tuple(dict.fromkeys(name for strategy in strategies for name in strategy.points))
     for sets in study.blocks():
-        measurements = study.measured(sets, points)
+        measurements = study.measure(sets, points)
         normal = draw(study.seed, study.key, "nominal compliances", sets, lambda stream: stream.standard_normal(n)).T
         for error in nominal_errors:
             nominal = robot.compliance[:, None] * np.exp(error * normal)
             for strategy in strategies:
-                shrunk = strategy.prior_std is not None
-                prior = Prior(nominal, strategy.prior_std * nominal / study.size.noise) if shrunk else None
-                compliance = estimate_compliance(strategy, measurements, n, prior)[0]
-                if not shrunk:
-                    compliance[: first_solvable_length(strategy, study.interpretation.independent_rows) - 1] = np.nan
+                if strategy.prior_std is None:
+                    compliance = study.estimate(strategy, measurements)
+                else:
+                    prior = Prior(nominal, strategy.prior_std * nominal / study.size.noise)
+                    compliance = estimate_compliance(strategy, measurements, n, prior)[0]
                 squares = mean_square_errors(form, compliance - robot.compliance[:, None])
                 yield {
                     **prefix_index_columns(sets, len(squares)),

@@ -52,7 +52,7 @@ def identified_blocks(
         if start is None:
             compliance = estimate_compliance(strategy, situation.measurements, chain.coordinates)[0]
         else:
-            compliance = situation.solved_exactly(start, range(1, len(condition) + 1))
+            compliance = situation.solve_exactly(start, range(1, len(condition) + 1))
         np.moveaxis(compliance, 1, -1)[np.isnan(condition)] = np.nan
         columns = prefix_index_columns(sets, len(compliance))
         yield columns | {f"c{j + 1}": compliance[:, j].T.ravel() for j in range(chain.coordinates)}
@@ -83,7 +83,7 @@ class Situation:
             for name in strategy.points
         }
 
-    def solved_exactly(self, start: float, lengths: Sequence[int]) -> np.ndarray:
+    def solve_exactly(self, start: float, lengths: Sequence[int]) -> np.ndarray:
         """Compliances by Gauss-Newton from `start`, (lengths, n, sets); see `gauss_newton.identify_exactly`."""
         starts = np.full(self.chain.coordinates, start)
         return identify_exactly(

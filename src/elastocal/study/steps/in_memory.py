@@ -15,8 +15,7 @@ from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regre
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot import Robot, with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.identification import Measurements
-from elastocal.study.interpretation import Interpretation, Size
+from elastocal.study.identification import Measurements, estimate_compliance, first_solvable_length
 from elastocal.study.metrics import Judge, make_judge
 from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
 from elastocal.study.steps.blocks import blocks_of_sets
@@ -27,6 +26,42 @@ if TYPE_CHECKING:
 
     from elastocal.mechanics.chain import MeasuringPoint
     from elastocal.study.experiments import Experiments
+    from elastocal.study.strategies import Strategy
+
+
+@dataclass(frozen=True)
+class Interpretation:
+    """How the paper's open points are read, see ``schemas/config.yaml``.
+
+    `loading`: R3, R4. `rows`: 6 where poses are measured, 3 where positions are (R5). `wrench_at`: R6. `average`,
+    `deviation_of`: R7 and R8, see `evaluation.average`. `reflectors_m`: from each measuring point, in its frame, to the
+    reflectors whose positions are measured there; without, the target of the robot itself is measured.
+    """
+
+    loading: Loading
+    rows: int
+    wrench_at: str
+    average: str
+    deviation_of: str
+    reflectors_m: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def independent_rows(self) -> int:
+        """Independent measurements of one point in one configuration: a rigid body moves in six ways."""
+        return min(6, self.rows * max(1, len(self.reflectors_m)))
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a study is.
+
+    `noise`: standard deviation, the same number in m and rad.
+    """
+
+    data_sets: int
+    configurations: int
+    tests: int
+    noise: float
 
 
 @dataclass(frozen=True)
@@ -92,7 +127,7 @@ class StudyInMemory:
         tests = self.tests(number)
         return make_judge(self.robot, tests, self.deflections(tests), self.interpretation.wrench_at)
 
-    def measured(
+    def measure(
         self, sets: np.ndarray, points: Sequence[str], repeat: str = "", drawn: Experiments | None = None
     ) -> dict[str, Measurements]:
         """What each measuring point contributes to some data sets.
@@ -113,6 +148,12 @@ class StudyInMemory:
                 deflection = deflection + self.size.noise * self.noise(sets, name + repeat)
                 found[name] = Measurements(regressors[name], np.moveaxis(configuration_first(deflection)[..., :rows], -1, 0))
         return found
+
+    def estimate(self, strategy: Strategy, measurements: Mapping[str, Measurements]) -> np.ndarray:
+        """Compliances (lengths, n, sets), rad/(N m), not a number where a length does not determine them."""
+        compliance = estimate_compliance(strategy, measurements, self.robot.joints)[0]
+        compliance[: first_solvable_length(strategy, self.interpretation.independent_rows) - 1] = np.nan
+        return compliance
 
     def _reflectors(
         self, sets: np.ndarray, name: str, repeat: str, drawn: Experiments, regressor: np.ndarray, deflection: np.ndarray

@@ -13,7 +13,7 @@ import numpy as np
 from elastocal.mechanics.elastostatics import joint_torques, loaded_point
 from elastocal.random_streams import draw
 from elastocal.study.experiments import Experiments
-from elastocal.study.identification import Measurements, condition_numbers, estimate_compliance, undetermined_prefixes
+from elastocal.study.identification import Measurements, condition_numbers, estimate_compliance, find_undetermined_prefixes
 from elastocal.study.metrics import mean_form, mean_square_errors
 from elastocal.study.steps.columns import prefix_index_columns
 from elastocal.study.steps.design import configuration_first
@@ -46,13 +46,13 @@ def kind_blocks(
         found: dict[str, Measurements] = {}
         for suffix, experiments in (("", drawn), (ONE_JOINT, one_joint_at_a_time(drawn))):
             for name, way in ways.items():
-                found[name + suffix] = replace(study, interpretation=way).measured(sets, (end,), suffix, experiments)[end]
-        found |= {f"{ENCODERS}, {1e6 * std:g} µrad": encoded(study, sets, drawn, std) for std in encoders_rad}
+                found[name + suffix] = replace(study, interpretation=way).measure(sets, (end,), suffix, experiments)[end]
+        found |= {f"{ENCODERS}, {1e6 * std:g} µrad": simulate_encoders(study, sets, drawn, std) for std in encoders_rad}
         strategy = Strategy("", (Stage((end,), tuple(range(n))),))
         for kind, measured in found.items():
             measurements = {end: measured}
             compliance, triangles = estimate_compliance(strategy, measurements, n)
-            undetermined = undetermined_prefixes(strategy, measurements, condition_numbers(strategy, triangles))
+            undetermined = find_undetermined_prefixes(strategy, measurements, condition_numbers(strategy, triangles))
             squares = mean_square_errors(form, compliance - study.robot.compliance[:, None])
             squares[undetermined] = np.nan
             yield {
@@ -78,7 +78,7 @@ def one_joint_at_a_time(experiments: Experiments) -> Experiments:
     return Experiments(angles, experiments.wrench)
 
 
-def encoded(study: StudyInMemory, sets: np.ndarray, drawn: Experiments, std: float) -> Measurements:
+def simulate_encoders(study: StudyInMemory, sets: np.ndarray, drawn: Experiments, std: float) -> Measurements:
     """How far each joint yields, read behind its gear: theta of equation 7 and normal noise of a standard deviation in rad."""
     chain = study.robot.chain
     at = loaded_point(chain, chain.end_effector, study.interpretation.wrench_at)

@@ -25,7 +25,7 @@ def observability_columns(study: StudyInMemory) -> dict[str, np.ndarray]:
     """
     robot, size, sets = study.robot, study.size, np.arange(study.size.data_sets)
     point, n, form = robot.chain.end_effector.name, robot.joints, mean_form(study.judge())
-    measurements = study.measured(sets, (point,))
+    measurements = study.measure(sets, (point,))
     strategy = Strategy("", (Stage((point,), tuple(range(n))),))
     error = estimate_compliance(strategy, measurements, n)[0][-1] - robot.compliance[:, None]
     information = prefix_information(measurements[point].regressor)[-1:]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.application.planning.criteria import CRITERIA, Criterion, criterion
-from elastocal.application.planning.exchange import exchanged, greedy
+from elastocal.application.planning.exchange import choose_greedily, exchange_candidates
 from elastocal.random_streams import stream
 from elastocal.study.designs import RANDOM
 from elastocal.study.experiments import Experiments
@@ -71,11 +71,11 @@ def simulated_design_blocks(
         found: list[tuple[str, int, Sequence[np.ndarray] | np.ndarray | list[int]]] = []
         for kind, rule in rules.items():
             # A greedy choice of fewer is the beginning of that of more.
-            longest = greedy(rows, max(sizes), rule)
-            found += [(kind, size, exchanged(rows, longest[:size], rule)) for size in sizes]
+            longest = choose_greedily(rows, max(sizes), rule)
+            found += [(kind, size, exchange_candidates(rows, longest[:size], rule)) for size in sizes]
         draws = stream(study.seed, study.key, f"random designs/{load}", 0)
         found += [(RANDOM, size, [draws.choice(count, size, False) for _ in range(_RANDOM_DESIGNS)]) for size in sizes]
-        errors = [_simulated(study, candidates, np.atleast_2d(chosen)) for _, _, chosen in found]
+        errors = [_simulate(study, candidates, np.atleast_2d(chosen)) for _, _, chosen in found]
         hidden = ", ".join(str(joint + 1) for joint in np.flatnonzero(~of))
         yield {
             "load": np.full(len(found), load, object),
@@ -104,7 +104,7 @@ def _candidates(study: StudyInMemory, count: int, direction: Sequence[float] | N
     return Candidates(rows, within.deflections(drawn)[0, :, : read.rows], observable, (forms[0], forms[1]))
 
 
-def _simulated(study: StudyInMemory, candidates: Candidates, designs: np.ndarray) -> tuple[float, float, float]:
+def _simulate(study: StudyInMemory, candidates: Candidates, designs: np.ndarray) -> tuple[float, float, float]:
     """RMS error with its standard error, and RMS error at the test pose, of noisy data sets by designs (D, size)."""
     repeats = -(-study.size.data_sets // len(designs))
     draws = stream(study.seed, study.key, f"noise of designs/{designs.shape[1]}", 0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from elastocal.study.identification import estimate_compliance
 from elastocal.study.steps.columns import data_sets
 from elastocal.study.steps.identify import Situation
-from elastocal.study.strategies import Strategy, without_forgotten_stages
+from elastocal.study.strategies import Strategy, drop_forgotten_stages
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -37,8 +37,8 @@ def solver_table(
         sets = data_sets(experiments)
         for strategy in strategies:
             situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
-            exact = situation.solved_exactly(start, [length])[0]
-            lasting = without_forgotten_stages(strategy, chain.coordinates)
+            exact = situation.solve_exactly(start, [length])[0]
+            lasting = drop_forgotten_stages(strategy, chain.coordinates)
             linear = estimate_compliance(lasting, situation.measurements, chain.coordinates)[0][length - 1]
             columns: dict[str, np.ndarray | str] = {"strategy": strategy.name, "data_set": sets}
             for j in range(chain.coordinates):

@@ -32,7 +32,7 @@ def tube_blocks(study: StudyInMemory, factors: Sequence[float], length: int) -> 
         other = replace(study, robot=with_tube(study.robot, replace(tube, outer_diameter_m=diameter)))
         size = np.linalg.norm(other.deflections(drawn)[..., :3], axis=-1)
         short = replace(other, size=replace(study.size, configurations=length))
-        compliance = estimate_compliance(strategy, short.measured(sets, (point,)), n)[0][-1]
+        compliance = estimate_compliance(strategy, short.measure(sets, (point,)), n)[0][-1]
         yield {
             "diameter": np.full(len(sets), diameter),
             "data_set": sets,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from elastocal.study.strategies import Strategy
 
 # The quantile that is pooled, and over how much about it its density is taken.
-QUANTILE, _ABOUT = 0.95, 0.01
+_QUANTILE, _ABOUT = 0.95, 0.01
 
 
 def use_blocks(
@@ -46,14 +46,14 @@ def _none(models: np.ndarray) -> np.ndarray:
 
 def _scores(tests: np.ndarray, cube: np.ndarray, path: np.ndarray) -> dict[str, np.ndarray]:
     """Columns of scores from errors (sets, places)."""
-    low, pooled, high = np.quantile(tests, [QUANTILE - _ABOUT, QUANTILE, QUANTILE + _ABOUT])
+    low, pooled, high = np.quantile(tests, [_QUANTILE - _ABOUT, _QUANTILE, _QUANTILE + _ABOUT])
     slope = (high - low) / (2 * _ABOUT)
     return {
         "mean": tests.mean(axis=1),
         "mean_square": (tests**2).mean(axis=1),
-        "p95": np.quantile(tests, QUANTILE, axis=1),
+        "p95": np.quantile(tests, _QUANTILE, axis=1),
         "pooled_p95": np.full(len(tests), pooled),
-        "pooled_p95_influence": slope * ((tests > pooled).mean(axis=1) - (1 - QUANTILE)),
+        "pooled_p95_influence": slope * ((tests > pooled).mean(axis=1) - (1 - _QUANTILE)),
         "iso_9283": cube.max(axis=1),
         "path_mean_square": (path**2).mean(axis=1),
         "path_max": path.max(axis=1),
