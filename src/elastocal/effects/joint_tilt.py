@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, per_joint
+from elastocal.effects.protocol import Candidate, load_behind, per_joint
 from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
@@ -37,6 +37,6 @@ def candidates(sites: Sites) -> list[Candidate]:
         def displacement(conditions: Conditions) -> Displacements:
             return [{c: conditions.total[:, c]} for c in coordinates]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, load_behind(sites, joint))
 
     return per_joint(sites, at, prismatic=True)

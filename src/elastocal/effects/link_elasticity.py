@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Shape
+from elastocal.effects.protocol import Candidate, Shape, load_behind
 from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def _candidate(sites: Sites, links: tuple[int, ...], detail: str) -> Candidate:
     length = float(np.linalg.norm(sites.link_vectors_m[longest]))
     parameters = sized(NAME, "1/EI", _NAMES, "1/(N m^2)", sites, max(longest - 1, 0), over=length)
     return Candidate(
-        NAME, FAMILY, joints, detail, parameters, displacement, frozenset({"load"}), (_TAPER,), location_name=detail
+        NAME, FAMILY, joints, detail, parameters, displacement, load_behind(sites, max(links)), (_TAPER,), location_name=detail
     )
 
 

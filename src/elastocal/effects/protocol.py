@@ -39,6 +39,15 @@ if TYPE_CHECKING:
 LOADED_JOINTS = frozenset({"load", "load on the joints"})
 
 
+def load_behind(sites: Sites, joints: int) -> frozenset[str]:
+    """Needs of the law of what yields to the load, behind so many joints.
+
+    A weight that is only usual, not declared, loads columns and rails: behind a joint that turns, what yields to it and how
+    much weighs on the joint are one thing, for which `link_weight` has the masses free.
+    """
+    return frozenset({"load"}) if all(sites.prismatic[:joints]) else LOADED_JOINTS
+
+
 class Displacing(Protocol):
     """Whatever displaces coordinates of the sites: a candidate, or a law that is none."""
 
