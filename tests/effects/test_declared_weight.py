@@ -222,6 +222,18 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
     assert not around.total[:, :6].any()
 
 
+@pytest.mark.parametrize(("chain", "first"), [("Rz(q1) Tz(1) Ry(q2) Tx(1) [end]", 1), ("Tz(q1) Tz(1) Ry(q2) Tx(1) [end]", 2)])
+def test_a_weight_that_is_only_usual_bends_columns_and_rails_and_nothing_behind_a_joint_that_turns(chain, first):
+    """Behind such a joint `link_weight` has the masses free; declared masses and external loads test all."""
+    sites = sites_of(chain_of(chain))
+    known, usual, declared = candidates_on(sites), frozenset({"load"}), frozenset({"load", "load on the joints"})
+    assert known["base_compliance"].needs <= usual and known["joint_tilt@1"].needs <= usual
+    for joint in (1, 2):
+        found = known[f"link_elasticity@{joint}"].needs
+        assert found <= declared and (found <= usual) == (joint < first)
+    assert (known["joint_tilt@2"].needs <= usual) == (first == 2)
+
+
 def test_gears_of_an_arm_without_an_external_load_are_loaded_by_its_weight(fanuc):
     robot, states = weighed(fanuc), made_states(6, 6, seed=8)
     states.wrench[:] = 0.0
