@@ -46,7 +46,7 @@ class Sites:
     metres and newtons. `masses`: what the links weigh, where the robot file says so. `gravity_m_s2`: base axes.
     `payload_kg`: as in `Robot`. `compliance` (n,): of the joints as in `Robot`, usual ones of rigid joints: the scale of
     what yields beside them. `usual_weight`: whether the structure, but no joint, bears the weight of `usual_masses`: where
-    no masses and no loads are known.
+    no masses and no loads are known of an arm that slides.
     """
 
     chain: Chain
