@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from elastocal_proof.plant.physical_robot import PhysicalRobot
     from elastocal_proof.plant.sizing import Yardstick
 
-# Levels of the targets that are shares of the limit, by group, and the share of their cases for which it is worked out, as one
+# Groups and levels of the targets that are shares of the limit, and the share of their cases for which it is worked out, as one
 # takes twenty seconds.
-_SAMPLED = {"single": (25.0, 50.0), "pair": (50.0, 200.0)}
+SAMPLED = (("single", 25.0), ("single", 50.0), ("pair", 50.0), ("pair", 200.0))
 _SHARE = 1 / 6
 # Of each kind at each location: as many as its details have directions, within a factor of two.
 _DRAWS = 8
@@ -60,9 +60,8 @@ def limit_of_sample(truth: Mapping[str, Any], robots_folder: str | Path) -> dict
     case = Case(**stated | {name: tuple(stated[name]) for name in ("effects", "levels")})
     drawn = stream(case.seed, "sample of the limit").random() < _SHARE
     absorbed = any(defect["of"] == "raw" for defect in truth["defects"])
-    if not drawn or absorbed or case.levels[:1] not in {(level,) for level in _SAMPLED.get(case.group, ())}:
-        return None
-    return limit(case, robots_folder)
+    compared = (case.group, *case.levels[:1]) in SAMPLED
+    return limit(case, robots_folder) if drawn and compared and not absorbed else None
 
 
 def limit(case: Case, robots_folder: str | Path) -> dict[str, Any]:

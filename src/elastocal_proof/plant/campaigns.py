@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, seen_poses
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, read_poses
 from elastocal_proof.plant.random_numbers import stream
 from elastocal_proof.plant.tracker import rotation_vector
 
@@ -156,8 +156,7 @@ def measured_table(
 
     Returns `table` (rows,); `outliers` (int, str): state and target of every measurement that is one.
     """
-    position, rotation = seen_poses(robot, schedule)
-    position, rotation, outlier = robot.tracker.read(position, rotation, stream(schedule.seed, "readings"))
+    position, rotation, outlier = read_poses(robot, schedule)
     if design.frame == "tracker":
         position, rotation = robot.tracker.in_own_frame(position, rotation)
     arm, shown = robot.arm, robot.arm.shown_angles(schedule.angle)

@@ -130,6 +130,13 @@ def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: Equilibrium | No
     return seen_at_rest(robot, schedule, at_rest(robot, schedule, start)[1])
 
 
+def read_poses(
+    robot: PhysicalRobot, schedule: Schedule, start: Equilibrium | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Poses of all targets with the noise of the robot's tracker, the same whenever they are asked for; as `Tracker.read`."""
+    return robot.tracker.read(*seen_poses(robot, schedule, start), stream(schedule.seed, "readings"))
+
+
 def at_rest(robot: PhysicalRobot, schedule: Schedule, start: Equilibrium | None = None) -> tuple[Machine, Equilibrium]:
     """The arm in equilibrium.
 

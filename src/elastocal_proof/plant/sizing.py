@@ -21,8 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, seen_at_rest, seen_poses
-from elastocal_proof.plant.random_numbers import stream
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, read_poses, seen_at_rest, seen_poses
 from elastocal_proof.plant.tracker import rotation_vector
 from elastocal_proof.plant.weights import allowed_centre_std_m
 
@@ -92,14 +91,13 @@ class Yardstick:
 
     def residual(self, robot: PhysicalRobot) -> np.ndarray:
         """As `left`, of a robot's measurements with the noise that they have in its campaign."""
-        position, rotation = seen_poses(robot, self.schedule, self._rest)
-        read = robot.tracker.read(position, rotation, stream(self.schedule.seed, "readings"))
-        return self._seen_and_left(*self._apart(*read[:2]))[1]
+        position, rotation, _ = read_poses(robot, self.schedule, self._rest)
+        return self._with_left(self._whitened(*self._apart(position, rotation)))[1]
 
     def signal(self, robot: PhysicalRobot) -> Signal:
         """How a robot differs from the faultless one."""
         metres, radians = self._change(robot)
-        seen, left = self._seen_and_left(metres, radians)
+        seen, left = self._with_left(self._whitened(metres, radians))
         rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in (metres, radians)]
         return Signal(float(seen @ seen), float(left @ left), *rms)
 
@@ -112,7 +110,7 @@ class Yardstick:
 
     def seen_and_left(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
         """A robot's change in the measurements that are not held out, and what is left of it as in `left`."""
-        return self._seen_and_left(*self._change(robot))
+        return self._with_left(self.change(robot))
 
     def angle_deg(self, robot: PhysicalRobot, others: Iterable[PhysicalRobot]) -> float:
         """Principal angle [1] between what is left of a robot and all that others make together, in any proportion.
@@ -131,13 +129,10 @@ class Yardstick:
         share = float(np.linalg.norm(directions[size > _SAME * size[0]] @ mine) / np.linalg.norm(mine))
         return float(np.degrees(np.arccos(min(share, 1.0))))
 
-    def _seen_and_left(self, metres: np.ndarray, radians: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        seen = self._whitened(metres, radians)[self.schedule.training].ravel()
-        return seen, self._left_of(seen)
-
-    def _left_of(self, seen: np.ndarray) -> np.ndarray:
-        seen = np.append(seen, np.zeros(self._priors))
-        return seen - self._absorbed @ (self._absorbed.T @ seen)
+    def _with_left(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        seen = change[self.schedule.training].ravel()
+        whole = np.append(seen, np.zeros(self._priors))
+        return seen, whole - self._absorbed @ (self._absorbed.T @ whole)
 
     def _change(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
         return self._apart(*seen_poses(robot, self.schedule, self._rest))
