@@ -175,7 +175,7 @@ def test_added_evidence_is_that_of_the_model_with_each_unit_added_at_each_size()
     conditioned = condition(statistics, UNITS[0].columns, np.full(2, 0.3), LOG_POSE)
     blocks = blocks_of(conditioned.gram, UNITS, [1, 2])
     found = added_evidence(conditioned, blocks, GRID, statistics.freedom, UNITS)
-    assert found.shape == (3, 3, 5) and np.isneginf(found[:, 0]).all()
+    assert found.shape == (3, 3, 6) and np.isneginf(found[:, 0]).all()
     constant = None
     for place, tau in enumerate(TAU):
         for number in (1, 2):
@@ -272,6 +272,24 @@ def test_sizes_below_the_smallest_of_a_unit_weigh_nothing_and_those_above_as_bef
     np.testing.assert_allclose(whole, np.exp(GRID.log_weights))
     assert not some[:2].any() and some.sum() == pytest.approx(1.0)
     np.testing.assert_allclose(some[2:] / some[-1], whole[2:] / whole[-1])
+
+
+def test_sizes_above_the_largest_of_a_unit_weigh_nothing_and_those_below_as_before():
+    whole = np.exp(GRID.log_weights)
+    some = np.exp(GRID.of(replace(UNITS[0], smallest=1, largest=4)))
+    assert some[[0, 5]].tolist() == [0.0, 0.0] and some.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(some[1:5] / some[1], whole[1:5] / whole[1])
+
+
+def test_a_signal_beyond_the_largest_size_of_a_unit_is_paid_for():
+    """Wherever the search for the sizes starts, as on a grid without the larger ones."""
+    statistics = statistics_of(quiet(1, (6.0, -5.0)).products, TAU)
+    left = Grid(GRID.scales[:5], GRID.log_weights[:5] - logsumexp(GRID.log_weights[:5]))
+    whole, cut = (evaluate(statistics, [UNITS[0]], grid, LOG_POSE, [0.1]).log_evidence for grid in (GRID, left))
+    for start in SETTINGS.scales:
+        found = evaluate(statistics, [replace(UNITS[0], largest=4)], GRID, LOG_POSE, [start])
+        assert found.log_evidence == pytest.approx(cut, abs=1e-8) and found.scales[0] == GRID.scales[4]
+    assert cut < whole - 1.0
 
 
 def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():

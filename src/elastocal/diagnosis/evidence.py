@@ -66,15 +66,17 @@ class Grid:
     log_weights: np.ndarray
 
     def of(self, unit: Unit) -> np.ndarray:
-        """Logarithms of the weights for one unit: its smallest size and those above share them, ndarray (S,)."""
-        return self._from[unit.smallest]
+        """Logarithms of the weights for one unit: sizes from its smallest to its largest share them, ndarray (S,)."""
+        return self._between[unit.smallest, unit.largest]
 
     @cached_property
-    def _from(self) -> np.ndarray:
-        """Weights from each size on, ndarray (S, S)."""
+    def _between(self) -> np.ndarray:
+        """Weights from each size to each, ndarray (S, S, S)."""
         places = np.arange(len(self.scales))
-        weights = np.where(places < places[:, None], -np.inf, self.log_weights)
-        return weights - log_sum_exp(weights, axis=1)[:, None]
+        outside = (places < places[:, None, None]) | (places > places[:, None])
+        weights = np.where(outside, -np.inf, self.log_weights)
+        with np.errstate(invalid="ignore"):
+            return weights - log_sum_exp(weights, axis=2)[..., None]
 
 
 def scale_weights(scales: Sequence[float] | np.ndarray, settings: Settings) -> np.ndarray:
@@ -253,7 +255,8 @@ def evaluate(
     if not units:
         values = base + log_likelihood(statistics.squares, statistics.freedom)
         return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values), np.zeros(0))
-    nearest = [max(int(np.argmin(np.abs(grid.scales - size))), unit.smallest) for size, unit in zip(start, units, strict=True)]
+    off = [np.where(np.isfinite(grid.of(u)), np.abs(grid.scales - size), np.inf) for size, u in zip(start, units, strict=True)]
+    nearest = [int(np.argmin(distances)) for distances in off]
     present = Joint(statistics, units, grid, base, np.array(nearest))
     profiles = present.profiles()
     for _ in range(_MOST_ASCENTS):

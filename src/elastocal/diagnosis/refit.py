@@ -44,7 +44,12 @@ def selected(linearized: Linearized, model: Model) -> Selected:
     for number, scale in zip(model.units, model.scales, strict=True):
         unit = linearized.problem.units[number]
         if unit.candidate:
-            effects.append((with_prior(unit.candidate, scale * unit.sizes), np.array(unit.shapes, float)))
+            effects.append(
+                (
+                    with_prior(unit.candidate, min(scale, linearized.problem.settings.largest_fitted) * unit.sizes),
+                    np.array(unit.shapes, float),
+                )
+            )
     return Selected(tuple(effects))
 
 
