@@ -40,10 +40,6 @@ class Settings:
         (0.01, 0.03, 0.1, 0.3, 1.0, 3.0),
         "sizes of an effect to average over, in those of the table: three times what such an effect reaches is a bad case",
     )
-    largest_fitted: float = _setting(
-        1.0,
-        "size with which an effect is fitted at most: a search needs wide priors, with which predictions extrapolate badly",
-    )
     scale_center: float = _setting(0.1, "most likely size of an effect, in sizes of the table")
     scale_spread: tuple[float, float] = _setting(
         (3.0, 1.0),
