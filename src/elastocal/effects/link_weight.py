@@ -56,11 +56,11 @@ def _of_the_arm(sites: Sites, joints: Sequence[int]) -> Iterator[Candidate]:
     carried = sites.carried_links(joints[0])
     some = carried[:_LINKS]
     across = _across(sites, some, range(sites.joints))
-    mass = {link: size_of(NAME, "mass", sites, link) for link in carried}
+    mass = size_of(NAME, "mass", sites)
 
     def candidate(detail: str, links: Sequence[int], axes: Sequence[tuple[int, int]]) -> Candidate:
-        parameters = [Parameter(f"mass_at_end_of_link_{k}", "kg", mass[k]) for k in links]
-        parameters += [Parameter(f"moment_{'xyz'[axis]}_of_link_{k}", "kg m", _OFF_M * mass[k]) for k, axis in axes]
+        parameters = [Parameter(f"mass_at_end_of_link_{k}", "kg", mass) for k in links]
+        parameters += [Parameter(f"moment_{'xyz'[axis]}_of_link_{k}", "kg m", _OFF_M * mass) for k, axis in axes]
 
         def displacement(conditions: Conditions) -> Displacements:
             torques = _torques(conditions, links, axes)
@@ -80,10 +80,10 @@ def _of_the_arm(sites: Sites, joints: Sequence[int]) -> Iterator[Candidate]:
 
 def _of_joints(sites: Sites, joints: Sequence[int]) -> Iterator[Candidate]:
     def candidate(joint: int, detail: str, links: Sequence[int], axes: Sequence[tuple[int, int]]) -> Candidate:
-        product = {link: size_of(NAME, "mass of one joint", sites, joint, link) for link in links}
-        parameters = [Parameter(f"compliance_times_mass_at_end_of_link_{k}", "rad kg/(N m)", product[k]) for k in links]
-        names = [(k, f"compliance_times_moment_{'xyz'[axis]}_of_link_{k}") for k, axis in axes]
-        parameters += [Parameter(name, "rad kg m/(N m)", _OFF_M * product[k]) for k, name in names]
+        product = size_of(NAME, "mass of one joint", sites, joint)
+        parameters = [Parameter(f"compliance_times_mass_at_end_of_link_{k}", "rad kg/(N m)", product) for k in links]
+        names = (f"compliance_times_moment_{'xyz'[axis]}_of_link_{k}" for k, axis in axes)
+        parameters += [Parameter(name, "rad kg m/(N m)", _OFF_M * product) for name in names]
 
         def displacement(conditions: Conditions) -> Displacements:
             return [{joint: torque[:, joint]} for torque in _torques(conditions, links, axes)]

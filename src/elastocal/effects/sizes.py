@@ -32,8 +32,7 @@ SHIFT, REACH, TORQUE = (
     "reach",
     "joint's turn under its full torque",
 )
-RATED, LOAD = "rated load", "weight of the rated load"
-MASS, SAG = "usual mass at the link's end", "joint's compliance times the usual mass at the link's end"
+RATED, LOAD, SAG = "rated load", "weight of the rated load", "joint's compliance times the rated load"
 # A carriage that slides turns by its compliance over the square of its length.
 _CARRIAGE_M, _SHORTEST_REACH_M = 0.3, 0.3
 
@@ -100,14 +99,8 @@ SIZES = tuple(
         ("hysteresis", "shift", 2e-5, ABSOLUTE, "the nut of a spindle"),
         ("lost_motion", "play", 1e-4, ABSOLUTE, "a third of an arc minute", 1),
         ("compensator_torque", "turn", 0.3, TORQUE, "a compensator bears a third of the weight"),
-        (
-            "link_weight",
-            "mass",
-            1.0,
-            MASS,
-            "an arm weighs six times what it carries, by length, half of each link at either end",
-        ),
-        ("link_weight", "mass of one joint", 1.0, SAG, "the same, by the joint's turn"),
+        ("link_weight", "mass", 1.5, RATED, "an arm weighs six times what it carries, a quarter of it at the end of a link"),
+        ("link_weight", "mass of one joint", 1.5, SAG, "the same, by the joint's turn"),
         ("payload", "mass", 0.15, RATED, "a cable package or a forgotten gripper"),
         ("force_bias", "force", 0.01, LOAD, "accuracy class of load cells that suit the arm"),
         ("force_scale", "scale", 0.02, ABSOLUTE, "a load cell that was calibrated long ago"),
@@ -139,8 +132,7 @@ _BY_NAME = {(size.effect, size.quantity): size for size in SIZES}
 def size_of(effect: str, quantity: str, sites: Sites, *joints: int) -> float:
     """Size that an effect reaches on an arm, in the SI unit of its parameter.
 
-    `joints`: from 0, by whose compliance it is sized: of several the geometric mean; needed where the table says so. Of a mass
-    the link, behind the joint that it turns.
+    `joints`: from 0, by whose compliance it is sized: of several the geometric mean; needed where the table says so.
     """
     size = _BY_NAME[effect, quantity]
     return size.share * _UNITS[size.of](sites, joints)
@@ -178,6 +170,5 @@ _UNITS: dict[str, Callable[[Sites, tuple[int, ...]], float]] = {
     TORQUE: lambda sites, joints: _of_joints(sites, joints) * full_torque_Nm(sites, joints[0]),
     RATED: lambda sites, joints: rated_kg(sites),
     LOAD: lambda sites, joints: rated_kg(sites) * standard_gravity,
-    MASS: lambda sites, links: float(sites.usual_masses[links[0]]),
-    SAG: lambda sites, places: _of_joints(sites, places[:1]) * float(sites.usual_masses[places[1]]),
+    SAG: lambda sites, joints: _of_joints(sites, joints) * rated_kg(sites),
 }
