@@ -263,7 +263,7 @@ def test_every_rule_watches_the_sources_of_its_own_script():
 _LOADED = """
 import ast, json, os, sys
 from pathlib import Path
-import matplotlib.figure, numpy, pandas, pyarrow.parquet
+import jsonschema, matplotlib.figure, mujoco, numpy, pandas, pyarrow.parquet, scipy.interpolate, scipy.stats, statsmodels.api
 root = Path(sys.argv[1])
 sys.path.insert(0, str(root / "workflow" / "scripts"))
 for script in sys.argv[2:]:
