@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from markdown_it import MarkdownIt
+from snakemake_starts import started
 from typer.testing import CliRunner
 
 from elastocal.command.main import app
@@ -251,7 +252,7 @@ def test_snakemake_knows_its_targets(words, tmp_path):
     for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "paper.bib", "CITATION.cff"):
         (tmp_path / name).symlink_to(ROOT / name)
     called = [sys.executable, "-m", "snakemake", "-n", "-q", "all", "-j1", *words]
-    ran = subprocess.run(called, cwd=tmp_path, capture_output=True, text=True)
+    ran = started(called, tmp_path, os.environ | {"PYTHONPATH": str(tmp_path / "src")})
     assert ran.returncode == 0, ran.stdout + ran.stderr
 
 

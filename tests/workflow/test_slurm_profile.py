@@ -1,11 +1,11 @@
 """The profile for Slurm lays out the jobs of every target, which needs no Slurm: no group waits for jobs that wait for it."""
 
+import os
 import re
-import subprocess
 import sys
 
 import pytest
-from durations import HUNG_S
+from snakemake_starts import started
 from study_folder import REPOSITORY
 
 # Those of the page, and the others of hours.
@@ -21,7 +21,7 @@ def folder(tmp_path):
 
 def test_jobs_of_every_target_can_be_grouped(folder):
     called = [sys.executable, "-m", "snakemake", "--profile", "profiles/slurm", "-n", "-p", *TARGETS]
-    done = subprocess.run(called, cwd=folder, capture_output=True, text=True, timeout=HUNG_S)
+    done = started(called, folder, os.environ | {"PYTHONPATH": str(folder / "src")})
     assert done.returncode == 0, done.stderr[-3000:]
     laid_out = set(re.findall(r"^(\w+) +\d+$", done.stdout, re.MULTILINE))
     assert {"seal_cases", "compile_report", "tabulate_league", "summarize_closed_loop"} <= laid_out
