@@ -27,6 +27,11 @@ hypothesis.settings.load_profile("repeatable")
 typer.testing._get_command = cache(typer.main.get_command)
 
 
+def pytest_collection_modifyitems(items):
+    """Files of minutes first, so that no worker is left alone with one at the end."""
+    items.sort(key=lambda item: item.path.parent.name != "workflow")
+
+
 def load_robot(key):
     path = CONFIG / "robots" / f"{key}.yaml"
     document = read_document(path)
