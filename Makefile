@@ -15,7 +15,7 @@ audit: .venv/ready-for-audit
 	$(BIN)/snakemake -j$(CORES) audit
 
 test: .venv/ready-for-tests
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
 # The profile for Slurm on a Slurm of this machine, which the tests start and stop; asks for root.
 test-slurm: .venv/ready-for-tests

@@ -1,9 +1,12 @@
 """Fixtures: the robots and strategies of the repository's own config."""
 
+from functools import cache
 from pathlib import Path
 
 import hypothesis
 import pytest
+import typer.main
+import typer.testing
 
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot_file import robot_from_document
@@ -20,6 +23,13 @@ hypothesis.settings.register_profile(
     suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
 hypothesis.settings.load_profile("repeatable")
+# Its runner builds all commands anew for each that is called.
+typer.testing._get_command = cache(typer.main.get_command)
+
+
+def pytest_collection_modifyitems(items):
+    """Files of minutes first, so that no worker is left alone with one at the end."""
+    items.sort(key=lambda item: item.path.parent.name != "workflow")
 
 
 def load_robot(key):

@@ -13,7 +13,7 @@ from elastocal.mechanics.kinematics import poses
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def campaign(request, fanuc):
-    return made(fanuc, 1, Plan(poses=20, tracker=request.param == "tracker"), with_other_compliances(fanuc, 1, 0.3))
+    return made(fanuc, 1, Plan(poses=12, tracker=request.param == "tracker"), with_other_compliances(fanuc, 1, 0.3))
 
 
 @pytest.mark.parametrize("joint", range(6))

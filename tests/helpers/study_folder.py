@@ -64,6 +64,13 @@ class Study:
         study.configure(SMALL)
         return study
 
+    @classmethod
+    def of_links(cls, folder):
+        """The repository's sources as they are, with results of their own."""
+        for name in SOURCES:
+            (folder / name).symlink_to(REPOSITORY / name)
+        return cls(folder)
+
     def copied_to(self, folder):
         """The same folder elsewhere, times of its files included."""
         shutil.copytree(self.folder, folder)
@@ -121,6 +128,13 @@ class Study:
         assert len(jobs) == (int(total[1]) if total else 0), done.stdout
         assert total or "Nothing to be done" in done.stdout
         return set(jobs)
+
+    def inputs_by_rule(self, *arguments):
+        """Files that the jobs of each rule read, from Snakemake's own plan."""
+        plan = self.snakemake("-n", "-p", "--forceall", *arguments)
+        assert plan.returncode == 0, plan.stderr[-2000:]
+        found = re.findall(r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE)
+        return {rule: set(files.split(", ")) for rule, files in found}
 
     def files(self, *patterns):
         """Relative paths of files by glob patterns, sorted."""

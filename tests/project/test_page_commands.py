@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from markdown_it import MarkdownIt
+from study_folder import Study
 from typer.testing import CliRunner
 
 from elastocal.command.main import app
@@ -248,17 +249,13 @@ def dry_runs():
 @pytest.mark.parametrize("words", dry_runs(), ids=" ".join)
 def test_snakemake_knows_its_targets(words, tmp_path):
     """A dry run: what the targets cost is minutes to hours, and others test what their jobs do."""
-    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "paper.bib", "CITATION.cff"):
-        (tmp_path / name).symlink_to(ROOT / name)
-    called = [sys.executable, "-m", "snakemake", "-n", "-q", "all", "-j1", *words]
-    ran = subprocess.run(called, cwd=tmp_path, capture_output=True, text=True)
+    ran = Study.of_links(tmp_path).snakemake("-n", "-q", "all", "-j1", *words)
     assert ran.returncode == 0, ran.stdout + ran.stderr
 
 
 @pytest.mark.parametrize("page", STORIES)
 def test_a_how_to_page_works_from_top_to_bottom(page, tmp_path):
-    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "paper.bib", "CITATION.cff"):
-        (tmp_path / name).symlink_to(ROOT / name)
+    Study.of_links(tmp_path)
     binaries = Path(sys.executable).parent
     (tmp_path / ".venv").symlink_to(binaries.parent)
     script = "set -euo pipefail\n" + "\n".join(STORIES[page])

@@ -6,6 +6,7 @@ import shutil
 import signal
 import socket
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -126,25 +127,32 @@ def plant(path, kind, victim):
         path.mkdir()
 
 
-def names_written(command, top):
+@pytest.fixture(scope="module")
+def names_written(checkout, tmp_path_factory):
     """The names that a command writes in a clean folder."""
-    words, place = COMMANDS[command]
-    before = listed(top)
-    assert run(*words) is None
-    after = listed(top)
-    names = [name for name in after if after[name] != before.get(name) and (top / name).is_file()]
-    assert names and all(Path(name).is_relative_to(place) for name in names)
-    return [f"{place}/{WHOLE[command]}"] if command in WHOLE else names
+
+    @cache
+    def names_of(command):
+        words, place = COMMANDS[command]
+        top = shutil.copytree(checkout, tmp_path_factory.mktemp("clean") / "top", symlinks=True)
+        before = listed(top)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(top)
+            assert run(*words) is None
+        after = listed(top)
+        names = [name for name in after if after[name] != before.get(name) and (top / name).is_file()]
+        assert names and all(Path(name).is_relative_to(place) for name in names)
+        return [f"{place}/{WHOLE[command]}"] if command in WHOLE else names
+
+    return names_of
 
 
 COUNTED = {}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_what_stands_at_a_name_that_is_written_is_refused_and_stays(checkout, tmp_path, monkeypatch, command):
-    clean = shutil.copytree(checkout, tmp_path / "clean", symlinks=True)
-    monkeypatch.chdir(clean)
-    names = names_written(command, clean)
+def test_what_stands_at_a_name_that_is_written_is_refused_and_stays(checkout, names_written, tmp_path, monkeypatch, command):
+    names = names_written(command)
     victim = tmp_path / "elsewhere" / "victim"
     victim.parent.mkdir()
     victim.write_text("mine")
@@ -167,15 +175,11 @@ def test_what_stands_at_a_name_that_is_written_is_refused_and_stays(checkout, tm
     print(f"{command}: {len(names)} names, {COUNTED[command]} refused")
 
 
-def test_names_that_were_once_foreseeable_are_not_written_through(checkout, tmp_path, monkeypatch):
+def test_names_that_were_once_foreseeable_are_not_written_through(checkout, names_written, tmp_path, monkeypatch):
     victim = tmp_path / "victim"
     victim.write_text("mine")
     for number, (command, (words, _)) in enumerate(COMMANDS.items()):
-        clean, planted = (
-            shutil.copytree(checkout, tmp_path / f"{number} {each}", symlinks=True) for each in ("clean", "planted")
-        )
-        monkeypatch.chdir(clean)
-        names = names_written(command, clean)
+        planted, names = shutil.copytree(checkout, tmp_path / str(number), symlinks=True), names_written(command)
         for name in names:
             (planted / f"{name}.partial").symlink_to(victim)
         monkeypatch.chdir(planted)
@@ -221,12 +225,12 @@ def test_a_pipe_where_a_file_is_read_is_refused_and_never_waited_for(checkout, t
 
 
 @pytest.mark.parametrize("command", ["plan", "plan of a campaign", "export", "certificate"])
-def test_a_command_that_is_killed_leaves_the_old_files_or_none(checkout, tmp_path, monkeypatch, command):
+def test_a_command_that_is_killed_leaves_the_old_files_or_none(checkout, names_written, tmp_path, monkeypatch, command):
     """Killed while it draws: what it wrote has no final name; the next run replaces all of the old ones."""
     top = shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(top)
     words = COMMANDS[command][0]
-    names = [] if command in WHOLE else names_written(command, top)
+    names = [] if command in WHOLE else names_written(command)
     for name in names:
         (top / name).write_text("old")
     child = os.fork()

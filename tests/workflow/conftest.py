@@ -1,4 +1,4 @@
-"""A small study, run once for all workers, and a folder of its own for each test that changes something."""
+"""A small study and a small proof, run once for all workers, and a folder of its own for each test that changes something."""
 
 import fcntl
 import os
@@ -8,22 +8,34 @@ import pytest
 from study_folder import Study
 
 
-@pytest.fixture(scope="session")
-def small_study(tmp_path_factory):
-    """The finished small study on two cores: the worker that asks first makes it, another that asks meanwhile waits.
+def made_once(factory, name, seed, *arguments):
+    """A finished run on two cores: the worker that asks first makes it, another that asks meanwhile waits.
 
     To be read, not to be changed.
     """
-    own = tmp_path_factory.getbasetemp()
-    study = Study((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "small")
+    own = factory.getbasetemp()
+    study = Study((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / name)
     with open(study.folder.with_suffix(".lock"), "w", encoding="utf-8") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         done = study.folder.with_suffix(".done")
         if not done.exists():
             shutil.rmtree(study.folder, ignore_errors=True)
-            Study.of_sources(study.folder).run()
+            Study.of_sources(study.folder).configure({"seed": seed})
+            study.run(*arguments)
             done.touch()
     return study
+
+
+@pytest.fixture(scope="session")
+def small_study(tmp_path_factory):
+    """The finished small study."""
+    return made_once(tmp_path_factory, "small", 1)
+
+
+@pytest.fixture(scope="session")
+def small_proof(tmp_path_factory):
+    """The smallest blind proof, finished; not by the seed of the proof: what is looked at here is not part of it."""
+    return made_once(tmp_path_factory, "proof", 31, "blind", "--config", "blind=smoke")
 
 
 @pytest.fixture

@@ -21,13 +21,22 @@ def ended(script, *arguments):
     return done.stdout
 
 
+def report():
+    return RUN["REPORT"].read_bytes() if RUN["REPORT"].exists() else None
+
+
+@pytest.fixture(scope="module")
+def small():
+    """What all of them print in one run, in which the rerun finds the study made, and the report before it."""
+    return report(), ended("run.py", "--small", "--only", *RUN["NAMES"])
+
+
 @pytest.mark.parametrize("name", RUN["NAMES"])
-def test_a_small_setting_has_a_ratio_for_each_row_and_touches_no_report(name):
-    before = RUN["REPORT"].read_bytes() if RUN["REPORT"].exists() else None
-    said = ended("run.py", "--small", "--only", name)
+def test_a_small_setting_has_a_ratio_for_each_row_and_touches_no_report(name, small):
+    before, said = small
     ratios = [float(ratio) for ratio in re.findall(rf"^  {name}\b.*: ratio (\S+), target none", said, re.MULTILINE)]
     assert ratios and min(ratios) > 0 and max(ratios) < float("inf")
-    assert (RUN["REPORT"].read_bytes() if RUN["REPORT"].exists() else None) == before
+    assert report() == before
 
 
 def test_every_module_with_rows_is_a_benchmark_that_runs():

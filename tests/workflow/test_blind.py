@@ -1,9 +1,6 @@
 """The blind proof as a workflow: no truth is read before the diagnosis, scores do not rerun it, a changed truth is refused."""
 
-import re
-
 import pytest
-from study_folder import Study
 
 BLIND = ("blind", "--config", "blind=smoke")
 # All that an analyst does: none of these may have a truth among its inputs.
@@ -12,35 +9,18 @@ AFTERWARDS = {"seal_cases", "oracle_cases", "score_cases", "score_follow_ups", "
 SEALED = "data/sealed/smoke_1"
 
 
-@pytest.fixture(scope="module")
-def scored(tmp_path_factory):
-    """The smallest blind proof, finished."""
-    study = Study.of_sources(tmp_path_factory.mktemp("blind") / "study")
-    # Not the seed of the proof: what is looked at here is not part of it.
-    study.configure({"seed": 31})
-    study.run(*BLIND)
-    return study
-
-
 @pytest.fixture
-def copy(scored, tmp_path):
+def copy(small_proof, tmp_path):
     """A copy, to be changed."""
-    return scored.copied_to(tmp_path / "study")
+    return small_proof.copied_to(tmp_path / "study")
 
 
 def rules(planned):
     return {job[0] for job in planned}
 
 
-def inputs_by_rule(study):
-    plan = study.snakemake("-n", "-p", "--forceall", *BLIND)
-    assert plan.returncode == 0, plan.stderr[-2000:]
-    found = re.findall(r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE)
-    return {rule: set(files.split(", ")) for rule, files in found}
-
-
-def test_no_diagnosing_rule_has_a_sealed_file_among_its_inputs(scored):
-    inputs = inputs_by_rule(scored)
+def test_no_diagnosing_rule_has_a_sealed_file_among_its_inputs(small_proof):
+    inputs = small_proof.inputs_by_rule(*BLIND)
     readers = {rule for rule, files in inputs.items() if any("sealed" in file for file in files if not file.startswith("src/"))}
     assert readers == AFTERWARDS
     assert set(inputs) >= ANALYSIS and not readers & ANALYSIS
@@ -50,18 +30,20 @@ def test_no_diagnosing_rule_has_a_sealed_file_among_its_inputs(scored):
     assert {"results/blind/smoke_1.json", "reports/blind/manifest.sha256"} <= inputs["oracle_cases"]
 
 
-def test_a_finished_proof_has_nothing_to_do(scored):
-    assert scored.planned(*BLIND) == set()
+def test_a_finished_proof_has_nothing_to_do(small_proof):
+    assert small_proof.planned(*BLIND) == set()
 
 
-def test_every_table_and_figure_is_there(scored):
+def test_every_table_and_figure_is_there(small_proof):
     tables = ["cases", "confusion", "coverage", "power", "probabilities", "reliability", "settings", "summary", "undetectable"]
-    assert set(scored.files("reports/blind/*.csv")) >= {f"reports/blind/{name}.csv" for name in tables}
+    assert set(small_proof.files("reports/blind/*.csv")) >= {f"reports/blind/{name}.csv" for name in tables}
     figures = ["confusion", "coverage", "errors", "power", "reliability", "sweep", "targets"]
     for kind in ("pdf", "png"):
-        assert scored.files(f"reports/blind/figures/*.{kind}") == [f"reports/blind/figures/{name}.{kind}" for name in figures]
-    assert scored.path("reports/blind/blind.pdf").read_bytes().startswith(b"%PDF")
-    assert len(scored.path("reports/blind/cases.csv").read_text(encoding="utf-8").splitlines()) == 1 + 4
+        assert small_proof.files(f"reports/blind/figures/*.{kind}") == [
+            f"reports/blind/figures/{name}.{kind}" for name in figures
+        ]
+    assert small_proof.path("reports/blind/blind.pdf").read_bytes().startswith(b"%PDF")
+    assert len(small_proof.path("reports/blind/cases.csv").read_text(encoding="utf-8").splitlines()) == 1 + 4
 
 
 EDITS = {

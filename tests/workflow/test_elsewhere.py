@@ -1,8 +1,6 @@
 """Results in another folder than the sources, as in a container: `snakemake --snakefile ELSEWHERE/Snakefile`."""
 
-import subprocess
-
-from durations import HUNG_S
+from snakemake_starts import started
 
 TARGETS = (
     "study",
@@ -23,7 +21,7 @@ def test_every_target_finds_its_sources_and_its_configuration(unstarted, tmp_pat
     place = tmp_path / "results of mine"
     place.mkdir()
     command = unstarted.command("-n", "--quiet", "--snakefile", str(unstarted.path("Snakefile")), "--", *TARGETS)
-    done = subprocess.run(**command | {"cwd": place}, capture_output=True, text=True, timeout=HUNG_S)
+    done = started(**command | {"cwd": place})
     assert done.returncode == 0, done.stderr[-3000:]
 
 

@@ -1,7 +1,6 @@
 """Closing the loop on a user's own campaign: one command, one folder, and no more work than an edit asks for."""
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -173,16 +172,8 @@ def test_a_finished_diagnosis_has_nothing_to_do(diagnosed):
     assert diagnosed.planned(OF_THE_STUDY, *OWN) == set()
 
 
-def inputs_by_rule(study, *arguments):
-    """Files that the jobs of each rule read, from Snakemake's own plan."""
-    plan = study.snakemake("-n", "-p", "--forceall", *arguments)
-    assert plan.returncode == 0, plan.stderr[-2000:]
-    found = re.findall(r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE)
-    return {rule: set(files.split(", ")) for rule, files in found}
-
-
 def test_no_step_before_the_judgement_reads_held_out_poses(diagnosed):
-    inputs = inputs_by_rule(diagnosed, *OWN)
+    inputs = diagnosed.inputs_by_rule(*OWN)
     assert set(STEPS) <= set(inputs)
     readers = {rule for rule, files in inputs.items() if any("held_out.parquet" in file for file in files)}
     # The target asks whether each file is there, and reads none.

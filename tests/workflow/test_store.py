@@ -10,7 +10,6 @@ import boto3
 import pytest
 from durations import HUNG_S
 from moto.server import ThreadedMotoServer
-from study_folder import Study
 
 BUCKET, FOLDER, BLIND = "results", "of/study/", "of/blind/"
 STORE = ("store", "--config", f"store=s3://{BUCKET}/{FOLDER.rstrip('/')}")
@@ -79,11 +78,9 @@ def test_what_is_fetched_from_the_store_is_the_run_that_its_crate_describes(stud
     assert study.files(".snakemake/storage/s3/**/*.parquet") == []
 
 
-def test_the_targets_that_are_named_are_described_and_uploaded_and_no_others(bucket, tmp_path):
+def test_the_targets_that_are_named_are_described_and_uploaded_and_no_others(small_proof, bucket, tmp_path):
     """The smallest blind proof, two of whose jobs write folders of cases."""
-    proof = Study.of_sources(tmp_path / "proof")
-    # Not the seed of the proof: what is looked at here is not part of it.
-    proof.configure({"seed": 31})
+    proof = small_proof.copied_to(tmp_path / "proof")
     proof.run("store", "--config", f"store=s3://{BUCKET}/{BLIND.rstrip('/')}", "crate_of=[blind]", "blind=smoke")
     described = fetched(bucket, BLIND, tmp_path / "fetched")
     cases = proof.files("data/blind/smoke_1/*/*", "data/sealed/smoke_1/*.json")

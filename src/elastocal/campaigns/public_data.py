@@ -7,8 +7,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import pooch
-
 from elastocal.errors import InputError
 
 # Of the sources here the largest has four megabytes.
@@ -71,6 +69,9 @@ def fetch(name: str, files: Mapping[str, PublicFile], folder: str | Path) -> Pat
         if found != file.sha256:
             raise InputError(local, "", f"SHA-256 {found}", f"{file.sha256}, as in {file.address}")
         return local
+    # Loads what asks a network, which the rules, who look for files alone, do without.
+    import pooch
+
     pooch.get_logger().setLevel(logging.ERROR)
     try:
         kept = pooch.retrieve(file.address, f"sha256:{file.sha256}", _name_copy(name, file), folder)

@@ -22,9 +22,9 @@ def measured_again(calibrated, rng):
     return replace(calibrated, estimate=stepped(calibrated.model, calibrated.estimate, root @ rng.standard_normal(len(root))))
 
 
-def comparison(before, after, seed=0, poses=60):
+def comparison(before, after, seed=0, poses=60, draws=DRAWS):
     angles = draw_angles(before, poses, np.random.default_rng(5))
-    return compare_campaigns(before, after, angles, DRAWS, np.random.default_rng(seed))
+    return compare_campaigns(before, after, angles, draws, np.random.default_rng(seed))
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +33,14 @@ def calibrated(fanuc):
 
 
 def test_a_robot_that_did_not_change_seldom_seems_changed(calibrated):
-    """At 5 % in 80 pairs; 10 or more have a probability of 0.7 % there, and of 0.99 at a rate of 20 %."""
+    """At 5 % in 80 pairs; 10 or more have a probability of 0.7 % there, and of 0.99 at a rate of 20 %.
+
+    By 99 draws a p-value is at most 0.05 in exactly 5 %.
+    """
     rng = np.random.default_rng(1)
     pairs = [(measured_again(calibrated, rng), measured_again(calibrated, rng)) for _ in range(80)]
-    found = [comparison(*pair, seed, poses=10) for seed, pair in enumerate(pairs)]
-    assert sum(each.p_value < 0.05 for each in found) <= binom.ppf(0.993, 80, 0.05)
+    found = [comparison(*pair, seed, poses=10, draws=99) for seed, pair in enumerate(pairs)]
+    assert sum(each.p_value <= 0.05 for each in found) <= binom.ppf(0.993, 80, 0.05)
     assert sum(min(change.p_value for change in each.changes) < 0.05 for each in found) <= binom.ppf(0.993, 80, 0.05)
 
 

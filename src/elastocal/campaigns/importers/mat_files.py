@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import scipy.io
+import scipy
 
 from elastocal.campaigns.public_data import LARGEST_BYTES
 from elastocal.counting import counted

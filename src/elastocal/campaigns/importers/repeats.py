@@ -1,9 +1,7 @@
 """Which rows of a source are repeats of one pose, where the source does not say."""
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
+import scipy  # Its parts load as they are used: the rules ask importers for their files alone, at each start of Snakemake.
 
 
 def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -18,9 +16,9 @@ def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tup
         1969.
     """
     count = len(joint_angles)
-    pairs = KDTree(joint_angles).query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    label = connected_components(graph, directed=False)[1]
+    pairs = scipy.spatial.KDTree(joint_angles).query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")
+    graph = scipy.sparse.coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
     first = np.unique(label, return_index=True)[1]
     rank = np.argsort(np.argsort(first))
     pose = rank[label]

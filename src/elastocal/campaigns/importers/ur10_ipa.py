@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from elastocal.campaigns.importers.csv_columns import numbers, read_columns, table
 from elastocal.campaigns.importers.reflectors import reflector_table, unloaded_document
@@ -64,7 +64,7 @@ def read(path: str | Path) -> dict[str, np.ndarray]:
     found = {
         "joint_angles": angles,
         "position": 1e-3 * position,
-        "rotation_vector": Rotation.from_euler(_EULER, orientation, degrees=True).as_rotvec(),
+        "rotation_vector": scipy.spatial.transform.Rotation.from_euler(_EULER, orientation, degrees=True).as_rotvec(),
     }
     if TEMPERATURE in cells:
         found["temperature_c"] = numbers(path, TEMPERATURE, cells[TEMPERATURE], ",")
