@@ -8,6 +8,7 @@ from elastocal.figures.campaign_errors import campaign_errors
 TABLE = pd.DataFrame(
     {
         "campaign": ["first_one", "second"],
+        "poses": [24, 1],
         **{f"before_rms{end}_mm": values for end, values in (("", [0.4, 2.0]), ("_low", [0.3, 1.8]), ("_high", [0.5, np.inf]))},
         **{f"after_rms{end}_mm": values for end, values in (("", [0.2, 1.9]), ("_low", [0.1, 1.7]), ("_high", [0.3, 2.2]))},
     }
@@ -21,3 +22,8 @@ def test_each_campaign_has_both_errors_at_their_values():
     np.testing.assert_allclose(before, [[0.4, 1], [2.0, 0]])
     np.testing.assert_allclose(after, [[0.2, 1], [1.9, 0]])
     assert all(np.isfinite(line.get_segments()).all() for container in axis.containers for line in container.lines[2])
+
+
+def test_sessions_of_one_campaign_stand_by_their_poses():
+    (axis,) = campaign_errors(TABLE.assign(campaign="folds")).axes
+    assert [label.get_text() for label in axis.get_yticklabels()] == ["folds, 24 poses", "folds, 1 pose"]

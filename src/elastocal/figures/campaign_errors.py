@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.counting import counted
 from elastocal.figures.style import PALETTE, label_decades, panels, styled
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ _STAGES = (("before", "declared model", PALETTE[1]), ("after", "with the effects
 def campaign_errors(table: pd.DataFrame) -> Figure:
     """Root mean square errors with their intervals, a line for each campaign.
 
-    `table`: ``campaign`` and ``before_rms_mm``, ``before_rms_low_mm``, ``before_rms_high_mm``, the same for after; mm.
+    `table`: ``campaign``, ``poses`` and ``before_rms_mm``, ``before_rms_low_mm``, ``before_rms_high_mm``, the same for after; mm.
     """
     rows = np.arange(len(table))[::-1]
     figure, axes = panels(1, 1, 24 + 6 * len(table))
@@ -30,7 +31,10 @@ def campaign_errors(table: pd.DataFrame) -> Figure:
         # An interval that is open above is drawn to the value alone.
         span = [rms - low, np.where(np.isfinite(high), high - rms, 0.0)]
         axis.errorbar(rms, rows, xerr=span, fmt="o", color=color, ms=4, lw=1.2, capsize=2, label=words, zorder=2)
-    axis.set_yticks(rows, [name.replace("_", " ") for name in table["campaign"]])
+    names = table["campaign"].str.replace("_", " ")
+    # A campaign with two sessions has two lines.
+    names = names.where(~names.duplicated(keep=False), names + ", " + table["poses"].map(lambda count: counted(count, "pose")))
+    axis.set_yticks(rows, names)
     axis.set_xscale("log")
     label_decades(axis.xaxis)
     axis.set_xlabel("RMS position error of held-out poses (mm), with 95 % intervals")
