@@ -68,7 +68,10 @@ ELSEWHERE = {
         ".venv/bin/python -m elastocal.io.records | sha256sum --check --quiet",
     ),
     "snakemake --profile profiles/slurm study": ("tests/workflow/test_slurm.py", '"--profile", str(profile)'),
-    "snakemake -j2 store --config store=s3://BUCKET/FOLDER": ("tests/workflow/test_store.py", 'STORE = ("store", "--config"'),
+    **dict.fromkeys(
+        ("snakemake store", "snakemake -j2 store --config store=s3://BUCKET/FOLDER"),
+        ("tests/workflow/test_store.py", 'STORE = ("store", "--config"'),
+    ),
     "snakemake -j2 store --config store=s3://BUCKET/FOLDER "
     "crate_of='[study, loop, measured, league, blind, closed_loop, planning]'": (
         "tests/workflow/test_store.py",
@@ -239,7 +242,8 @@ def dry_runs():
             for word in shlex.split(text)[1:]
             if word not in ("-n", "-q", "rules", "-k") and not re.fullmatch(r"-j\d+", word)
         ]
-        if "--config" in words:
+        # With options of its own, of which one, `--version`, would end the others' run before it begins.
+        if any(word.startswith("--") for word in words):
             own.append(words)
         else:
             plain |= set(words)
