@@ -163,8 +163,11 @@ def alternative_words(name: str) -> str:
 
 
 def in_common(effect: str, alternatives: Iterable[str]) -> str:
-    """What an effect and all that may be meant instead have in common, as people call it: yielding; empty of no one kind."""
-    families = {getattr(effects().get(name), "FAMILY", "") for name in (effect, *alternatives) if name != OTHER}
+    """What an effect and all that may be meant instead have in common, as people call it: yielding; empty of no one kind.
+
+    What the catalogue does not have may be of any.
+    """
+    families = {getattr(effects().get(name), "FAMILY", "") for name in (effect, *alternatives)}
     kinds = {_IN_COMMON.get(family, "") for family in families}
     return kinds.pop() if len(kinds) == 1 else ""
 

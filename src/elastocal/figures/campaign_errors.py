@@ -20,7 +20,8 @@ _STAGES = (("before", "declared model", PALETTE[1]), ("after", "with the effects
 def campaign_errors(table: pd.DataFrame) -> Figure:
     """Root mean square errors with their intervals, a line for each campaign.
 
-    `table`: ``campaign``, ``poses`` and ``before_rms_mm``, ``before_rms_low_mm``, ``before_rms_high_mm``, the same for after; mm.
+    `table`: ``campaign``, ``poses``, and ``before_rms_mm``, ``before_rms_low_mm``, ``before_rms_high_mm``, the same for after:
+    mm.
     """
     rows = np.arange(len(table))[::-1]
     figure, axes = panels(1, 1, 24 + 6 * len(table))
