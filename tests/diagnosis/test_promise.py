@@ -87,7 +87,6 @@ def fixed(*means, weights=None, hypotheses=None):
         means,
         (CERTAIN * np.eye(unknowns),) * count,
         (np.eye(unknowns) / np.sqrt(CERTAIN),) * count,
-        (np.zeros(unknowns, int),) * count,
     )
 
 

@@ -2,8 +2,7 @@
 
 Maximum a posteriori, a generalized ridge regression [1]: coefficients keep the normal priors under which they were selected,
 half-normal ones as normal, so that what the measurements do not determine stays at zero; the noise is that which the selected
-model leaves. No prior is wider than all sizes of the effect together made it before the measurements: what asks for more is
-often something else beside the law, which fits where poses are and not between them.
+model leaves.
 
 [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
 """
@@ -41,12 +40,11 @@ class Selected:
 
 def selected(linearized: Linearized, model: Model) -> Selected:
     """What a model of the posterior is for the exact fit."""
-    problem, effects = linearized.problem, []
+    effects = []
     for number, scale in zip(model.units, model.scales, strict=True):
-        unit = problem.units[number]
+        unit = linearized.problem.units[number]
         if unit.candidate:
-            size = min(scale, problem.grid.root_mean_square(unit))
-            effects.append((with_prior(unit.candidate, size * unit.sizes), np.array(unit.shapes, float)))
+            effects.append((with_prior(unit.candidate, scale * unit.sizes), np.array(unit.shapes, float)))
     return Selected(tuple(effects))
 
 

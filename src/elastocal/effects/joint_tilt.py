@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, load_behind, per_joint
-from elastocal.effects.sizes import sized
+from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -31,12 +30,12 @@ def candidates(sites: Sites) -> list[Candidate]:
     def at(joint: int) -> Candidate:
         # A carriage rolls about its own axis too, which is no joint's.
         across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
-        parameters = sized(NAME, "tilt", [f"tilt_about_{'xyz'[axis]}" for axis in across], "rad/(N m)", sites, joint)
+        parameters = tuple(Parameter(f"tilt_about_{'xyz'[axis]}", "rad/(N m)", 2e-7, sign=1) for axis in across)
         coordinates = [sites.tilt[joint][axis] for axis in across]
 
         def displacement(conditions: Conditions) -> Displacements:
             return [{c: conditions.total[:, c]} for c in coordinates]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, load_behind(sites, joint))
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))
 
     return per_joint(sites, at, prismatic=True)

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate
-from elastocal.effects.sizes import sized
+from elastocal.effects.protocol import Candidate, Parameter
 from elastocal.effects.warmth import by_warmth
 
 if TYPE_CHECKING:
@@ -27,7 +26,10 @@ if TYPE_CHECKING:
 NAME, FAMILY = "thermal_growth", "drift"
 MOVES_ROBOT = True
 WORDS = "thermal growth of the links"
-_QUANTITIES = {"temperature": ("expansion", "1/K"), "time": ("final growth", "m/m")}
+_PARAMETERS = {
+    "temperature": Parameter("expansion", "1/K", 3e-5, sign=1),
+    "time": Parameter("final_growth", "m/m", 3e-4),
+}
 
 
 def candidates(sites: Sites) -> list[Candidate]:
@@ -37,9 +39,7 @@ def candidates(sites: Sites) -> list[Candidate]:
         def displacement(conditions: Conditions, *values: float) -> Displacements:
             return [longer(sites, rise(conditions, *values))]
 
-        quantity, unit = _QUANTITIES[cause]
-        parameters = sized(NAME, quantity, [quantity.replace(" ", "_")], unit, sites)
-        return Candidate(NAME, FAMILY, (), cause, parameters, displacement, needs, shapes)
+        return Candidate(NAME, FAMILY, (), cause, (_PARAMETERS[cause],), displacement, needs, shapes)
 
     return by_warmth(candidate_of)
 
