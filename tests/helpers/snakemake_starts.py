@@ -17,7 +17,7 @@ from pathlib import Path
 from durations import HUNG_S
 
 # What the plug-ins, the rules and the scripts import of other people; nothing of elastocal, of which each folder has its own.
-_SHARED = (
+SHARED = (
     *("grimp", "jsonschema", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "matplotlib.figure"),
     *("mujoco", "pandas", "pyarrow.parquet", "scipy.interpolate", "scipy.optimize", "scipy.sparse.csgraph", "scipy.spatial"),
     *("scipy.stats", "snakemake_executor_plugin_slurm", "snakemake_storage_plugin_s3", "statsmodels.api", "typst", "yaml"),
@@ -51,7 +51,7 @@ def started(args, cwd, env):
 def _serve():
     import snakemake.cli
 
-    for name in _SHARED:
+    for name in SHARED:
         __import__(name)
     gc.freeze()
     for line in sys.stdin:

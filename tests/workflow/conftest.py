@@ -8,8 +8,8 @@ import pytest
 from study_folder import Study
 
 
-def made_once(factory, name, seed, *arguments):
-    """A finished run on two cores: the worker that asks first makes it, another that asks meanwhile waits.
+def made_once(factory, name, changes, *arguments):
+    """A finished run on two cores, by a small study with `changes`: the worker that asks first makes it, others wait for it.
 
     To be read, not to be changed.
     """
@@ -20,7 +20,7 @@ def made_once(factory, name, seed, *arguments):
         done = study.folder.with_suffix(".done")
         if not done.exists():
             shutil.rmtree(study.folder, ignore_errors=True)
-            Study.of_sources(study.folder).configure({"seed": seed})
+            Study.of_sources(study.folder).configure(changes)
             study.run(*arguments)
             done.touch()
     return study
@@ -29,13 +29,13 @@ def made_once(factory, name, seed, *arguments):
 @pytest.fixture(scope="session")
 def small_study(tmp_path_factory):
     """The finished small study."""
-    return made_once(tmp_path_factory, "small", 1)
+    return made_once(tmp_path_factory, "small", {})
 
 
 @pytest.fixture(scope="session")
 def small_proof(tmp_path_factory):
     """The smallest blind proof, finished; not by the seed of the proof: what is looked at here is not part of it."""
-    return made_once(tmp_path_factory, "proof", 31, "blind", "--config", "blind=smoke")
+    return made_once(tmp_path_factory, "proof", {"seed": 31}, "blind", "--config", "blind=smoke")
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from itertools import product
 
 import pytest
 from durations import HUNG_S
+from snakemake_starts import SHARED
 from study_folder import NOISE, REPOSITORY, ROBOTS, STRATEGIES
 
 from import_closure import closure
@@ -260,10 +261,11 @@ def test_every_rule_watches_the_sources_of_its_own_script():
 
 
 # Forks before it imports anything of the package, so that every script starts without it; other people's modules may be there.
-_LOADED = """
+_LOADED = (
+    f"import {', '.join(SHARED)}"
+    + """
 import ast, json, os, sys
 from pathlib import Path
-import jsonschema, matplotlib.figure, mujoco, numpy, pandas, pyarrow.parquet, scipy.interpolate, scipy.stats, statsmodels.api
 root = Path(sys.argv[1])
 sys.path.insert(0, str(root / "workflow" / "scripts"))
 for script in sys.argv[2:]:
@@ -284,6 +286,7 @@ for script in sys.argv[2:]:
     print(script, os.fdopen(read).read())
     assert os.wait()[1] == 0
 """
+)
 
 
 @pytest.fixture(scope="module")

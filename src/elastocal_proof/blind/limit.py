@@ -31,9 +31,15 @@ if TYPE_CHECKING:
     from elastocal_proof.plant.physical_robot import PhysicalRobot
     from elastocal_proof.plant.sizing import Yardstick
 
-# Groups and levels of the targets that are shares of the limit, and the share of their cases for which it is worked out, as one
-# takes twenty seconds.
-SAMPLED = (("single", 25.0), ("single", 50.0), ("pair", 50.0), ("pair", 200.0))
+# Groups and levels of the targets that are shares of the limit: by what the diagnosis is counted there, by what the best
+# analyst, and in words.
+COMPARED = {
+    ("single", 25.0): ("detected", "limit_detected", "detected at 25"),
+    ("single", 50.0): ("named_right", "limit_right", "right name alone at 50"),
+    ("pair", 50.0): ("exact", "limit_right", "both of two effects at 50 each"),
+    ("pair", 200.0): ("exact", "limit_right", "both of two effects at 200 each"),
+}
+# Of their cases those for which it is worked out, as one takes twenty seconds.
 _SHARE = 1 / 6
 # Of each kind at each location: as many as its details have directions, within a factor of two.
 _DRAWS = 8
@@ -60,7 +66,7 @@ def limit_of_sample(truth: Mapping[str, Any], robots_folder: str | Path) -> dict
     case = Case(**stated | {name: tuple(stated[name]) for name in ("effects", "levels")})
     drawn = stream(case.seed, "sample of the limit").random() < _SHARE
     absorbed = any(defect["of"] == "raw" for defect in truth["defects"])
-    compared = (case.group, *case.levels[:1]) in SAMPLED
+    compared = (case.group, *case.levels[:1]) in COMPARED
     return limit(case, robots_folder) if drawn and compared and not absorbed else None
 
 

@@ -12,7 +12,7 @@ from scipy.stats import bootstrap
 from elastocal.random_streams import stream
 from elastocal_proof.blind.calibration import calibration_error
 from elastocal_proof.blind.cases import GEAR_GRAVITY, HARD, MOVED, SEVERAL_JOINTS, UNDECLARED
-from elastocal_proof.blind.limit import SAMPLED
+from elastocal_proof.blind.limit import COMPARED
 from elastocal_proof.blind.rates import rate
 from elastocal_proof.blind.robots import PROOF, TUNED
 from elastocal_proof.blind.scores import NONE
@@ -67,14 +67,6 @@ _TARGETS: dict[_Key | None, Target] = {
     ("ratio", None): Target("within 5 %", 0.0, WITHIN),
     ("worse", None): _at_most(0.01),
     ("coverage", None): Target("92 to 98 %", 0.92, 0.98),
-}
-
-# What the diagnosis is counted by, and the best analyst, for each group and level.
-_BESIDE_THE_LIMIT = {
-    ("single", 25.0): ("detected", "limit_detected", "detected at 25"),
-    ("single", 50.0): ("named_right", "limit_right", "right name alone at 50"),
-    ("pair", 50.0): ("exact", "limit_right", "both of two effects at 50 each"),
-    ("pair", 200.0): ("exact", "limit_right", "both of two effects at 200 each"),
 }
 
 
@@ -166,8 +158,7 @@ def _of_cases(cases: pd.DataFrame) -> Iterator[dict[str, Any]]:
 def _over_the_limit(cases: pd.DataFrame, seed: int) -> Iterator[dict[str, Any]]:
     """What is found beside what the best analyst finds of the same cases."""
     sampled = cases[cases.limit_right.notna()]
-    for group, level in SAMPLED:
-        ours, best, words = _BESIDE_THE_LIMIT[group, level]
+    for (group, level), (ours, best, words) in COMPARED.items():
         part = sampled[(sampled.group == group) & (sampled.level == level)]
         yield _rated(f"{words}, by the best analyst", part[best] == 1.0, None)
         hits = part[ours].to_numpy(float), part[best].to_numpy(float)
