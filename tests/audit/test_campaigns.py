@@ -84,6 +84,23 @@ def test_a_probability_that_is_no_sum_over_models_is_found(run):
 
 
 @pytest.mark.parametrize(
+    ("units", "stated", "found"),
+    [
+        ("joint_offset@2; other[2] own", "joint_offset + other", []),
+        ("joint_offset@2; other[2] own", "joint_offset", []),
+        ("joint_offset@2; other[2] own", "other", []),
+        ("joint_offset@2; payload", "joint_offset", ["mechanisms of the parts of each model"]),
+        ("joint_offset@2", "other", ["mechanisms of the parts of each model"]),
+        ("other[2] own", "nothing", ["mechanisms of the parts of each model"]),
+    ],
+)
+def test_a_model_states_its_parts_or_of_a_smooth_error_and_laws_one_alone(run, units, stated, found):
+    frame = pd.DataFrame({"probability": [1.0], "log_odds": [0.0], "mechanisms": [stated], "units": [units]})
+    frame.to_parquet(run.folder / FOLDER / "models.parquet")
+    assert failed(campaigns.models(run, f"{FOLDER}/models.parquet", "cell")) == found
+
+
+@pytest.mark.parametrize(
     ("wrong", "named", "expected"),
     [(False, "payload", []), (True, "payload", ["heldout errors after"]), (True, "setup_step", [])],
 )

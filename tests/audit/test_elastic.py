@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.joint_space import configurations
@@ -31,11 +32,14 @@ def test_a_uniform_link_is_a_cantilever():
     assert found[0, 0] == 0
 
 
-def test_a_tapered_link_turns_by_the_integral_of_its_compliance():
-    taper = 0.4
-    # Of 1 / (1 - t s)^3 from 0 to 1.
-    integral = ((1 - taper) ** -2 - 1) / (2 * taper)
-    assert beam(taper)[1][6, 6] == pytest.approx(LENGTH * BENDING * integral)
+def test_a_tapered_link_shifts_and_twists_as_the_uniform_one_and_turns_by_the_integral_of_its_compliance():
+    taper, uniform = 0.4, beam()[1]
+    found = beam(taper)[1]
+    assert found[2, 2] == pytest.approx(uniform[2, 2]) and found[4, 4] == pytest.approx(uniform[4, 4])
+    # Of (1 - s)^2 / (1 - t s)^3 and of 1 / (1 - t s)^3 from 0 to 1.
+    shifting = quad(lambda s: (1 - s) ** 2 / (1 - taper * s) ** 3, 0, 1)[0]
+    turning = ((1 - taper) ** -2 - 1) / (2 * taper)
+    assert found[6, 6] == pytest.approx(LENGTH * BENDING * turning / (3 * shifting))
 
 
 def test_short_links_do_not_bend():

@@ -1,5 +1,6 @@
 """Models that are left: by dense generalized least squares and normal densities written out."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -111,7 +112,19 @@ def members_like(count, hypotheses, seed=0, certain=None, weights=None):
         roots.append(np.linalg.inv(np.linalg.cholesky(precision)).T)
     weights = rng.dirichlet(np.ones(count)) if weights is None else np.array(weights)
     names = tuple((f"h{number}",) for number in range(max(hypotheses) + 1))
-    return Members(names, np.array(hypotheses), np.log(weights), tuple(columns), means, tuple(precisions), tuple(roots))
+    signs = tuple(np.zeros(len(mine), int) for mine in columns)
+    return Members(names, np.array(hypotheses), np.log(weights), tuple(columns), means, tuple(precisions), tuple(roots), signs)
+
+
+def test_coefficients_have_the_sign_that_physics_gives_wherever_one_in_sixteen_draws_does():
+    members = members_like(1, [0], certain=1.0)
+    columns, mean = members.columns[0], np.zeros_like(members.means)
+    one = replace(members, means=mean, signs=(np.array([1, -1][: len(columns)] + [0] * (len(columns) - 2)),))
+    drawn = one.drawn(0, 200, np.random.default_rng(0))[:, columns]
+    assert (drawn[:, 0] > 0).all() and (drawn[:, 1] < 0).all()
+    np.testing.assert_allclose(np.abs(drawn).mean(axis=0)[:2], np.sqrt(2 / np.pi), rtol=0.15)
+    # Where none does, they are as the measurements have them.
+    assert (replace(one, means=mean - 20.0 * one.signs[0][0]).drawn(0, 3, np.random.default_rng(0))[:, columns[0]] < 0).all()
 
 
 def test_misfits_are_the_mean_log_densities_of_measurements_written_out():

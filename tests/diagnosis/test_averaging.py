@@ -6,9 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made_problems import made_problem, made_rows, made_unit
+from scipy.optimize import minimize
 
-from elastocal.diagnosis.averaging import averaged, expected_to_help, other_predictions, squares_explained
+from elastocal.diagnosis.averaging import averaged, expected_to_help, other_predictions, squares_beyond, squares_explained
 from elastocal.diagnosis.evidence import Joint
+from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.search import Model, Posterior
 
 TAU = np.array([0.0, 0.3, 0.9])
@@ -24,6 +26,11 @@ UNITS = (
     made_unit("b", (1,), 2, candidate=candidate("b", 1)),
     made_unit("other", (1,), [3, 4]),
 )
+
+
+def on_the_mean(problem):
+    """A problem in which a gain need not be sure."""
+    return replace(problem, settings=replace(problem.settings, useful=0.0))
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +161,7 @@ def test_a_model_is_expected_to_help_where_the_expected_square_of_the_error_fall
     found = posterior_of(((0,), [0.3], 0.0, best), *rest)
     for model in found.models:
         falls = expected_square(rows, line.problem, found, model) < expected_square(rows, line.problem, found, None)
-        assert expected_to_help(line.problem, found, model) == (falls and len(model.units) > 0)
+        assert expected_to_help(on_the_mean(line.problem), found, model) == (falls and len(model.units) > 0)
 
 
 def test_what_is_there_or_not_helps_where_it_is_more_probable_than_not(made):
@@ -162,7 +169,7 @@ def test_what_is_there_or_not_helps_where_it_is_more_probable_than_not(made):
     _, line = made
     for probability, helps in ((0.49, False), (0.51, True)):
         found = posterior_of(((0,), [0.3], 0.0, probability), ((), [], 0.0, 1 - probability))
-        assert expected_to_help(line.problem, found, found.models[0]) == helps
+        assert expected_to_help(on_the_mean(line.problem), found, found.models[0]) == helps
 
 
 def test_what_other_models_predict_as_well_helps_however_improbable_it_is_by_itself():
@@ -171,11 +178,22 @@ def test_what_other_models_predict_as_well_helps_however_improbable_it_is_by_its
     candidates = rows.candidates.copy()
     candidates[:, 2] = candidates[:, 0]
     rows = replace(rows, candidates=candidates, residual=rows.residual + 0.5 * candidates[:, 0])
-    problem, _ = made_problem(rows, (made_unit("a", (1,), 0), made_unit("b", (1,), 2)), tau=TAU)
+    problem = on_the_mean(made_problem(rows, (made_unit("a", (1,), 0), made_unit("b", (1,), 2)), tau=TAU)[0])
     found = posterior_of(((0,), [0.3], 0.0, 0.3), ((1,), [0.3], 0.0, 0.3), ((), [], 0.0, 0.4))
     assert expected_to_help(problem, found, found.models[0]) and expected_to_help(problem, found, found.models[1])
     apart = posterior_of(((0,), [0.3], 0.0, 0.3), ((), [], 0.0, 0.7))
     assert not expected_to_help(problem, apart, apart.models[0])
+
+
+@pytest.mark.parametrize(("times", "helps"), [(1.05, True), (0.95, False)])
+def test_a_gain_helps_where_its_interval_excludes_nothing(made, times, helps):
+    """Of a model that is certain the gain is what it explains, d'd, and its standard error at most twice the root of that."""
+    _, line = made
+    found = posterior_of(((0,), [0.3], 0.0, 1.0))
+    explained = squares_explained(line.problem, found.models[0])["a"]
+    limit = np.sqrt(explained / max(mean_square_left(line.problem, found.models[0]), 1.0)) / 2.0
+    problem = replace(line.problem, settings=replace(line.problem.settings, useful=limit / times))
+    assert expected_to_help(problem, found, found.models[0]) == helps
 
 
 def test_squares_explained_are_those_of_the_displacements_that_each_mechanism_makes(made):
@@ -191,6 +209,28 @@ def test_squares_explained_are_those_of_the_displacements_that_each_mechanism_ma
         some[columns] = coefficients[columns]
         expected[mechanism] = some @ gram @ some
     assert squares_explained(problem, model) == pytest.approx(expected, rel=1e-6)
+
+
+def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_with_their_priors(made):
+    """As the least penalised sum of squares, found by a search, and all of them where nothing else is in the model."""
+    rows, _ = made
+    problem, _ = made_problem(rows, UNITS, tau=TAU)
+    model = Model((0, 2), 0.0, np.array([0.3, 0.1]), 0.0)
+    coefficients, gram = most_probable(rows, problem, model), projected_gram(rows)
+    mine, others = UNITS[0].columns, UNITS[2].columns
+
+    def left(values):
+        off = np.zeros(len(coefficients))
+        off[mine], off[others] = coefficients[mine], -values
+        return off @ gram @ off + (values**2).sum() / 0.1**2
+
+    whole, beyond = squares_beyond(problem, model, {"a"})
+    assert whole == pytest.approx(squares_explained(problem, model)["a"], rel=1e-6)
+    assert beyond == pytest.approx(minimize(left, np.zeros(len(others))).fun, rel=1e-6)
+    assert 0.0 < beyond < whole
+    assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[1] == pytest.approx(
+        squares_explained(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
+    )
 
 
 def test_other_models_predict_otherwise_by_their_probability_and_unknown_causes_are_in_none_that_is_kept(made):

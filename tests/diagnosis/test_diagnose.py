@@ -45,6 +45,15 @@ def test_the_problem_is_whitened_by_the_noise_that_is_there(diagnosed):
     assert rows[1].about.noise.position_m == pytest.approx(6e-5, rel=0.3)
 
 
+def test_a_model_that_is_kept_without_what_was_found_has_the_noise_that_it_leaves(kuka, config_folder, tmp_path):
+    table = made_table(kuka, "made", plan=PLAN, offset_of_joint_3=OFFSET)
+    case, _ = cases_in(made_folder(tmp_path / "made", kuka, table=table, declared=[]), config_folder / "robots")
+    kept = diagnose(case, Settings(useful=1e9), 1)
+    assert [effect["adopted"] for effect in kept.document["effects"]] == [False] and kept.document["kept"] == "declared"
+    factor = kept.document["noise"]["factor"]
+    assert factor > 1.1 and factor == pytest.approx(np.sqrt(kept.document["misfit"]["before"]))
+
+
 def _priors(fitted):
     return {
         parameter.prior_std for owner, parameter in fitted.parameters if owner.startswith("link_geometry") and parameter.sized

@@ -95,6 +95,19 @@ def test_evidence_does_not_depend_on_where_the_search_for_the_sizes_starts(numbe
     assert len(found) == 1
 
 
+def test_sizes_of_many_units_that_overlap_end_where_no_other_size_of_one_is_more_probable():
+    rows, draws = made_rows(1, poses=60, candidates=100), np.random.default_rng(1)
+    shared = draws.standard_normal((100, 5)) @ draws.standard_normal((5, 100))
+    columns = rows.candidates @ (np.eye(100) + 3.0 * shared)
+    rows = replace(rows, candidates=columns, residual=rows.residual + columns @ draws.normal(0.0, 0.1, 100))
+    statistics, units = statistics_of(rows.products, TAU), [made_unit(str(n), (1,), n) for n in range(100)]
+    found = evaluate(statistics, units, GRID, LOG_POSE, np.ones(100))
+    places = np.searchsorted(GRID.scales, found.scales)
+    profiles = Joint(statistics, units, GRID, statistics.log_likelihood + LOG_POSE, places).profiles()
+    for place, profile in zip(places, profiles, strict=True):
+        assert profile[1 + place] > profile[1:].max() - 1e-6
+
+
 @pytest.mark.parametrize("signal", SIGNALS)
 @pytest.mark.parametrize("chosen", [(0, 1), (0, 2), (0, 1, 2)])
 def test_evidence_of_several_units_is_that_of_all_combinations_of_sizes(signal, chosen):
@@ -175,7 +188,7 @@ def test_added_evidence_is_that_of_the_model_with_each_unit_added_at_each_size()
     conditioned = condition(statistics, UNITS[0].columns, np.full(2, 0.3), LOG_POSE)
     blocks = blocks_of(conditioned.gram, UNITS, [1, 2])
     found = added_evidence(conditioned, blocks, GRID, statistics.freedom, UNITS)
-    assert found.shape == (3, 3, 5) and np.isneginf(found[:, 0]).all()
+    assert found.shape == (3, 3, 6) and np.isneginf(found[:, 0]).all()
     constant = None
     for place, tau in enumerate(TAU):
         for number in (1, 2):
@@ -272,6 +285,32 @@ def test_sizes_below_the_smallest_of_a_unit_weigh_nothing_and_those_above_as_bef
     np.testing.assert_allclose(whole, np.exp(GRID.log_weights))
     assert not some[:2].any() and some.sum() == pytest.approx(1.0)
     np.testing.assert_allclose(some[2:] / some[-1], whole[2:] / whole[-1])
+
+
+def test_sizes_above_the_largest_of_a_unit_weigh_nothing_and_those_below_as_before():
+    whole = np.exp(GRID.log_weights)
+    some = np.exp(GRID.of(replace(UNITS[0], smallest=1, largest=4)))
+    assert some[[0, 5]].tolist() == [0.0, 0.0] and some.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(some[1:5] / some[1], whole[1:5] / whole[1])
+
+
+def test_a_signal_beyond_the_largest_size_of_a_unit_is_paid_for():
+    """Wherever the search for the sizes starts, as on a grid without the larger ones."""
+    statistics = statistics_of(quiet(1, (6.0, -5.0)).products, TAU)
+    left = Grid(GRID.scales[:5], GRID.log_weights[:5] - logsumexp(GRID.log_weights[:5]))
+    whole, cut = (evaluate(statistics, [UNITS[0]], grid, LOG_POSE, [0.1]).log_evidence for grid in (GRID, left))
+    for start in SETTINGS.scales:
+        found = evaluate(statistics, [replace(UNITS[0], largest=4)], GRID, LOG_POSE, [start])
+        assert found.log_evidence == pytest.approx(cut, abs=1e-8) and found.scales[0] == GRID.scales[4]
+    assert cut < whole - 1.0
+
+
+def test_the_prior_of_a_coefficient_over_all_sizes_has_the_deviation_of_its_draws():
+    """200,000 draws: a standard error of 0.5 %, for large sizes are rare."""
+    unit = replace(UNITS[0], smallest=1, largest=4)
+    draws = np.random.default_rng(1)
+    sizes = draws.choice(GRID.scales, 200_000, p=np.exp(GRID.of(unit)))
+    assert GRID.root_mean_square(unit) == pytest.approx((sizes * draws.standard_normal(len(sizes))).std(), rel=0.02)
 
 
 def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():

@@ -87,6 +87,7 @@ def fixed(*means, weights=None, hypotheses=None):
         means,
         (CERTAIN * np.eye(unknowns),) * count,
         (np.eye(unknowns) / np.sqrt(CERTAIN),) * count,
+        (np.zeros(unknowns, int),) * count,
     )
 
 

@@ -51,6 +51,18 @@ def test_priors_arrive_in_the_fit(found):
     np.testing.assert_allclose(np.diag(final.covariance), np.diag(expected), rtol=1e-2)
 
 
+def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurements(found):
+    _, _, line, models = found
+    best = models.models[0]
+    unit = line.problem.units[best.units[0]]
+    before = line.problem.grid.root_mean_square(unit)
+    sizes = [0.5 * before, before, SETTINGS.scales[-1]]
+    assert before < SETTINGS.scales[-1]
+    chosen = [selected(line, replace(best, scales=np.array([size]))).effects[0][0] for size in sizes]
+    deviations = [candidate.parameters[0].prior_std / unit.sizes[0] for candidate in chosen]
+    np.testing.assert_allclose(deviations, [0.5 * before, before, before], rtol=1e-12)
+
+
 def test_a_later_fit_starts_from_the_shapes_that_one_before_has_found(kuka):
     campaign = planted(kuka, {"thermal_growth[time]": [2e-5]}, seed=4)
     candidate = campaign.candidates["thermal_growth[time]"]

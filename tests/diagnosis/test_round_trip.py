@@ -132,6 +132,10 @@ def test_models_table_is_the_posterior(found, tmp_path):
     assert (np.diff(table["probability"]) <= 0).all() and table["model"].tolist() == list(range(len(table["model"])))
     assert "joint_offset" in table["mechanisms"][0] and "joint_offset@3" in table["units"][0]
     assert table["mechanisms"][table["units"] == ""].tolist() == ["nothing"]
+    # What a model states counts in the verdict's probabilities, whatever its parts are.
+    for name, probability in diagnosis.evidence.conclusion.mechanisms.items():
+        having = [name in stated.split(" + ") for stated in table["mechanisms"]]
+        assert table["probability"][having].sum() == pytest.approx(probability, abs=1e-9)
 
 
 def test_every_candidate_is_in_the_table_tested_or_with_a_reason(found, tmp_path):

@@ -193,13 +193,17 @@ def link_elasticity(arm, law, name, taper):
     """Curvature and twist under the load on each piece of the link, integrated to its far end."""
     links = arm.long if law.detail == "one section" else list(law.joints) or [0]
     found = 0.0
+    # Of the uniform link that a force shifts, or a moment twists, as far.
+    power = 2 if name.startswith("bending") else 0
+    softer = (1 - taper * (NODES + 1) / 2) ** -3.0
+    uniform = 1.0 / (power + 1) / (WEIGHTS / 2 @ (softer * (1 - (NODES + 1) / 2) ** power))
     for link in links:
         after, (along, length) = arm.far_end(link), arm.link(link)
         force, moment = arm.load(after)
         shift = turn = np.zeros((STATES, 3))
         for place, weighs in zip(length * (NODES + 1) / 2, WEIGHTS * length / 2, strict=True):
             lever = along * (length - place)
-            there = (moment + np.cross(lever, force)) * weighs / (1 - taper * place / length) ** 3
+            there = (moment + np.cross(lever, force)) * weighs * uniform / (1 - taper * place / length) ** 3
             twist = along * (there * along).sum(axis=1, keepdims=True)
             part = there - twist if name.startswith("bending") else twist
             shift, turn = shift + np.cross(part, lever), turn + part

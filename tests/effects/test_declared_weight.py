@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.stats import chi2
-from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
+from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, chain_of, robot_of
 from synthetic import (
     NOISE,
     conditions_on,
@@ -21,7 +21,7 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.conditions import offered, with_springs
+from elastocal.effects.conditions import conditions_of, offered, with_springs
 from elastocal.effects.declared_weight import candidate
 from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.least_squares import fit
@@ -30,6 +30,7 @@ from elastocal.fitting.parameters import parameters
 from elastocal.fitting.prediction import residuals
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.motion import motion
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 
@@ -175,12 +176,18 @@ def test_growth_of_gravity_with_each_correction_is_its_slope_on_the_coordinates_
 def test_priors_are_those_of_the_robot_file(fanuc):
     robot = replace(fanuc, masses=(Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1), Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2)))
     found = candidate(sites_of(robot)).parameters
-    # A centre is off by its relative error times its distance from the joint, or times the width of a link: a tenth of the arm.
+    # A centre is off by its relative error times its distance from the joint, and lies anywhere in the girth of its link.
     width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
-    first, second = (20.0 * max(0.5, width)), (10.0 * width)
+    first, second = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5), np.hypot(10.0 * 0.01, 50.0 * width / 12**0.5)
     assert [p.prior_std for p in found] == pytest.approx([20.0, *[first] * 3, 10.0, *[second] * 3])
     assert [p.name for p in found[:2]] == ["mass_error_of_link_2", "moment_error_x_of_link_2"]
+
+
+def test_centre_of_a_slender_link_may_lie_forty_millimetres_off_all_the_same():
+    arm = chain_of("Rz(q1) Tz(0.3) Ry(q2) Tz(0.3) [hand]")
+    sites = replace(sites_of(arm), masses=(Mass(2, 4.0, (0.0, 0.0, 0.0), 0.1),))
+    assert [p.prior_std for p in candidate(sites).parameters] == pytest.approx([0.4, *[4.0 * 0.04] * 3])
 
 
 def test_robot_without_masses_bears_the_external_load_alone(fanuc):
@@ -190,6 +197,41 @@ def test_robot_without_masses_bears_the_external_load_alone(fanuc):
     unloaded = replace(states, wrench=np.zeros((4, 6)))
     assert "load" in offered(around.sites, states) and "load" not in offered(around.sites, unloaded)
     assert "load" in offered(sites_of(weighed(fanuc)), unloaded)
+
+
+def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(fanuc):
+    """Half of each link at either end, six times the rated load in all: slopes of its potential energy."""
+    states = made_states(6, 4, seed=7)
+    states.wrench[:] = 0.0
+    sites = replace(sites_of(replace(fanuc, payload_kg=100.0)), usual_weight=True)
+    around = conditions_of(sites, fanuc.compliance, states)
+    assert sites.usual_masses.sum() == pytest.approx(600.0)
+    assert offered(sites, states) & {"load", "load on the joints"} == {"load"}
+
+    def energy(coordinates):
+        ends = motion(sites.chain, coordinates, sites.followed).position[1 : sites.joints + 2]
+        return -np.einsum("k,kis,i->s", sites.usual_masses, ends, np.array(sites.gravity_m_s2))
+
+    commanded = np.zeros((4, sites.chain.coordinates))
+    commanded[:, :6] = states.joint_angles
+    for coordinate in (*sites.base, *sites.tilt[1], *sites.link_end[2]):
+        step = np.zeros(sites.chain.coordinates)
+        step[coordinate] = 1e-4
+        slope = (energy(commanded + step) - energy(commanded - step)) / 2e-4
+        np.testing.assert_allclose(around.total[:, coordinate], -slope, atol=1e-3)
+    assert not around.total[:, :6].any()
+
+
+@pytest.mark.parametrize(("chain", "first"), [("Rz(q1) Tz(1) Ry(q2) Tx(1) [end]", 1), ("Tz(q1) Tz(1) Ry(q2) Tx(1) [end]", 2)])
+def test_a_weight_that_is_only_usual_bends_columns_and_rails_and_nothing_behind_a_joint_that_turns(chain, first):
+    """Behind such a joint `link_weight` has the masses free; declared masses and external loads test all."""
+    sites = sites_of(chain_of(chain))
+    known, usual, declared = candidates_on(sites), frozenset({"load"}), frozenset({"load", "load on the joints"})
+    assert known["base_compliance"].needs <= usual and known["joint_tilt@1"].needs <= usual
+    for joint in (1, 2):
+        found = known[f"link_elasticity@{joint}"].needs
+        assert found <= declared and (found <= usual) == (joint < first)
+    assert (known["joint_tilt@2"].needs <= usual) == (first == 2)
 
 
 def test_gears_of_an_arm_without_an_external_load_are_loaded_by_its_weight(fanuc):

@@ -107,11 +107,15 @@ def test_links_that_get_thinner_bend_as_the_equation_of_the_beam_integrated(tape
     def softer(place):
         return (1 - taper * place / length) ** -3
 
+    # Sized by the uniform link that bends under a force, and twists, as far.
+    bends, twists = (quad(lambda place, p=p: (length - place) ** p * softer(place), 0, length)[0] for p in (2, 0))
+    bends, twists = length**3 / 3 / bends, length / twists
+
     for number, moment in enumerate((lambda place: 10 * (length - place), lambda place: 5.0)):
         turn = quad(lambda place, moment=moment: moment(place) * softer(place), 0, length)[0]
         shift = quad(lambda place, moment=moment: (length - place) * moment(place) * softer(place), 0, length)[0]
-        np.testing.assert_allclose(made[0, number], [0, shift, 0, 0, 0, turn], rtol=1e-7, atol=1e-12)
-    np.testing.assert_allclose(made[1, 2], [0, 0, 0, 3 * quad(softer, 0, length)[0], 0, 0], rtol=1e-7, atol=1e-12)
+        np.testing.assert_allclose(made[0, number], bends * np.array([0, shift, 0, 0, 0, turn]), rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(made[1, 2], [0, 0, 0, 3 * twists * quad(softer, 0, length)[0], 0, 0], rtol=1e-7, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["fanuc", *OTHER_CHAINS])

@@ -9,6 +9,7 @@ from synthetic import candidate_on, conditions_on, displacements, equipped, made
 
 from elastocal.effects import transmission_harmonic
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.mechanics.sites import sites_of
 
 COUNT = 6
@@ -58,13 +59,11 @@ def test_stiffening_with_two_slopes_begins_where_they_meet(case, meeting):
         assert_only(made, joint, beyond[:, joint])
 
 
-def test_plausible_stiffening_moves_the_end_of_the_arm_alike_at_every_joint():
-    """Five millimetres under a kilonewton across the arm outstretched; a tool is at least half a metre long."""
-    chain = chain_of("Rz(q1) Tz(1) Ry(q2) Tx(2) Ry(q3) Tx(0.1) [hand]")
-    for joint, lever in enumerate((3.1, 2.1, 0.5), 1):
+def test_stiffening_takes_half_of_the_compliance_of_a_gear(fanuc):
+    for joint, compliance in enumerate(fanuc.compliance, 1):
         for detail in ("", "[two slopes]"):
-            (beyond,) = candidate_on(chain, f"stiffening@{joint}{detail}").parameters
-            assert beyond.plausible * (1e3 * lever) * lever == pytest.approx(5e-3), joint
+            (beyond,) = candidates_on(sites_of(fanuc))[f"stiffening@{joint}{detail}"].parameters
+            assert (beyond.plausible, beyond.sign) == (pytest.approx(0.5 * compliance), -1)
 
 
 def test_play_is_mostly_taken_up_before_the_slopes_of_a_stiffening_gear_meet(fanuc):
@@ -128,8 +127,8 @@ def test_ratio_is_linear_in_the_angle_of_the_joint_and_of_the_one_before(case):
             assert_only(column, joint, around.joint_angles[:, source])
 
 
-# An arm of two metres that turns about the vertical: its full torque is that of a kilonewton, 2000 N m.
-TURNTABLE, FULL_NM = "Rz(q1) Tx(2) [hand]", 2000.0
+# An arm of two metres that turns about the vertical; eight kilograms a cubic metre of reach suit it.
+TURNTABLE, FULL_NM = "Rz(q1) Tx(2) [hand]", 8.0 * 2.0**3 * 9.80665 * 2.0
 
 
 def under(torques, approach=None):
@@ -205,9 +204,9 @@ def test_torques_of_laws_are_shares_of_the_full_torque_of_the_joint(key, lowest,
     ("key", "name", "unit", "plausible", "sign", "needs"),
     [
         # Play opens with the torque and a gear gets stiffer with it; friction may hold back either way.
-        ("lost_motion@1", "half_play", "rad", 1e-4, 1, {"load"}),
-        ("stiffening@1", "beyond", "rad/(N m)", 5e-3 / 2.0 / FULL_NM, -1, {"load"}),
-        ("stiffening@1[two slopes]", "beyond", "rad/(N m)", 5e-3 / 2.0 / FULL_NM, -1, {"load"}),
+        ("lost_motion@1", "half_play", "rad", 1e-4, 1, LOADED_JOINTS),
+        ("stiffening@1", "beyond", "rad/(N m)", 1e-3 / FULL_NM, -1, LOADED_JOINTS),
+        ("stiffening@1[two slopes]", "beyond", "rad/(N m)", 1e-3 / FULL_NM, -1, LOADED_JOINTS),
         ("hysteresis@1", "half_width", "rad", 1e-4, 0, {"approach"}),
     ],
 )

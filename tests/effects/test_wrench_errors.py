@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.effects.protocol import Parameter
+from elastocal.effects.protocol import LOADED_JOINTS, Parameter
 from elastocal.effects.wrench_errors import Axis, at_flange_and_in_pull, base_and_flange, lever_of_pull
 
 PLACE = np.array([0.1, -0.4, 0.25])
@@ -70,4 +70,4 @@ def test_errors_are_offered_in_both_frames_at_the_flange_and_in_the_pull():
     ):
         found = offer("law", "load", parameters, lambda axis, wrench: axis.push(wrench))
         assert [law.detail for law in found] == details
-        assert all(law.needs == {"load"} and law.joints == () and law.parameters == parameters for law in found)
+        assert all(law.needs == LOADED_JOINTS and law.joints == () and law.parameters == parameters for law in found)

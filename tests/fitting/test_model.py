@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support import robot_of
 from synthetic import made_measurements, made_model
 
 from elastocal.campaigns.campaign import Campaign, Target
@@ -38,3 +39,21 @@ def test_declared_model_weighs_what_the_robot_file_weighs(fanuc):
     model = declared_model(Campaign("c", robot, "position", "base", TARGETS, "identify", (), None, {}, measurements))
     assert [effect.key for effect in model.effects] == ["joint_compliance", "declared_weight"]
     assert model.sites.masses == robot.masses and model.sites.gravity_m_s2 == (0.0, 0.0, 9.0)
+
+
+@pytest.mark.parametrize(
+    ("chain", "slides"), [("Tz(q1) Tz(0.5) Ry(q2) Tx(1) [end]", True), ("Rz(q1) Tz(0.5) Ry(q2) Tx(1) [end]", False)]
+)
+def test_a_usual_weight_loads_an_arm_that_slides_and_of_which_neither_masses_nor_loads_are_known(chain, slides):
+    robot, target = robot_of(chain), (Target("A", "end", (0, 0, 0)),)
+    measurements = made_measurements(made_model(robot.chain, target), np.random.default_rng(0), 2, 1, 0.0, 0.0)
+
+    def usual(robot, measurements):
+        campaign = Campaign("c", robot, "position", "base", target, "nominal", (), None, {}, measurements)
+        return declared_model(campaign).sites.usual_weight
+
+    unloaded = replace(measurements, wrench=np.zeros_like(measurements.wrench))
+    loaded = replace(measurements, wrench=np.ones_like(measurements.wrench))
+    assert usual(robot, unloaded) == slides
+    assert not usual(robot, loaded)
+    assert not usual(replace(robot, masses=(Mass(1, 10.0, (0.1, 0.0, 0.0), 0.1),)), unloaded)

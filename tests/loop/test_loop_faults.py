@@ -141,7 +141,7 @@ def test_a_target_offset_in_millimetres_is_named(kuka, config_folder, tmp_path):
 
 
 def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, config_folder, tmp_path):
-    """Unloaded, each target once in a pose, beside a noise of centimetres: there is no fault, and nothing shows."""
+    """Unloaded, each target once in a pose, beside a noise of a decimetre: there is no fault, and nothing shows."""
     table = made_table(kuka, "made")
     keys = np.column_stack([table["pose"], np.unique(table["target"], return_inverse=True)[1]])
     rows = np.flatnonzero(table["load"] == 0)
@@ -149,7 +149,7 @@ def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, config_folder, tm
     kept = {name: values[rows] for name, values in table.items() if name not in ("rx", "ry", "rz", *WRENCH)}
     kept["repeat"] = 0 * rows
     targets = {point: {"point": point, "offset_m": "unknown"} for point in ("3DoF", "6DoF")}
-    unknown = {"targets": targets, "frame": "tracker", "compliance": "nominal", "noise": {"position_m": 0.05}}
+    unknown = {"targets": targets, "frame": "tracker", "compliance": "nominal", "noise": {"position_m": 0.1}}
     folder = made_folder(tmp_path / "made", kuka, table=kept, **unknown)
     verdict = reported(folder, config_folder, tmp_path / "out")
     assert verdict["verdict"] == "not_testable" and verdict["effects"] == []

@@ -34,9 +34,9 @@ def offset_and_harmonic(table):
     return offset(table) | {"q5": table["q5"] - 1e-3 * np.cos(2 * table["q5"])}
 
 
-def offset_that_grows(table):
-    """An offset, and a quarter of it more wherever there is a load: no law of the catalogue."""
-    return table | {"q3": table["q3"] - 4e-4 - 1e-4 * table["load"]}
+def offset_that_creeps(table):
+    """An offset that creeps from half of it to as much again while people measure, beyond what laws may be off by."""
+    return table | {"q3": table["q3"] - 4e-4 * (0.5 + table["pose"] / table["pose"].max())}
 
 
 def foreign(table):
@@ -59,7 +59,7 @@ KINDS = {
     "adequate": (lambda table: table, USUAL, {}),
     "named": (offset, USUAL, {}),
     "several": (offset_and_harmonic, USUAL, {}),
-    "class": (offset_that_grows, USUAL, {}),
+    "class": (offset_that_creeps, USUAL, {}),
     "unexplained": (foreign, BOTH_SENSES, {}),
     "not_testable": (
         hidden,
@@ -104,7 +104,7 @@ def test_the_verdict_is_the_same_for_one_seed(kuka, tmp_path):
     folder = folder_of(tmp_path, kuka, "adequate").as_posix()
     one, other = (diagnosed(folder, ROBOTS.as_posix(), 7) for _ in range(2))
     assert one == other
-    assert diagnosed(folder, ROBOTS.as_posix(), 8)["probabilities"]["alarm_p_value"] != one["probabilities"]["alarm_p_value"]
+    assert diagnosed(folder, ROBOTS.as_posix(), 9)["probabilities"]["alarm_p_value"] != one["probabilities"]["alarm_p_value"]
 
 
 def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp_path):

@@ -10,7 +10,7 @@ def test_every_setting_is_listed_with_value_and_reason():
     rows = facts_of(CAMPAIGNS["named"])["settings"]
     assert len(rows) == len(CAMPAIGNS["named"]["settings"]) and all(map(all, rows))
     assert ["alarm level", "0.02"] in [row[:2] for row in rows]
-    assert ["scales", "0.01, 0.03, 0.1, 0.3, 1"] in [row[:2] for row in rows]
+    assert ["scales", "0.01, 0.03, 0.1, 0.3, 1, 3"] in [row[:2] for row in rows]
 
 
 def test_candidates_that_cannot_be_tested_are_gathered_by_reason():
@@ -30,6 +30,6 @@ def test_joints_are_rigid_where_their_compliances_are_neither_stated_nor_identif
     described = {"campaign": {"compliance": compliance, "declared": []}, "held_out": None, "robot": {"name": "x"}}
     if stated:
         described["robot"]["compliance_urad_per_Nm"] = [1.0]
-    settings = {name: {"value": 0.1} for name in ("alarm_draws", "alarm_level", "mechanism_probability", "named_probability")}
+    settings = {name: {"value": 0.1} for name in ("alarm_draws", "alarm_level", "mechanism_probability", "ambiguity_loss")}
     verdict = {"settings": settings, "candidates_tested": 1, "untestable": {}, "heldout": {"poses": 3}}
     assert method(verdict, described)["rigid"] == rigid

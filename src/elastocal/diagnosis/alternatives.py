@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.new_states import Instrument
     from elastocal.diagnosis.search import Model
 
-# Draws of each model's coefficients.
-_DRAWS = 4
+# Draws of each model's coefficients, and times as many that are drawn where physics gives signs.
+_DRAWS, _SPARE = 4, 16
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,8 @@ class Members:
 
     `names`: of the hypotheses, the best first. `hypothesis` (M,) of int. `log_weights` (M,): of their probabilities, which sum
     to one. `columns`: of the unknowns that each has. `means` (M, U): of the unknowns; zero for those that a model does not
-    have. `precisions` (d, d). `roots` (d, d): times white noise, deviations of its coefficients.
+    have. `precisions` (d, d). `roots` (d, d): times white noise, deviations of its coefficients. `signs` (d,): that physics
+    gives them, 0 where they may have either.
     """
 
     names: tuple[tuple[str, ...], ...]
@@ -55,6 +56,7 @@ class Members:
     means: np.ndarray
     precisions: tuple[np.ndarray, ...]
     roots: tuple[np.ndarray, ...]
+    signs: tuple[np.ndarray, ...]
 
     def without(self, hypotheses: Sequence[int]) -> Members:
         """These models without those of some hypotheses."""
@@ -68,13 +70,16 @@ class Members:
             self.means[kept],
             tuple(self.precisions[m] for m in kept),
             tuple(self.roots[m] for m in kept),
+            tuple(self.signs[m] for m in kept),
         )
 
     def drawn(self, model: int, count: int, stream: np.random.Generator) -> np.ndarray:
-        """Coefficients from the posterior of one model, ndarray (count, U)."""
+        """Coefficients from the posterior of one model, those that break no sign first, ndarray (count, U)."""
+        columns, signs = self.columns[model], self.signs[model]
+        spare = _SPARE if signs.any() else 1
+        some = self.means[model][columns] + stream.standard_normal((spare * count, len(columns))) @ self.roots[model].T
         found = np.repeat(self.means[model][None], count, axis=0)
-        white = stream.standard_normal((count, len(self.columns[model])))
-        found[:, self.columns[model]] += white @ self.roots[model].T
+        found[:, columns] = some[np.argsort((some * signs < 0.0).any(axis=1), kind="stable")[:count]]
         return found
 
 
@@ -83,7 +88,7 @@ def members_of(
 ) -> Members:
     """Posterior of the coefficients of each model, in units of the noise that the leading model leaves.
 
-    All models are taken at the pose error of the leading one; half-normal priors count as normal ones.
+    All models are taken at the pose error of the leading one; half-normal priors count as normal ones but in what is drawn.
 
     `kept`: models of each hypothesis, the best first. `factor`: times the noise taken that the leading model leaves.
     """
@@ -94,7 +99,7 @@ def members_of(
     place = np.zeros(products.gram.shape[0], int)
     place[declared + instrument.columns] = declared + np.arange(len(instrument.columns))
     unknown_places = np.arange(instrument.unknowns - added, instrument.unknowns)
-    hypothesis, odds, columns, means, precisions, roots = [], [], [], [], [], []
+    hypothesis, odds, columns, means, precisions, roots, signs = [], [], [], [], [], [], []
     for number, (_, models) in enumerate(kept.items()):
         for model in models:
             mine = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
@@ -114,6 +119,8 @@ def members_of(
             means.append(mean)
             precisions.append(whole)
             roots.append(np.linalg.inv(np.linalg.cholesky(whole)).T)
+            given = [problem.units[n].signs for n in model.units]
+            signs.append(np.concatenate([np.zeros(declared, int), *given, np.zeros(added, int)]))
     log_weights = np.array(odds)
     return Members(
         tuple(kept),
@@ -123,6 +130,7 @@ def members_of(
         np.array(means),
         tuple(precisions),
         tuple(roots),
+        tuple(signs),
     )
 
 

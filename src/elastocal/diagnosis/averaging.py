@@ -22,7 +22,7 @@ from elastocal.diagnosis.search import UNLIKELY
 from elastocal.diagnosis.statistics import normal_equations
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.linearize import Linearized
@@ -73,8 +73,9 @@ def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bo
     """Whether predictions are expected to be better with a model than without it, at poses like those of the measurements.
 
     By the posterior expectation of squared error: with d the displacement that a model predicts and E d its mean over all
-    models, the expected square of the error falls from E d'd to E d'd - 2 d'E d + d'd where d is added: where 2 d'E d exceeds
-    d'd. Measurements that were held out take no part.
+    models, the expected square of the error falls from E d'd to E d'd - 2 d'E d + d'd where d is added: by 2 d'E d - d'd. Under
+    the model alone that has at most the variance 4 d'd of a least-squares estimate; the interval of the gain has to exclude
+    nothing. Measurements that were held out take no part.
 
     `model`: of the posterior.
     """
@@ -82,7 +83,8 @@ def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bo
     mean, mine = np.zeros(len(gram)), _predicted(problem, model)
     for other, probability in _likely(posterior, model):
         mean += probability * _predicted(problem, other)
-    return bool(mine @ gram @ (2.0 * mean - mine) > 0.0)
+    error = 2.0 * np.sqrt(mine @ gram @ mine * max(mean_square_left(problem, model), 1.0))
+    return bool(mine @ gram @ (2.0 * mean - mine) > problem.settings.useful * error)
 
 
 def other_predictions(problem: Problem, posterior: Posterior, model: Model) -> float:
@@ -123,6 +125,25 @@ def squares_explained(problem: Problem, model: Model) -> dict[str, float]:
         columns = np.concatenate([unit.columns for unit in units])
         found[mechanism] = float(coefficients[columns] @ gram[np.ix_(columns, columns)] @ coefficients[columns])
     return found
+
+
+def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) -> tuple[float, float]:
+    """Sum of squares of the displacements that some mechanisms of a model make, and how much of it the others cannot make.
+
+    The others may take any size that their priors allow: a Schur complement of the Gram matrix with the priors of the others.
+    """
+    coefficients, gram = _predicted(problem, model), problem.statistics.gram[0]
+    units = [problem.units[number] for number in model.units]
+    deviations = np.repeat(model.scales, [len(unit.columns) for unit in units])
+    mine = np.repeat([unit.mechanism in mechanisms for unit in units], [len(unit.columns) for unit in units])
+    columns = np.concatenate([unit.columns for unit in units])
+    ours, rest = columns[mine], columns[~mine]
+    made = gram[:, ours] @ coefficients[ours]
+    whole = float(coefficients[ours] @ made[ours])
+    if not len(rest):
+        return whole, whole
+    inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~mine] ** -2.0)
+    return whole, whole - float(made[rest] @ np.linalg.solve(inner, made[rest]))
 
 
 def _predicted(problem: Problem, model: Model) -> np.ndarray:

@@ -152,8 +152,9 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     lost: list[str] = []
     if found:
-        if not found.conclusion.best.named:
-            steps[-1] = replace(steps[-1], fitted=final)
+        if not found.adopted:
+            named = found.conclusion.best.named
+            steps[-1] = replace(steps[-1], fitted=_with_noise_left(case, declared, found) if named else final)
         lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
         found = replace(found, adopted=found.adopted and not lost)
         if found.adopted:
@@ -171,6 +172,12 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     warnings = [*document["warnings"], *warnings_of(left_out)]
     document |= {"contradictions": contradicting, "gross_errors": left_out, "warnings": warnings}
     return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
+
+
+def _with_noise_left(case: Case, declared: Fit, found: Evidence) -> Fit:
+    """The declared model under the noise that it leaves itself, for nothing else enters the model that is kept."""
+    noise = remaining_noise(found.linearized.problem, found.posterior.nothing, found.linearized.about.noise, declared.noise)
+    return fit(declared.model, case.observations, noise, declared.estimate, reweighted=True)
 
 
 def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settings: Settings) -> list[str]:

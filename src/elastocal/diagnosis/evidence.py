@@ -66,15 +66,21 @@ class Grid:
     log_weights: np.ndarray
 
     def of(self, unit: Unit) -> np.ndarray:
-        """Logarithms of the weights for one unit: its smallest size and those above share them, ndarray (S,)."""
-        return self._from[unit.smallest]
+        """Logarithms of the weights for one unit: sizes from its smallest to its largest share them, ndarray (S,)."""
+        return self._between[unit.smallest, unit.largest]
+
+    def root_mean_square(self, unit: Unit) -> float:
+        """Standard deviation of a coefficient of a unit before the measurements, over all its sizes, in plausible sizes."""
+        return float(np.sqrt(np.exp(self.of(unit)) @ self.scales**2))
 
     @cached_property
-    def _from(self) -> np.ndarray:
-        """Weights from each size on, ndarray (S, S)."""
+    def _between(self) -> np.ndarray:
+        """Weights from each size to each, ndarray (S, S, S)."""
         places = np.arange(len(self.scales))
-        weights = np.where(places < places[:, None], -np.inf, self.log_weights)
-        return weights - log_sum_exp(weights, axis=1)[:, None]
+        outside = (places < places[:, None, None]) | (places > places[:, None])
+        weights = np.where(outside, -np.inf, self.log_weights)
+        with np.errstate(invalid="ignore"):
+            return weights - log_sum_exp(weights, axis=2)[..., None]
 
 
 def scale_weights(scales: Sequence[float] | np.ndarray, settings: Settings) -> np.ndarray:
@@ -241,7 +247,7 @@ def evaluate(
 
     The sum over all combinations of sizes is taken as the product of the sums over each size about the mode; exact for one
     unit, and where sizes are independent given the measurements. The mode is found by coordinate ascent (iterated conditional
-    modes [1]), all units at once where that raises the density and else the one that gains most. One inverse gives what every
+    modes [1]), all units at once where that raises the density and else those that gain most. One inverse gives what every
     unit sees given all others: with C the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
 
     `log_pose` (T,): logarithm of the prior weight of each size of the pose error. `start`: sizes from which the search for the
@@ -253,31 +259,40 @@ def evaluate(
     if not units:
         values = base + log_likelihood(statistics.squares, statistics.freedom)
         return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values), np.zeros(0))
-    nearest = [max(int(np.argmin(np.abs(grid.scales - size))), unit.smallest) for size, unit in zip(start, units, strict=True)]
+    off = [np.where(np.isfinite(grid.of(u)), np.abs(grid.scales - size), np.inf) for size, u in zip(start, units, strict=True)]
+    nearest = [int(np.argmin(distances)) for distances in off]
     present = Joint(statistics, units, grid, base, np.array(nearest))
     profiles = present.profiles()
-    for _ in range(_MOST_ASCENTS):
-        best = np.array([int(np.argmax(profile[1:])) for profile in profiles])
-        gains = np.array([p[1:].max() - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
-        if gains.max() <= _NO_GAIN:
-            break
-        moved = Joint(statistics, units, grid, base, np.where(gains > _NO_GAIN, best, present.places))
-        if moved.log_density <= present.log_density:
-            places = present.places.copy()
-            places[np.argmax(gains)] = best[np.argmax(gains)]
-            moved = Joint(statistics, units, grid, base, places)
-            if moved.log_density <= present.log_density:
-                break
-        present = moved
-        profiles = present.profiles()
+    while (moved := _ascended(statistics, present, profiles)) is not None:
+        present, profiles = moved, moved.profiles()
     sums = np.array([log_sum_exp(p[1:]) - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
     without = np.array([profile[0] for profile in profiles]) - sums + sums.sum()
     log_posterior = present.by_pose_error - log_sum_exp(present.by_pose_error)
     return Evaluated(float(present.log_density + sums.sum()), present.scales, log_posterior, without)
 
 
-# Sizes lie on a grid, so that an ascent ends by itself; these end one that rounding keeps going.
-_MOST_ASCENTS, _NO_GAIN = 30, 1e-9
+# Of what the steps of an ascent take, that which rounding may make.
+_NO_GAIN = 1e-9
+# So many times fewer units are moved where all at once do not raise the density.
+_FEWER = 4
+
+
+def _ascended(statistics: Statistics, present: Joint, profiles: Sequence[np.ndarray]) -> Joint | None:
+    """A step of the ascent: as many units as raise the density, those that gain most first; None at the mode.
+
+    Sizes lie on a grid and the density rises, so that steps end.
+    """
+    best = np.array([int(np.argmax(profile[1:])) for profile in profiles])
+    gains = np.array([p[1:].max() - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
+    order, count = np.argsort(-gains), int((gains > _NO_GAIN).sum())
+    while count:
+        places = present.places.copy()
+        places[order[:count]] = best[order[:count]]
+        moved = Joint(statistics, present.units, present.grid, present.base, places)
+        if moved.log_density > present.log_density:
+            return moved
+        count = 0 if count == 1 else max(count // _FEWER, 1)
+    return None
 
 
 # Above so many columns LAPACK's inverse of positive matrices, called for each of them, costs less than all of numpy's together.

@@ -6,6 +6,7 @@ orders) that differ in their law are variants, of which a model holds one at mos
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -33,7 +34,8 @@ class Unit:
     `candidate`: None for `OTHER`. `columns` (d,) of int: its columns in the sufficient statistics. `sizes` (d,): plausible size
     of each parameter: a column is the sensitivity times this. `signs` (d,) of int: sign that physics gives each parameter, 0
     where it may have either. `log_prior`: logarithm of its share among the variants at its location. `competitor`: of `OTHER`.
-    `smallest`: place in the grid of sizes of the smallest that the measurements could show.
+    `smallest`: place in the grid of sizes of the smallest that the measurements could show. `largest`: of the largest that such
+    an effect may have; -1 for the last.
     """
 
     mechanism: str
@@ -46,6 +48,7 @@ class Unit:
     log_prior: float = 0.0
     competitor: Competitor | None = None
     smallest: int = 0
+    largest: int = -1
 
     @property
     def key(self) -> str:
@@ -129,12 +132,16 @@ def units_of(
         sizes = np.array([p.plausible * p.order**-settings.harmonic_decay for p in candidate.parameters])
         signs = np.array([parameter.sign for parameter in candidate.parameters])
         log_share = float(np.log(share))
-        units.append(Unit(candidate.effect, candidate.location, candidate, values, columns, sizes, signs, log_share))
+        largest = bisect_right(settings.scales, min((p.most for p in candidate.parameters), default=np.inf)) - 1
+        units.append(
+            Unit(candidate.effect, candidate.location, candidate, values, columns, sizes, signs, log_share, largest=largest)
+        )
         start += len(columns)
     at = [each.location for each, _ in features]
     for each, count in features:
         columns, log_share = np.arange(start, start + count), -float(np.log(at.count(each.location)))
-        units.append(Unit(OTHER, each.location, None, (), columns, np.ones(count), np.zeros(count, int), log_share, each))
+        whole = np.ones(count), np.zeros(count, int), log_share, each
+        units.append(Unit(OTHER, each.location, None, (), columns, *whole, largest=len(settings.scales) - 1))
         start += count
     require_unique([unit.key for unit in units])
     return tuple(units)

@@ -53,13 +53,14 @@ class Verdict:
     """A diagnosis with what held-out poses say of it.
 
     `document`: contents of verdict.json. `rows`: of before_after.csv. `held_out`: what was held out, without its gross errors.
-    `left_out`: these.
+    `left_out`: these. `outside` (P,) of bool: poses held out that lie outside the range of the fitted ones.
     """
 
     document: dict[str, Any]
     rows: list[dict[str, Any]]
     held_out: Case
     left_out: Measurements
+    outside: np.ndarray
 
 
 def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
@@ -69,9 +70,9 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     bootstrap over poses.
     """
     case, steps = diagnosis.case, diagnosis.steps
-    errors, part = without_gross_errors(diagnosis, held_out)
+    errors, part, outside = without_gross_errors(diagnosis, held_out)
     left_out = entries_of(errors, held_out.campaign, held_out=True)
-    rows, heldout, warnings = heldout_errors(steps, case, part, seed)
+    rows, heldout, warnings = heldout_errors(steps, case, part, outside, seed)
     of_all = [row["heldout_rms_m"] for row in rows]
     heldout["with_gross_errors"] = None
     if left_out:
@@ -89,19 +90,21 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
         "gross_errors": [*diagnosis.document["gross_errors"], *left_out],
         "warnings": [*diagnosis.document["warnings"], *warnings_of(left_out), *warnings],
     }
-    return Verdict(document, rows, part, held_out.campaign.measurements.select(errors.gross))
+    return Verdict(document, rows, part, held_out.campaign.measurements.select(errors.gross), outside)
 
 
-def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case]:
-    """Held-out rows that the final model does not explain, by the rule of the training rows; and the case without."""
-    final, count = diagnosis.final, len(held_out.campaign.measurements)
+def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case, np.ndarray]:
+    """Held-out rows that the final model does not explain, by the rule of the training rows; the case without; and which of
+    its poses lie outside the range of the fitted ones, (P,)."""
+    final, measurements = diagnosis.final, held_out.campaign.measurements
+    poses = outside_poses(final, diagnosis.case, held_out)
     if any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
-        return Deviations.none(count, held_out.model.rows), held_out
+        return Deviations.none(len(measurements), held_out.model.rows), held_out, poses
     part, settings = held_out, Settings()
-    errors = Deviations.none(count, held_out.model.rows)
+    errors = Deviations.none(len(measurements), held_out.model.rows)
     noise = noise_from(diagnosis.document).of_measurements
     yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
-    outside = outside_poses(final, diagnosis.case, held_out)[state_clusters(held_out.campaign.measurements)]
+    outside = poses[state_clusters(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
         there, last = placed(final, diagnosis.case, part), errors.gross
@@ -109,7 +112,7 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
         if (errors.gross == last).all():
             break
-    return errors, part
+    return errors, part, np.bincount(state_clusters(part.campaign.measurements), outside[~errors.gross]) > 0
 
 
 def _remainder(diagnosis: Diagnosis, held_out: Case, seed: int) -> dict[str, Any] | None:
@@ -136,11 +139,12 @@ def _gains(rows: Iterable[Mapping[str, Any]]) -> dict[str, float]:
 
 
 def heldout_errors(
-    steps: Sequence[Step], case: Case, held_out: Case, seed: int
+    steps: Sequence[Step], case: Case, held_out: Case, outside: np.ndarray, seed: int
 ) -> tuple[list[dict[str, Any]], dict[str, Any], list[str]]:
     """Errors of every step on training and held-out poses.
 
-    `held_out`: as in `judge`. Returns `rows`: of before_after.csv; `heldout`: as in verdict.json.
+    `held_out`, `seed`: as in `judge`. `outside` (P,): as of `Verdict`. Returns `rows`: of before_after.csv; `heldout`: as in
+    verdict.json.
     """
     there, errors = _errors(steps, case, held_out)
     before, after = _declared(steps), len(steps) - 1
@@ -160,7 +164,6 @@ def heldout_errors(
         row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
         rows.append(row)
     ends = [_summary(errors[number]) for number in (0, before, after)]
-    outside = outside_poses(steps[after].fitted, case, held_out)
     by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
         "uncalibrated": ends[0] | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
@@ -210,7 +213,7 @@ def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     for part, left_out, unseen in ((case, diagnosis.left_out, False), (verdict.held_out, verdict.left_out, True)):
         there = [placed(fitted, case, part) for fitted in (before, after)]
-        outside = outside_poses(after, case, part) if unseen else np.zeros(part.observations.cluster.max() + 1, bool)
+        outside = verdict.outside if unseen else np.zeros(part.observations.cluster.max() + 1, bool)
         measurements = part.campaign.measurements
         for some, beyond in ((measurements, outside[state_clusters(measurements)]), (left_out, np.zeros(len(left_out), bool))):
             if not len(some):

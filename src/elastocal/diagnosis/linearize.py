@@ -131,9 +131,9 @@ def linearized(
         products = summed(source.blocks(source.lines(parts)), triangle[:-1, :-1], deviation, present, grid)
     statistics = statistics_of(products, grid)
     smallest = smallest_shown(statistics, units, settings)
-    shown = tuple(replace(unit, smallest=int(n)) for unit, n in zip(units, smallest, strict=True) if n < len(settings.scales))
+    shown = tuple(replace(unit, smallest=int(n)) for unit, n in zip(units, smallest, strict=True) if n <= unit.largest)
     small = {unit.candidate.key for unit in units if unit.candidate} - {u.candidate.key for u in shown if u.candidate}
-    untestable |= dict.fromkeys(sorted(small), "too small to be seen at its plausible size")
+    untestable |= dict.fromkeys(sorted(small), "too small to be seen at any size that such an effect has")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
     problem = Problem(statistics, shown, prior_of(shown, settings), settings)
     return Linearized(problem, products, untestable, fitted, around, keys, unit_rad)
@@ -157,8 +157,7 @@ def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Sett
     A test for one direction, with a Bonferroni correction for all units, reaches that where the non-centrality is the critical
     value. A smaller effect is there or not, and the measurements are the same: it counts as not there.
 
-    Returns (number of units,) of int: place among the sizes; their number where even the largest, the plausible one, is too
-    small to be seen.
+    Returns (number of units,) of int: place among the sizes; their number where even the largest is too small to be seen.
     """
     critical = chi2.isf(settings.alarm_level / max(len(units), 1), 1)
     grams = (statistics.gram[0][np.ix_(unit.columns, unit.columns)] for unit in units)

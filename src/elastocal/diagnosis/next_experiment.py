@@ -31,7 +31,7 @@ from elastocal.diagnosis.proposal import (
     without_poses,
 )
 from elastocal.diagnosis.refit import mean_square_left
-from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE
+from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE, mechanisms_of_models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -143,10 +143,8 @@ def _ambiguous(evidence: Evidence, settings: Settings) -> tuple[dict[tuple[str, 
     instead = [name for name in names[1:] if not set(name) >= set(names[0])]
     if len(names) < 2 or (conclusion.verdict == NAMED and not instead):
         return {}, NOTHING_AMBIGUOUS
-    units = evidence.linearized.problem.units
     models: dict[tuple[str, ...], list[Model]] = {name: [] for name in names}
-    for model in found.models:
-        name = tuple(sorted({units[n].mechanism for n in model.units}))
+    for model, name in zip(found.models, mechanisms_of_models(evidence.linearized.problem, found), strict=True):
         if name in models:
             models[name].append(model)
     room = _MODELS - len(names)

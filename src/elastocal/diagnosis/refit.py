@@ -2,7 +2,8 @@
 
 Maximum a posteriori, a generalized ridge regression [1]: coefficients keep the normal priors under which they were selected,
 half-normal ones as normal, so that what the measurements do not determine stays at zero; the noise is that which the selected
-model leaves.
+model leaves. No prior is wider than all sizes of the effect together made it before the measurements: what asks for more is
+often something else beside the law, which fits where poses are and not between them.
 
 [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
 """
@@ -40,11 +41,12 @@ class Selected:
 
 def selected(linearized: Linearized, model: Model) -> Selected:
     """What a model of the posterior is for the exact fit."""
-    effects = []
+    problem, effects = linearized.problem, []
     for number, scale in zip(model.units, model.scales, strict=True):
-        unit = linearized.problem.units[number]
+        unit = problem.units[number]
         if unit.candidate:
-            effects.append((with_prior(unit.candidate, scale * unit.sizes), np.array(unit.shapes, float)))
+            size = min(scale, problem.grid.root_mean_square(unit))
+            effects.append((with_prior(unit.candidate, size * unit.sizes), np.array(unit.shapes, float)))
     return Selected(tuple(effects))
 
 

@@ -3,11 +3,11 @@
 A hypothesis is a set of mechanisms, whatever their locations. `OTHER` beside a mechanism means that a related mechanism acts;
 `OTHER` alone, that the catalogue does not have what acts.
 
-A class lists the credible set of highest posterior probability [1] and what the measurements alone favour; the probability of
-a mechanism is its posterior inclusion probability [2], summed over hypotheses.
+The probability of a mechanism is its posterior inclusion probability [1], summed over hypotheses. A law is never quite that of
+the machine: what the smooth error adds to a mechanism counts as the mechanism itself while it is small beside it.
 
-[1] Box, G. E. P. and Tiao, G. C., Bayesian Inference in Statistical Analysis, Addison-Wesley, 1973.
-[2] Barbieri, M. M. and Berger, J. O., Optimal predictive model selection, Annals of Statistics 32, 2004.
+[1] Barbieri, M. M. and Berger, J. O., Optimal predictive model selection, Annals of Statistics 32, 2004.
+[2] Berger, J. O., Statistical Decision Theory and Bayesian Analysis, section 1.3, Springer, 1985.
 """
 
 from __future__ import annotations
@@ -17,18 +17,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.diagnosis.averaging import squares_beyond
 from elastocal.diagnosis.hypotheses import OTHER
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from elastocal.diagnosis.alarm import Alarm
-    from elastocal.diagnosis.search import Posterior, Problem
+    from elastocal.diagnosis.search import Model, Posterior, Problem
+    from elastocal.diagnosis.settings import Settings
 
 ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
 UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
 # Family of what any measurements test, even of a single pose: that nothing of it shows says nothing of the robot.
 _OF_THE_SETUP = "drift"
+# Models below this move no probability that is stated.
+_TELLING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -72,11 +76,10 @@ class Conclusion:
 def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusion:
     """State the verdict.
 
-    Returns adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for, and favoured over
-    each other one by the measurements alone. class: one mechanism, but which of some, or whether a related one, remains
-    ambiguous. several: more than one mechanism. unexplained: something acts that the catalogue does not have, or that no model
-    explains better than "nothing" does. not_testable: the measurements can test no mechanism of the robot, and nothing of the
-    set-up shows.
+    Returns adequate: no alarm. named: one mechanism, stated alone. class: one mechanism, but which of some, or whether a
+    related one, remains ambiguous. several: more than one mechanism. unexplained: something acts that the catalogue does not
+    have, or that no model explains better than "nothing" does. not_testable: the measurements can test no mechanism of the
+    robot, and nothing of the set-up shows.
     """
     settings = problem.settings
     hypotheses = hypotheses_of(problem, posterior)
@@ -88,39 +91,31 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
         return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)
     if not alarm.raised:
         return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms)
-    # The alarm has decided that something is missing; the posterior says what: nothing of the catalogue, one mechanism or more.
+    # The alarm has decided that something is missing; the posterior says what: first how many mechanisms, then which.
     there = [h for h in hypotheses if h.mechanisms]
-    if nothing.probability >= settings.credible:
-        return Conclusion(UNEXPLAINED, hypotheses, nothing, {}, mechanisms)
     weights = [sum(h.probability for h in there if h.kind == kind) for kind in (UNEXPLAINED, CLASS, SEVERAL)]
     kind = (UNEXPLAINED, CLASS, SEVERAL)[int(np.argmax(weights))]
-    best = next(h for h in there if h.kind == kind)
-    if kind == UNEXPLAINED:
-        return Conclusion(UNEXPLAINED, hypotheses, best, {}, mechanisms)
-    total = sum(weights)
-    favoured = _favoured_instead(problem, posterior, best, there) if kind == CLASS else ()
-    sure = best.probability >= settings.named_probability and not favoured
-    if kind == CLASS and OTHER not in best.mechanisms and sure:
-        return Conclusion(NAMED, hypotheses, best, dict.fromkeys(best.named, ()), mechanisms)
-    credible = _credible(there, settings.credible * total)
-    credible += tuple(hypothesis for hypothesis in favoured if hypothesis not in credible)
-    return Conclusion(kind, hypotheses, best, {name: _instead_of(name, best, credible) for name in best.named}, mechanisms)
+    best = next((h for h in there if h.kind == kind), nothing)
+    sure, stated = _least_expected_loss([best, *(h for h in there if h != best)], settings)
+    if not stated or kind == UNEXPLAINED:
+        return Conclusion(UNEXPLAINED, hypotheses, best if stated else nothing, {}, mechanisms)
+    named = sure and kind == CLASS and OTHER not in best.mechanisms
+    alternatives = {name: () if named else _instead_of(name, best, stated) for name in best.named}
+    return Conclusion(NAMED if named else kind, hypotheses, best, alternatives, mechanisms)
 
 
-def _favoured_instead(
-    problem: Problem, posterior: Posterior, best: Hypothesis, hypotheses: Iterable[Hypothesis]
-) -> tuple[Hypothesis, ...]:
-    """Other single mechanisms under which the measurements are at least as probable, each at its best location.
+def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tuple[bool, Sequence[Hypothesis]]:
+    """Whether to state the first of some hypotheses alone, and which to state where not: a Bayes decision [2].
 
-    The best has only its prior over these, which goes by how many locations and laws each has: no name rests on that alone.
+    A wrong name costs one, and so does a class that does not hold what is so; a class costs something by itself, and for each
+    line. To state none costs what a missed effect does. `ranked`: without "nothing", which a class leaves open.
     """
-
-    def log_bayes_factor(hypothesis: Hypothesis) -> float:
-        model = posterior.models[hypothesis.model]
-        return model.log_odds - problem.prior.log_odds_of(problem.units[number] for number in model.units)
-
-    single = [h for h in hypotheses if len(h.mechanisms) == 1 and h.model >= 0 and h != best]
-    return tuple(h for h in single if log_bayes_factor(h) >= log_bayes_factor(best))
+    probability = np.array([hypothesis.probability for hypothesis in ranked])
+    further, missed = np.arange(len(ranked)), np.clip(probability.sum() - np.cumsum(probability), 0.0, None)
+    classes = settings.ambiguity_loss + settings.width_loss * further + missed
+    none, alone = settings.missed_loss * probability.sum(), 1.0 - probability[0]
+    worth = ranked[: int(np.argmin(classes)) + 1]
+    return alone < classes.min(), worth if none > min(alone, classes.min()) else ()
 
 
 def _marginal(hypotheses: Iterable[Hypothesis]) -> dict[str, float]:
@@ -139,12 +134,36 @@ def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, .
     Returns the most probable first; "nothing" is always among them.
     """
     found: dict[tuple[str, ...], tuple[float, int]] = {(): (0.0, -1)}
-    for number, (model, probability) in enumerate(zip(posterior.models, posterior.probabilities, strict=True)):
-        names = tuple(sorted({problem.units[unit].mechanism for unit in model.units}))
+    stated = zip(mechanisms_of_models(problem, posterior), posterior.probabilities, strict=True)
+    for number, (names, probability) in enumerate(stated):
         held, best = found.get(names, (0.0, number))
         found[names] = held + float(probability), number if best < 0 else best
     ranked = sorted(found.items(), key=lambda item: -item[1][0])
     return tuple(Hypothesis(names, probability, model) for names, (probability, model) in ranked)
+
+
+def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[str, ...]]:
+    """What each model says that acts, in the order of the names; empty for "nothing"."""
+    pairs = zip(posterior.models, posterior.probabilities, strict=True)
+    return [tuple(sorted(_mechanisms_of(problem, model, probability))) for model, probability in pairs]
+
+
+def _mechanisms_of(problem: Problem, model: Model, probability: float) -> set[str]:
+    """What a model says that acts: its mechanisms, and something unknown where it has a smooth error beside them.
+
+    Neither a law nor the smooth error is quite what the machine does. So of the two that counts as a part of the other which
+    makes displacements that the other cannot make, but within the tolerance of laws.
+    """
+    names = {problem.units[unit].mechanism for unit in model.units}
+    known = names - {OTHER}
+    if OTHER not in names or not known or probability <= _TELLING:
+        return names
+    by_laws, beyond_unknown = squares_beyond(problem, model, known)
+    by_unknown, beyond_laws = squares_beyond(problem, model, {OTHER})
+    tolerance = problem.settings.law_tolerance**2
+    if beyond_laws < tolerance * by_laws:
+        return known
+    return {OTHER} if beyond_unknown < tolerance * by_unknown else names
 
 
 def location_probabilities(problem: Problem, posterior: Posterior, mechanism: str) -> dict[tuple[int | str, ...], float]:
@@ -158,12 +177,6 @@ def location_probabilities(problem: Problem, posterior: Posterior, mechanism: st
         for location in locations:
             found[location] = found.get(location, 0.0) + float(probability)
     return {location: value / total for location, value in sorted(found.items(), key=lambda entry: -entry[1])}
-
-
-def _credible(hypotheses: list[Hypothesis], probability: float) -> list[Hypothesis]:
-    """Smallest set of hypotheses, in falling order, that holds a probability."""
-    reached = np.cumsum([h.probability for h in hypotheses])
-    return hypotheses[: int(np.searchsorted(reached, probability)) + 1]
 
 
 def _instead_of(name: str, best: Hypothesis, credible: Iterable[Hypothesis]) -> tuple[str, ...]:

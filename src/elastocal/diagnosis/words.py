@@ -34,6 +34,16 @@ _PARAMETER_WORDS = (
     (r"\bmoment\b", "first moment"),
     (r"\b1 over ([EG])([IJ])\b", r"1/(\1\2)"),
 )
+# What the mechanisms of a family have in common.
+_IN_COMMON = {
+    "elastic": "yielding",
+    "geometry": "an error of geometry",
+    "gravity": "weight",
+    "transmission": "an error of a gear",
+    "gearbox": "an error of a gear",
+    "load": "an error of the load",
+    "drift": "drift of the set-up or by warmth",
+}
 # Locations that have no joint: what stands there in the place of one.
 _PARTS = ("column", "base")
 # Bands of orders, variants and the like are given for as many locations; of more only their joints.
@@ -150,6 +160,16 @@ def hypotheses_words(sets: Sequence[Mapping[str, Any]]) -> list[str]:
 def alternative_words(name: str) -> str:
     """What may be meant instead of a mechanism: another, or a related one."""
     return RELATED if name == OTHER else physical_name(name)
+
+
+def in_common(effect: str, alternatives: Iterable[str]) -> str:
+    """What an effect and all that may be meant instead have in common, as people call it: yielding; empty of no one kind.
+
+    What the catalogue does not have may be of any.
+    """
+    families = {getattr(effects().get(name), "FAMILY", "") for name in (effect, *alternatives)}
+    kinds = {_IN_COMMON.get(family, "") for family in families}
+    return kinds.pop() if len(kinds) == 1 else ""
 
 
 def in_words(text: str) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Parameter
+from elastocal.effects.sizes import sized
 from elastocal.effects.wrench_errors import base_and_flange
 
 if TYPE_CHECKING:
@@ -21,9 +21,9 @@ NAME, FAMILY = "application_point", "load"
 # The wrench was recorded wrongly; one that is declared for a task is right.
 MOVES_ROBOT = False
 WORDS = "wrong load application point"
-_PARAMETERS = tuple(Parameter(f"shift_{axis}", "m", 0.02) for axis in "xyz")
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate for each frame in which the shift can be fixed."""
-    return base_and_flange(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.shift(wrench))
+    parameters = sized(NAME, "shift", [f"shift_{axis}" for axis in "xyz"], "m", sites)
+    return base_and_flange(NAME, FAMILY, parameters, lambda axis, wrench: axis.shift(wrench))

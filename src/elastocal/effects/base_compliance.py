@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import Candidate
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -21,16 +22,13 @@ if TYPE_CHECKING:
 NAME, FAMILY = "base_compliance", "elastic"
 MOVES_ROBOT = True
 WORDS = "elasticity of the foundation"
-_PARAMETERS = (
-    Parameter("horizontal", "m/N", 2e-8, sign=1),
-    Parameter("vertical", "m/N", 2e-8, sign=1),
-    Parameter("tilt", "rad/(N m)", 1e-7, sign=1),
-)
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """Two candidates at the foot: all ways to give, and rocking alone, which is what most foundations do."""
     tx, ty, tz, rx, ry, _ = sites.base
+    tilt = sized(NAME, "tilt", ["tilt"], "rad/(N m)", sites)
+    parameters = (*sized(NAME, "shift", ["horizontal", "vertical"], "m/N", sites), *tilt)
 
     def displacement(conditions: Conditions) -> Displacements:
         load = conditions.total
@@ -41,6 +39,6 @@ def candidates(sites: Sites) -> list[Candidate]:
 
     load = frozenset({"load"})
     return [
-        Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, load),
-        Candidate(NAME, FAMILY, (), "rocking", _PARAMETERS[2:], rocking, load),
+        Candidate(NAME, FAMILY, (), "", parameters, displacement, load),
+        Candidate(NAME, FAMILY, (), "rocking", tilt, rocking, load),
     ]

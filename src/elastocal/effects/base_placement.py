@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import Candidate, moved_and_turned
+from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -23,17 +24,14 @@ NAME, FAMILY = "base_placement", "geometry"
 MOVES_ROBOT = True
 WORDS = "base that stands elsewhere than declared"
 # What registering a base by a tracker leaves: 0.05 to 0.3 mm and 20 to 100 urad; several times that where a step went wrong.
-_PARAMETERS = (
-    *(Parameter(f"d{axis}", "m", 5e-4) for axis in "xyz"),
-    *(Parameter(f"r{axis}", "rad", 3e-4) for axis in "xyz"),
-)
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate, at the foot."""
+    parameters = moved_and_turned(size_of(NAME, "shift", sites), size_of(NAME, "turn", sites))
 
     def displacement(conditions: Conditions) -> Displacements:
         always = np.ones(len(conditions.joint_angles))
         return [{coordinate: always} for coordinate in sites.base]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"declared base"}))]
+    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, frozenset({"declared base"}))]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
+from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -26,9 +27,8 @@ WORDS = "bearing runout"
 _ORDERS = (1, 2)
 _WAVES = (("cos", np.cos), ("sin", np.sin))
 _SAMPLES_PER_PERIOD = 4
-# Large slewing bearings run out by some hundredths of a millimetre. Over the part of a turn that a joint uses the two orders
+# Over the part of a turn that a joint uses the two orders
 # are nearly one function, and like a link of other dimensions: a prior of that size keeps them from cancelling each other.
-_RUNOUT_M, _WOBBLE_RAD = 5e-5, 5e-5
 
 
 def candidates(sites: Sites) -> list[Candidate]:
@@ -43,7 +43,8 @@ def candidates(sites: Sites) -> list[Candidate]:
 def _candidate(sites: Sites, joint: int, motion: str) -> Candidate:
     own = sites.joint_axes[joint]
     axes = (own,) if motion == "axial" else ((own + 1) % 3, (own + 2) % 3)
-    unit, size = ("rad", _WOBBLE_RAD) if motion == "wobble" else ("m", _RUNOUT_M)
+    unit, quantity = ("rad", "wobble") if motion == "wobble" else ("m", "shift")
+    size = size_of(NAME, quantity, sites)
     parameters = tuple(
         Parameter(f"{motion}_{'xyz'[axis]}_{name}_{order}q", unit, size, size)
         for axis in axes

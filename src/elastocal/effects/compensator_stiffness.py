@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.effects import compensator_torque
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 NAME, FAMILY = "compensator_stiffness", "elastic"
 MOVES_ROBOT = True
 WORDS = "stiffness of the gravity compensator"
-_PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad/(N m)", 2e-7 / order) for order in (1, 2) for wave in ("cos", "sin"))
 
 
 def candidates(sites: Sites) -> list[Candidate]:
@@ -35,8 +34,10 @@ def candidates(sites: Sites) -> list[Candidate]:
     if joint is None:
         return []
 
+    parameters = compensator_torque.wave_parameters(NAME, "variation", "rad/(N m)", sites, joint)
+
     def displacement(conditions: Conditions) -> Displacements:
         torque = conditions.total[:, joint]
         return [{joint: torque * wave} for wave in compensator_torque.waves(conditions.joint_angles[:, joint])]
 
-    return [Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}))]
+    return [Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, LOADED_JOINTS)]

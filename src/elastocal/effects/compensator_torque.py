@@ -16,17 +16,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import Candidate
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Displacements
+    from elastocal.effects.protocol import Displacements, Parameter
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "compensator_torque", "gravity"
 MOVES_ROBOT = True
 WORDS = "torque of the gravity compensator"
-_PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad", 1e-3 / order) for order in (1, 2) for wave in ("cos", "sin"))
 
 
 def candidates(sites: Sites) -> list[Candidate]:
@@ -35,6 +35,8 @@ def candidates(sites: Sites) -> list[Candidate]:
     if joint is None:
         return []
 
+    parameters = wave_parameters(NAME, "turn", "rad", sites, joint)
+
     def displacement(conditions: Conditions) -> Displacements:
         return [{joint: wave} for wave in waves(conditions.joint_angles[:, joint])]
 
@@ -42,8 +44,8 @@ def candidates(sites: Sites) -> list[Candidate]:
         return displacement(conditions)[:2]
 
     return [
-        Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement),
-        Candidate(NAME, FAMILY, (joint + 1,), "first order", _PARAMETERS[:2], first_order),
+        Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement),
+        Candidate(NAME, FAMILY, (joint + 1,), "first order", parameters[:2], first_order),
     ]
 
 
@@ -57,3 +59,9 @@ def turned_joint(sites: Sites) -> int | None:
 def waves(angle: np.ndarray) -> list[np.ndarray]:
     """Cosine and sine of an angle (S,) and of twice the angle, in the order of the parameters; list of ndarray (S,)."""
     return [wave(order * angle) for order in (1, 2) for wave in (np.cos, np.sin)]
+
+
+def wave_parameters(effect: str, quantity: str, unit: str, sites: Sites, joint: int) -> tuple[Parameter, ...]:
+    """Parameters of `waves`, of which those of twice the angle are half as large."""
+    each = (sized(effect, quantity, [f"cos_{order}q", f"sin_{order}q"], unit, sites, joint, over=order) for order in (1, 2))
+    return tuple(parameter for order in each for parameter in order)

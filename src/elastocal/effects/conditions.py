@@ -90,10 +90,22 @@ class Conditions:
         centres = np.array([mass.centre_m for mass in sites.masses])
         along, rotation = masses[:, None] * centres + corrections[:, 1:], self._body_rotation
         first = sum(along[:, j, None, None] * rotation[:, :, j] for j in range(3))
-        first += masses[:, None, None] * self._body_position
-        on_each = self._falling[0] * (self._behind @ masses)[:, None]
+        return self._gravity_of(masses, first + masses[:, None, None] * self._body_position, self._behind)
+
+    @cached_property
+    def usual_gravity(self) -> np.ndarray:
+        """Generalized force of the usual masses on every coordinate beyond the joints, whose sag has its own law; (S, C)."""
+        masses, ends = self.sites.usual_masses, self.sites.followed[1 : self.sites.joints + 2]
+        first = masses[:, None, None] * self.motion.position[1 : len(ends) + 1]
+        found = self._gravity_of(masses, first, (self.motion.place[:, None] < [end.after for end in ends]).astype(float))
+        found[:, : self.sites.joints] = 0.0
+        return found
+
+    def _gravity_of(self, masses: np.ndarray, first: np.ndarray, behind: np.ndarray) -> np.ndarray:
+        """By masses (m,), their first moments (m, 3, S), and which are behind each moving transform (K, m); (S, C)."""
+        on_each = self._falling[0] * (behind @ masses)[:, None]
         for i in range(3):
-            on_each += self._falling[1][i] * (self._behind @ first[:, i])
+            on_each += self._falling[1][i] * (behind @ first[:, i])
         return self.motion.by_coordinate(on_each).T
 
     def gravity_of_corrections(self, coordinates: Sequence[int]) -> Iterator[np.ndarray]:
@@ -120,7 +132,9 @@ class Conditions:
 
     @cached_property
     def total(self) -> np.ndarray:
-        """External load and weight of the declared masses on every coordinate of the sites, ndarray (S, C)."""
+        """External load and weight of the declared masses, or of usual ones, on every coordinate of the sites, (S, C)."""
+        if self.sites.usual_weight:
+            return self.load + self.usual_gravity
         return self.load + self.gravity if self.sites.masses else self.load
 
     @cached_property
@@ -295,11 +309,13 @@ def with_total(conditions: Conditions, total: np.ndarray) -> Conditions:
 def offered(sites: Sites, states: States) -> frozenset[str]:
     """What is there that effects may need.
 
-    Returns "load": an external load, or declared masses, whose weight loads the joints too; "external load", without which the
-    compliances are not identifiable; "approach", where it is known somewhere; "time" and "temperature", where they change.
+    Returns "load": an external load or a weight; "load on the joints": that, or declared masses; "external load", without which
+    the compliances are not identifiable; "approach", where it is known somewhere; "time" and "temperature", where they change.
     """
+    loaded = bool(sites.masses) or bool(states.wrench.any())
     there = {
-        "load": bool(sites.masses) or bool(states.wrench.any()),
+        "load": sites.usual_weight or loaded,
+        "load on the joints": loaded,
         "external load": bool(states.wrench.any()),
         "approach": states.approach is not None and bool(states.approach.any()),
         "time": states.time_s is not None and np.ptp(states.time_s) > 0,

@@ -12,7 +12,8 @@ from __future__ import annotations
 from itertools import combinations
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -22,17 +23,18 @@ if TYPE_CHECKING:
 NAME, FAMILY = "cross_compliance", "elastic"
 MOVES_ROBOT = True
 WORDS = "elastic coupling"
-_PARAMETERS = (Parameter("compliance", "rad/(N m)", 2e-7),)
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a pair of joints that turn."""
 
     def of(one: int, other: int) -> Candidate:
+        parameters = sized(NAME, "coupling", ["compliance"], "rad/(N m)", sites, one, other)
+
         def displacement(conditions: Conditions) -> Displacements:
             return [{one: conditions.total[:, other], other: conditions.total[:, one]}]
 
-        return Candidate(NAME, FAMILY, (one + 1, other + 1), "", _PARAMETERS, displacement, frozenset({"load"}))
+        return Candidate(NAME, FAMILY, (one + 1, other + 1), "", parameters, displacement, LOADED_JOINTS)
 
     revolute = [joint for joint in range(sites.joints) if not sites.prismatic[joint]]
     return [of(one, other) for one, other in combinations(revolute, 2)]

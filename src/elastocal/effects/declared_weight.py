@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 EFFECT = "declared_weight"
-# A centre of mass is uncertain by its share of the width of a link, too, which is about a tenth of the arm's length (KUKA
-# KR 270: 0.3 m of 2.7 m): links that are short, or whose centre is stated on their line, have it somewhere in their housing.
-_WIDTH_OF_LENGTH = 0.1
+# Links are as wide as a tenth of the arm is long (KUKA KR 270: 0.3 m of 2.7 m); motors and gears put the centre of a slender
+# one so far off the line as well.
+_WIDTH_OF_LENGTH, _LEAST_OFF_M = 0.1, 0.04
 
 
 def candidate(sites: Sites) -> Candidate:
@@ -39,7 +39,8 @@ def candidate(sites: Sites) -> Candidate:
 
 def _parameters(mass: Mass, width: float) -> tuple[Parameter, ...]:
     mass_std = mass.relative_std * mass.mass_kg
-    moment_std = mass_std * max(float(np.linalg.norm(mass.centre_m)), width)
+    # Of a centre that is known as well as its mass is, and may lie anywhere in the girth of its link (uniform distribution).
+    moment_std = float(np.hypot(mass_std * np.linalg.norm(mass.centre_m), mass.mass_kg * max(_LEAST_OFF_M, width / 12**0.5)))
     return (
         Parameter(f"mass_error_of_link_{mass.link}", "kg", mass_std, mass_std),
         *(Parameter(f"moment_error_{axis}_of_link_{mass.link}", "kg m", moment_std, moment_std) for axis in "xyz"),

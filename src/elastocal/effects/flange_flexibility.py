@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -22,14 +23,13 @@ if TYPE_CHECKING:
 NAME, FAMILY = "flange_flexibility", "elastic"
 MOVES_ROBOT = True
 WORDS = "flexibility of the flange"
-# A bolted joint of a tool gives some ten micrometres and a tenth of a milliradian under a kilonewton at half a metre.
-_SHIFTS = tuple(Parameter(f"shift_{axis}", "m/N", 2e-8, sign=1) for axis in "xyz")
-_TURNS = tuple(Parameter(f"turn_{axis}", "rad/(N m)", 2e-7, sign=1) for axis in "xyz")
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """Two candidates at the last measuring point: all six directions, and turns alone, which is most of what a flange does."""
     coordinates = sites.link_end[-1]
+    shifts = sized(NAME, "shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
+    turns = sized(NAME, "turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1)
 
     def displacement(conditions: Conditions) -> Displacements:
         return [{coordinate: conditions.load[:, coordinate]} for coordinate in coordinates]
@@ -37,8 +37,8 @@ def candidates(sites: Sites) -> list[Candidate]:
     def turning(conditions: Conditions) -> Displacements:
         return displacement(conditions)[3:]
 
-    load = frozenset({"load"})
+    load = LOADED_JOINTS
     return [
-        Candidate(NAME, FAMILY, (), "", (*_SHIFTS, *_TURNS), displacement, load),
-        Candidate(NAME, FAMILY, (), "turns", _TURNS, turning, load),
+        Candidate(NAME, FAMILY, (), "", (*shifts, *turns), displacement, load),
+        Candidate(NAME, FAMILY, (), "turns", turns, turning, load),
     ]

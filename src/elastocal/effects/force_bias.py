@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Parameter
+from elastocal.effects.sizes import sized
 from elastocal.effects.wrench_errors import at_flange_and_in_pull
 
 if TYPE_CHECKING:
@@ -21,9 +21,9 @@ NAME, FAMILY = "force_bias", "load"
 # The wrench was recorded wrongly; one that is declared for a task is right.
 MOVES_ROBOT = False
 WORDS = "zero error of the force sensor"
-_PARAMETERS = tuple(Parameter(f"along_{axis}", "N", 10.0) for axis in "xyz")
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate for each frame in which the sensor can sit."""
-    return at_flange_and_in_pull(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.push(wrench))
+    parameters = sized(NAME, "force", [f"along_{axis}" for axis in "xyz"], "N", sites)
+    return at_flange_and_in_pull(NAME, FAMILY, parameters, lambda axis, wrench: axis.push(wrench))

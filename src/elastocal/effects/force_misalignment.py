@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Parameter
+from elastocal.effects.sizes import sized
 from elastocal.effects.wrench_errors import at_flange_and_in_pull
 
 if TYPE_CHECKING:
@@ -24,9 +24,9 @@ NAME, FAMILY = "force_misalignment", "load"
 # The wrench was recorded wrongly; one that is declared for a task is right.
 MOVES_ROBOT = False
 WORDS = "misalignment of the force sensor"
-_PARAMETERS = tuple(Parameter(f"about_{axis}", "rad", 0.02) for axis in "xyz")
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate for each frame in which the sensor can sit, at the flange and in the pull."""
-    return at_flange_and_in_pull(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.turn(wrench))
+    parameters = sized(NAME, "turn", [f"about_{axis}" for axis in "xyz"], "rad", sites)
+    return at_flange_and_in_pull(NAME, FAMILY, parameters, lambda axis, wrench: axis.turn(wrench))

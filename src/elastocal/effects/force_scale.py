@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -21,13 +22,13 @@ NAME, FAMILY = "force_scale", "load"
 # The wrench was recorded wrongly; one that is declared for a task is right.
 MOVES_ROBOT = False
 WORDS = "scale error of the force sensor"
-_PARAMETERS = (Parameter("scale", "1", 0.02),)
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate."""
+    parameters = sized(NAME, "scale", ["scale"], "1", sites)
 
     def displacement(conditions: Conditions) -> Displacements:
         return [dict(enumerate(conditions.joint_deflections(conditions.wrench).T))]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"load"}))]
+    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, LOADED_JOINTS)]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter, needed
+from elastocal.effects.protocol import Candidate, moved_and_turned, needed
+from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -19,18 +20,15 @@ NAME, FAMILY = "frame_drift", "drift"
 # Tracker and foot drift alike in the measurements, and a task counts from where the foot stands.
 MOVES_ROBOT = False
 WORDS = "drift of the tracker or of the robot's foot"
-_PARAMETERS = (
-    *(Parameter(f"d{axis}", "m/h", 2e-4) for axis in "xyz"),
-    *(Parameter(f"r{axis}", "rad/h", 1e-4) for axis in "xyz"),
-)
 _HOUR_S = 3600.0
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate, at the foot."""
+    parameters = moved_and_turned(size_of(NAME, "shift an hour", sites), size_of(NAME, "turn an hour", sites), "/h")
 
     def displacement(conditions: Conditions) -> Displacements:
         hours = needed(conditions.time_s) / _HOUR_S
         return [{coordinate: hours} for coordinate in sites.base]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"time"}), of_setup=True)]
+    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, frozenset({"time"}), of_setup=True)]

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter, needed, per_joint
+from elastocal.effects.protocol import Candidate, needed, per_joint
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 NAME, FAMILY = "hysteresis", "gearbox"
 MOVES_ROBOT = True
 WORDS = "hysteresis"
-# The nut of a spindle has some hundredths of a millimetre.
-_TURN, _SHIFT = Parameter("half_width", "rad", 1e-4), Parameter("half_width", "m", 2e-5)
 
 
 def candidates(sites: Sites) -> list[Candidate]:
@@ -32,7 +31,8 @@ def candidates(sites: Sites) -> list[Candidate]:
         def displacement(conditions: Conditions) -> Displacements:
             return [{joint: needed(conditions.approach)[:, joint]}]
 
-        parameter = _SHIFT if sites.prismatic[joint] else _TURN
-        return Candidate(NAME, FAMILY, (joint + 1,), "", (parameter,), displacement, frozenset({"approach"}))
+        unit, quantity = ("m", "shift") if sites.prismatic[joint] else ("rad", "turn")
+        parameters = sized(NAME, quantity, ["half_width"], unit, sites)
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"approach"}))
 
     return per_joint(sites, at, prismatic=True)

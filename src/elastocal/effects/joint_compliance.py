@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Displacements
     from elastocal.mechanics.sites import Sites
 
+# Published compliances are up to five times those that suit the size of an arm.
+_OVER_USUAL = 10.0
+
 
 def candidate(sites: Sites) -> Candidate:
     """Compliances of all joints as one candidate."""
@@ -21,6 +24,7 @@ def candidate(sites: Sites) -> Candidate:
     def displacement(conditions: Conditions) -> Displacements:
         return [{joint: conditions.total[:, joint]} for joint in range(sites.joints)]
 
-    sizes = [("m/N", 1e-6) if prismatic else ("rad/(N m)", 1e-5) for prismatic in sites.prismatic]
-    parameters = tuple(Parameter(f"c{joint}", unit, size) for joint, (unit, size) in enumerate(sizes, 1))
+    units = ["m/N" if prismatic else "rad/(N m)" for prismatic in sites.prismatic]
+    sizes = [_OVER_USUAL * compliance for compliance in sites.compliance]
+    parameters = tuple(Parameter(f"c{j}", unit, size) for j, (unit, size) in enumerate(zip(units, sizes, strict=True), 1))
     return Candidate("joint_compliance", "declared", (), "", parameters, displacement, frozenset({"load"}))

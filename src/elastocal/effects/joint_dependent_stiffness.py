@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, per_joint
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, per_joint
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -21,17 +22,18 @@ if TYPE_CHECKING:
 NAME, FAMILY = "joint_dependent_stiffness", "elastic"
 MOVES_ROBOT = True
 WORDS = "angle-dependent stiffness"
-_PARAMETERS = (Parameter("cos_q", "rad/(N m)", 2e-7), Parameter("sin_q", "rad/(N m)", 2e-7))
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint."""
 
     def at(joint: int) -> Candidate:
+        parameters = sized(NAME, "variation", ["cos_q", "sin_q"], "rad/(N m)", sites, joint)
+
         def displacement(conditions: Conditions) -> Displacements:
             angle, torque = conditions.joint_angles[:, joint], conditions.total[:, joint]
             return [{joint: torque * np.cos(angle)}, {joint: torque * np.sin(angle)}]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}))
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, LOADED_JOINTS)
 
     return per_joint(sites, at)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, per_joint
+from elastocal.effects.protocol import Candidate, per_joint
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 NAME, FAMILY = "joint_offset", "geometry"
 MOVES_ROBOT = True
 WORDS = "zero offset"
-_TURN, _SHIFT = Parameter("offset", "rad", 1e-3), Parameter("offset", "m", 1e-3)
 
 
 def candidates(sites: Sites) -> list[Candidate]:
@@ -32,7 +32,8 @@ def candidates(sites: Sites) -> list[Candidate]:
         def displacement(conditions: Conditions) -> Displacements:
             return [{joint: np.ones(len(conditions.joint_angles))}]
 
-        parameter = _SHIFT if sites.prismatic[joint] else _TURN
-        return Candidate(NAME, FAMILY, (joint + 1,), "", (parameter,), displacement)
+        unit, quantity = ("m", "shift") if sites.prismatic[joint] else ("rad", "turn")
+        parameters = sized(NAME, quantity, ["offset"], unit, sites)
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement)
 
     return per_joint(sites, at, prismatic=True)

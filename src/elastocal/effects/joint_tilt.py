@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter, per_joint
+from elastocal.effects.protocol import Candidate, load_behind, per_joint
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -30,12 +31,12 @@ def candidates(sites: Sites) -> list[Candidate]:
     def at(joint: int) -> Candidate:
         # A carriage rolls about its own axis too, which is no joint's.
         across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
-        parameters = tuple(Parameter(f"tilt_about_{'xyz'[axis]}", "rad/(N m)", 2e-7, sign=1) for axis in across)
+        parameters = sized(NAME, "tilt", [f"tilt_about_{'xyz'[axis]}" for axis in across], "rad/(N m)", sites, joint)
         coordinates = [sites.tilt[joint][axis] for axis in across]
 
         def displacement(conditions: Conditions) -> Displacements:
             return [{c: conditions.total[:, c]} for c in coordinates]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, load_behind(sites, joint))
 
     return per_joint(sites, at, prismatic=True)

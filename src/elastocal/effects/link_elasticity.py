@@ -3,9 +3,10 @@
 y = F_y l^3 a/EI + M_z l^2 b/EI, r_z = F_y l^2 b/EI + M_z l c/EI, likewise in the other plane, r_x = M_x l c/GJ,
 
 are shift (m) and turns (rad) of the far end under force F (N) and moment M (N m) there, with x along the link of length l (m):
-Euler-Bernoulli and St Venant [1], linear in 1/EI and 1/GJ, 1/(N m^2), at the near end. A uniform link has a, b, c = 1/3, 1/2,
-1; one whose diameter falls linearly by a share t to its far end, thin-walled, the integrals over s from 0 to 1 of (1 - s)^2,
-1 - s and 1 over (1 - t s)^3. Stretching and shear are left out, for they are small in links much longer than wide.
+Euler-Bernoulli and St Venant [1]. A uniform link has a, b, c = 1/3, 1/2, 1; one whose diameter falls linearly by a share t to
+its far end, thin-walled, the integrals over s from 0 to 1 of (1 - s)^2, 1 - s and 1 over (1 - t s)^3. Linear in 1/EI and 1/GJ,
+1/(N m^2), of the uniform link that a force shifts and a moment along twists as far: so what is estimated of the size hardly
+depends on the taper. Stretching and shear are left out, for they are small in links much longer than wide.
 
 [1] S. P. Timoshenko and J. M. Gere, Mechanics of Materials, Van Nostrand Reinhold, 1972.
 """
@@ -17,7 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape
+from elastocal.effects.protocol import Candidate, Shape, load_behind
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -29,8 +31,7 @@ MOVES_ROBOT = True
 WORDS = "elastic bending and torsion"
 PART = "link"
 DETAIL_WORDS = {"one section": "all of one cross-section"}
-# One per mille of the bending compliance of a solid steel rod of 0.1 m is 1e-9; thin-walled cast arms reach 1e-6.
-_PARAMETERS = tuple(Parameter(name, "1/(N m^2)", 3e-7, sign=1) for name in ("bending_1_over_EI", "torsion_1_over_GJ"))
+_NAMES = ("bending_1_over_EI", "torsion_1_over_GJ")
 _SHORTEST_M = 0.05
 # Arms get thinner towards the wrist.
 _TAPER = Shape("taper", "1", 0.3, 0.0, 0.6, tried=1)
@@ -63,26 +64,28 @@ def _candidate(sites: Sites, links: tuple[int, ...], detail: str) -> Candidate:
         return [bent, twisted]
 
     joints = tuple(k for k in links if k)
+    longest = max(links, key=lambda k: float(np.linalg.norm(sites.link_vectors_m[k])))
+    length = float(np.linalg.norm(sites.link_vectors_m[longest]))
+    parameters = sized(NAME, "1/EI", _NAMES, "1/(N m^2)", sites, max(longest - 1, 0), over=length)
     return Candidate(
-        NAME, FAMILY, joints, detail, _PARAMETERS, displacement, frozenset({"load"}), (_TAPER,), location_name=detail
+        NAME, FAMILY, joints, detail, parameters, displacement, load_behind(sites, max(links)), (_TAPER,), location_name=detail
     )
 
 
 def _end_compliance(sites: Sites, link: int, taper: float) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of the far end of a link by its wrench for a unit of 1/EI, (6, 6), and its turn by the moment for 1/GJ."""
-    shift_by_force, by_either, turn_by_moment = _flexibilities(taper)
+    by_either, turn_by_moment = _flexibilities(taper)
     length = np.linalg.norm(sites.link_vectors_m[link])
     along = sites.link_vectors_m[link] / length
     lengthwise = np.outer(along, along)
     across, turned = np.eye(3) - lengthwise, np.cross(np.eye(3), along).T * by_either * length**2
-    bending = np.block(
-        [[shift_by_force * length**3 * across, turned @ across], [-turned @ across, turn_by_moment * length * across]]
-    )
-    return bending, turn_by_moment * length * lengthwise
+    bending = np.block([[length**3 / 3.0 * across, turned @ across], [-turned @ across, turn_by_moment * length * across]])
+    return bending, length * lengthwise
 
 
-def _flexibilities(taper: float) -> list[float]:
-    """a, b and c of a link whose diameter falls by a share."""
+def _flexibilities(taper: float) -> tuple[float, float]:
+    """b and c of a link whose diameter falls by a share, over 3 a."""
     places = 0.5 * (1.0 + _NODES)
-    softer = 0.5 * _WEIGHTS / (1.0 - taper * places) ** 3
-    return [float(softer @ (1.0 - places) ** power) for power in (2, 1, 0)]
+    softer = _WEIGHTS / (1.0 - taper * places) ** 3
+    a, b, c = (float(softer @ (1.0 - places) ** power) for power in (2, 1, 0))
+    return b / (3.0 * a), c / (3.0 * a)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, per_joint
+from elastocal.effects.protocol import Candidate, moved_and_turned, per_joint
+from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -24,19 +25,18 @@ NAME, FAMILY = "link_geometry", "geometry"
 MOVES_ROBOT = True
 WORDS = "geometric error"
 PART = "link"
-_PARAMETERS = tuple(Parameter(f"d{axis}", "m", 1e-3) for axis in "xyz") + tuple(
-    Parameter(f"r{axis}", "rad", 1e-3) for axis in "xyz"
-)
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a link behind a joint, named by that joint; the column before joint 1 belongs to the base."""
+
+    parameters = moved_and_turned(size_of(NAME, "length", sites), size_of(NAME, "turn", sites))
 
     def at(joint: int) -> Candidate:
         def displacement(conditions: Conditions) -> Displacements:
             ones = np.ones(len(conditions.joint_angles))
             return [{coordinate: ones} for coordinate in sites.link_end[joint + 1]]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement)
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement)
 
     return per_joint(sites, at, prismatic=True)

@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -31,10 +32,8 @@ WORDS = "gravity sag"
 _OFF_THE_LINE, _ALL_LINKS = "off the line", "all links"
 DETAIL_WORDS = {_OFF_THE_LINE: "centres of mass off the links' axes"}
 _LINKS = 2
-# Some 200 kg on a joint of 1 urad/(N m), and their centre 0.2 m off the line of the link. Of the arm, where it is known what it
-# may carry, which is about a sixth of its own mass, a quarter of that at the end of a link.
-_PRODUCT, _MOMENT = 2e-4, 4e-5
-_LINK_OVER_RATED, _LINK_KG, _OFF_M = 1.5, 200.0, 0.2
+# Of a centre of mass off the line of its link.
+_OFF_M = 0.2
 _OF_THE_ARM = "arm"
 
 
@@ -57,7 +56,7 @@ def _of_the_arm(sites: Sites, joints: Sequence[int]) -> Iterator[Candidate]:
     carried = sites.carried_links(joints[0])
     some = carried[:_LINKS]
     across = _across(sites, some, range(sites.joints))
-    mass = _LINK_KG if sites.payload_kg is None else _LINK_OVER_RATED * sites.payload_kg
+    mass = size_of(NAME, "mass", sites)
 
     def candidate(detail: str, links: Sequence[int], axes: Sequence[tuple[int, int]]) -> Candidate:
         parameters = [Parameter(f"mass_at_end_of_link_{k}", "kg", mass) for k in links]
@@ -81,9 +80,10 @@ def _of_the_arm(sites: Sites, joints: Sequence[int]) -> Iterator[Candidate]:
 
 def _of_joints(sites: Sites, joints: Sequence[int]) -> Iterator[Candidate]:
     def candidate(joint: int, detail: str, links: Sequence[int], axes: Sequence[tuple[int, int]]) -> Candidate:
-        parameters = [Parameter(f"compliance_times_mass_at_end_of_link_{k}", "rad kg/(N m)", _PRODUCT) for k in links]
+        product = size_of(NAME, "mass of one joint", sites, joint)
+        parameters = [Parameter(f"compliance_times_mass_at_end_of_link_{k}", "rad kg/(N m)", product) for k in links]
         names = (f"compliance_times_moment_{'xyz'[axis]}_of_link_{k}" for k, axis in axes)
-        parameters += [Parameter(name, "rad kg m/(N m)", _MOMENT) for name in names]
+        parameters += [Parameter(name, "rad kg m/(N m)", _OFF_M * product) for name in names]
 
         def displacement(conditions: Conditions) -> Displacements:
             return [{joint: torque[:, joint]} for torque in _torques(conditions, links, axes)]

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.full_load import full_torque_Nm
-from elastocal.effects.protocol import Candidate, Parameter, Shape, per_joint
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Shape, per_joint
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 NAME, FAMILY = "lost_motion", "gearbox"
 MOVES_ROBOT = True
 WORDS = "lost motion (backlash)"
-_PARAMETERS = (Parameter("half_play", "rad", 1e-4, sign=1),)
 # Of the full torque.
 _START, _LOWEST, _HIGHEST = 0.03, 0.003, 0.1
 
@@ -33,12 +33,13 @@ def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint."""
 
     def at(joint: int) -> Candidate:
+        parameters = sized(NAME, "play", ["half_play"], "rad", sites)
         full = full_torque_Nm(sites, joint)
         taken_up = Shape("torque", "N m", _START * full, _LOWEST * full, _HIGHEST * full)
 
         def displacement(conditions: Conditions, torque: float) -> Displacements:
             return [{joint: np.tanh(conditions.total[:, joint] / torque)}]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}), (taken_up,))
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, LOADED_JOINTS, (taken_up,))
 
     return per_joint(sites, at)

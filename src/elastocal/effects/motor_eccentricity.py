@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -25,8 +26,6 @@ NAME, FAMILY = "motor_eccentricity", "transmission"
 MOVES_ROBOT = True
 WORDS = "motor eccentricity"
 _ORDERS = (1, 2)
-# An eccentric of some milliradians at the motor, over a ratio of a hundred.
-_AMPLITUDE_RAD = 5e-5
 # Any angles make the waves of the motor distinguishable; twice as many as there are of them, and some.
 _DISTINCT_ANGLES = 12
 
@@ -35,13 +34,16 @@ def candidates(sites: Sites) -> list[Candidate]:
     """One candidate for each joint whose gear ratio is known."""
     ratios = sites.gear_ratio or (None,) * sites.joints
     geared = zip(ratios, sites.prismatic, strict=True)
-    return [_candidate(joint, ratio) for joint, (ratio, prismatic) in enumerate(geared) if ratio is not None and not prismatic]
+    return [
+        _candidate(sites, joint, ratio)
+        for joint, (ratio, prismatic) in enumerate(geared)
+        if ratio is not None and not prismatic
+    ]
 
 
-def _candidate(joint: int, ratio: float) -> Candidate:
-    parameters = tuple(
-        Parameter(f"{wave}_{order}_motor", "rad", _AMPLITUDE_RAD) for order in _ORDERS for wave in ("cos", "sin")
-    )
+def _candidate(sites: Sites, joint: int, ratio: float) -> Candidate:
+    size = size_of(NAME, "amplitude", sites)
+    parameters = tuple(Parameter(f"{wave}_{order}_motor", "rad", size) for order in _ORDERS for wave in ("cos", "sin"))
 
     def displacement(conditions: Conditions) -> Displacements:
         angle = ratio * conditions.joint_angles[:, joint]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -27,7 +28,6 @@ NAME, FAMILY = "nest_eccentricity", "geometry"
 # The reflector circles in its nest, and the flange does not.
 MOVES_ROBOT = False
 WORDS = "eccentric nest of the reflector"
-_SIZE_M = 5e-5
 _ORDER, _SAMPLES_PER_PERIOD = 2, 4
 
 
@@ -37,8 +37,9 @@ def candidates(sites: Sites) -> list[Candidate]:
     if sites.prismatic[last]:
         return []
     across = [axis for axis in range(3) if axis != sites.joint_axes[last]]
+    size = size_of(NAME, "shift", sites)
     parameters = tuple(
-        Parameter(f"{wave}_{'xyz'[axis]}_{_ORDER}q", "m", _SIZE_M, _SIZE_M) for axis in across for wave in ("cos", "sin")
+        Parameter(f"{wave}_{'xyz'[axis]}_{_ORDER}q", "m", size, size) for axis in across for wave in ("cos", "sin")
     )
 
     def displacement(conditions: Conditions) -> Displacements:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Parameter
+from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -25,9 +26,8 @@ NAME, FAMILY = "payload", "gravity"
 # It hangs on the flange in tasks as in the campaign, until someone takes it off.
 MOVES_ROBOT = True
 WORDS = "weight of an undeclared payload"
-# A cable package or a forgotten gripper: some share of what the robot may carry, with its centre so far from the flange. Where
-# the rated load is not known, an arm carries about a sixth of its own mass; and where that is not known either, this.
-_SHARE_OF_RATED, _RATED_OVER_MASS, _LEVER_M, _USUAL_KG = 0.15, 1 / 6, 0.2, 10.0
+# From the flange to the centre of a gripper.
+_LEVER_M = 0.2
 
 
 def displacement(conditions: Conditions) -> Displacements:
@@ -48,19 +48,14 @@ def candidates(sites: Sites) -> list[Candidate]:
     def mass(conditions: Conditions) -> Displacements:
         return displacement(conditions)[:1]
 
-    plausible = _plausible_kg(sites)
+    plausible = size_of(NAME, "mass", sites)
     parameters = (
         Parameter("mass", "kg", plausible),
         *(Parameter(f"moment_{axis}", "kg m", _LEVER_M * plausible) for axis in "xyz"),
     )
+    # Where neither a load nor what the links weigh is known, what hangs on the flange is not distinguishable from that.
+    known = LOADED_JOINTS - {"load"}
     return [
-        Candidate(NAME, FAMILY, (), "", parameters, displacement),
-        Candidate(NAME, FAMILY, (), "mass", parameters[:1], mass),
+        Candidate(NAME, FAMILY, (), "", parameters, displacement, known),
+        Candidate(NAME, FAMILY, (), "mass", parameters[:1], mass, known),
     ]
-
-
-def _plausible_kg(sites: Sites) -> float:
-    if sites.payload_kg is not None:
-        return _SHARE_OF_RATED * sites.payload_kg
-    total = sum(mass.mass_kg for mass in sites.masses)
-    return _SHARE_OF_RATED * _RATED_OVER_MASS * total if total else _USUAL_KG

@@ -35,6 +35,19 @@ if TYPE_CHECKING:
     Law = Callable[Concatenate[Conditions, ...], Displacements]
 
 
+# Needs of laws that go with the load on the joints.
+LOADED_JOINTS = frozenset({"load", "load on the joints"})
+
+
+def load_behind(sites: Sites, joints: int) -> frozenset[str]:
+    """Needs of the law of what yields to the load, behind so many joints.
+
+    A weight that is only usual, not declared, loads columns and rails: behind a joint that turns, what yields to it and how
+    much weighs on the joint are one thing, for which `link_weight` has the masses free.
+    """
+    return frozenset({"load"}) if all(sites.prismatic[:joints]) else LOADED_JOINTS
+
+
 class Displacing(Protocol):
     """Whatever displaces coordinates of the sites: a candidate, or a law that is none."""
 
@@ -52,7 +65,7 @@ class Parameter:
     distinguish only in part, as in ridge regression [1]. None, as nearly everywhere, for no prior. Reported with the estimate.
     `sign`: that such an effect has by its physics; 0 where it may have either. `order`: of a harmonic, whose plausible size
     falls with it; 1 elsewhere. `sized`: whether the prior's standard deviation was estimated from the measurements, not known
-    beforehand.
+    beforehand. `most`: times its plausible size that a search allows for.
 
     [1] A. E. Hoerl and R. W. Kennard, Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
@@ -64,6 +77,7 @@ class Parameter:
     sign: int = 0
     order: int = 1
     sized: bool = False
+    most: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -112,16 +126,16 @@ class Shape:
 class Candidate:
     """One way in which one effect can act on this robot.
 
-    `joints`: joints concerned, counted from 1; empty where the effect belongs to no joint. `detail`: which variant, where an
-    effect has more than one for these joints. `parameters`: in which the displacement is linear. `displacement`:
-    ``displacement(conditions, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its displacement per
-    unit of the parameter, ndarray (S,). It may go with the total loads of the coordinates that it displaces, of no others.
-    `needs`: what must be there, see `Model.offered`: "load", "external load", "approach", "time", "temperature", "declared
-    base". `distinct_angles`: how many different angles of its joints the law needs to be distinguishable from a smooth one.
-    `of_setup`: whether it belongs to where tracker and robot stood in one campaign, and is not carried over to another.
-    `location_name`: names the location beside the joints where these do not: a column, a band of orders. Candidates of one
-    effect at one location are variants of its law, of which only one can hold. `turning`: joints with whose angles the law
-    goes, counted from 1, where it belongs to no joint.
+    `joints`: joints concerned, counted from 1; empty where the effect belongs to no joint. `detail`: which variant, where
+    an effect has more than one for these joints. `parameters`: in which the displacement is linear. `displacement`:
+    ``displacement(conditions, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its displacement
+    per unit of the parameter, ndarray (S,). It may go with the total loads of the coordinates that it displaces, of no
+    others. `needs`: what must be there, see `Model.offered`: "load", "load on the joints", "external load", "approach",
+    "time", "temperature", "declared base". `distinct_angles`: how many different angles of its joints the law needs to be
+    distinguishable from a smooth one. `of_setup`: whether it belongs to where tracker and robot stood in one campaign, and
+    is not carried over to another. `location_name`: names the location beside the joints where these do not: a column, a
+    band of orders. Candidates of one effect at one location are variants of its law, of which only one can hold. `turning`:
+    joints with whose angles the law goes, counted from 1, where it belongs to no joint.
     """
 
     effect: str
@@ -147,6 +161,12 @@ class Candidate:
         """Unique name, such as ``link_weight@2`` or ``transmission_harmonic@1[orders 3-12]``."""
         where = "@" + "+".join(map(str, self.joints)) if self.joints else ""
         return f"{self.effect}{where}" + (f"[{self.detail}]" if self.detail else "")
+
+
+def moved_and_turned(shift: float, turn: float, per: str = "") -> tuple[Parameter, ...]:
+    """Parameters of a shift along and a turn about each axis, of plausible sizes in m and rad; `per` follows their units."""
+    sizes = (("d", "m", shift), ("r", "rad", turn))
+    return tuple(Parameter(f"{letter}{axis}", unit + per, size) for letter, unit, size in sizes for axis in "xyz")
 
 
 def at_shapes(key: str, shapes: Iterable[float]) -> str:

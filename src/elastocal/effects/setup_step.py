@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape, needed
+from elastocal.effects.protocol import Candidate, Shape, moved_and_turned, needed
+from elastocal.effects.sizes import size_of
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -22,10 +23,6 @@ NAME, FAMILY = "setup_step", "drift"
 MOVES_ROBOT = False
 WORDS = "shift of the set-up between rows"
 PARAMETER_WORDS = {"when": "share of the measurements before it"}
-_PARAMETERS = (
-    *(Parameter(f"d{axis}", "m", 5e-4) for axis in "xyz"),
-    *(Parameter(f"r{axis}", "rad", 2e-4) for axis in "xyz"),
-)
 # The nearest of these has all but a 24th of the measurements on the right side of the step. Nearer to an end than the outermost
 # a step would be a shift of nearly all measurements.
 _WHEN = Shape("when", "1", 0.5, 1 / 12, 11 / 12, tried=11)
@@ -33,9 +30,10 @@ _WHEN = Shape("when", "1", 0.5, 1 / 12, 11 / 12, tried=11)
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate, at the foot."""
+    parameters = moved_and_turned(size_of(NAME, "shift", sites), size_of(NAME, "turn", sites))
 
     def displacement(conditions: Conditions, when: float) -> Displacements:
         after = (needed(conditions.progress) >= when).astype(float)
         return [{coordinate: after} for coordinate in sites.base]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, shapes=(_WHEN,), of_setup=True)]
+    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, shapes=(_WHEN,), of_setup=True)]

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.full_load import full_torque_Nm, lever_m
-from elastocal.effects.protocol import Candidate, Parameter, Shape, per_joint
+from elastocal.effects.full_load import full_torque_Nm
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Shape, per_joint
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 NAME, FAMILY = "stiffening", "gearbox"
 MOVES_ROBOT = True
 WORDS = "gear stiffening"
-# The end of the robot moves by so much under the full torque.
-_MOVED_M = 5e-3
 # Of the full torque. Slopes that meet at less are those of play; where both laws reach, either may be meant.
 _START, _LOWEST, _HIGHEST = 0.3, 0.05, 0.8
 _LAWS: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
@@ -51,11 +50,11 @@ def candidates(sites: Sites) -> list[Candidate]:
 
 def _candidate(sites: Sites, joint: int, detail: str) -> Candidate:
     full, as_at_rest = full_torque_Nm(sites, joint), _LAWS[detail]
-    beyond = Parameter("beyond", "rad/(N m)", _MOVED_M / lever_m(sites, joint) / full, sign=-1)
+    beyond = sized(NAME, "lost beyond", ["beyond"], "rad/(N m)", sites, joint)
     meeting = Shape("torque", "N m", _START * full, _LOWEST * full, _HIGHEST * full)
 
     def displacement(conditions: Conditions, torque: float) -> Displacements:
         load = conditions.total[:, joint]
         return [{joint: load - as_at_rest(load, torque)}]
 
-    return Candidate(NAME, FAMILY, (joint + 1,), detail, (beyond,), displacement, frozenset({"load"}), (meeting,))
+    return Candidate(NAME, FAMILY, (joint + 1,), detail, beyond, displacement, LOADED_JOINTS, (meeting,))

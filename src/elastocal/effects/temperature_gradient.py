@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.sizes import size_of
 from elastocal.effects.warmth import by_warmth
 
 if TYPE_CHECKING:
@@ -36,8 +37,7 @@ DETAIL_WORDS = {
     "column temperature": "across the column, by temperature",
     "column time": "across the column, by time",
 }
-# Steel, half of the warmth across 0.3 m; by time some 8 K of it.
-_PLAUSIBLE = {"temperature": ("1/(K m)", 2e-5), "time": ("1/m", 1.5e-4)}
+_QUANTITIES = {"temperature": ("curvature a kelvin", "1/(K m)"), "time": ("curvature", "1/m")}
 _SHORTEST_M = 0.05
 
 
@@ -63,7 +63,8 @@ def _across(sites: Sites, link: int) -> list[Candidate]:
         return [{c: warmer * part for c, part in zip(coordinates, end, strict=True) if part} for end in ends]
 
     def candidate_of(cause: str, rise: Rise, needs: frozenset[str], shapes: tuple[Shape, ...]) -> Candidate:
-        unit, plausible = _PLAUSIBLE[cause]
+        quantity, unit = _QUANTITIES[cause]
+        plausible = size_of(NAME, quantity, sites)
         parameters = tuple(Parameter(name, unit, plausible) for name in names)
         where = cause if link else f"column {cause}"
         law = lambda conditions, *values: bent(rise(conditions, *values))  # noqa: E731
@@ -88,7 +89,8 @@ def _along(sites: Sites, lengths: np.ndarray) -> list[Candidate]:
         }
 
     def candidate_of(cause: str, rise: Rise, needs: frozenset[str], shapes: tuple[Shape, ...]) -> Candidate:
-        unit, plausible = _PLAUSIBLE[cause]
+        quantity, unit = _QUANTITIES[cause]
+        plausible = size_of(NAME, quantity, sites)
         law = lambda conditions, *values: [grown(rise(conditions, *values))]  # noqa: E731
         growth = (Parameter("growth_along", unit, plausible),)
         return Candidate(NAME, FAMILY, (), f"along {cause}", growth, law, needs, shapes, location_name="along")

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import Candidate
+from elastocal.effects.sizes import sized
 from elastocal.effects.warmth import by_warmth
 
 if TYPE_CHECKING:
@@ -26,10 +27,7 @@ if TYPE_CHECKING:
 NAME, FAMILY = "thermal_growth", "drift"
 MOVES_ROBOT = True
 WORDS = "thermal growth of the links"
-_PARAMETERS = {
-    "temperature": Parameter("expansion", "1/K", 3e-5, sign=1),
-    "time": Parameter("final_growth", "m/m", 3e-4),
-}
+_QUANTITIES = {"temperature": ("expansion", "1/K"), "time": ("final growth", "m/m")}
 
 
 def candidates(sites: Sites) -> list[Candidate]:
@@ -39,7 +37,9 @@ def candidates(sites: Sites) -> list[Candidate]:
         def displacement(conditions: Conditions, *values: float) -> Displacements:
             return [longer(sites, rise(conditions, *values))]
 
-        return Candidate(NAME, FAMILY, (), cause, (_PARAMETERS[cause],), displacement, needs, shapes)
+        quantity, unit = _QUANTITIES[cause]
+        parameters = sized(NAME, quantity, [quantity.replace(" ", "_")], unit, sites)
+        return Candidate(NAME, FAMILY, (), cause, parameters, displacement, needs, shapes)
 
     return by_warmth(candidate_of)
 

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import Candidate
+from elastocal.effects.sizes import sized
 from elastocal.effects.thermal_growth import longer
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ NAME, FAMILY = "tracker_scale", "geometry"
 # The tracker shows lengths that the robot does not have.
 MOVES_ROBOT = False
 WORDS = "scale error of the tracker"
-# Twenty kelvins or 70 hPa of air that were not entered in the tracker.
-_PARAMETERS = (Parameter("scale", "m/m", 2e-5),)
 
 
 def candidates(sites: Sites) -> list[Candidate]:
@@ -38,4 +37,4 @@ def candidates(sites: Sites) -> list[Candidate]:
         travels = {joint: conditions.joint_angles[:, joint] for joint, slides in enumerate(sites.prismatic) if slides}
         return [longer(sites, np.ones(len(conditions.joint_angles))) | travels]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement)]
+    return [Candidate(NAME, FAMILY, (), "", sized(NAME, "scale", ["scale"], "m/m", sites), displacement)]

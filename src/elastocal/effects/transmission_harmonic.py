@@ -9,11 +9,13 @@ bands that are judged one by one; those of the motor's turns are `motor_eccentri
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import Candidate
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -25,22 +27,26 @@ MOVES_ROBOT = True
 WORDS = "gear transmission error"
 _BANDS = ((1, 2), (3, 6), (7, 12), (13, 18), (19, 24), (25, 30), (31, 36))
 _SAMPLES_PER_PERIOD = 4
-# Gears of robots err by up to about an arc minute. Over the part of a turn that a joint uses, neighbouring orders are nearly
+# Over the part of a turn that a joint uses, neighbouring orders are nearly
 # the same function: without a prior they would cancel each other at a hundred times that.
-_AMPLITUDE_RAD = 2e-4
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint and band of orders."""
-    return [_candidate(joint, low, high) for joint in range(sites.joints) if not sites.prismatic[joint] for low, high in _BANDS]
+    return [
+        _candidate(sites, joint, low, high)
+        for joint in range(sites.joints)
+        if not sites.prismatic[joint]
+        for low, high in _BANDS
+    ]
 
 
-def _candidate(joint: int, low: int, high: int) -> Candidate:
+def _candidate(sites: Sites, joint: int, low: int, high: int) -> Candidate:
     orders = range(low, high + 1)
     parameters = tuple(
-        Parameter(f"{wave}_{order}q", "rad", _AMPLITUDE_RAD, _AMPLITUDE_RAD, order=order)
+        replace(wave, prior_std=wave.plausible, order=order)
         for order in orders
-        for wave in ("cos", "sin")
+        for wave in sized(NAME, "amplitude", (f"cos_{order}q", f"sin_{order}q"), "rad", sites)
     )
 
     def displacement(conditions: Conditions) -> Displacements:

@@ -10,11 +10,13 @@ between two integers is where a search has to try; and less than a whole wave in
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape
+from elastocal.effects.protocol import Candidate, Shape
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -29,18 +31,18 @@ DETAIL_WORDS = {f"order {above}-{above + 1}": f"order between {above} and {above
 # Nearer to an integer than this an order is not distinguishable from it.
 _MARGIN = 0.25
 _SAMPLES_PER_PERIOD = 4
-_AMPLITUDE_RAD = 2e-4
 
 
 def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint and interval between two integers."""
     revolute = [joint for joint in range(sites.joints) if not sites.prismatic[joint]]
-    return [_candidate(joint, above) for joint in revolute for above in range(1, _HIGHEST)]
+    return [_candidate(sites, joint, above) for joint in revolute for above in range(1, _HIGHEST)]
 
 
-def _candidate(joint: int, above: int) -> Candidate:
+def _candidate(sites: Sites, joint: int, above: int) -> Candidate:
     order = Shape("order", "1", above + 0.5, above + _MARGIN, above + 1 - _MARGIN, tried=1)
-    parameters = tuple(Parameter(f"{wave}_kq", "rad", _AMPLITUDE_RAD, order=above + 1) for wave in ("cos", "sin"))
+    waves = sized(NAME, "amplitude", ("cos_kq", "sin_kq"), "rad", sites)
+    parameters = tuple(replace(wave, order=above + 1) for wave in waves)
 
     def displacement(conditions: Conditions, order: float) -> Displacements:
         angle = order * conditions.joint_angles[:, joint]

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import Candidate
+from elastocal.effects.sizes import sized
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +39,7 @@ def _candidate(sites: Sites, joint: int, sources: Sequence[int], detail: str) ->
     # A spindle has a pitch of its own, but is not coupled to what turns.
     alike = [source for source in sources if sites.prismatic[source] == sites.prismatic[joint]]
     unit = "m/m" if sites.prismatic[joint] else "rad/rad"
-    parameters = tuple(Parameter(f"per_q{source + 1}", unit, 1e-3) for source in alike)
+    parameters = sized(NAME, "per turn", [f"per_q{source + 1}" for source in alike], unit, sites)
 
     def displacement(conditions: Conditions) -> Displacements:
         return [{joint: conditions.joint_angles[:, source]} for source in alike]

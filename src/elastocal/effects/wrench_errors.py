@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -120,7 +120,7 @@ def _in_both_frames(
         return [dict(enumerate(angles.T)) for angles in turned]
 
     return [
-        Candidate(name, family, (), frame + how, parameters, law, frozenset({"load"}))
+        Candidate(name, family, (), frame + how, parameters, law, LOADED_JOINTS)
         for frame, law in (("base axes", in_base), ("flange axes", in_flange))
     ]
 

@@ -99,6 +99,9 @@ def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Mod
     `effects`: declared effects.
     """
     sites = sites_of(campaign.robot)
+    # Under an arm whose first joint turns, a base that yields and the sag of that arm are one thing until weights are known.
+    unknown = not sites.masses and not campaign.measurements.wrench.any()
+    sites = replace(sites, usual_weight=sites.prismatic[0] and unknown)
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
     weight = (declared_weight.candidate(sites),) if sites.masses else ()
     return Model(

@@ -10,6 +10,7 @@ import numpy as np
 from elastocal.diagnosis.confounding import angles_between, nearest_angles
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.search import initial_screening
+from elastocal.diagnosis.verdict import mechanisms_of_models
 from elastocal.fitting.case import noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
 from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
@@ -105,14 +106,13 @@ def model_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
     """Columns of the models table."""
     if not diagnosis.evidence:
         return {column.name: np.zeros(0) for column in MODELS.columns}
-    found, units = diagnosis.evidence.posterior, diagnosis.evidence.linearized.problem.units
-    members = [[units[number] for number in model.units] for model in found.models]
+    found, problem = diagnosis.evidence.posterior, diagnosis.evidence.linearized.problem
     return {
-        "model": np.arange(len(members)),
+        "model": np.arange(len(found.models)),
         "probability": found.probabilities,
         "log_odds": np.array([model.log_odds for model in found.models]),
-        "mechanisms": [" + ".join(sorted({unit.mechanism for unit in each})) or "nothing" for each in members],
-        "units": ["; ".join(unit.key for unit in each) for each in members],
+        "mechanisms": [" + ".join(names) or "nothing" for names in mechanisms_of_models(problem, found)],
+        "units": ["; ".join(problem.units[number].key for number in model.units) for model in found.models],
         "pose_error_rad": np.array([model.pose_error_rad for model in found.models]),
     }
 

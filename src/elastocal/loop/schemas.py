@@ -73,8 +73,8 @@ MODELS = TableSchema(
         Column("model", "int32", "", "rank of the model, 0 the most probable", minimum=0),
         Column("probability", "float64", "", "posterior probability"),
         Column("log_odds", "float64", "", "posterior log odds against the declared model"),
-        Column("mechanisms", "text", "", "its mechanisms, joined by +; nothing, and other, are mechanisms here"),
-        Column("units", "text", "", "its candidates with shape values, joined by ;"),
+        Column("mechanisms", "text", "", "which it says act, joined by +; nothing, and other, are mechanisms here"),
+        Column("units", "text", "", "its candidates with shape values, joined by ;, whether or not it says that they act"),
         Column("pose_error_rad", "float64", "rad", "most probable error of a joint common to the measurements of a pose"),
     ),
 )

@@ -21,28 +21,32 @@ from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.motion import Motion, motion
 from elastocal.mechanics.robot import STANDING, Compensator, Mass, Robot
+from elastocal.mechanics.usual_values import usual_compliance, usual_payload_kg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 # Below this a link is a point.
 _SHORTEST_M = 1e-6
+_MASS_OVER_RATED = 6.0
 
 
 @dataclass(frozen=True)
 class Sites:
     """A chain with every coordinate in which the robot can deviate.
 
-    `chain`: coordinates 0..n-1 are the joints as before. All others are zero in the nominal robot. `joints`: n. `base`: tx Ty
-    Tz Rx Ry Rz of the foot, base axes. `tilt`: for each joint Rx Ry Rz just behind it, in the frame that turns with it.
+    `chain`: coordinates 0..n-1 are the joints as before. All others are zero in the nominal robot. `joints`: n. `base`: tx
+    Ty Tz Rx Ry Rz of the foot, base axes. `tilt`: for each joint Rx Ry Rz just behind it, in the frame that turns with it.
     `link_end`: for each link 0..n Tx Ty Tz Rx Ry Rz at its far end, in the frame of the chain there. Link 0 is the column
     before joint 1, link n the flange behind the last joint. `joint_axes`: 0, 1, 2 for a joint about x, y, z of its frame.
     `link_vectors_m` (n + 1, 3): from the near to the far end of each link, in the frame of its far end. A link ends at a
-    passive joint; what lies behind that and before the next joint belongs to no link. `link_rotations` (n + 1, 3, 3): from the
-    frame at the far end of each link to that at its near end: fixed rotations between two joints. `joint_signs`: sense in which
-    each joint turns about its axis, +1 or -1. `prismatic`: which joints shift along their axis instead; theirs are metres and
-    newtons. `masses`: what the links weigh, where the robot file says so. `gravity_m_s2`: base axes. `payload_kg`: as in
-    `Robot`.
+    passive joint; what lies behind that and before the next joint belongs to no link. `link_rotations` (n + 1, 3, 3): from
+    the frame at the far end of each link to that at its near end: fixed rotations between two joints. `joint_signs`: sense
+    in which each joint turns about its axis, +1 or -1. `prismatic`: which joints shift along their axis instead; theirs are
+    metres and newtons. `masses`: what the links weigh, where the robot file says so. `gravity_m_s2`: base axes.
+    `payload_kg`: as in `Robot`. `compliance` (n,): of the joints as in `Robot`, usual ones of rigid joints: the scale of
+    what yields beside them. `usual_weight`: whether the structure, but no joint, bears the weight of `usual_masses`: where
+    no masses and no loads are known of an arm that slides.
     """
 
     chain: Chain
@@ -60,6 +64,8 @@ class Sites:
     gear_ratio: tuple[float | None, ...] | None = None
     compensator: Compensator | None = None
     payload_kg: float | None = None
+    compliance: tuple[float, ...] = ()
+    usual_weight: bool = False
 
     def far_end(self, link: int) -> MeasuringPoint:
         """The far end of a link, 0 for the column, as a measuring point."""
@@ -78,6 +84,17 @@ class Sites:
         end = MeasuringPoint("end", self.chain.end_effector.after)
         far_ends = [self.far_end(link) for link in range(self.joints + 1)]
         return (end, *far_ends, *(self.body(mass.link) for mass in self.masses))
+
+    @cached_property
+    def usual_masses(self) -> np.ndarray:
+        """Masses at the far ends of links 0..n, where none are declared, ndarray (n + 1,), kg.
+
+        Arms weigh six times what they carry; by length, half of each link at either end.
+        """
+        lengths = np.linalg.norm(self.link_vectors_m[1:], axis=1)
+        rated = usual_payload_kg(self.chain) if self.payload_kg is None else self.payload_kg
+        halves = 0.5 * _MASS_OVER_RATED * rated * lengths / max(lengths.sum(), _SHORTEST_M)
+        return np.append(0.0, halves) + np.append(halves, 0.0)
 
     @property
     def down(self) -> np.ndarray:
@@ -153,9 +170,11 @@ def sites_of(holder: Robot | Chain) -> Sites:
     floor.
     """
     if isinstance(holder, Robot):
-        known = (holder.masses, holder.gravity_m_s2, holder.gear_ratio, holder.compensator, holder.payload_kg)
+        usual = usual_compliance(holder.chain, holder.payload_kg)
+        compliance = tuple(np.where(holder.compliance > 0.0, holder.compliance, usual).tolist())
+        known = (holder.masses, holder.gravity_m_s2, holder.gear_ratio, holder.compensator, holder.payload_kg, compliance)
         return _sites_of(holder.chain, *known)
-    return _sites_of_chain(holder)
+    return replace(_sites_of_chain(holder), compliance=tuple(usual_compliance(holder).tolist()))
 
 
 # Every part of a diagnosis asks for the sites of its robot; what a run has to do with are a few robots.
@@ -167,6 +186,7 @@ def _sites_of(
     gear_ratio: tuple[float | None, ...] | None,
     compensator: Compensator | None,
     payload_kg: float | None,
+    compliance: tuple[float, ...],
 ) -> Sites:
     return replace(
         _sites_of_chain(chain),
@@ -175,6 +195,7 @@ def _sites_of(
         gear_ratio=gear_ratio,
         compensator=compensator,
         payload_kg=payload_kg,
+        compliance=compliance,
     )
 
 

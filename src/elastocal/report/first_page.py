@@ -17,6 +17,7 @@ from elastocal.diagnosis.words import (
     effect_words,
     found_words,
     hypotheses_words,
+    in_common,
     listed,
     physical_name,
 )
@@ -330,7 +331,9 @@ def _ambiguity(effect: Mapping[str, Any]) -> str:
     if not effect["alternatives"]:
         return f"Its probability is {probability_words(effect['probability'])}."
     others = listed((alternative_words(name) for name in effect["alternatives"]), MOST_NAMES, last="or")
-    return f"Instead of {physical_name(effect['name'])} it may be {others}: these measurements do not distinguish them."
+    common = in_common(effect["name"], effect["alternatives"])
+    either = f"; it is {common} either way" if common else ""
+    return f"Instead of {physical_name(effect['name'])} it may be {others}: these measurements do not distinguish them{either}."
 
 
 def _unsure_location(effect: Mapping[str, Any]) -> list[str]:

@@ -27,7 +27,7 @@ def method(verdict: Mapping[str, Any], descriptions: Mapping[str, Any]) -> dict[
         "draws": grouped(settings["alarm_draws"]["value"]),
         "level": percent(settings["alarm_level"]["value"]),
         "prior": percent(settings["mechanism_probability"]["value"]),
-        "named": percent(settings["named_probability"]["value"]),
+        "named": percent(settings["ambiguity_loss"]["value"]),
         "held_out": counted(verdict["heldout"]["poses"], "pose"),
         "where": f" of another campaign ({other['campaign']['campaign']})" if other else "",
         "declared": listed(map(physical_name, declared)) if declared else "",

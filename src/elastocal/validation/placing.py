@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import select_states
 
@@ -60,7 +61,7 @@ def carried_over(fitted: Fit, model: Model, states: States) -> Fit:
 
     `states`: of the other campaign.
     """
-    there = model.offered(states) | {"load", "external load"}
+    there = model.offered(states) | {*LOADED_JOINTS, "external load"}
     kept = [n for n, effect in enumerate(fitted.model.effects) if not effect.of_setup and effect.needs <= there]
     known = replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept))
     coefficients, shapes = fitted.estimate.coefficients, fitted.estimate.shapes

@@ -138,13 +138,23 @@ def diagnosis(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
 
 
 def models(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
-    """Probabilities of the models follow from their odds; each model's mechanisms are those of its parts."""
+    """Probabilities of the models follow from their odds; each model's mechanisms are those of its parts.
+
+    Of parts beside a smooth error either that or they may be too small to be stated.
+    """
     frame = run.table(file)
     odds = np.exp(frame["log_odds"] - frame["log_odds"].max())
     yield compare("probabilities by odds", "numpy", frame["probability"], odds * frame["probability"].sum() / odds.sum())
     parts = [{re.split(r"[@\[ ]", unit)[0] for unit in units.split("; ") if unit} for units in frame["units"]]
-    off = frame["mechanisms"][[" + ".join(sorted(named)) or "nothing" for named in parts] != frame["mechanisms"]]
-    yield require("mechanisms of the parts of each model", "text", not len(off), ", ".join(off[:2]), len(frame))
+    off = [stated for stated, named in zip(frame["mechanisms"], parts, strict=True) if stated not in _stated_of(named)]
+    yield require("mechanisms of the parts of each model", "text", not off, ", ".join(off[:2]), len(frame))
+
+
+def _stated_of(parts: set[str]) -> set[str]:
+    """What a model of some mechanisms may state."""
+    known = parts - {"other"}
+    choices = [parts, known, parts - known] if known and known != parts else [parts]
+    return {" + ".join(sorted(names)) or "nothing" for names in choices}
 
 
 def residuals(run: Audited, file: str, campaign: str) -> Iterator[Finding]:

@@ -116,7 +116,8 @@ def _mean_rotation(vectors: np.ndarray) -> np.ndarray:
 class Springs:
     """What yields in a robot.
 
-    `joints` (n,): rad/(N m). `bending`, `torsion`: 1/EI and 1/GJ of every link at its near end, 1/(N m^2). `taper`: share by
+    `joints` (n,): rad/(N m). `bending`, `torsion`: 1/EI and 1/GJ, 1/(N m^2), of the uniform link that a force shifts
+    and a moment along twists as far as every link. `taper`: share by
     which the diameter falls along a link.
     """
 
@@ -189,9 +190,12 @@ def _cantilever(vector: np.ndarray, springs: Springs) -> np.ndarray:
     """Compliance (6, 6) of a link at its far end, force over moment, axes of the frame there."""
     length = float(np.linalg.norm(vector))
     axial = np.outer(vector, vector) / length**2
+    places = 0.5 * (1 + _NODES)
+    each = 0.5 * length * _WEIGHTS / (1 - springs.taper * places) ** 3
+    bending = springs.bending * length / 3 / (each @ (1 - places) ** 2)
+    torsion = springs.torsion * length / each.sum()
     total = np.zeros((6, 6))
-    for place, weight in zip(0.5 * (1 + _NODES), 0.5 * length * _WEIGHTS, strict=True):
-        softer = weight / (1 - springs.taper * place) ** 3
+    for place, softer in zip(places, each, strict=True):
         lever = np.concatenate([pin.skew((1 - place) * vector), np.eye(3)], axis=1)
-        total += lever.T @ (softer * (springs.bending * (np.eye(3) - axial) + springs.torsion * axial)) @ lever
+        total += lever.T @ (softer * (bending * (np.eye(3) - axial) + torsion * axial)) @ lever
     return total

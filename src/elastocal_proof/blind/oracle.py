@@ -22,6 +22,7 @@ from elastocal.fitting.case import Case, noise_from
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.whole import cases_in
+from elastocal.validation.fitted_range import outside_poses
 from elastocal_proof.plant.defects import OUTSIDE
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ def oracle(
     declared = fit_declared(case.model, case.observations, noise_from(verdict).of_measurements)
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
-    _, heldout, _ = heldout_errors([Step("oracle", "declared", fitted)], case, unseen, seed)
+    outside = outside_poses(fitted, case, unseen)
+    _, heldout, _ = heldout_errors([Step("oracle", "declared", fitted)], case, unseen, outside, seed)
     return _outcome(members, p_value, heldout["before"])
 
 
