@@ -59,10 +59,11 @@ def probability_facts(problem: Problem, posterior: Posterior, conclusion: Conclu
         if hypothesis.probability < _LEAST_LISTED:
             continue
         units = posterior.models[hypothesis.model].units if hypothesis.model >= 0 else ()
-        where = {
-            name: [location_words(name, problem.units[n].location) for n in units if problem.units[n].mechanism == name]
+        at = {
+            name: dict.fromkeys(problem.units[n].location for n in units if problem.units[n].mechanism == name)
             for name in hypothesis.mechanisms
         }
+        where = {name: [location_words(name, location) for location in found] for name, found in at.items()}
         sets.append({"mechanisms": list(hypothesis.mechanisms), "probability": hypothesis.probability, "locations": where})
     nothing = next(h.probability for h in conclusion.hypotheses if not h.mechanisms)
     return {

@@ -60,6 +60,11 @@ class Unit:
             name = f"{OTHER}{list(self.location)} {self.competitor.name}"
         return at_shapes(name, self.shapes)
 
+    @property
+    def place(self) -> tuple[str, tuple[int | str, ...], str]:
+        """What no two units of a model share: variants at one location exclude each other, laws of `OTHER` do not."""
+        return self.mechanism, self.location, self.competitor.name if self.competitor else ""
+
 
 @dataclass(frozen=True)
 class Prior:
@@ -101,7 +106,7 @@ def prior_of(units: Sequence[Unit], settings: Settings) -> Prior:
     for mechanism in dict.fromkeys(unit.mechanism for unit in units):
         probability = special.get(mechanism, settings.mechanism_probability)
         odds[mechanism] = float(np.log(probability / (1.0 - probability)))
-        locations = len({unit.location for unit in units if unit.mechanism == mechanism})
+        locations = len({unit.place for unit in units if unit.mechanism == mechanism})
         numbers = np.arange(1, locations + 1)
         geometric = numbers * np.log(settings.further_location)
         geometric -= logsumexp(geometric)
@@ -137,11 +142,9 @@ def units_of(
             Unit(candidate.effect, candidate.location, candidate, values, columns, sizes, signs, log_share, largest=largest)
         )
         start += len(columns)
-    at = [each.location for each, _ in features]
     for each, count in features:
-        columns, log_share = np.arange(start, start + count), -float(np.log(at.count(each.location)))
-        whole = np.ones(count), np.zeros(count, int), log_share, each
-        units.append(Unit(OTHER, each.location, None, (), columns, *whole, largest=len(settings.scales) - 1))
+        whole = np.arange(start, start + count), np.ones(count), np.zeros(count, int)
+        units.append(Unit(OTHER, each.location, None, (), *whole, competitor=each, largest=len(settings.scales) - 1))
         start += count
     require_unique([unit.key for unit in units])
     return tuple(units)

@@ -1,13 +1,14 @@
 """A competitor for effects that the catalogue does not have: smooth random displacements of each joint and of the base.
 
-A displacement is a random function of a few inputs, a sum of random Fourier features [1] with normal coefficients: an
-approximate Gaussian process. Such a discrepancy [2] should leave to the model what the model explains [3]: what is constant
-of it, or at a joint straight in its angle, is taken off, for a zero offset, a frame that is fitted and a transmission ratio
-have names. A function of everything at once would fit nothing better than chance does, so that each law has the inputs of one
-cause, as terms of an additive Gaussian process have [4]: a joint's own angle, torque and approach; the angles of the joints
-beside it; time and temperature; the load on the base along each of its axes; the place of the end. Half of the features are
-multiplied by the load, so that they vanish without it. Alone it means that the residual is *unexplained*; beside a mechanism,
-that a *related* one acts. It names nothing and is not used to predict.
+A displacement is a random function of a few inputs, an approximate Gaussian process: the principal components over the states
+of a campaign (Karhunen-Loeve) of a sum of random Fourier features [1] with normal coefficients. Such a discrepancy [2] should
+leave to the model what the model explains [3]: what is constant of it, or at a joint straight in its angle, is taken off, for a
+zero offset, a frame that is fitted and a transmission ratio have names. A function of everything at once would fit nothing
+better than chance does, so that each law has the inputs of one cause, as terms of an additive Gaussian process have [4]: a
+joint's own angle, torque and approach; the angles of the joints beside it; time and temperature; the load on the base along
+each of its axes; the place of the end. Half of the features are multiplied by the load, so that they vanish without it. Alone
+it means that the residual is *unexplained*; beside a mechanism, that a *related* one acts. It names nothing and is not used to
+predict.
 
 [1] Rahimi, A. and Recht, B., Random features for large-scale kernel machines, Advances in Neural Information Processing Systems
     20, 2007.
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
     from elastocal.effects.conditions import Conditions
 
+    _Waves = Callable[[Conditions], np.ndarray]
+
 # Deviations that no machine would hide: joints about an arc minute, the base a tenth of a millimetre and of a milliradian.
 JOINT_RAD, BASE_M, BASE_RAD = 2e-4, 1e-4, 1e-4
 # Length scales of the features in units of the inputs, which are of size one: from smooth to as many waves as poses can show.
@@ -42,7 +45,8 @@ _LENGTH_SCALES = (0.7, 3.0)
 OWN, NEIGHBOURS, TIME, FORCE, PLACE = "own", "neighbours", "time", "force", "place"
 SHIFT, TURN = "shift", "turn"
 _AT_A_JOINT, _AT_THE_BASE = (OWN, NEIGHBOURS, TIME), (FORCE, TIME, PLACE)
-_BASE_FEATURES = 6
+# Of so many random features the principal components are taken, at a joint as many as the settings say.
+_DRAWN, _BASE_FEATURES = 64, 6
 # Inputs that differ by less, in SI units or of their largest value, differ by rounding.
 _ROUNDING = 1e-9
 _SEED = 2007
@@ -80,49 +84,49 @@ def competitors(campaign: Conditions) -> list[Competitor]:
 class Law:
     """Random displacements by one law, in the shape of a candidate: per unit of their coefficients in plausible sizes.
 
-    `campaign`: by whose inputs and loads those of all states are normalised. `size`: rad or m. `parts` (int, callable,
-    callable): coordinate that is displaced, waves by their inputs, and the part of them that has a name by the states. `waves`:
-    of each coordinate.
+    `size`: rad or m. `parts` (int, callable): a coordinate that is displaced, and its waves (S, some) by the states.
+    `features`: how many displacements these are.
     """
 
     competitor: Competitor
-    campaign: Conditions
     size: float
-    parts: tuple[tuple[int, Callable[[np.ndarray], np.ndarray], Callable[[Conditions], np.ndarray]], ...]
-    waves: int
-
-    @property
-    def features(self) -> int:
-        """How many displacements these are."""
-        return self.waves * len(self.parts)
+    parts: tuple[tuple[int, _Waves], ...]
+    features: int
 
     def displacement(self, around: Conditions) -> list[dict[int, np.ndarray]]:
         """For each feature a displacement of one coordinate in some states, list of dict of int to ndarray (S,)."""
-        location = self.competitor.location
-        found: list[dict[int, np.ndarray]] = []
-        largest = np.abs(_load(self.campaign, location)).max(initial=0.0)
-        for coordinate, smooth, named in self.parts:
-            waves = smooth(_inputs(around, self.competitor, coordinate, self.campaign)) - named(around)
-            if largest > _ROUNDING:
-                waves[:, waves.shape[1] // 2 :] *= (_load(around, location) / largest)[:, None]
-            found += [{coordinate: self.size * wave} for wave in waves.T]
-        return found
+        return [{coordinate: self.size * wave} for coordinate, waves in self.parts for wave in waves(around).T]
 
 
 def law_of(competitor: Competitor, campaign: Conditions, features: int) -> Law:
     """Draw the displacements by one law.
 
-    `campaign`: of whose states what has a name is taken off. `features`: at a joint.
+    `campaign`: over whose states they are the principal ones, and of whose states what has a name is taken off. `features`: at
+    a joint.
     """
     location = competitor.location
     draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)
     size = JOINT_RAD if location else BASE_M if competitor.motion == SHIFT else BASE_RAD
-    parts, waves = [], features if location else _BASE_FEATURES
+    count = features if location else _BASE_FEATURES
+    loads = np.abs(_load(campaign, location)).max(initial=0.0)
+    parts = []
     for coordinate in _coordinates(campaign, competitor):
-        known = _inputs(campaign, competitor, coordinate, campaign)
-        smooth = _waves(waves, known.shape[1], draws)
-        parts.append((coordinate, smooth, _named_part(competitor, campaign, smooth(known))))
-    return Law(competitor, campaign, size, tuple(parts), waves)
+        free = _principal(_waves(competitor, campaign, coordinate, draws), campaign, count - count // 2)
+        other = _waves(competitor, campaign, coordinate, draws)
+        loaded = _principal(_times_load(other, location, loads) if loads > _ROUNDING else other, campaign, count // 2)
+        parts += [(coordinate, free), (coordinate, loaded)]
+    return Law(competitor, size, tuple(parts), count * len(parts) // 2)
+
+
+def _principal(waves: _Waves, campaign: Conditions, count: int) -> _Waves:
+    """So many principal components of waves over the states of a campaign, together of unit variance at most."""
+    seen = waves(campaign)
+    _, axes = np.linalg.eigh(seen.T @ seen)
+    return lambda around: waves(around) @ axes[:, : -count - 1 : -1]
+
+
+def _times_load(waves: _Waves, location: tuple[int, ...], largest: float) -> _Waves:
+    return lambda around: waves(around) * (_load(around, location) / largest)[:, None]
 
 
 def _coordinates(around: Conditions, competitor: Competitor) -> list[int]:
@@ -132,13 +136,15 @@ def _coordinates(around: Conditions, competitor: Competitor) -> list[int]:
     return list(around.sites.base[:3] if competitor.motion == SHIFT else around.sites.base[3:])
 
 
-def _waves(count: int, inputs: int, draws: np.random.Generator) -> Callable[[np.ndarray], np.ndarray]:
-    """Random functions of so many inputs, values (S, count), whose squares sum to about one; without an input zero."""
+def _waves(competitor: Competitor, campaign: Conditions, coordinate: int, draws: np.random.Generator) -> _Waves:
+    """Random functions of the inputs of a law without their part that has a name; without an input zero."""
+    known = _inputs(campaign, competitor, coordinate, campaign)
     low, high = np.log(_LENGTH_SCALES)
-    lengths = np.exp(draws.uniform(low, high, count))
-    frequency, phase = draws.standard_normal((inputs, count)) / lengths, draws.uniform(0, 2 * np.pi, count)
-    size = np.sqrt(2.0 / count) if inputs else 0.0
-    return lambda values: size * np.cos(values @ frequency + phase)
+    lengths = np.exp(draws.uniform(low, high, _DRAWN))
+    frequency, phase = draws.standard_normal((known.shape[1], _DRAWN)) / lengths, draws.uniform(0, 2 * np.pi, _DRAWN)
+    size = np.sqrt(1.0 / _DRAWN) if known.shape[1] else 0.0
+    named = _named_part(competitor, campaign, size * np.cos(known @ frequency + phase))
+    return lambda around: size * np.cos(_inputs(around, competitor, coordinate, campaign) @ frequency + phase) - named(around)
 
 
 def _named_part(competitor: Competitor, campaign: Conditions, waves: np.ndarray) -> Callable[[Conditions], np.ndarray]:

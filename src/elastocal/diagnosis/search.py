@@ -187,8 +187,8 @@ class _Searcher:
             return
         self.extended.add(model)
         units = self.problem.units
-        taken = {(units[number].mechanism, units[number].location) for number in model}
-        open_units = [n for n, unit in enumerate(units) if (unit.mechanism, unit.location) not in taken]
+        taken = {units[number].place for number in model}
+        open_units = [n for n, unit in enumerate(units) if unit.place not in taken]
         if not open_units:
             return
         sizes = self.sizes[model]
@@ -264,11 +264,10 @@ class _Searcher:
 
     def start_from(self, known: Collection[str]) -> None:
         """Meet the model of some candidates, each with the best of its shapes."""
-        best: dict[tuple[str, tuple[int | str, ...]], tuple[int]] = {}
+        best: dict[tuple[str, tuple[int | str, ...], str], tuple[int]] = {}
         for number, unit in enumerate(self.problem.units):
             if unit.candidate and unit.candidate.key in known:
-                place = unit.mechanism, unit.location
-                best[place] = max(best.get(place, (number,)), (number,), key=self.met.__getitem__)
+                best[unit.place] = max(best.get(unit.place, (number,)), (number,), key=self.met.__getitem__)
         if best:
             self.measure(tuple(sorted(number for (number,) in best.values())))
 
