@@ -20,6 +20,7 @@ def made_document(name, **changes):
         "declared": [],
         "noise": {"position_m": 6e-5},
         "holdout": {"fraction": 0.3, "seed": 1},
+        "remainder": "none",
     }
     return document | changes
 

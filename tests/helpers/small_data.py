@@ -41,6 +41,7 @@ def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
         "declared": ["joint_offset", "link_geometry"],
         "noise": {"position_m": noise_m},
         "holdout": {"fraction": 0.3, "seed": 1},
+        "remainder": "none",
     }
     write_campaign(folder, document, table, 8, "csv")
     (folder / "robot.yaml").write_text(yaml.safe_dump(SERVICE_ARM), encoding="utf-8")

@@ -15,7 +15,7 @@ from elastocal.mechanics.robot import Robot, with_rigid_joints
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
-_NO_REMAINDER = "none"
+NO_REMAINDER, BEST_REMAINDER = "none", "auto"
 UNKNOWN = "unknown"
 NOT_TURNED = (0.0, 0.0, 0.0)
 
@@ -88,9 +88,10 @@ class Campaign:
     "pose". `frame`: tracker: the placement of the base in it is unknown, and another one in each session. `compliance`: one of
     "nominal", "identify". `declared`: effects of the catalogue that the model already has. `noise`: ``position_m``,
     ``orientation_rad``, ``joint_rad``, as far as the campaign declares them. `holdout`: ``fraction`` and ``seed``, ``blocks``
-    and ``seed``, ``session``, ``poses`` or ``campaign``. `remainder`: regression on what the final model leaves, a name in
-    `remainder.catalogue`. `table`: name of the file of measurements; empty where they come from none. `header_line`: line of
-    the file in which its header stands, where it is a text whose rows are lines.
+    and ``seed``, ``session``, ``poses`` or ``campaign``. `remainder`: regression on what the final model leaves: a name in
+    `remainder.catalogue`, "auto" for the best of them or none, or "none". `table`: name of the file of measurements; empty
+    where they come from none. `header_line`: line of the file in which its header stands, where it is a text whose rows are
+    lines.
     """
 
     name: str
@@ -103,7 +104,7 @@ class Campaign:
     noise: dict[str, Any] | None
     holdout: dict[str, Any]
     measurements: Measurements
-    remainder: str | None = None
+    remainder: str = NO_REMAINDER
     table: str = ""
     header_line: int | None = None
 
@@ -121,7 +122,7 @@ def assemble_campaign(document: Mapping[str, Any], robot: Robot, measurements: M
     `document`: contents of ``campaign.yaml``. `source`: named in errors.
     """
     compliance = document.get("compliance", "nominal")
-    remainder = document.get("remainder", _NO_REMAINDER)
+    remainder = document.get("remainder", BEST_REMAINDER)
     rigid = compliance == "nominal" and not robot.compliance_known
     return Campaign(
         name=document["campaign"],
@@ -134,7 +135,7 @@ def assemble_campaign(document: Mapping[str, Any], robot: Robot, measurements: M
         noise=document.get("noise"),
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
         measurements=measurements,
-        remainder=None if remainder == _NO_REMAINDER else remainder,
+        remainder=remainder,
         table=document.get("table", ""),
         header_line=document.get("header_line"),
     )

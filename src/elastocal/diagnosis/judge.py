@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.campaigns.campaign import BEST_REMAINDER, NO_REMAINDER
 from elastocal.campaigns.columns import residual_columns
 from elastocal.counting import counted
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
@@ -118,10 +119,11 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
 def _remainder(diagnosis: Diagnosis, held_out: Case, seed: int) -> dict[str, Any] | None:
     """What a regression on the remainder of the final model adds on held-out poses, where the campaign asks for one."""
     campaign = diagnosis.case.campaign
-    if campaign.remainder is None or any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
+    if campaign.remainder == NO_REMAINDER or any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
         return None
     # Poses held out at random have neighbours among those fitted; others have not, and nor may those that set the intervals.
-    plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
+    regression = None if campaign.remainder == BEST_REMAINDER else campaign.remainder
+    plan = Plan(regression, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
     draws = stream(seed, campaign.name, "remainder", 0)
     return remainder_facts(plan, diagnosis.declared, diagnosis.final, diagnosis.case, held_out, draws)
 

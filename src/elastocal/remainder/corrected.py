@@ -26,24 +26,26 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.observations import Observations
-    from elastocal.remainder.protocol import Predictor, Setting
+    from elastocal.remainder.protocol import Setting
+    from elastocal.remainder.tuning import Tuned
 
 # As many folds choose a setting as judge the method.
 _INNER_FOLDS = 5
-# Intervals are scaled by so many observations at most: one quantile, which they fix to two per cent.
-_MOST_FOR_INTERVALS = 2_000
+# One of all regressions is chosen, and intervals are scaled, by so many observations at most: a quantile, which they fix to two
+# per cent.
+_MOST_TO_CHOOSE = 2_000
 
 
 @dataclass(frozen=True)
 class Plan:
     """How a remainder is to be regressed.
 
-    `regression`: name in `catalogue`. `blocks`: whether settings and intervals come from blocks of joint space, as for poses
-    far from those fitted; else from random folds. `within_range`: whether nothing is corrected at poses outside the range of
-    those fitted.
+    `regression`: name in `catalogue`; None for that which cross-validation chooses, or none. `blocks`: whether settings and
+    intervals come from blocks of joint space, as for poses far from those fitted; else from random folds. `within_range`:
+    whether nothing is corrected at poses outside the range of those fitted.
     """
 
-    regression: str
+    regression: str | None
     blocks: bool
     within_range: bool
     seed: int
@@ -55,12 +57,15 @@ class Corrected:
 
     `residual` (M, 3): measured less predicted positions, m, base axes. `std` (M, 3): standard deviation stated for them, m;
     None where the regression states none. `outside` (M,) of bool: whether the pose lies outside the range of those fitted.
+    `regression`, `words`: name of the one that was chosen, and what people call it; empty where no correction was best.
     `setting`: as chosen; None where no correction was best.
     """
 
     residual: np.ndarray
     std: np.ndarray | None
     outside: np.ndarray
+    regression: str
+    words: str
     setting: Setting | None
 
 
@@ -78,8 +83,8 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
     """
     there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
     outside, elsewhere = outside_poses(fitted, case, held_out)[there.cluster], not same_campaign(case, held_out)
-    predictor, setting = _regression(plan, fitted, case, elsewhere)
-    prediction = predictor(inputs_of(model, estimate, there, elsewhere))
+    found = _regression(plan, fitted, case, elsewhere)
+    prediction = found.predictor(inputs_of(model, estimate, there, elsewhere))
     mean = np.where(outside[:, None], 0.0, prediction.mean) if plan.within_range else prediction.mean
     if elsewhere:
         session = np.searchsorted(estimate.sessions, there.states.session[there.state])
@@ -87,18 +92,24 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
         known = replace(fitted, model=model, estimate=estimate)
         estimate = fit_frames(known, model, replace(there, position=moved), fitted.noise)
     residual = position_residuals(model, estimate, there) - mean
-    return Corrected(residual, prediction.std, outside, setting)
+    chosen = found.regression
+    return Corrected(
+        residual, prediction.std, outside, chosen.NAME if chosen else "", chosen.WORDS if chosen else "", found.setting
+    )
 
 
-def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> tuple[Predictor, Setting | None]:
-    seen, regression = case.observations, regressions()[plan.regression]
+def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> Tuned:
+    seen, all_of_them = case.observations, regressions()
+    among = [all_of_them[plan.regression]] if plan.regression else list(all_of_them.values())
+    some = sample_of(seen, _MOST_TO_CHOOSE)
     inputs = inputs_of(fitted.model, fitted.estimate, seen, elsewhere)
     left = position_residuals(fitted.model, fitted.estimate, seen)
-    found = tuned(regression, _inner_parts(plan, fitted, seen, elsewhere), inputs, left, plan.seed)
-    if not regression.HAS_INTERVALS or found.setting is None:
-        return found.predictor, found.setting
-    parts = _inner_parts(plan, fitted, sample_of(seen, _MOST_FOR_INTERVALS), elsewhere)
-    return calibrated(regression, found.setting, found.predictor, parts, plan.seed), found.setting
+    parts = _inner_parts(plan, fitted, seen if plan.regression else some, elsewhere)
+    found = tuned(among, parts, inputs, left, plan.seed)
+    if found.regression is None or found.setting is None or not found.regression.HAS_INTERVALS:
+        return found
+    parts = _inner_parts(plan, fitted, some, elsewhere)
+    return replace(found, predictor=calibrated(found.regression, found.setting, found.predictor, parts, plan.seed))
 
 
 def _inner_parts(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Iterator[Part]:

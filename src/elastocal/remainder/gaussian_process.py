@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from elastocal.remainder.protocol import Inputs, Predictor, Setting
 
-NAME = "gaussian_process"
+NAME, WORDS = "gaussian_process", "Gaussian process"
 HAS_INTERVALS = True
 # Marginal likelihood chooses among its hyperparameters, from the same poses.
 SETTINGS: Sequence[Setting] = ({},)

@@ -75,12 +75,13 @@ class Predictor(Protocol):
 class Regression(Protocol):
     """A module of this package.
 
-    `NAME`: as configurations name it. `SETTINGS`: among which `tuning.tuned` chooses by poses that a fit has not seen; a single
-    one where the regression chooses itself. `HAS_INTERVALS`: whether it states standard deviations; `intervals.calibrated`
-    makes them honest.
+    `NAME`: as configurations name it. `WORDS`: as people do. `SETTINGS`: among which `tuning.tuned` chooses by poses that a fit
+    has not seen; a single one where the regression chooses itself. `HAS_INTERVALS`: whether it states standard deviations;
+    `intervals.calibrated` makes them honest.
     """
 
     NAME: str
+    WORDS: str
     SETTINGS: Sequence[Setting]
     HAS_INTERVALS: bool
 

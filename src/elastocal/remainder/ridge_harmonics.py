@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from elastocal.remainder.protocol import Inputs, Predictor, Setting
 
-NAME = "ridge_harmonics"
+NAME, WORDS = "ridge_harmonics", "ridge regression on harmonics of the joint angles"
 HAS_INTERVALS = False
 # The penalty counts in mean squares of a column.
 SETTINGS: Sequence[Setting] = tuple(

@@ -27,11 +27,11 @@ def remainder_facts(
     """Held-out errors with a regression on what the final model leaves, beside those without.
 
     `declared`, `final`: to the training poses. `case`: of the training poses. `draws`: of the bootstrap over poses. Returns
-    ``regression``; ``errors``, the summary of `held_out.summary` with it; ``rms_ci95_m``; of the squared error that the
-    declared model leaves the shares that effects (``physics``) and the regression (``regression_share``) explain and that is
-    ``left``; ``reduction_ci95`` of the RMS by the regression alone; ``covered``, the share of coordinates inside the stated 95
-    % intervals, and ``half_width_m``, half of their median width within and outside the range; ``outside``, poses outside the
-    range of those fitted, at which nothing is corrected.
+    ``regression``, empty where none helps, and its ``words``; ``errors``, the summary of `held_out.summary` with it;
+    ``rms_ci95_m``; of the squared error that the declared model leaves the shares that effects (``physics``) and the regression
+    (``regression_share``) explain and that is ``left``; ``reduction_ci95`` of the RMS by the regression alone; ``covered``, the
+    share of coordinates inside the stated 95 % intervals, and ``half_width_m``, half of their median width within and outside
+    the range; ``outside``, poses outside the range of those fitted, at which nothing is corrected.
     """
     before, after = (position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (declared, final))
     found = corrected(plan, final, case, held_out)
@@ -39,7 +39,8 @@ def remainder_facts(
     limits, reductions = intervals([after, with_it], _REPLICATES, draws)
     squares = [float((errors.distance**2).mean()) for errors in (before, after, with_it)]
     facts: dict[str, Any] = {
-        "regression": plan.regression,
+        "regression": found.regression,
+        "words": found.words,
         "errors": {name: float(value) for name, value in summary(with_it.distance).items()},
         "rms_ci95_m": [float(end) for end in limits[1]["rms_m"]],
         "reduction_ci95": [reductions[1].low, reductions[1].high],

@@ -115,14 +115,19 @@ def remainder_sentence(remainder: Mapping[str, Any] | None, heldout: Mapping[str
     """What a regression on the remainder adds on validation poses, and how far its intervals are to be believed."""
     if remainder is None:
         return ""
+    if not remainder["regression"]:
+        return (
+            "No regression on what the final model leaves predicts fitted poses that it has not seen better than the model "
+            "alone, beyond a standard error, so that none is used."
+        )
     low, high = (length(end) for end in remainder["rms_ci95_m"])
     fall = [minus(f"{-100 * end:+.0f}") for end in reversed(remainder["reduction_ci95"])]
     shares = {name: minus(f"{100 * remainder[name]:.0f} %") for name in ("physics", "regression_share", "left")}
     sentence = (
-        "A Gaussian process, fitted to what the final model leaves of the fitted poses, predicts the validation poses with an "
-        f"RMS error of {length(remainder['errors']['rms_m'])} (95 %: {low} to {high}) instead of "
+        f"A {remainder['words']}, fitted to what the final model leaves of the fitted poses, predicts the validation poses "
+        f"with an RMS error of {length(remainder['errors']['rms_m'])} (95 %: {low} to {high}) instead of "
         f"{length(heldout['after']['rms_m'])}: a change of the error by {fall[0]} to {fall[1]} %. Of the squared error that "
-        f"the declared model leaves, the effects explain {shares['physics']} and the process {shares['regression_share']}; "
+        f"the declared model leaves, the effects explain {shares['physics']} and the regression {shares['regression_share']}; "
         f"{shares['left']} is left."
     )
     widths = remainder["half_width_m"]

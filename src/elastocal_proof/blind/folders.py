@@ -71,6 +71,7 @@ def campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
         "compliance": "identify",
         "declared": list(design.declared),
         "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
+        "remainder": "none",
     }
     if design.declared_noise is not None:
         document["noise"] = dict(zip(("position_m", "orientation_rad"), design.declared_noise, strict=True))
