@@ -17,15 +17,15 @@ SETTINGS = Settings()
 
 
 def every_model(units):
-    """All sets of units with one variant at a location at most, "nothing" among them."""
+    """All sets of units with one variant at a place at most, "nothing" among them."""
     for size in range(len(units) + 1):
         for chosen in combinations(units, size):
-            if len({(unit.mechanism, unit.location) for unit in chosen}) == size:
+            if len({unit.place for unit in chosen}) == size:
                 yield chosen
 
 
 def made_units():
-    """Three mechanisms: at three locations, one of which has three laws; at two; and at one. A competitor of two laws."""
+    """Three mechanisms: at three locations, one of which has three laws; at two; and at one. Two laws of the competitor."""
     third = float(np.log(1 / 3))
     return (
         made_unit("harmonic", (1,), 0),
@@ -34,8 +34,8 @@ def made_units():
         made_unit("offset", (1,), 5),
         made_unit("offset", (2,), 6),
         made_unit("link_weight", (), 7),
-        made_unit(OTHER, (1,), 8, log_prior=float(np.log(1 / 2))),
-        made_unit(OTHER, (1,), 9, log_prior=float(np.log(1 / 2))),
+        made_unit(OTHER, (1,), 8),
+        made_unit(OTHER, (1,), 9, law=NEIGHBOURS),
     )
 
 
@@ -114,11 +114,10 @@ def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(cat
     against = [unit for unit in units if unit.mechanism == OTHER]
     assert [(unit.competitor, len(unit.columns)) for unit in against] == features
     assert not any(unit.competitor for unit in units if unit.candidate)
-    # Laws and shapes at one location share its probability.
-    for mechanism in {unit.mechanism for unit in units}:
-        for place in {unit.location for unit in units if unit.mechanism == mechanism}:
-            mine = [unit.log_prior for unit in units if (unit.mechanism, unit.location) == (mechanism, place)]
-            assert np.exp(mine).sum() == pytest.approx(1.0), (mechanism, place)
+    # Laws and shapes at one location share its probability; laws of the competitor have places of their own.
+    for place in {unit.place for unit in units}:
+        assert np.exp([unit.log_prior for unit in units if unit.place == place]).sum() == pytest.approx(1.0), place
+    assert len({unit.place for unit in against}) == len(features)
     assert len({unit.key for unit in units}) == len(units)
 
 

@@ -99,6 +99,16 @@ def test_half_of_the_features_vanish_without_the_load(competitor):
     assert zero.sum() == FEATURES // 2 and found[zero][:, 20:].any(axis=1).all()
 
 
+@pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)
+def test_features_are_the_principal_ones_of_many_over_the_states_of_the_campaign(competitor):
+    """The same first ones however many, in falling order; 8 of 64 hold more than half of the squares."""
+    few, many = ((waves(displacements(around(), competitor, count)) ** 2).sum(axis=1) for count in (16, 128))
+    for some, all_of_them in zip(np.split(few, 2), np.split(many, 2), strict=True):
+        np.testing.assert_allclose(some, all_of_them[:8], rtol=1e-9)
+        assert (np.diff(all_of_them) < 1e-12 * all_of_them[0]).all()
+        assert some.sum() > 0.5 * all_of_them.sum()
+
+
 @pytest.mark.parametrize("law", [FORCE, TIME, PLACE])
 @pytest.mark.parametrize(("motion", "size", "mine"), [(SHIFT, BASE_M, slice(0, 3)), (TURN, BASE_RAD, slice(3, 6))])
 def test_the_base_shifts_or_turns_in_all_three_directions_by_about_its_size(law, motion, size, mine):

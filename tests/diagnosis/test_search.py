@@ -10,6 +10,7 @@ from made_problems import made_problem, made_rows, made_unit
 
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.other import NEIGHBOURS
 from elastocal.diagnosis.search import _Searcher, initial_screening, pose_errors_within_reach, posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import Statistics
@@ -46,7 +47,7 @@ def enumerated(problem):
     for size in range(len(problem.units) + 1):
         for model in combinations(range(len(problem.units)), size):
             units = [problem.units[number] for number in model]
-            if len({(unit.mechanism, unit.location) for unit in units}) < size:
+            if len({unit.place for unit in units}) < size:
                 continue
             found = evaluate(problem.statistics, units, problem.grid, problem.log_pose, np.full(size, 0.1))
             odds[model] = found.log_evidence + problem.prior.log_odds_of(units)
@@ -101,8 +102,14 @@ def test_nothing_is_always_among_the_models_however_improbable():
 def test_no_model_has_two_laws_at_one_location():
     found = posterior(problem_of("two mechanisms", settings=replace(Settings(), kept_models=10**6)))
     for model in found.models:
-        places = [(UNITS[number].mechanism, UNITS[number].location) for number in model.units]
+        places = [UNITS[number].place for number in model.units]
         assert len(set(places)) == len(places)
+
+
+def test_laws_of_the_competitor_at_one_location_join_in_one_model():
+    rows, laws = made_rows(poses=14), (made_unit(OTHER, (1,), [0, 1]), made_unit(OTHER, (1,), [2, 3], law=NEIGHBOURS))
+    rows = replace(rows, residual=rows.residual + 0.8 * rows.candidates[:, :4].sum(axis=1))
+    assert posterior(made_problem(rows, laws, tau=TAU)[0]).models[0].units == (0, 1)
 
 
 def test_no_model_is_larger_than_the_settings_allow():

@@ -87,11 +87,11 @@ def made_rows(seed=0, poses=8, size=(3, 9), declared=4, candidates=6, joints=2, 
     return rows.drawn(rng)
 
 
-def made_unit(mechanism, location, columns, signs=0, log_prior=0.0, candidate=None, shapes=(), smallest=0):
+def made_unit(mechanism, location, columns, signs=0, log_prior=0.0, candidate=None, shapes=(), smallest=0, law=OWN):
     """A unit of some columns, each of plausible size one."""
     columns = np.atleast_1d(columns)
     signs = np.full(len(columns), signs, int)
-    competitor = Competitor(location, OWN) if mechanism == OTHER else None
+    competitor = Competitor(location, law) if mechanism == OTHER else None
     return Unit(mechanism, location, candidate, shapes, columns, np.ones(len(columns)), signs, log_prior, competitor, smallest)
 
 
