@@ -202,6 +202,7 @@ def remainder_facts(outside=0):
     """What verdict.json says of a regression on the remainder."""
     return {
         "regression": "gaussian_process",
+        "words": "Gaussian process",
         "errors": {"mean_m": 5.5e-5, "rms_m": 6.0e-5, "p95_m": 1.0e-4, "max_m": 1.5e-4},
         "rms_ci95_m": [5.0e-5, 7.2e-5],
         "reduction_ci95": [-0.05, 0.31],

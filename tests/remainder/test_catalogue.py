@@ -12,7 +12,7 @@ import numpy as np
 
 from elastocal.remainder.protocol import Prediction
 
-NAME, SETTINGS, HAS_INTERVALS = "constant", ({},), False
+NAME, WORDS, SETTINGS = "constant", "constant", ({},)
 
 
 def fitted(inputs, residual, settings, seed):

@@ -1,22 +1,16 @@
 """Intervals hold what they claim, whatever a regression thinks of itself."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from made_remainders import made_inputs
 
 from elastocal.remainder.intervals import NORMAL_WIDTH, calibrated
-from elastocal.remainder.protocol import Part, Prediction
+from elastocal.remainder.protocol import Prediction
 
 
 def boasting(factor):
-    """A regression that predicts zero and states a multiple of the noise, which grows with the first angle."""
-
-    def predictor(there):
-        return Prediction(np.zeros((len(there), 3)), factor * spread(there))
-
-    return SimpleNamespace(fitted=lambda inputs, residual, settings, seed: iter([predictor])), predictor
+    """A predictor of zero that states a multiple of the noise, which grows with the first angle."""
+    return lambda there: Prediction(np.zeros((len(there), 3)), factor * spread(there))
 
 
 def spread(there):
@@ -27,8 +21,7 @@ def spread(there):
 def test_intervals_hold_95_percent_and_keep_their_shape(factor):
     inputs, _ = made_inputs(600, seed=1)
     off = np.random.default_rng(2).normal(size=(600, 3)) * spread(inputs)
-    regression, predictor = boasting(factor)
-    honest = calibrated(regression, {}, predictor, [Part(inputs, off, inputs, off)], 1)
+    honest = calibrated(boasting(factor), [np.abs(off) / (factor * spread(inputs))])
     there, _ = made_inputs(2000, seed=3)
     found = honest(there)
     # 1,800 scores and 6,000 coordinates: standard errors of 0.5 and 0.3 %.
@@ -38,10 +31,5 @@ def test_intervals_hold_95_percent_and_keep_their_shape(factor):
 
 
 def test_without_standard_deviations_nothing_is_scaled():
-    inputs, residual = made_inputs(30, seed=1)
-
-    def predictor(there):
-        return Prediction(np.zeros((len(there), 3)))
-
-    regression = SimpleNamespace(fitted=lambda *args: iter([predictor]))
-    assert calibrated(regression, {}, predictor, [Part(inputs, residual, inputs, residual)], 1)(inputs).std is None
+    inputs, _ = made_inputs(30, seed=1)
+    assert calibrated(lambda there: Prediction(np.zeros((len(there), 3))), [])(inputs).std is None

@@ -1,11 +1,12 @@
 """Settings are chosen by poses that a fit has not seen."""
 
+from types import SimpleNamespace
+
 import numpy as np
-import pytest
 from made_remainders import made_inputs
 
-from elastocal.remainder import gaussian_process, ridge_harmonics
-from elastocal.remainder.protocol import Part
+from elastocal.remainder import extra_trees, gaussian_process, ridge_harmonics
+from elastocal.remainder.protocol import Part, Prediction
 from elastocal.remainder.tuning import no_correction, tuned
 
 
@@ -19,7 +20,7 @@ def parts(inputs, residual, count=4):
 def test_the_orders_that_are_there_are_chosen():
     inputs, _ = made_inputs(200, seed=1)
     harmonic = inputs.jacobian[:, :, 0] * 1e-3 * np.sin(5 * inputs.joint_angles[:, [0]])
-    found = tuned(ridge_harmonics, parts(inputs, harmonic), inputs, harmonic, 1)
+    found = tuned([ridge_harmonics], parts(inputs, harmonic), inputs, harmonic, 1)
     assert found.setting["orders"] >= 5
     there, _ = made_inputs(50, seed=2)
     expected = there.jacobian[:, :, 0] * 1e-3 * np.sin(5 * there.joint_angles[:, [0]])
@@ -32,17 +33,33 @@ def test_where_nothing_helps_nothing_is_corrected():
     for seed in range(20):
         inputs, _ = made_inputs(40, seed)
         noise = np.random.default_rng(100 + seed).normal(0.0, 1e-4, (40, 3))
-        found = tuned(ridge_harmonics, parts(inputs, noise), inputs, noise, 1)
+        found = tuned([ridge_harmonics], parts(inputs, noise), inputs, noise, 1)
         assert (found.setting is None) == (found.predictor is no_correction)
         sizes.append(np.sqrt((found.predictor(inputs).mean ** 2).mean()))
     assert np.median(sizes) < 3e-5
 
 
-def test_a_regression_with_one_setting_asks_for_no_folds():
-    inputs, residual = made_inputs(30, seed=1)
+def test_of_several_regressions_the_one_that_predicts_left_out_poses_best_is_chosen():
+    """Two trends are smooth; what jumps at a place is not, and no wave."""
+    every = [extra_trees, gaussian_process, ridge_harmonics]
+    inputs, smooth = made_inputs(120, seed=1)
+    jumps = np.where(inputs.joint_angles[:, [0]] > 0.37, 3e-4, -3e-4) * np.where(inputs.joint_angles[:, [1]] > -0.2, 1.0, 0.2)
+    jumps = jumps + np.random.default_rng(3).normal(0.0, 2e-5, (120, 3))
+    assert [tuned(every, parts(inputs, off), inputs, off, 1).regression for off in (smooth, jumps)] == [
+        gaussian_process,
+        extra_trees,
+    ]
 
-    def never():
-        pytest.fail("folds were made")
-        yield
 
-    assert tuned(gaussian_process, never(), inputs, residual, 1).setting == {}
+def test_a_gain_within_its_standard_error_is_none():
+    """One fold of four gains, the others lose a little."""
+
+    def fitted(inputs, residual, settings, seed):
+        yield lambda there: Prediction(np.full((len(there), 3), 1e-4))
+
+    regression = SimpleNamespace(NAME="made", SETTINGS=({},), fitted=fitted)
+    inputs, _ = made_inputs(40, seed=1)
+    for worth, chosen in ((9e-5, regression), (4.9e-5, None)):
+        residual = np.full((40, 3), worth)
+        residual[::4] = 2e-4
+        assert tuned([regression], parts(inputs, residual), inputs, residual, 1).regression is chosen

@@ -12,7 +12,6 @@ from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.remainder.catalogue import regressions
 from elastocal.remainder.inputs import inputs_of
-from elastocal.remainder.intervals import calibrated
 from elastocal.remainder.protocol import Part
 from elastocal.remainder.tuning import tuned
 from elastocal.validation.fitted_range import outside_poses
@@ -31,8 +30,8 @@ if TYPE_CHECKING:
 
 # As many folds choose a setting as judge the method.
 _INNER_FOLDS = 5
-# One of all regressions is chosen, and intervals are scaled, by so many observations at most: a quantile, which they fix to two
-# per cent.
+# By so many observations at most a regression is chosen and its intervals are scaled: by a quantile, which they fix to two per
+# cent.
 _MOST_TO_CHOOSE = 2_000
 
 
@@ -101,15 +100,9 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
 def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> Tuned:
     seen, all_of_them = case.observations, regressions()
     among = [all_of_them[plan.regression]] if plan.regression else list(all_of_them.values())
-    some = sample_of(seen, _MOST_TO_CHOOSE)
+    parts = _inner_parts(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
     inputs = inputs_of(fitted.model, fitted.estimate, seen, elsewhere)
-    left = position_residuals(fitted.model, fitted.estimate, seen)
-    parts = _inner_parts(plan, fitted, seen if plan.regression else some, elsewhere)
-    found = tuned(among, parts, inputs, left, plan.seed)
-    if found.regression is None or found.setting is None or not found.regression.HAS_INTERVALS:
-        return found
-    parts = _inner_parts(plan, fitted, some, elsewhere)
-    return replace(found, predictor=calibrated(found.regression, found.setting, found.predictor, parts, plan.seed))
+    return tuned(among, parts, inputs, position_residuals(fitted.model, fitted.estimate, seen), plan.seed)
 
 
 def _inner_parts(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Iterator[Part]:

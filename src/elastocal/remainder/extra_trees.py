@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from elastocal.remainder.protocol import Inputs, Predictor, Setting
 
 NAME, WORDS = "extra_trees", "forest of extremely randomized trees"
-HAS_INTERVALS = False
 _TREES = 100
 # Observations in a leaf, and the share of the inputs among which each node chooses: the two that the method's authors tune.
 SETTINGS: Sequence[Setting] = tuple(

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from elastocal.remainder.protocol import Inputs, Predictor, Setting
 
 NAME, WORDS = "gaussian_process", "Gaussian process"
-HAS_INTERVALS = True
 # Marginal likelihood chooses among its hyperparameters, from the same poses.
 SETTINGS: Sequence[Setting] = ({},)
 # Hyperparameters come from so many observations: a step towards them costs the third power of their number.

@@ -76,14 +76,12 @@ class Regression(Protocol):
     """A module of this package.
 
     `NAME`: as configurations name it. `WORDS`: as people do. `SETTINGS`: among which `tuning.tuned` chooses by poses that a fit
-    has not seen; a single one where the regression chooses itself. `HAS_INTERVALS`: whether it states standard deviations;
-    `intervals.calibrated` makes them honest.
+    has not seen; a single one where the regression chooses itself.
     """
 
     NAME: str
     WORDS: str
     SETTINGS: Sequence[Setting]
-    HAS_INTERVALS: bool
 
     def fitted(self, inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
         """Fit the regression with each of some settings, in their order.

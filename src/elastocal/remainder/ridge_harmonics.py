@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from elastocal.remainder.protocol import Inputs, Predictor, Setting
 
 NAME, WORDS = "ridge_harmonics", "ridge regression on harmonics of the joint angles"
-HAS_INTERVALS = False
 # The penalty counts in mean squares of a column.
 SETTINGS: Sequence[Setting] = tuple(
     {"orders": orders, "penalty": float(penalty), "geometry": geometry}
