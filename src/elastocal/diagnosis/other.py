@@ -108,25 +108,21 @@ def law_of(competitor: Competitor, campaign: Conditions, features: int) -> Law:
     draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)
     size = JOINT_RAD if location else BASE_M if competitor.motion == SHIFT else BASE_RAD
     count = features if location else _BASE_FEATURES
-    loads = np.abs(_load(campaign, location)).max(initial=0.0)
     parts = []
     for coordinate in _coordinates(campaign, competitor):
-        free = _principal(_waves(competitor, campaign, coordinate, draws), campaign, count - count // 2)
-        other = _waves(competitor, campaign, coordinate, draws)
-        loaded = _principal(_times_load(other, location, loads) if loads > _ROUNDING else other, campaign, count // 2)
-        parts += [(coordinate, free), (coordinate, loaded)]
-    return Law(competitor, size, tuple(parts), count * len(parts) // 2)
+        waves = _waves(competitor, campaign, coordinate, draws)
+        parts.append((coordinate, _principal(waves, waves(campaign), count)))
+    return Law(competitor, size, tuple(parts), count * len(parts))
 
 
-def _principal(waves: _Waves, campaign: Conditions, count: int) -> _Waves:
-    """So many principal components of waves over the states of a campaign, together of unit variance at most."""
-    seen = waves(campaign)
-    _, axes = np.linalg.eigh(seen.T @ seen)
-    return lambda around: waves(around) @ axes[:, : -count - 1 : -1]
-
-
-def _times_load(waves: _Waves, location: tuple[int, ...], largest: float) -> _Waves:
-    return lambda around: waves(around) * (_load(around, location) / largest)[:, None]
+def _principal(waves: _Waves, seen: np.ndarray, count: int) -> _Waves:
+    """So many principal components of waves, half of them of the half that goes with the load; `seen`: over a campaign."""
+    axes = np.zeros((2 * _DRAWN, count))
+    free = count - count // 2
+    for drawn, kept in ((slice(_DRAWN), slice(free)), (slice(_DRAWN, None), slice(free, None))):
+        _, found = np.linalg.eigh(seen[:, drawn].T @ seen[:, drawn])
+        axes[drawn, kept] = found[:, ::-1][:, : axes[drawn, kept].shape[1]]
+    return lambda around: waves(around) @ axes
 
 
 def _coordinates(around: Conditions, competitor: Competitor) -> list[int]:
@@ -137,14 +133,31 @@ def _coordinates(around: Conditions, competitor: Competitor) -> list[int]:
 
 
 def _waves(competitor: Competitor, campaign: Conditions, coordinate: int, draws: np.random.Generator) -> _Waves:
-    """Random functions of the inputs of a law without their part that has a name; without an input zero."""
+    """Random functions (S, 2 * drawn) of the inputs of a law without their part that has a name; without an input zero.
+
+    Each half has a variance of about one half; the second goes with the load.
+    """
     known = _inputs(campaign, competitor, coordinate, campaign)
+    drawn = [_drawn(known.shape[1], draws) for _ in range(2)]
+    frequency, phase = (np.concatenate(each, axis=-1) for each in zip(*drawn, strict=True))
+    size = np.sqrt(1.0 / _DRAWN) if known.shape[1] else 0.0
+    largest = np.abs(_load(campaign, competitor.location)).max(initial=0.0)
+    named = _named_part(competitor, campaign, size * np.cos(known @ frequency + phase))
+
+    def waves(around: Conditions) -> np.ndarray:
+        found = size * np.cos(_inputs(around, competitor, coordinate, campaign) @ frequency + phase) - named(around)
+        if largest > _ROUNDING:
+            found[:, _DRAWN:] *= (_load(around, competitor.location) / largest)[:, None]
+        return found
+
+    return waves
+
+
+def _drawn(inputs: int, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (inputs, drawn) and phases of random Fourier features."""
     low, high = np.log(_LENGTH_SCALES)
     lengths = np.exp(draws.uniform(low, high, _DRAWN))
-    frequency, phase = draws.standard_normal((known.shape[1], _DRAWN)) / lengths, draws.uniform(0, 2 * np.pi, _DRAWN)
-    size = np.sqrt(1.0 / _DRAWN) if known.shape[1] else 0.0
-    named = _named_part(competitor, campaign, size * np.cos(known @ frequency + phase))
-    return lambda around: size * np.cos(_inputs(around, competitor, coordinate, campaign) @ frequency + phase) - named(around)
+    return draws.standard_normal((inputs, _DRAWN)) / lengths, draws.uniform(0, 2 * np.pi, _DRAWN)
 
 
 def _named_part(competitor: Competitor, campaign: Conditions, waves: np.ndarray) -> Callable[[Conditions], np.ndarray]:
