@@ -397,7 +397,8 @@ def defects_of(case: Case, robot: PhysicalRobot, design: Design) -> list[_Sized]
 
     Where a location has no size of the wanted non-centrality, or one beyond three times the plausible, the next one is
     drawn; of eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the
-    raw non-centrality is taken instead, and the ground truth states so: nothing can find that.
+    raw non-centrality is taken instead, and the ground truth states so: nothing can find that. Where even that is less at the
+    largest size that means anything, it is that size.
     """
     if not case.effects:
         return []
@@ -408,9 +409,7 @@ def defects_of(case: Case, robot: PhysicalRobot, design: Design) -> list[_Sized]
         sized = _first_plausible(yardstick, robot, drawn, level, "retained") or _first_plausible(
             yardstick, robot, drawn, level, "raw"
         )
-        if sized is None:
-            raise ValueError(f"{case.key}: no {effect} has a non-centrality of {level:g}")
-        found += sized
+        found += sized or _largest(yardstick, robot, drawn[0], level)
     return found
 
 
@@ -518,6 +517,20 @@ def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, r
     if case.alternative:
         truth["alternative"] = {"effect": case.alternative, "angle_deg": angle_to_alternative(case, robot, design, bad)}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
+
+
+def _largest(yardstick: Yardstick, robot: PhysicalRobot, defects: list[Defect], level: float) -> list[_Sized]:
+    """Defects at the largest size that means anything."""
+    found = []
+    for each in defects:
+        kind = KINDS[each.effect]
+        if np.isinf(kind.largest):
+            raise ValueError(f"{each.effect} at {each.joints}: no size has a non-centrality of {level:g}")
+        defect = replace(each, size=kind.largest)
+        signal = asdict(yardstick.signal(with_defects(robot, [defect])))
+        share = kind.largest / kind.plausible_on(robot.arm)
+        found.append((defect, {"non_centrality": level, "of": "raw", "draw": 1, "share_of_plausible": share, "signal": signal}))
+    return found
 
 
 def _slipped(
