@@ -138,6 +138,14 @@ def test_a_wrong_force_scale_is_told_to_be_absorbed(tmp_path):
     assert truth["defects"][0]["signal"]["retained"] < 0.1
 
 
+def test_what_no_size_makes_so_visible_has_the_largest_size_that_means_anything():
+    """The force of a load cell that is off by a tenth shows less than a non-centrality of 10,000."""
+    case = a_case(("force_scale",), (1e4,))
+    ((defect, sizing),) = defects_of(case, specimen_of(case, ROBOTS), design_of(case))
+    assert (defect.size, sizing["of"]) == (KINDS["force_scale"].largest, "raw")
+    assert 10.0 < sizing["signal"]["raw"] < 1e4
+
+
 def test_a_pair_has_both_each_at_its_own_non_centrality(tmp_path):
     _, truth = made(a_case(("joint_offset", "hysteresis"), (50.0, 200.0)), tmp_path)
     assert [d["effect"] for d in truth["defects"]] == ["joint_offset", "hysteresis"]
