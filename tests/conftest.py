@@ -1,12 +1,9 @@
 """Fixtures: the robots and strategies of the repository's own config."""
 
-from functools import cache
 from pathlib import Path
 
 import hypothesis
 import pytest
-import typer.main
-import typer.testing
 
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot_file import robot_from_document
@@ -23,8 +20,6 @@ hypothesis.settings.register_profile(
     suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
 hypothesis.settings.load_profile("repeatable")
-# Its runner builds all commands anew for each that is called.
-typer.testing._get_command = cache(typer.main.get_command)
 
 
 def pytest_collection_modifyitems(items):
