@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 NAME, WORDS = "gaussian_process", "Gaussian process"
 # Marginal likelihood chooses among its hyperparameters, from the same poses.
 SETTINGS: Sequence[Setting] = ({},)
-# Hyperparameters come from so many observations: a step towards them costs the third power of their number.
-_MOST_FOR_HYPERPARAMETERS = 800
+# Hyperparameters come from so many observations: a step towards them costs the third power of their number, and 800 take eight
+# times as long for errors that differ by 2 % either way (UR5 and UR10).
+_MOST_FOR_HYPERPARAMETERS = 300
 # Of so many the covariance matrix takes 1.2 GB; of more, so many are drawn.
 _MOST = 12_000
 # In standard deviations of each input: from wiggles between neighbours to one trend across all poses.
