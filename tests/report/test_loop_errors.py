@@ -51,9 +51,9 @@ def test_poses_outside_the_fitted_range_are_told_apart():
 def test_what_a_regression_adds_is_said_with_shares_intervals_and_where_it_corrects_nothing():
     said = plainly(remainder_sentence(remainder_facts(outside=3), CAMPAIGNS["named"]["heldout"]))
     assert "RMS error of 60.0 µm (95 %: 50.0 µm to 72.0 µm) instead of 84.0 µm: a change of the error by −31 to +5 %" in said
-    assert "the effects explain 51 % and the regression 24 %; 25 % is left" in said
+    assert "the effects explain 51.0 % and the regression 24.0 %; 25.0 % is left" in said
     assert "± 100 µm within the range of the fitted poses, ± 400 µm outside (median of a coordinate), hold 95 %" in said
-    assert "At the 3 poses outside that range it corrects nothing" in said
+    assert "At the 3 poses outside the range of the fitted ones it corrects nothing" in said
     within = plainly(remainder_sentence(remainder_facts(), CAMPAIGNS["named"]["heldout"]))
     assert "outside" not in within
     assert remainder_sentence(None, CAMPAIGNS["named"]["heldout"]) == ""

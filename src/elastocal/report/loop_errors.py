@@ -122,7 +122,7 @@ def remainder_sentence(remainder: Mapping[str, Any] | None, heldout: Mapping[str
         )
     low, high = (length(end) for end in remainder["rms_ci95_m"])
     fall = [minus(f"{-100 * end:+.0f}") for end in reversed(remainder["reduction_ci95"])]
-    shares = {name: minus(f"{100 * remainder[name]:.0f} %") for name in ("physics", "regression_share", "left")}
+    shares = {name: minus(f"{100 * remainder[name]:.1f} %") for name in ("physics", "regression_share", "left")}
     sentence = (
         f"A {remainder['words']}, fitted to what the final model leaves of the fitted poses, predicts the validation poses "
         f"with an RMS error of {length(remainder['errors']['rms_m'])} (95 %: {low} to {high}) instead of "
@@ -139,7 +139,7 @@ def remainder_sentence(remainder: Mapping[str, Any] | None, heldout: Mapping[str
             "coordinates."
         )
     if remainder["outside"]:
-        sentence += f" At the {counted(remainder['outside'], 'pose')} outside that range it corrects nothing."
+        sentence += f" At the {counted(remainder['outside'], 'pose')} outside the range of the fitted ones it corrects nothing."
     return sentence + " It names no cause and is not part of the exported model."
 
 
