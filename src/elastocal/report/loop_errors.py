@@ -117,8 +117,8 @@ def remainder_sentence(remainder: Mapping[str, Any] | None, heldout: Mapping[str
         return ""
     if not remainder["regression"]:
         return (
-            "No regression on what the final model leaves predicts fitted poses that it has not seen better than the model "
-            "alone, beyond a standard error, so that none is used."
+            "What the final model leaves shows no pattern: no regression on it predicts fitted poses that it has not seen "
+            "better than the model alone, beyond a standard error, and none is used."
         )
     low, high = (length(end) for end in remainder["rms_ci95_m"])
     fall = [minus(f"{-100 * end:+.0f}") for end in reversed(remainder["reduction_ci95"])]
