@@ -198,6 +198,30 @@ def test_no_unit_of_a_model_is_smaller_than_measurements_can_show():
     assert all((model.scales >= problem.grid.scales[least]).all() for model in found.models)
 
 
+class Promising(_Searcher):
+    """Models in a row without an end: every second one is met with 15 more than it turns out to have."""
+
+    def __init__(self):
+        self.problem, self.met, self.measured = SimpleNamespace(settings=Settings()), {(0,): 0.0}, {}
+        self.extended, self.best_measured = set(), -np.inf
+
+    def measure(self, model):
+        self.met[model] = self.measured[model] = 0.0
+        self.best_measured = 0.0
+
+    def extend(self, model):
+        assert len(self.extended) < 50, "the search does not end"
+        self.extended.add(model)
+        self.met[(model[0] + 1,)] = -1.0 if model[0] % 2 else 15.0
+
+
+def test_a_search_ends_where_extensions_promise_more_than_they_hold():
+    """Only models that were measured say whether anything got better."""
+    searcher = Promising()
+    searcher.grow()
+    assert len(searcher.measured) <= 2 * Settings().patience
+
+
 def test_the_posterior_is_the_same_each_time():
     one, other = (posterior(problem_of("two mechanisms")) for _ in range(2))
     assert [model.units for model in one.models] == [model.units for model in other.models]
