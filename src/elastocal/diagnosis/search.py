@@ -174,7 +174,6 @@ class _Searcher:
         self.met: dict[tuple[int, ...], float] = {(): 0.0}
         self.sizes: dict[tuple[int, ...], np.ndarray] = {(): self.empty.scales}
         self.measured: dict[tuple[int, ...], Model] = {}
-        self.best_measured = -np.inf
         self.extended: set[tuple[int, ...]] = set()
         self.extend(())
 
@@ -236,7 +235,6 @@ class _Searcher:
         odds = found.log_evidence - self.empty.log_evidence + whole
         self.met[model], self.sizes[model] = odds, found.scales
         self.measured[model] = Model(model, odds, found.scales, self.pose_error(found))
-        self.best_measured = max(self.best_measured, odds)
         if odds == max(self.met.values()):
             self.keep_pose_errors(np.flatnonzero(found.log_pose > _OUT_OF_QUESTION))
         for place, number in enumerate(model):
@@ -276,11 +274,14 @@ class _Searcher:
     def grow(self) -> None:
         """Extend the best models that have not been, in rounds, until rounds bring nothing better.
 
-        What is better is said of models that were measured: an extension is met at sizes of the others that it may not keep.
+        There are as many as lead to the largest model and back at most: extensions are met at sizes of the others that they may
+        not keep, and where they promise more than they hold something seems to get better without an end.
         """
         settings, idle, rising = self.problem.settings, 0, False
-        while idle < settings.patience:
-            best, measured = max(self.met.values()), self.best_measured
+        for _ in range(2 * settings.largest_model):
+            if idle >= settings.patience:
+                break
+            best = max(self.met.values())
             waiting = [m for m, odds in self.met.items() if m not in self.extended and odds > best - _NEGLIGIBLE]
             if not waiting:
                 break
@@ -289,7 +290,8 @@ class _Searcher:
                 if model not in self.measured:
                     self.measure(model)
                 self.extend(model)
-            rising = self.best_measured > measured + _BETTER
+            gained = max(self.met.values()) - best
+            rising = gained > _BETTER
             idle = 0 if rising else idle + 1
 
     def weigh(self) -> Posterior:
