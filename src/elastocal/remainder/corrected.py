@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.observations import Observations
-    from elastocal.remainder.protocol import Setting
+    from elastocal.remainder.protocol import Regression, Setting
     from elastocal.remainder.tuning import Tuned
 
 # As many folds choose a setting as judge the method.
@@ -56,15 +56,13 @@ class Corrected:
 
     `residual` (M, 3): measured less predicted positions, m, base axes. `std` (M, 3): standard deviation stated for them, m;
     None where the regression states none. `outside` (M,) of bool: whether the pose lies outside the range of those fitted.
-    `regression`, `words`: name of the one that was chosen, and what people call it; empty where no correction was best.
-    `setting`: as chosen; None where no correction was best.
+    `regression`, `setting`: as chosen; None where no correction was best.
     """
 
     residual: np.ndarray
     std: np.ndarray | None
     outside: np.ndarray
-    regression: str
-    words: str
+    regression: Regression | None
     setting: Setting | None
 
 
@@ -91,10 +89,7 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
         known = replace(fitted, model=model, estimate=estimate)
         estimate = fit_frames(known, model, replace(there, position=moved), fitted.noise)
     residual = position_residuals(model, estimate, there) - mean
-    chosen = found.regression
-    return Corrected(
-        residual, prediction.std, outside, chosen.NAME if chosen else "", chosen.WORDS if chosen else "", found.setting
-    )
+    return Corrected(residual, prediction.std, outside, found.regression, found.setting)
 
 
 def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> Tuned:

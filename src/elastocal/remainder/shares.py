@@ -39,8 +39,8 @@ def remainder_facts(
     limits, reductions = intervals([after, with_it], _REPLICATES, draws)
     squares = [float((errors.distance**2).mean()) for errors in (before, after, with_it)]
     facts: dict[str, Any] = {
-        "regression": found.regression,
-        "words": found.words,
+        "regression": found.regression.NAME if found.regression else "",
+        "words": found.regression.WORDS if found.regression else "",
         "errors": {name: float(value) for name, value in summary(with_it.distance).items()},
         "rms_ci95_m": [float(end) for end in limits[1]["rms_m"]],
         "reduction_ci95": [reductions[1].low, reductions[1].high],
