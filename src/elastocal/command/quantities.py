@@ -53,11 +53,7 @@ def _quantity(text: str, units: Mapping[str, float]) -> float:
 
 
 def numbers(option: str, text: str, count: int, largest: float = _FARTHEST_PLACE_M) -> np.ndarray:
-    """Numbers separated by commas, metres.
-
-    `option`: named in errors. `largest`: size that each may have. Returns (count,). Raises `InputError`: another count, or
-    something that is no number of such a size.
-    """
+    """So many numbers separated by commas, metres, each of at most a size; anything else is refused."""
     try:
         found = np.array([float(part) for part in text.split(",")])
     except ValueError:

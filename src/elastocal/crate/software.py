@@ -16,10 +16,7 @@ _CLASSIFIER = "License :: OSI Approved :: "
 
 @dataclass(frozen=True)
 class Package:
-    """An installed package.
-
-    `licence`: as the package states it, empty where it does not.
-    """
+    """An installed package, with its licence as it states it, empty where it does not."""
 
     name: str
     version: str
@@ -32,10 +29,7 @@ class Package:
 
 
 def installed_packages() -> list[Package]:
-    """All packages of the environment that this runs in.
-
-    Returns by name, each once.
-    """
+    """All packages of the environment that this runs in, by name, each once."""
     found: dict[str, Package] = {}
     for distribution in distributions():
         metadata = distribution.metadata

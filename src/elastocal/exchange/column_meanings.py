@@ -228,10 +228,7 @@ def _check_external_axes(text: TextTable, columns: Mapping[str, str], mapped: Ma
 def check_complete(
     text: TextTable, columns: Mapping[str, str], angles: Sequence[str], needed: Sequence[str], robot: Robot | None
 ) -> None:
-    """Refuse a table without all joint angles of the robot, or without one of the columns that are needed.
-
-    `columns`: headers by name. `angles`: names of those that are joint angles.
-    """
+    """Refuse a table without all joint angles of the robot (`angles`), or without one of the columns that are needed."""
     if not angles:
         named = f" or as the robot has them: {', '.join(robot.joint_names)}" if robot and robot.joint_names else ""
         allowed = (

@@ -32,10 +32,7 @@ _JOINTS = {
 
 
 def robot_from_kinematics(document: Mapping[str, Any], path: str | Path, name: str | None = None) -> Imported:
-    """The robot of a kinematics file, its links in the order of the arm.
-
-    Raises `InputError` for another key than those of the format or a cell that is no number.
-    """
+    """The robot of a kinematics file, its links in the order of the arm; other keys and what is no number are refused."""
     source = Path(path).as_posix()
     described = document[KINEMATICS]
     if not isinstance(described, dict):
