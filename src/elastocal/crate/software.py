@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 from dataclasses import dataclass
 from importlib.metadata import distributions
 from typing import TYPE_CHECKING
@@ -37,11 +36,6 @@ def installed_packages() -> list[Package]:
         # Of two on the path the first is imported.
         found.setdefault(name, Package(name, distribution.version, _licence(metadata)))
     return [found[name] for name in sorted(found)]
-
-
-def python_version() -> str:
-    """Version of the interpreter."""
-    return platform.python_version()
 
 
 def _licence(metadata: PackageMetadata) -> str:
