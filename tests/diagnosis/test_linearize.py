@@ -11,13 +11,7 @@ from support import UR10, chain_of
 from synthetic import NOISE, conditions_on, made_states
 
 from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
-from elastocal.diagnosis.linearize import (
-    lacking,
-    linearized,
-    shapes_looked_at_closely,
-    shapes_tried,
-    smallest_shown,
-)
+from elastocal.diagnosis.linearize import lacking, linearized, shapes_looked_at_closely, shapes_tried, smallest_shown
 from elastocal.diagnosis.other import competitors
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
@@ -47,6 +41,14 @@ def with_effect(campaign, key, values):
     start = campaign.declared.estimate.with_effects([campaign.candidates[key]])
     start.coefficients[-1][:] = values
     return model, start
+
+
+def fitted_at(campaign, key, *shapes):
+    """The declared fit with an effect of no size, of given shapes or of those that a fit starts from."""
+    model, start = with_effect(campaign, key, 0.0)
+    if shapes:
+        start.shapes[-1][:] = shapes
+    return replace(campaign.declared, model=model, estimate=start)
 
 
 def unit_of(found, key):
@@ -180,9 +182,7 @@ def test_shapes_are_tried_over_their_range_and_as_fitted(campaign):
     (shape,) = shaped.shapes
     tried = [value for (value,) in shapes_tried(shaped, campaign.declared)]
     assert len(tried) == 3 and tried == sorted(tried) and shape.lowest < tried[0] and tried[-1] < shape.highest
-    model, start = with_effect(campaign, shaped.key, 0.0)
-    fitted = replace(campaign.declared, model=model, estimate=start)
-    assert shapes_tried(shaped, fitted) == [(shape.start,)]
+    assert shapes_tried(shaped, fitted_at(campaign, shaped.key)) == [(shape.start,)]
     assert shapes_tried(campaign.candidates["joint_offset@3"], campaign.declared) == [()]
 
 
@@ -190,9 +190,7 @@ def test_shapes_are_tried_over_their_range_and_as_fitted(campaign):
 def test_a_step_that_was_fitted_is_tried_close_to_where_it_was_within_its_range(campaign, when):
     """Itself among them, or the fit could only become worse; each of its values has a share of the prior."""
     step = campaign.candidates["setup_step"]
-    model, start = with_effect(campaign, "setup_step", 0.0)
-    start.shapes[-1][:] = when
-    tried = [value for (value,) in shapes_tried(step, replace(campaign.declared, model=model, estimate=start))]
+    tried = [value for (value,) in shapes_tried(step, fitted_at(campaign, "setup_step", when))]
     (shape,) = step.shapes
     assert np.isclose(tried, when).any() and len(tried) >= 4
     assert min(tried) >= shape.lowest and max(tried) <= shape.highest
@@ -207,11 +205,7 @@ def test_names_of_all_that_is_tested_are_unique_wherever_a_step_was_fitted(campa
     """As tried, and after a closer look about each value that was tried, however close these lie to the end of the range."""
     states = made_states(6, rows)
     around = conditions_on(chain_of(UR10), states if dated else replace(states, time_s=None, temperature_c=None))
-    fitted = campaign.declared
-    if when is not None:
-        model, start = with_effect(campaign, "setup_step", 0.0)
-        start.shapes[-1][:] = when
-        fitted = replace(fitted, model=model, estimate=start)
+    fitted = campaign.declared if when is None else fitted_at(campaign, "setup_step", when)
     model = replace(fitted.model, sites=around.sites)
     candidates = [c for c in candidates_on(around.sites).values() if not lacking(c, model, states)]
     laws = [(each, 1) for each in competitors(around)]
@@ -284,10 +278,7 @@ def test_the_best_shape_stays_among_those_looked_at_wherever_it_lies(bent, key, 
 def test_a_shape_that_was_fitted_elsewhere_than_tried_stays_among_those_looked_at(campaign):
     """A fit tries its own value alone, which is nowhere near the middle of the range."""
     key = "thermal_growth[time]"
-    model, start = with_effect(campaign, key, 0.0)
-    start.shapes[-1][:] = 1300.0
-    fitted = replace(campaign.declared, model=model, estimate=start)
-    problem = problem_of(campaign, fitted, (key, "joint_offset@3")).problem
+    problem = problem_of(campaign, fitted_at(campaign, key, 1300.0), (key, "joint_offset@3")).problem
     (values,) = looked_at(problem, factors(problem, {(key, 0): 30.0})).values()
     below, above = np.geomspace(900.0, 1300.0, 5)[1:-1], np.geomspace(1300.0, 36000.0, 5)[1:-1]
     np.testing.assert_allclose(values, [*below, 1300.0, *above])
@@ -312,9 +303,7 @@ def test_every_shape_of_the_catalogue_is_tried_within_its_range(campaign):
 def test_a_shape_that_was_fitted_at_an_end_of_its_range_is_tried_there_and_not_beyond(campaign, key, end):
     candidate = campaign.candidates[key]
     ends = ends_of(candidate)
-    model, start = with_effect(campaign, key, 0.0)
-    start.shapes[-1][:] = ends[end]
-    tried = [value for (value,) in shapes_tried(candidate, replace(campaign.declared, model=model, estimate=start))]
+    tried = [value for (value,) in shapes_tried(candidate, fitted_at(campaign, key, ends[end]))]
     assert ends[end] in tried and min(tried) >= ends[0] and max(tried) <= ends[1]
     # Only of a step others are tried beside, all on the one side that there is.
     assert (len(tried) > 1) == (key == "setup_step")
