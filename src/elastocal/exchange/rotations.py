@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.exchange.column_names import EULER, HOMOGENEOUS, MATRIX, QUATERNION, VECTOR
 
 NO_ROTATION, VECTORS, QUATERNIONS, MATRICES, HOMOGENEOUS_MATRICES = "none", "vector", "quaternion", "matrix", "homogeneous"
-_COLUMNS = {
+_COLUMNS: dict[str, tuple[str, ...]] = {
     NO_ROTATION: (),
     VECTORS: VECTOR,
     QUATERNIONS: QUATERNION,
