@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.fitting.prediction import target_points
@@ -11,16 +10,10 @@ from elastocal.mechanics.kinematics import poses
 from elastocal.remainder.inputs import inputs_of
 
 
-@pytest.fixture
-def made(fanuc):
-    """A model, its estimate and what is seen of it."""
+def test_the_jacobian_is_that_of_each_target_and_its_place_is_shown(fanuc):
     model = made_model(fanuc.chain, rows=3, compliance=fanuc.compliance)
     estimate = made_estimate(model, (0,), seed=3)
-    return model, estimate, seen_exactly(model, estimate, made_states(6, 9, seed=4))
-
-
-def test_the_jacobian_is_that_of_each_target_and_its_place_is_shown(made):
-    model, estimate, seen = made
+    seen = seen_exactly(model, estimate, made_states(6, 9, seed=4))
     inputs = inputs_of(model, estimate, seen, elsewhere=False)
     step, joint = 1e-6, 2
     for number, point in enumerate(target_points(model, estimate)):
@@ -35,8 +28,10 @@ def test_the_jacobian_is_that_of_each_target_and_its_place_is_shown(made):
         np.testing.assert_array_equal(inputs.others[mask, -3:], np.tile(estimate.target_offset[number], (mask.sum(), 1)))
 
 
-def test_time_and_temperature_carry_nothing_over_to_another_campaign(made):
-    model, estimate, seen = made
+def test_time_and_temperature_carry_nothing_over_to_another_campaign(fanuc):
+    model = made_model(fanuc.chain, rows=3, compliance=fanuc.compliance)
+    estimate = made_estimate(model, (0,), seed=3)
+    seen = seen_exactly(model, estimate, made_states(6, 9, seed=4))
     timed, timeless = (
         replace(seen, states=replace(seen.states, time_s=time, temperature_c=temperature))
         for time, temperature in ((np.arange(9.0), np.full(9, 21.0)), (None, None))
