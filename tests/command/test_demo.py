@@ -25,17 +25,9 @@ def run(elastocal, monkeypatch, tmp_path):
     whole = main.InOrder.main
     monkeypatch.setattr(main.InOrder, "main", main_of_the_rest)
     monkeypatch.setattr(demo, "workplace", lambda: tmp_path)
-    stand_ins = {
-        "fill_sheet": lambda *_: 12,
-        "write_milling_path": lambda *_: 50,
-        "measured_errors": lambda *_: {
-            "uncorrected": np.full(3, 2e-3),
-            "corrected": np.full(3, 1e-4),
-            "noise alone": np.full(3, 9e-5),
-        },
-    }
-    for name, stand_in in stand_ins.items():
-        monkeypatch.setattr(f"elastocal_proof.blind.rehearsal_files.{name}", stand_in)
+    missed = {name: np.full(3, off) for name, off in (("uncorrected", 2e-3), ("corrected", 1e-4), ("noise alone", 9e-5))}
+    for name, result in (("fill_sheet", 12), ("write_milling_path", 50), ("measured_errors", missed)):
+        monkeypatch.setattr(f"elastocal_proof.blind.rehearsal_files.{name}", lambda *_, result=result: result)
     monkeypatch.setattr("elastocal.campaigns.reading.read_descriptions", lambda *_: ({}, ""))
 
     def ended(*words, **other):

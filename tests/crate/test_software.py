@@ -2,7 +2,7 @@
 
 from importlib.metadata import version
 
-from elastocal.crate.software import installed_packages, python_version
+from elastocal.crate.software import installed_packages
 
 
 def test_packages_stand_once_each_with_version_and_licence():
@@ -15,7 +15,3 @@ def test_packages_stand_once_each_with_version_and_licence():
     assert listed["elastocal"].licence == "MIT"
     assert all("\n" not in package.licence for package in found)
     assert listed["numpy"].url == f"pkg:pypi/numpy@{version('numpy')}"
-
-
-def test_the_version_of_python_is_that_of_this_interpreter():
-    assert python_version().startswith("3.")

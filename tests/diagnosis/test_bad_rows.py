@@ -115,10 +115,6 @@ def test_a_bad_row_that_is_held_out_is_named_and_both_errors_are_given(tmp_path,
     assert any("line 15" in warning for warning in found["warnings"])
 
 
-def test_without_a_bad_row_there_is_no_second_figure(clean):
-    assert clean["heldout"]["with_gross_errors"] is None
-
-
 def test_two_swapped_rows_leave_the_verdict_and_are_both_named(tmp_path, clean):
     found = verdict_on(tmp_path, [(swapped, 8, 30)])
     assert places(found) == places(clean)

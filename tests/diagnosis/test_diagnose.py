@@ -97,11 +97,8 @@ def test_an_error_that_all_measurements_of_a_pose_share_is_noise_of_the_model_an
 
 
 @pytest.fixture(scope="module")
-def case(kuka, config_folder, tmp_path_factory):
-    """A robot whose joint 3 stands 1 mrad beyond what it reports; a load that is nowhere but at the last point."""
-    table = made_table(kuka, "made", offset_of_joint_3=OFFSET)
-    folder = made_folder(tmp_path_factory.mktemp("diagnose") / "made", kuka, table=table)
-    return cases_in(folder, config_folder / "robots")[0]
+def case(cases):
+    return cases[0]
 
 
 @pytest.fixture(scope="module")

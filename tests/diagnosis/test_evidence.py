@@ -71,6 +71,11 @@ def evaluated(rows, units, start=None):
     return evaluate(statistics, units, GRID, LOG_POSE, start)
 
 
+def part_of_grid(kept):
+    """A grid of some of the sizes alone."""
+    return Grid(GRID.scales[kept], GRID.log_weights[kept] - logsumexp(GRID.log_weights[kept]))
+
+
 def log_bayes_factor(rows, units):
     return evaluated(rows, units).log_evidence - evaluated(rows, ()).log_evidence
 
@@ -280,25 +285,20 @@ def test_weights_of_the_pose_error_are_those_of_the_settings():
     np.testing.assert_allclose(weights, [0.7, 0.1, 0.1, 0.1])
 
 
-def test_sizes_below_the_smallest_of_a_unit_weigh_nothing_and_those_above_as_before():
-    whole, some = (np.exp(GRID.of(made_unit("a", (1,), 0, smallest=smallest))) for smallest in (0, 2))
-    np.testing.assert_allclose(whole, np.exp(GRID.log_weights))
-    assert not some[:2].any() and some.sum() == pytest.approx(1.0)
-    np.testing.assert_allclose(some[2:] / some[-1], whole[2:] / whole[-1])
-
-
-def test_sizes_above_the_largest_of_a_unit_weigh_nothing_and_those_below_as_before():
-    whole = np.exp(GRID.log_weights)
-    some = np.exp(GRID.of(replace(UNITS[0], smallest=1, largest=4)))
-    assert some[[0, 5]].tolist() == [0.0, 0.0] and some.sum() == pytest.approx(1.0)
-    np.testing.assert_allclose(some[1:5] / some[1], whole[1:5] / whole[1])
+@pytest.mark.parametrize(
+    ("bounds", "kept"), [({}, slice(0, 6)), ({"smallest": 2}, slice(2, 6)), ({"smallest": 1, "largest": 4}, slice(1, 5))]
+)
+def test_sizes_beyond_those_of_a_unit_weigh_nothing_and_the_others_as_before(bounds, kept):
+    some = np.exp(GRID.of(replace(UNITS[0], **bounds)))
+    assert some.sum() == pytest.approx(1.0) and not np.delete(some, np.arange(6)[kept]).any()
+    np.testing.assert_allclose(some[kept], np.exp(part_of_grid(kept).log_weights))
 
 
 def test_a_signal_beyond_the_largest_size_of_a_unit_is_paid_for():
     """Wherever the search for the sizes starts, as on a grid without the larger ones."""
     statistics = statistics_of(quiet(1, (6.0, -5.0)).products, TAU)
-    left = Grid(GRID.scales[:5], GRID.log_weights[:5] - logsumexp(GRID.log_weights[:5]))
-    whole, cut = (evaluate(statistics, [UNITS[0]], grid, LOG_POSE, [0.1]).log_evidence for grid in (GRID, left))
+    grids = GRID, part_of_grid(slice(5))
+    whole, cut = (evaluate(statistics, [UNITS[0]], grid, LOG_POSE, [0.1]).log_evidence for grid in grids)
     for start in SETTINGS.scales:
         found = evaluate(statistics, [replace(UNITS[0], largest=4)], GRID, LOG_POSE, [start])
         assert found.log_evidence == pytest.approx(cut, abs=1e-8) and found.scales[0] == GRID.scales[4]
@@ -317,8 +317,7 @@ def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():
     """Of a small signal, for which the sizes left out are the likely ones: wherever the search for the sizes starts."""
     rows = quiet(1, (0.02, -0.01))
     unit = replace(UNITS[0], smallest=3)
-    left = Grid(GRID.scales[3:], GRID.log_weights[3:] - logsumexp(GRID.log_weights[3:]))
-    expected = brute_log_bayes_factor(rows, [unit], left)
+    expected = brute_log_bayes_factor(rows, [unit], part_of_grid(slice(3, None)))
     for start in SETTINGS.scales:
         found = evaluated(rows, [unit], [start])
         assert found.log_evidence - evaluated(rows, ()).log_evidence == pytest.approx(expected, abs=1e-8)
@@ -347,7 +346,7 @@ def test_moments_are_averaged_over_the_sizes_that_a_unit_may_have():
     statistics = statistics_of(quiet(16, (0.03, -0.02)).products, TAU)
     base = statistics.log_likelihood + LOG_POSE
     unit = replace(UNITS[0], smallest=2)
-    left = Grid(GRID.scales[2:], GRID.log_weights[2:] - logsumexp(GRID.log_weights[2:]))
+    left = part_of_grid(slice(2, None))
     ((mean, variance),) = Joint(statistics, [unit], GRID, base, np.array([3])).moments()
     ((expected, spread),) = Joint(statistics, [UNITS[0]], left, base, np.array([1])).moments()
     np.testing.assert_allclose(mean, expected)

@@ -28,17 +28,23 @@ def test_a_location_in_words_is(mechanism, location):
 
 
 @pytest.fixture(scope="module")
-def found(kuka):
+def campaign(kuka):
+    return planted(kuka, {}, seed=1)
+
+
+@pytest.fixture(scope="module")
+def found(campaign):
     """A fit of some effects that the robot does not have."""
-    campaign = planted(kuka, {}, seed=1)
     effects = [campaign.candidates[key] for key in ("joint_tilt@2", "payload", "joint_offset@3", "base_compliance")]
     model, start = campaign.declared.model.with_effects(effects), campaign.declared.estimate.with_effects(effects)
     count = len(campaign.declared.parameters) + sum(len(effect.parameters) for effect in effects)
-    deviation = np.full(count, 1e-12)
-    fitted = replace(
-        campaign.declared, model=model, estimate=start, covariance=np.diag(deviation**2), held=np.zeros(count, bool)
-    )
+    stated = {"covariance": 1e-24 * np.eye(count), "held": np.zeros(count, bool)}
+    fitted = replace(campaign.declared, model=model, estimate=start, **stated)
     return fitted, [{"members": [effect.key]} for effect in effects]
+
+
+def effect_of(fitted, key):
+    return next(effect for effect in fitted.model.effects if effect.key == key)
 
 
 def with_value(fitted, key, value, error):
@@ -55,7 +61,7 @@ def with_value(fitted, key, value, error):
 def test_parameters_have_their_values_errors_and_priors(found):
     fitted, _ = found
     fitted = with_value(fitted, "joint_offset@3", 3e-4, 2e-5)
-    effect = next(effect for effect in fitted.model.effects if effect.key == "joint_offset@3")
+    effect = effect_of(fitted, "joint_offset@3")
     (entry,) = parameter_entries(effect, fitted, Averaged({}, {}))
     assert entry == {
         "name": "joint_offset@3 offset",
@@ -71,14 +77,12 @@ def test_parameters_have_their_values_errors_and_priors(found):
     assert entry["value"] == pytest.approx(3.1e-4) and entry["std_error"] == 4e-5
 
 
-def test_what_a_search_has_chosen_is_marked_as_such(kuka):
-    campaign = planted(kuka, {}, seed=1)
+def test_what_a_search_has_chosen_is_marked_as_such(campaign):
     step = campaign.candidates["setup_step"]
     model, start = campaign.declared.model.with_effects([step]), campaign.declared.estimate.with_effects([step])
     count = len(campaign.declared.parameters) + len(step.parameters) + len(step.shapes)
-    fitted = replace(
-        campaign.declared, model=model, estimate=start, covariance=np.eye(count), held=np.arange(count) == count - 1
-    )
+    stated = {"covariance": np.eye(count), "held": np.arange(count) == count - 1}
+    fitted = replace(campaign.declared, model=model, estimate=start, **stated)
     entries = parameter_entries(step, fitted, Averaged({}, {}))
     assert [entry.get("shape", False) for entry in entries] == [False] * 6 + [True] and entries[-1]["name"] == "setup_step when"
 
@@ -103,7 +107,7 @@ def declared_springs(fitted, compliance):
 def test_no_mass_is_told_where_the_compliances_are_not_identified(found):
     fitted, entries = found
     heavy = with_value(fitted, "payload", 24.4, 0.9)
-    payload = next(effect for effect in heavy.model.effects if effect.key == "payload")
+    payload = effect_of(heavy, "payload")
     assert parameter_entries(payload, heavy, Averaged({}, {}))[0]["unit"] == "kg"
     taken = declared_springs(heavy, 1e-6 * np.array([20.0, 8.0, 3.0, 2.0, 2.0, 2.0]))
     # Weight cannot turn the first joint, however soft it is.
@@ -114,10 +118,9 @@ def test_no_mass_is_told_where_the_compliances_are_not_identified(found):
     assert not any("rated payload" in warning for warning in implausible(taken, entries, rated_kg=3.0))
 
 
-def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, kuka):
-    campaign = planted(kuka, {}, seed=1)
+def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, campaign, kuka):
     fitted, _ = found
-    payload = next(effect for effect in fitted.model.effects if effect.key == "payload")
+    payload = effect_of(fitted, "payload")
     heavy = with_value(fitted, "payload", 20.0, 1.0)
     assert sag_entries("payload", [payload], heavy, campaign.observations) == []
     taken = declared_springs(heavy, kuka.compliance)
@@ -129,8 +132,7 @@ def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, kuka):
     largest = np.linalg.norm(positions[0] - positions[1], axis=1).max()
     assert entry["unit"] == "m" and entry["value"] == pytest.approx(largest, rel=0.02)
     assert entry["std_error"] == pytest.approx(entry["value"] / 20.0, rel=1e-3)
-    tilt = next(effect for effect in fitted.model.effects if effect.key == "joint_tilt@2")
-    assert sag_entries("joint_tilt", [tilt], taken, campaign.observations) == []
+    assert sag_entries("joint_tilt", [effect_of(fitted, "joint_tilt@2")], taken, campaign.observations) == []
 
 
 def test_nothing_is_implausible_about_values_within_their_limits(found):
@@ -148,7 +150,7 @@ def test_the_wrong_sign_is_named(found):
 
 def test_a_size_beyond_what_such_an_effect_reaches_is_named(found):
     fitted, entries = found
-    plausible = next(e for e in fitted.model.effects if e.key == "joint_offset@3").parameters[0].plausible
+    plausible = effect_of(fitted, "joint_offset@3").parameters[0].plausible
     for sign in (1, -1):
         (warning,) = implausible(with_value(fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible), entries)
         assert warning.startswith("joint_offset@3: offset is") and "3 times what such an effect reaches" in warning

@@ -5,21 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bad_rows import damaged
-from made_folders import made_folder, made_table
 
 from elastocal.diagnosis.kept_rows import extreme_loads, first_kept, fitted_to
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop.whole import cases_in
 
 SETTINGS, BAD = Settings(), 11
 
 
-@pytest.fixture(scope="module")
-def case(kuka, config_folder, tmp_path_factory):
-    """Training part of a robot whose joint 3 stands 1 mrad off, which is not declared."""
-    folder = tmp_path_factory.mktemp("rows") / "made"
-    made_folder(folder, kuka, table=made_table(kuka, "made", offset_of_joint_3=1e-3))
-    return cases_in(folder, config_folder / "robots")[0]
+@pytest.fixture
+def case(cases):
+    return cases[0]
 
 
 def test_all_rows_are_kept_where_all_are_good(case):

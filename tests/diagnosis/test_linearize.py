@@ -11,13 +11,7 @@ from support import UR10, chain_of
 from synthetic import NOISE, conditions_on, made_states
 
 from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
-from elastocal.diagnosis.linearize import (
-    lacking,
-    linearized,
-    shapes_looked_at_closely,
-    shapes_tried,
-    smallest_shown,
-)
+from elastocal.diagnosis.linearize import lacking, linearized, shapes_looked_at_closely, shapes_tried, smallest_shown
 from elastocal.diagnosis.other import competitors
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
@@ -47,6 +41,14 @@ def with_effect(campaign, key, values):
     start = campaign.declared.estimate.with_effects([campaign.candidates[key]])
     start.coefficients[-1][:] = values
     return model, start
+
+
+def fitted_at(campaign, key, *shapes):
+    """The declared fit with an effect of no size, of given shapes or of those that a fit starts from."""
+    model, start = with_effect(campaign, key, 0.0)
+    if shapes:
+        start.shapes[-1][:] = shapes
+    return replace(campaign.declared, model=model, estimate=start)
 
 
 def unit_of(found, key):
@@ -117,23 +119,17 @@ def test_candidates_without_their_covariate_are_untestable_with_the_reason(kuka)
     assert tested == {"joint_offset@3"}
 
 
-def test_too_few_angles_of_a_joint_test_no_harmonic_of_it(kuka):
+@pytest.mark.parametrize(
+    ("key", "joint", "angles"),
+    [("transmission_harmonic@4[orders 1-2]", 4, 3), *(("nest_eccentricity", 6, n) for n in (3, 7, 8))],
+)
+def test_too_few_angles_of_a_joint_test_no_law_that_goes_by_them(kuka, key, joint, angles):
+    """Nor of the last joint a nest, a law that belongs to no joint."""
     states = made_states(6, 30, seed=4)
-    states.joint_angles[:, 3] = np.arange(30) % 3 * 0.4
+    states.joint_angles[:, joint - 1] = np.arange(30) % angles * 0.4
     campaign = planted(kuka, {}, states=states, targets=HAND)
-    candidate = campaign.candidates["transmission_harmonic@4[orders 1-2]"]
-    told = lacking(candidate, campaign.declared.model, states)
-    assert told == f"3 angles of joint 4 where {candidate.distinct_angles} are needed"
-
-
-@pytest.mark.parametrize("angles", [3, 7, 8])
-def test_too_few_angles_of_the_last_joint_test_no_nest(kuka, angles):
-    """A law that belongs to no joint and goes with the angle of one."""
-    states = made_states(6, 30, seed=4)
-    states.joint_angles[:, 5] = np.arange(30) % angles * 0.4
-    campaign = planted(kuka, {}, states=states, targets=HAND)
-    told = lacking(campaign.candidates["nest_eccentricity"], campaign.declared.model, states)
-    assert told == ("" if angles == 8 else f"{angles} angles of joint 6 where 8 are needed")
+    told = lacking(campaign.candidates[key], campaign.declared.model, states)
+    assert told == ("" if angles == 8 else f"{angles} angles of joint {joint} where 8 are needed")
 
 
 def test_what_is_too_small_to_be_seen_at_any_size_is_untestable(kuka):
@@ -180,9 +176,7 @@ def test_shapes_are_tried_over_their_range_and_as_fitted(campaign):
     (shape,) = shaped.shapes
     tried = [value for (value,) in shapes_tried(shaped, campaign.declared)]
     assert len(tried) == 3 and tried == sorted(tried) and shape.lowest < tried[0] and tried[-1] < shape.highest
-    model, start = with_effect(campaign, shaped.key, 0.0)
-    fitted = replace(campaign.declared, model=model, estimate=start)
-    assert shapes_tried(shaped, fitted) == [(shape.start,)]
+    assert shapes_tried(shaped, fitted_at(campaign, shaped.key)) == [(shape.start,)]
     assert shapes_tried(campaign.candidates["joint_offset@3"], campaign.declared) == [()]
 
 
@@ -190,9 +184,7 @@ def test_shapes_are_tried_over_their_range_and_as_fitted(campaign):
 def test_a_step_that_was_fitted_is_tried_close_to_where_it_was_within_its_range(campaign, when):
     """Itself among them, or the fit could only become worse; each of its values has a share of the prior."""
     step = campaign.candidates["setup_step"]
-    model, start = with_effect(campaign, "setup_step", 0.0)
-    start.shapes[-1][:] = when
-    tried = [value for (value,) in shapes_tried(step, replace(campaign.declared, model=model, estimate=start))]
+    tried = [value for (value,) in shapes_tried(step, fitted_at(campaign, "setup_step", when))]
     (shape,) = step.shapes
     assert np.isclose(tried, when).any() and len(tried) >= 4
     assert min(tried) >= shape.lowest and max(tried) <= shape.highest
@@ -207,11 +199,7 @@ def test_names_of_all_that_is_tested_are_unique_wherever_a_step_was_fitted(campa
     """As tried, and after a closer look about each value that was tried, however close these lie to the end of the range."""
     states = made_states(6, rows)
     around = conditions_on(chain_of(UR10), states if dated else replace(states, time_s=None, temperature_c=None))
-    fitted = campaign.declared
-    if when is not None:
-        model, start = with_effect(campaign, "setup_step", 0.0)
-        start.shapes[-1][:] = when
-        fitted = replace(fitted, model=model, estimate=start)
+    fitted = campaign.declared if when is None else fitted_at(campaign, "setup_step", when)
     model = replace(fitted.model, sites=around.sites)
     candidates = [c for c in candidates_on(around.sites).values() if not lacking(c, model, states)]
     laws = [(each, 1) for each in competitors(around)]
@@ -266,28 +254,10 @@ def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_
     np.testing.assert_allclose(found["thermal_growth[time]"], closer)
 
 
-@pytest.mark.parametrize(
-    ("key", "place", "best", "ends"),
-    [
-        ("setup_step", 0, 1 / 12, (1 / 12, 2 / 12)),
-        ("setup_step", 10, 11 / 12, (10 / 12, 11 / 12)),
-        ("link_elasticity@3", 0, 0.3, (0.0, 0.6)),
-    ],
-)
-def test_the_best_shape_stays_among_those_looked_at_wherever_it_lies(bent, key, place, best, ends):
-    (values,) = looked_at(bent, factors(bent, {(key, place): 30.0})).values()
-    assert np.isclose(values, best).sum() == 1 and values == sorted(values)
-    inside = [value for value in values if ends[0] < value < ends[1]]
-    assert len(inside) >= 3 and (np.diff(values) > 1e-6).all()
-
-
 def test_a_shape_that_was_fitted_elsewhere_than_tried_stays_among_those_looked_at(campaign):
     """A fit tries its own value alone, which is nowhere near the middle of the range."""
     key = "thermal_growth[time]"
-    model, start = with_effect(campaign, key, 0.0)
-    start.shapes[-1][:] = 1300.0
-    fitted = replace(campaign.declared, model=model, estimate=start)
-    problem = problem_of(campaign, fitted, (key, "joint_offset@3")).problem
+    problem = problem_of(campaign, fitted_at(campaign, key, 1300.0), (key, "joint_offset@3")).problem
     (values,) = looked_at(problem, factors(problem, {(key, 0): 30.0})).values()
     below, above = np.geomspace(900.0, 1300.0, 5)[1:-1], np.geomspace(1300.0, 36000.0, 5)[1:-1]
     np.testing.assert_allclose(values, [*below, 1300.0, *above])
@@ -312,9 +282,7 @@ def test_every_shape_of_the_catalogue_is_tried_within_its_range(campaign):
 def test_a_shape_that_was_fitted_at_an_end_of_its_range_is_tried_there_and_not_beyond(campaign, key, end):
     candidate = campaign.candidates[key]
     ends = ends_of(candidate)
-    model, start = with_effect(campaign, key, 0.0)
-    start.shapes[-1][:] = ends[end]
-    tried = [value for (value,) in shapes_tried(candidate, replace(campaign.declared, model=model, estimate=start))]
+    tried = [value for (value,) in shapes_tried(candidate, fitted_at(campaign, key, ends[end]))]
     assert ends[end] in tried and min(tried) >= ends[0] and max(tried) <= ends[1]
     # Only of a step others are tried beside, all on the one side that there is.
     assert (len(tried) > 1) == (key == "setup_step")
@@ -328,10 +296,11 @@ def test_a_closer_look_stays_within_the_range_and_keeps_all_that_was_tried(bent,
     for place in range(len(units)):
         (values,) = looked_at(bent, factors(bent, {(key, place): 30.0})).values()
         assert set(before) < set(values) and min(values) >= lowest and max(values) <= highest
-        # None of the new ones is beyond a neighbour of the best.
-        best = before.index(units[place].shapes[0])
+        assert values == sorted(values) and np.diff(values).min() > 1e-6
+        # Three new ones or more, none of them beyond a neighbour of the best.
+        best, found = before.index(units[place].shapes[0]), set(values) - set(before)
         edges = [lowest, *before, highest]
-        assert all(edges[best] <= value <= edges[best + 2] for value in set(values) - set(before))
+        assert len(found) >= 3 and all(edges[best] <= value <= edges[best + 2] for value in found)
 
 
 def test_other_shapes_of_a_winning_candidate_and_all_other_candidates_stay_units_of_the_closer_problem(campaign):

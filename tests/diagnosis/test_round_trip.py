@@ -23,6 +23,13 @@ def there_and_back(path, schema, blocks):
     return read_table(path, schema)
 
 
+def came_back(diagnosis, folder):
+    """The diagnosis of its files."""
+    facts = json.loads(json.dumps(tables.diagnosis_facts(diagnosis)))
+    steps = there_and_back(folder / "s.parquet", STEPS, tables.step_blocks(diagnosis))
+    return tables.diagnosis_from(diagnosis.case, facts, steps)
+
+
 def cases_of(folder, robots, robot, **changes):
     table = made_table(robot, "made", plan=PLAN, offset_of_joint_3=changes.pop("offset", 0.0))
     return cases_in(made_folder(folder / "made", robot, table=table, **changes), robots)
@@ -72,9 +79,7 @@ def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_
     assert diagnosis.document["converged"]["final"] == diagnosis.declared.converged
     verdict = judge(diagnosis, held_out, 1).document
     assert verdict["heldout"]["before"] == verdict["heldout"]["after"] and verdict["effects"][0]["heldout_gain"] is None
-    facts = json.loads(json.dumps(tables.diagnosis_facts(diagnosis)))
-    steps = there_and_back(tmp_path / "s.parquet", STEPS, tables.step_blocks(diagnosis))
-    back = tables.diagnosis_from(diagnosis.case, facts, steps)
+    back = came_back(diagnosis, tmp_path)
     assert [step.kind for step in back.steps] == ["frames", "declared"]
     assert not any(effect["adopted"] for effect in judge(back, held_out, 1).document["effects"])
     # And the next experiment can be planned.
@@ -91,9 +96,7 @@ def test_an_effect_that_is_expected_to_help_is_adopted(found):
 @pytest.mark.parametrize("kind", ["found", "faulty"])
 def test_a_diagnosis_comes_back_and_is_judged_the_same(kind, request, tmp_path):
     diagnosis, held_out = request.getfixturevalue(kind)
-    facts = json.loads(json.dumps(tables.diagnosis_facts(diagnosis)))
-    steps = there_and_back(tmp_path / "s.parquet", STEPS, tables.step_blocks(diagnosis))
-    back = tables.diagnosis_from(diagnosis.case, facts, steps)
+    back = came_back(diagnosis, tmp_path)
     assert [(step.name, step.kind) for step in back.steps] == [(step.name, step.kind) for step in diagnosis.steps]
     for mine, theirs in zip(back.steps, diagnosis.steps, strict=True):
         assert mine.fitted.parameters == theirs.fitted.parameters, mine.name

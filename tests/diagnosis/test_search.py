@@ -41,6 +41,19 @@ def problem_of(signal, seed=0, settings=None):
     return made_problem(replace(rows, residual=rows.residual + moved), UNITS, settings, TAU)[0]
 
 
+def cancelling(size, units):
+    """The problem of a campaign with so much of three columns that nearly cancel: no single one of them shows.
+
+    A search of it extends but the best model once.
+    """
+    rows = made_rows(3, poses=14, candidates=6)
+    common = 30 * np.random.default_rng(4).standard_normal(len(rows.pose))
+    candidates = rows.candidates.copy()
+    candidates[:, :3] += np.outer(common, [1, 1, -2])
+    rows = replace(rows, candidates=candidates, residual=rows.residual + size * candidates[:, :3].sum(axis=1))
+    return made_problem(rows, units, replace(Settings(), beam=1, patience=1), TAU)[0]
+
+
 def enumerated(problem):
     """Posterior probability of every model, each evaluated in full."""
     odds = {}
@@ -78,15 +91,8 @@ def test_the_most_probable_model_is_the_one_that_made_the_measurements(signal, b
 
 
 def test_a_mechanism_at_all_its_locations_is_found_where_no_single_one_of_them_shows():
-    """Columns that nearly cancel, and a search that extends but the best model once: no single location leads there."""
-    rows = made_rows(3, poses=14, candidates=6)
-    common = 30 * np.random.default_rng(4).standard_normal(len(rows.pose))
-    candidates = rows.candidates.copy()
-    candidates[:, :3] += np.outer(common, [1, 1, -2])
-    rows = replace(rows, candidates=candidates, residual=rows.residual + candidates[:, :3].sum(axis=1))
     units = (*UNITS[:3], made_unit("tilt", (1,), 3), made_unit("tilt", (2,), 4))
-    problem, _ = made_problem(rows, units, replace(Settings(), beam=1, patience=1), TAU)
-    assert posterior(problem).models[0].units == (0, 1, 2)
+    assert posterior(cancelling(1.0, units)).models[0].units == (0, 1, 2)
 
 
 def test_nothing_is_always_among_the_models_however_improbable():
@@ -159,15 +165,9 @@ def test_sizes_of_a_model_come_in_the_order_of_its_units():
 
 
 def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
-    """Columns that nearly cancel, of mechanisms at one location each: no single one of them shows, nor any two."""
-    rows = made_rows(3, poses=14, candidates=6)
-    common = 30 * np.random.default_rng(4).standard_normal(len(rows.pose))
-    candidates = rows.candidates.copy()
-    candidates[:, :3] += np.outer(common, [1, 1, -2])
-    rows = replace(rows, candidates=candidates, residual=rows.residual + 1.5 * candidates[:, :3].sum(axis=1))
+    """Of mechanisms at one location each: no single one of them shows, nor any two."""
     units = [made_unit(name, (1,), column, candidate=SimpleNamespace(key=name)) for column, name in enumerate("abc")]
-    units += [made_unit("d", (1,), 3), made_unit("e", (1,), 4)]
-    problem, _ = made_problem(rows, units, replace(Settings(), beam=1, patience=1), TAU)
+    problem = cancelling(1.5, [*units, made_unit("d", (1,), 3), made_unit("e", (1,), 4)])
     best = max(posterior(problem, keys).models[0].log_odds for keys in ((), ("a",)))
     # What is known and not tested is no matter.
     found = posterior(problem, {"a", "b", "c", "gone"})

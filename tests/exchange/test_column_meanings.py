@@ -84,9 +84,8 @@ def test_a_quaternion_beside_joints_is_a_question(tmp_path, joints, parts):
     with refused(tmp_path / "t.csv", "header", ", ".join(parts), "length 1", f"--column qw={parts[0]!r}"):
         table(tmp_path, text)
     if joints:
-        columns = {f"q{number}": name for number, name in enumerate(joints, 1)} | dict(
-            zip(("qw", "qx", "qy", "qz"), parts, strict=True)
-        )
+        columns = {f"q{number}": name for number, name in enumerate(joints, 1)}
+        columns |= dict(zip(("qw", "qx", "qy", "qz"), parts, strict=True))
         found = table(tmp_path, text, replace(PLAIN, columns=columns))
         got = np.column_stack([found.table[name] for name in ("rx", "ry", "rz")])
         np.testing.assert_allclose(got, turns.as_rotvec(), atol=1e-5)
@@ -159,13 +158,9 @@ def test_a_rail_is_measured_in_lengths_and_a_joint_in_angles(tmp_path):
     ("names", "words"), [("J1,J2,J3", ["3 joints", "--ignore"]), ("J1", ["no column q2"]), ("a,b", ["no joint angles"])]
 )
 def test_as_many_joints_as_the_robot_has_are_needed(tmp_path, names, words):
+    text = f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n"
     with refused(tmp_path / "t.csv", "header", *words):
-        table(
-            tmp_path,
-            f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n",
-            PLAIN,
-            robot_of("Rz(q1) Tx(1) Rz(q2) [A]"),
-        )
+        table(tmp_path, text, PLAIN, robot_of("Rz(q1) Tx(1) Rz(q2) [A]"))
 
 
 def test_topics_have_positions_orientations_and_forces(tmp_path):
@@ -259,8 +254,3 @@ def test_a_name_that_changes_is_refused_with_its_line(tmp_path):
     text += "shoulder_pan,elbow,shoulder_lift,3,1,2,1,2,3\n"
     with refused(tmp_path / "t.csv", "line 4, column name0", "'shoulder_pan'", "'elbow' in line 2"):
         table(tmp_path, text, PLAIN, three_joints())
-
-
-def test_positions_without_names_are_a_question(tmp_path):
-    with refused(tmp_path / "t.csv", "header", "no joint angles", "position0"):
-        table(tmp_path, "position0,position1,x,y,z\n1,2,1,2,3\n")

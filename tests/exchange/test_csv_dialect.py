@@ -48,7 +48,7 @@ def test_a_separator_at_the_end_of_rows_and_quotes_are_read(tmp_path):
         ("x;y;x\n1;2;3\n", ["line 1", "'x' twice"]),
         ("x;y\n1;2\n1\n", ["line 3", "1 cell", "2, one for each"]),
         ("x;y\n1,5;2.5\n", ["'2.5' in line 2", "'1,5' in line 2", "--decimal"]),
-        ('x;y\n"1;2\n', ["line 2"]),
+        ('x;y\n"1;2\n', ["line 2", "quotes in pairs"]),
         ("x;y\n1;\x002\n", ["line 2", r"the character '\x00'", "UTF-16"]),
         *((f"x;y\n1{each};2\n", ["line 2", ascii(each), "printable"]) for each in "\x0c\x1b\x85\u2028\u202e\u2067"),
         # A blank that does not break.

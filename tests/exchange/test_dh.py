@@ -49,6 +49,27 @@ def frames_of(rows, coordinates, modified):
     return found
 
 
+def assert_stands_and_weighs(robot, rows, modified, places, step):
+    """As rows with a mass and its centre do: `places` are those of measuring points among the rows."""
+    states = made_states(robot.joints, 4, seed=1)
+    own = conditions_of(sites_of(robot), robot.compliance, states).gravity[:, : robot.joints]
+
+    def height(q):
+        """Sum of mass times height, whose slope against gravity is the torque."""
+        frames = frames_of(rows, q, modified)
+        return sum(row[7] * frame.act(np.array(row[8:11]))[2] for row, frame in zip(rows, frames, strict=True))
+
+    for name, place in places.items():
+        position, rotation = poses(robot.chain, states.joint_angles, robot.chain.point(name))
+        for number, q in enumerate(states.joint_angles):
+            frame = frames_of(rows, q, modified)[place]
+            np.testing.assert_allclose(position[number], frame.translation, rtol=0, atol=1e-9)
+            assert np.linalg.norm(pin.log3(frame.rotation.T @ rotation[number])) < 1e-9
+    for number, q in enumerate(states.joint_angles):
+        slope = np.array([(height(q + each) - height(q - each)) / (2 * step) for each in step * np.eye(robot.joints)])
+        np.testing.assert_allclose(own[number], -9.80665 * slope, rtol=0, atol=step)
+
+
 angle, length = st.floats(-3.2, 3.2), st.floats(-0.5, 0.5)
 tables = st.lists(st.tuples(angle, length, length, angle, st.sampled_from("RPF")), min_size=1, max_size=7).filter(
     lambda rows: any(row[4] != "F" for row in rows)
@@ -62,22 +83,7 @@ def test_any_table_is_where_its_notation_puts_it_and_weighs_there(tmp_path_facto
     weighed = [(*row, -1, 1, 1.5 + number, 0.1, -0.02 * number, 0.05) for number, row in enumerate(rows)]
     path = write(tmp_path_factory.mktemp("dh"), weighed, header)
     robot = robot_from_document(yaml.safe_load(robot_text(robot_from_dh(path, modified, DhOptions("rad", "m")))))
-    states = made_states(robot.joints, 4, seed=1)
-    position, rotation = poses(robot.chain, states.joint_angles, robot.chain.end_effector)
-    own = conditions_of(sites_of(robot), robot.compliance, states).gravity[:, : robot.joints]
-
-    def height(q):
-        """Sum of mass times height, whose slope against gravity is the torque."""
-        frames = frames_of(rows, q, modified)
-        return sum(row[7] * frame.act(np.array(row[8:]))[2] for row, frame in zip(weighed, frames, strict=True))
-
-    for number, q in enumerate(states.joint_angles):
-        end = frames_of(rows, q, modified)[-1]
-        np.testing.assert_allclose(position[number], end.translation, rtol=0, atol=1e-9)
-        assert np.linalg.norm(pin.log3(end.rotation.T @ rotation[number])) < 1e-9
-        steps = 1e-5 * np.eye(robot.joints)
-        slope = np.array([(height(q + step) - height(q - step)) / 2e-5 for step in steps])
-        np.testing.assert_allclose(own[number], -9.80665 * slope, rtol=0, atol=1e-5)
+    assert_stands_and_weighs(robot, weighed, modified, {robot.chain.end_effector.name: -1}, 1e-5)
 
 
 def test_the_ur_of_this_project_is_its_table(tmp_path, config_folder):
@@ -88,9 +94,8 @@ def test_the_ur_of_this_project_is_its_table(tmp_path, config_folder):
     robot = robot_from_dh(write(tmp_path, rows), options=PLAIN).robot
     known = robot_from_document(read_document(config_folder / "robots" / "ur10.yaml"))
     q = np.random.default_rng(0).uniform(-3, 3, (5, 6))
-    for one, other in zip(
-        poses(robot.chain, q, robot.chain.end_effector), poses(known.chain, q, known.chain.end_effector), strict=True
-    ):
+    both = (poses(each.chain, q, each.chain.end_effector) for each in (robot, known))
+    for one, other in zip(*both, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
 
 
@@ -162,23 +167,7 @@ def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(tmp_pa
     robot = robot_from_document(yaml.safe_load(robot_text(result)))
     assert sum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T") < 2.5
     assert any("cancel" in note for note in result.notes)
-    states = made_states(6, 5, seed=2)
-    own = conditions_of(sites_of(robot), robot.compliance, states).gravity[:, :6]
-    points = {point.name: point for point in robot.chain.points}
-    for name, place in (("wrist", 4), ("flange", 5)):
-        position, rotation = poses(robot.chain, states.joint_angles, points[name])
-        for number, q in enumerate(states.joint_angles):
-            frame = frames_of(weighed, q, modified)[place]
-            np.testing.assert_allclose(position[number], frame.translation, rtol=0, atol=1e-9)
-            assert np.linalg.norm(pin.log3(frame.rotation.T @ rotation[number])) < 1e-9
-
-    def height(q):
-        frames = frames_of(weighed, q, modified)
-        return sum(2.0 * frame.act(np.array(centre))[2] for frame, centre in zip(frames, centres, strict=True))
-
-    for number, q in enumerate(states.joint_angles):
-        slope = np.array([(height(q + step) - height(q - step)) / 2e-4 for step in 1e-4 * np.eye(6)])
-        np.testing.assert_allclose(own[number], -9.80665 * slope, rtol=0, atol=1e-4)
+    assert_stands_and_weighs(robot, weighed, modified, {"wrist": 4, "flange": 5}, 1e-4)
 
 
 def test_lengths_that_do_not_cancel_are_still_refused(tmp_path):
@@ -188,15 +177,7 @@ def test_lengths_that_do_not_cancel_are_still_refused(tmp_path):
 
 
 def homogeneous(rotation, shift):
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = rotation, shift
-    return made
-
-
-def moved(kind, amount):
-    if kind == "P":
-        return homogeneous(np.eye(3), [0, 0, amount])
-    return homogeneous(Rotation.from_euler("z", amount).as_matrix(), [0, 0, 0])
+    return pin.SE3(rotation, np.array(shift, float)).homogeneous
 
 
 @given(seed=st.integers(0, 10**6), kinds=st.text("RP", min_size=1, max_size=5))
@@ -211,16 +192,16 @@ def test_poses_of_all_points_are_those_of_the_pieces(seed, kinds):
     words, slides = _slid_words(gaps, kinds)
     assert slides.shape == (len(kinds) + 1,) and slides[0] == 0.0
     chain = parse_chain(" ".join(words), {}, "test")
-    points = {point.name: point for point in chain.points}
     q = rng.uniform(-2, 2, len(kinds))
     at = np.eye(4)
     for number, gap in enumerate(gaps):
         if number:
-            at = at @ moved(kinds[number - 1], q[number - 1])
+            turns = kinds[number - 1] == "R"
+            at = at @ screw("z", q[number - 1] * turns, q[number - 1] * (not turns)).homogeneous
         for transform, name in gap:
             at = at @ transform
             if name:
-                position, rotation = poses(chain, q[None], points[name])
+                position, rotation = poses(chain, q[None], chain.point(name))
                 np.testing.assert_allclose(position[0], at[:3, 3], rtol=0, atol=1e-9)
                 np.testing.assert_allclose(rotation[0], at[:3, :3], rtol=0, atol=1e-9)
 

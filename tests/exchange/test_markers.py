@@ -4,19 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from imported_tables import PLAIN as NAMED
+from imported_tables import table
 from support import refused
 
 from elastocal.exchange.import_options import ImportOptions
 from elastocal.exchange.markers import markers_in
-from elastocal.exchange.measurement_table import read_measurement_table
 
-PLAIN = ImportOptions(units={"angles": "deg", "lengths": "mm"})
+PLAIN = replace(NAMED, target=None)
 TWO = ("A", "B")
-
-
-def table(folder, text, options=PLAIN):
-    (folder / "t.csv").write_text(text)
-    return read_measurement_table(folder / "t.csv", options)
 
 
 @pytest.mark.parametrize(
@@ -36,13 +32,13 @@ def table(folder, text, options=PLAIN):
     ],
 )
 def test_markers_are_asked_for_and_read_where_they_are_stated(tmp_path, headers, markers):
-    text = f"q1,{headers},fz\n90,{','.join('111213212223')},-5\n".replace(",1,1", ",1,1")
     places = {header: 10 * (number + 1) for number, header in enumerate(headers.split(","))}
-    text = f"q1,{headers},fz\n90,{','.join(map(str, places.values()))},-5\n7,{','.join(map(str, places.values()))},0\n"
+    cells = ",".join(map(str, places.values()))
+    text = f"q1,{headers},fz\n90,{cells},-5\n7,{cells},0\n"
     named = markers_in(headers.split(","))
     assert tuple(named) == markers
     with refused(tmp_path / "t.csv", "header", *map(repr, markers), f"--target {markers[0]}"):
-        table(tmp_path, text)
+        table(tmp_path, text, PLAIN)
     targets = {"SMR": markers[1], markers[0]: markers[0]}
     found = table(tmp_path, text, replace(PLAIN, targets=targets))
     assert found.table["target"].tolist() == ["SMR", markers[0]] * 2 and found.table["pose"].tolist() == [1, 1, 2, 2]

@@ -25,12 +25,8 @@ ORIGINS = {
 
 def write(folder, links, **beside):
     path = folder / "calib.yaml"
-    path.write_text(
-        yaml.safe_dump(
-            {"kinematics": {name: dict(zip(KEYS, origin, strict=True)) for name, origin in links.items()} | beside},
-            sort_keys=False,
-        )
-    )
+    described = {name: dict(zip(KEYS, origin, strict=True)) for name, origin in links.items()}
+    path.write_text(yaml.safe_dump({"kinematics": described | beside}, sort_keys=False))
     return path
 
 
@@ -39,10 +35,8 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
     path = write(tmp_path, {name: ORIGINS[name] for name in PARTS[::order]}, hash="calib_7")
     result = robot_from_dh(path, name="ur5")
     robot = robot_from_document(yaml.safe_load(robot_text(result)))
-    assert robot.joint_names == (
-        *("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint"),
-        *("wrist_1_joint", "wrist_2_joint", "wrist_3_joint"),
-    )
+    wrist = "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"
+    assert robot.joint_names == ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", *wrist)
     assert robot.chain.end_effector.name == "wrist_3" and any("base_link" in note for note in result.notes)
     q = np.random.default_rng(0).uniform(-3, 3, (5, 6))
     position, rotation = poses(robot.chain, q, robot.chain.end_effector)
@@ -50,20 +44,15 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
         at = pin.SE3.Identity()
         for name, angle in zip(PARTS, angles, strict=True):
             *shift, roll, pitch, yaw = ORIGINS[name]
-            at = (
-                at
-                * pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(shift, float))
-                * pin.SE3(pin.exp3(angle * np.eye(3)[2]), np.zeros(3))
-            )
+            at = at * pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(shift, float))
+            at = at * pin.SE3(pin.exp3(angle * np.eye(3)[2]), np.zeros(3))
         np.testing.assert_allclose(position[number], at.translation, rtol=0, atol=1e-9)
         np.testing.assert_allclose(rotation[number], at.rotation, rtol=0, atol=1e-9)
 
 
 def test_links_of_another_robot_keep_their_order_and_names(tmp_path):
-    assert robot_from_dh(write(tmp_path, {"lower": ORIGINS["forearm"], "fore": ORIGINS["wrist_1"]})).robot.joint_names == (
-        "lower",
-        "fore",
-    )
+    path = write(tmp_path, {"lower": ORIGINS["forearm"], "fore": ORIGINS["wrist_1"]})
+    assert robot_from_dh(path).robot.joint_names == ("lower", "fore")
 
 
 @pytest.mark.parametrize(
@@ -75,11 +64,7 @@ def test_links_of_another_robot_keep_their_order_and_names(tmp_path):
         ({"kinematics": {"shoulder": {"x": 1}}}, "kinematics.shoulder", ["found x;", "roll"]),
         ({"kinematics": {"shoulder": [1, 2]}}, "kinematics.shoulder", ["list"]),
         ({"kinematics": {"shoulder": dict.fromkeys(KEYS, "a")}}, "kinematics.shoulder.x", ["'a'"]),
-        (
-            {"kinematics": {"shoulder": dict.fromkeys(KEYS, 0), "forearm": dict.fromkeys(KEYS, 0)}},
-            "kinematics",
-            ["no link upper_arm"],
-        ),
+        ({"kinematics": dict.fromkeys(("shoulder", "forearm"), dict.fromkeys(KEYS, 0))}, "kinematics", ["no link upper_arm"]),
     ],
 )
 def test_what_is_no_kinematics_is_refused(tmp_path, document, key, words):

@@ -55,8 +55,3 @@ def test_loads_starts_and_covariates_are_read_where_they_are(tmp_path):
 def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
     with refused((tmp_path / "path.csv").as_posix(), key, *words):
         read_target_path(write_path(tmp_path, header, [row]), 2)
-
-
-def test_a_file_that_is_not_there_is_refused(tmp_path):
-    with refused((tmp_path / "none.csv").as_posix(), "", "no such file"):
-        read_target_path(tmp_path / "none.csv", 6)

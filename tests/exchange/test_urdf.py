@@ -68,19 +68,15 @@ def test_a_part_of_the_tree_stands_and_weighs_as_in_the_whole(tmp_path):
     assert {mass.link for mass in robot.masses} == {0, 1, 2, 3}
 
 
-def test_limits_are_degrees_and_metres_and_a_turn_where_there_are_none(tmp_path):
-    path = written(tmp_path, *ARM)
-    robot = robot_from_urdf(path, "base", "flange").robot
+def test_limits_are_degrees_and_metres(tmp_path):
+    robot = robot_from_urdf(written(tmp_path, *ARM), "base", "flange").robot
     np.testing.assert_allclose(robot.joint_limits, [[-1.5, 2.0], [-2 * np.pi, 2 * np.pi], [-0.1, 0.25], [-2, 2]], atol=1e-9)
-    free = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), limits=None))
+
+
+@pytest.mark.parametrize("limits", [None, (-1e16, 1e16)])
+def test_no_limits_and_those_that_stand_for_none_are_a_turn_either_way(tmp_path, limits):
+    free = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), limits=limits))
     result = robot_from_urdf(free, "a", "b")
-    assert result.document["joint_limits_deg"] == [[-360.0, 360.0]]
-    assert any("'j' has no limits" in note for note in result.notes)
-
-
-def test_limits_that_stand_for_none_are_a_turn_too(tmp_path):
-    endless = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), limits=(-1e16, 1e16)))
-    result = robot_from_urdf(endless, "a", "b")
     assert result.document["joint_limits_deg"] == [[-360.0, 360.0]]
     assert any("'j' has no limits" in note for note in result.notes)
 

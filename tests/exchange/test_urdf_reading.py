@@ -97,8 +97,3 @@ def test_more_links_than_can_be_followed_are_refused_at_once(tmp_path):
     joints = [joint(f"j{number}", f"l{number}", f"l{number + 1}") for number in range(2001)]
     with refused(tmp_path / "made.urdf", "", "2002 times <link>", "at most 2000"):
         read_urdf(file_of(tmp_path, robot(*links, *joints)))
-
-
-def test_a_file_that_is_not_there_is_one_line(tmp_path):
-    with refused(tmp_path / "none.urdf", "", "no such file"):
-        read_urdf(tmp_path / "none.urdf")

@@ -7,31 +7,18 @@ import pytest
 from support import refused
 
 from elastocal.io import atomic_writes
-from elastocal.io.atomic_writes import (
-    atomic_write,
-    check_folder,
-    check_places,
-    remove_partials,
-    write_text,
-    write_together,
-)
+from elastocal.io.atomic_writes import atomic_write, check_folder, check_places, remove_partials, write_text, write_together
 
 
-def test_a_file_appears_only_once_it_is_complete(tmp_path):
+@pytest.mark.parametrize("before", [None, "much longer than what follows"])
+def test_a_file_appears_only_once_it_is_complete_and_replaces_what_was_there_as_a_whole(tmp_path, before):
     path = tmp_path / "one.txt"
-    with atomic_write(path) as partial:
-        Path(partial).write_text("half", encoding="utf-8")
-        assert not path.exists() and Path(partial).parent == tmp_path
-    assert path.read_text(encoding="utf-8") == "half" and list(tmp_path.iterdir()) == [path]
-
-
-def test_what_was_there_is_replaced_as_a_whole(tmp_path):
-    path = tmp_path / "one.txt"
-    path.write_text("much longer than what follows", encoding="utf-8")
+    if before:
+        path.write_text(before, encoding="utf-8")
     with atomic_write(str(path)) as partial:
-        Path(partial).write_text("new", encoding="utf-8")
-        assert path.read_text(encoding="utf-8").startswith("much longer")
-    assert path.read_text(encoding="utf-8") == "new"
+        Path(partial).write_text("half", encoding="utf-8")
+        assert Path(partial).parent == tmp_path and (path.read_text(encoding="utf-8") if path.exists() else None) == before
+    assert path.read_text(encoding="utf-8") == "half" and list(tmp_path.iterdir()) == [path]
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])

@@ -27,13 +27,8 @@ ORIGIN = {"elastocal_version": "0.1.0", "configuration": {"seed": 1}, "noise_um"
 
 def block(kind, first, rows=3, **changes):
     numbers = np.arange(first, first + rows)
-    return {
-        "kind": kind,
-        "number": numbers,
-        "length": 0.1 * numbers,
-        "share": np.where(numbers % 2, np.nan, numbers / 3),
-        "good": numbers % 3 == 0,
-    } | changes
+    made = {"kind": kind, "number": numbers, "length": 0.1 * numbers, "share": np.where(numbers % 2, np.nan, numbers / 3)}
+    return {name: values for name, values in (made | {"good": numbers % 3 == 0} | changes).items() if values is not None}
 
 
 @pytest.fixture
@@ -125,20 +120,13 @@ def test_the_same_table_is_the_same_file(tmp_path, path):
         ({"number": [0, 4, -2]}, "column number, row 2", ["-2", ">= 0"]),
         ({"length": [0.1, 0.2]}, "rows", ["2, 3", "one length"]),
         ({"width": [1, 2, 3]}, "columns", ["width", "things"]),
+        ({"share": None}, "columns", ["share", "things"]),
     ],
 )
 def test_faulty_values_are_not_written(new, changes, key, words):
     with refused(new, key, *words):
         write_table(new, SCHEMA, [block("a", 0), block("a", 3, **changes)], {})
     assert not Path(new).exists()
-
-
-def test_a_block_without_a_column_is_not_written(tmp_path):
-    path, missing = str(tmp_path / "faulty.parquet"), block("a", 0)
-    del missing["share"]
-    with refused(path, "columns", "share"):
-        write_table(path, SCHEMA, [missing], {})
-    assert not Path(path).exists()
 
 
 def test_missing_values_are_written_where_the_column_allows_them(new):
@@ -151,21 +139,11 @@ def broken_after(blocks):
     raise RuntimeError("the blocks ran dry")
 
 
-def test_nothing_half_written_remains_under_the_final_name(tmp_path):
-    path = tmp_path / "things.parquet"
-    with pytest.raises(RuntimeError, match="ran dry"):
-        write_table(str(path), SCHEMA, broken_after([block("a", 0)]), {})
-    assert not path.exists()
-
-
-def test_an_older_file_survives_a_block_that_fails(path):
+def test_an_older_file_survives_a_block_that_fails_and_no_other_is_left_behind(path):
     before = Path(path).read_bytes()
     with pytest.raises(RuntimeError, match="ran dry"):
         write_table(path, SCHEMA, broken_after([block("b", 9)]), {})
     assert Path(path).read_bytes() == before
-
-
-def test_a_finished_file_leaves_no_other_file_behind(path):
     assert [p.name for p in Path(path).parent.iterdir()] == ["things.parquet"]
 
 
@@ -214,10 +192,6 @@ def test_a_parquet_file_of_somebody_else_is_refused(new):
     pq.write_table(pa.table({"number": [1, 2]}), new)
     with refused(new, "metadata elastocal.table", "nothing", "things"):
         read_table(new, SCHEMA)
-
-
-def test_a_file_without_provenance_is_refused(new):
-    pq.write_table(pa.table({"number": [1, 2]}), new)
     with refused(new, "elastocal.provenance"):
         read_provenance(new)
 
@@ -273,27 +247,24 @@ def test_a_value_that_an_empty_table_cannot_have_is_refused(new):
         read_table(new, TEXTS, kind="k")
 
 
-def test_texts_of_another_length_are_refused(tmp_path):
+def test_texts_of_another_length_are_refused():
     with refused("t.parquet", "rows", "one length"):
         write_table("t.parquet", TEXTS, [text_block(["a", "b"]) | {"owner": ["a"]}], ORIGIN)
 
 
-def test_what_a_file_is_of_stands_in_columns_that_any_reader_finds(tmp_path):
-    path = tmp_path / "things.parquet"
-    write_table(path, SCHEMA, [block("a", 0), block("b", 3, 2)], ORIGIN | {"robot": "kuka", "noise": "200", "strategy": "6DoF"})
-    read = pq.read_table(path)
-    assert read.column_names[:3] == ["robot", "noise_um", "strategy"] and pa.types.is_dictionary(
-        read.schema.field("robot").type
-    )
+def test_what_a_file_is_of_stands_in_columns_that_any_reader_finds(new):
+    write_table(new, SCHEMA, [block("a", 0), block("b", 3, 2)], ORIGIN | {"robot": "kuka", "noise": "200", "strategy": "6DoF"})
+    read = pq.read_table(new)
+    assert read.column_names[:3] == ["robot", "noise_um", "strategy"]
+    assert pa.types.is_dictionary(read.schema.field("robot").type)
     assert set(read["robot"].to_pylist()) == {"kuka"} and set(read["noise_um"].to_pylist()) == {200.0}
-    encodings = pq.ParquetFile(path).metadata.row_group(0).column(1).encodings
+    encodings = pq.ParquetFile(new).metadata.row_group(0).column(1).encodings
     assert any("DICTIONARY" in encoding for encoding in encodings)
     # Those who know the schema read what they know.
-    assert list(read_table(path, SCHEMA)) == [column.name for column in SCHEMA.columns]
+    assert list(read_table(new, SCHEMA)) == [column.name for column in SCHEMA.columns]
 
 
-def test_a_column_of_the_schema_is_not_taken_from_the_provenance(tmp_path):
+def test_a_column_of_the_schema_is_not_taken_from_the_provenance(new):
     schema = TableSchema("named", (Column("robot", "string", "", "another robot"), Column("number", "int32", "", "a number")))
-    path = tmp_path / "named.parquet"
-    write_table(path, schema, [{"robot": "mine", "number": np.arange(2)}], {"robot": "kuka"})
-    assert pq.read_table(path)["robot"].to_pylist() == ["mine", "mine"]
+    write_table(new, schema, [{"robot": "mine", "number": np.arange(2)}], {"robot": "kuka"})
+    assert pq.read_table(new)["robot"].to_pylist() == ["mine", "mine"]

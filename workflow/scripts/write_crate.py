@@ -1,5 +1,6 @@
 """A finished run as a Workflow Run RO-Crate, with its configuration, its software and a data package of its tables."""
 
+import platform
 from dataclasses import asdict
 from importlib.metadata import metadata
 
@@ -9,7 +10,7 @@ import pandas as pd
 
 from elastocal.crate.data_package import data_package
 from elastocal.crate.run_crate import FinishedRun, run_crate
-from elastocal.crate.software import installed_packages, python_version
+from elastocal.crate.software import installed_packages
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import write_json
@@ -31,7 +32,7 @@ def write_crate(job: Job) -> None:
         configuration=job.output.configuration,
         software_list=job.output.software,
         packages=packages,
-        python=python_version(),
+        python=platform.python_version(),
         others=[job.output.tables],
     )
     words = {

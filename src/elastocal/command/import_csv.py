@@ -15,7 +15,6 @@ from elastocal.counting import counted
 from elastocal.errors import InputError, printable
 
 if TYPE_CHECKING:
-    from elastocal.exchange.import_options import ImportOptions
     from elastocal.exchange.measurement_table import ImportedMeasurements
     from elastocal.mechanics.robot import Robot
 
@@ -83,14 +82,8 @@ def csv(
     }
     if len(markers) < len(several) or "" in markers:
         raise InputError("--target", "", ", ".join(several), "a name for each marker, such as A, or A=MARKER")
-    stated: dict[str, Any] = {
-        "separator": separator,
-        "decimal": decimal,
-        "header": header,
-        "encoding": encoding,
-        "thousands": thousands,
-    }
-    stated |= {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty}
+    stated: dict[str, Any] = {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty, "separator": separator}
+    stated |= {"decimal": decimal, "header": header, "encoding": encoding, "thousands": thousands}
     chosen = replace(
         earlier,
         ignore=[*(earlier.ignore or ()), *(ignore or ())] or None,
@@ -104,7 +97,7 @@ def csv(
     with write_together(folder, (CSV, IMPORT)) as partial:
         write_measurements(partial / CSV, found.table, found.joints)
         write_text(partial / IMPORT, import_options_text(found.options, file))
-    lines = [*_summary(found, found.options), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"]
+    lines = [*_summary(found), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"]
     typer.echo("\n".join(map(printable, lines)))
 
 
@@ -142,12 +135,13 @@ def _is_filled(path: Path) -> bool:
             return True
 
 
-def _summary(found: ImportedMeasurements, options: ImportOptions) -> list[str]:
+def _summary(found: ImportedMeasurements) -> list[str]:
     import numpy as np
 
     from elastocal.mechanics.components import WRENCH_NAMES
 
-    table = found.table
+    table, options = found.table, found.options
+    columns, units = options.columns or {}, options.units or {}
     poses = len(np.unique(np.column_stack([table.get("session", np.zeros_like(table["pose"])), table["pose"]]), axis=0))
     targets = ", ".join(sorted(set(table["target"].tolist())))
     first = [
@@ -158,16 +152,12 @@ def _summary(found: ImportedMeasurements, options: ImportOptions) -> list[str]:
     ]
     if found.skipped:
         first.append(f"left out: {counted(found.skipped, 'row')} without a position")
-    read = [f"{name} from {header!r}" + (f" in {options.units[name]}" if options.units and name in options.units else "")
-            for name, header in (options.columns or {}).items()]  # fmt: skip
-    numbered = [name for name in ("pose", "load", "repeat") if name not in (options.columns or {})]
+    read = [f"{name} from {header!r}{f' in {units[name]}' if name in units else ''}" for name, header in columns.items()]
+    lists = {
+        "counted, as no column has it": [name for name in ("pose", "load", "repeat") if name not in columns],
+        "taken for zero, as no column has it": [name for name in WRENCH_NAMES if name not in columns],
+        "not used": found.ignored,
+    }
     lines = [*first, f"read: {'; '.join(read)}", f"orientations: {options.rotation}"]
-    if numbered:
-        lines.append(f"counted, as no column has it: {', '.join(numbered)}")
-    forces = [name for name in WRENCH_NAMES if name not in (options.columns or {})]
-    if forces:
-        lines.append(f"taken for zero, as no column has it: {', '.join(forces)}")
-    if found.ignored:
-        lines.append(f"not used: {', '.join(found.ignored)}")
-    lines += [f"note: {note}" for note in found.notes]
-    return lines
+    lines += [f"{what}: {', '.join(names)}" for what, names in lists.items() if names]
+    return [*lines, *(f"note: {note}" for note in found.notes)]

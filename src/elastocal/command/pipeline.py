@@ -11,10 +11,7 @@ _INSTALLED = f"share/elastocal/{_SNAKEFILE}"
 
 
 def pipeline() -> Path:
-    """The folder with the Snakefile: of the checkout, where there is one, else what was installed with this package.
-
-    Raises `InputError` where there is none.
-    """
+    """The folder with the Snakefile: of the checkout, where there is one, else what this package installed; none is refused."""
     found = _checkout() or _installed()
     if found is None:
         allowed = "a folder inside of a checkout of elastocal, or its wheel installed in an environment"

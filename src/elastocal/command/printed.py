@@ -17,11 +17,7 @@ _LONGEST = 60
 
 
 def printed(option: str, text: str) -> str:
-    """A text that is printed as it is.
-
-    `option`: named in errors. Returns without blanks around it. Raises `InputError`: nothing but blanks, a line break or
-    another control character, or more characters than a line of the document has.
-    """
+    """A text that a document prints as it is, without the blanks around it; it has to stand on one line of it."""
     line = text.strip(" ")
     if steering(line) or not 0 < len(line) <= _LONGEST:
         raise InputError(option, "", repr(text), f"1 to {_LONGEST} characters on one line")
@@ -29,11 +25,7 @@ def printed(option: str, text: str) -> str:
 
 
 def iso_date(option: str, text: str) -> str:
-    """A day of the calendar.
-
-    `option`: named in errors. `text`: as ISO 8601 writes it with hyphens, such as ``2026-11-20``. Raises `InputError`: another
-    form, or no such day.
-    """
+    """A day of the calendar as ISO 8601 writes it with hyphens, such as ``2026-11-20``; anything else is refused."""
     try:
         day = date.fromisoformat(text).isoformat()
     except ValueError:

@@ -23,41 +23,29 @@ LARGEST_SEED, MOST_POSES, MOST_ROWS, MOST_JOBS = 2**32 - 1, 10_000, 10_000_000, 
 
 
 def length_m(option: str, text: str) -> float:
-    """A length with its unit in metres.
-
-    `option`: named in errors. `text`: such as ``0.2mm``. Raises `InputError`: no unit, less than any instrument tells, or more
-    than any robot misses by.
-    """
-    value = _quantity(text, _METRES)
-    if not _LEAST_M <= value <= _LARGEST_M:
-        allowed = f"a length with its unit such as 0.2mm or 60um, {1e6 * _LEAST_M:g} um to {_LARGEST_M:g} m"
-        raise InputError(option, "", repr(text), allowed)
-    return value
+    """A length such as ``0.2mm`` in metres; refused without its unit, or of a size that no instrument or robot has."""
+    return _quantity(option, text, _METRES, (_LEAST_M, _LARGEST_M), "a length with its unit such as 0.2mm or 60um")
 
 
 def angle_rad(option: str, text: str) -> float:
-    """An angle such as ``0.01deg`` in rad; an InputError without its unit, or of a size that no noise has."""
-    value = _quantity(text, _RADIANS)
-    if not _LEAST_RAD <= value <= _LARGEST_RAD:
-        allowed = (
-            f"an angle with its unit such as 0.01deg, 0.1mrad or 60urad, {1e6 * _LEAST_RAD:g} urad to {_LARGEST_RAD:g} rad"
-        )
-        raise InputError(option, "", repr(text), allowed)
+    """An angle such as ``0.01deg`` in rad; refused without its unit, or of a size that no noise has."""
+    examples = "an angle with its unit such as 0.01deg, 0.1mrad or 60urad"
+    return _quantity(option, text, _RADIANS, (_LEAST_RAD, _LARGEST_RAD), examples)
+
+
+def _quantity(option: str, text: str, units: Mapping[str, float], bounds: tuple[float, float], examples: str) -> float:
+    """A number with one of some units, of which the one of size 1 is SI, between bounds."""
+    match = _QUANTITY.fullmatch(text.strip())
+    value = float(match[1]) * units.get(match[2], 0.0) if match else 0.0
+    least, largest = bounds
+    if not least <= value <= largest:
+        unit = next(unit for unit, size in units.items() if size == 1.0)
+        raise InputError(option, "", repr(text), f"{examples}, {1e6 * least:g} u{unit} to {largest:g} {unit}")
     return value
 
 
-def _quantity(text: str, units: Mapping[str, float]) -> float:
-    """A number with one of some units; 0 where it is none."""
-    match = _QUANTITY.fullmatch(text.strip())
-    return float(match[1]) * units.get(match[2], 0.0) if match else 0.0
-
-
 def numbers(option: str, text: str, count: int, largest: float = _FARTHEST_PLACE_M) -> np.ndarray:
-    """Numbers separated by commas, metres.
-
-    `option`: named in errors. `largest`: size that each may have. Returns (count,). Raises `InputError`: another count, or
-    something that is no number of such a size.
-    """
+    """So many numbers separated by commas, metres, each of at most a size; anything else is refused."""
     try:
         found = np.array([float(part) for part in text.split(",")])
     except ValueError:

@@ -23,10 +23,9 @@ _TYPES = {"b": "boolean", "i": "integer", "u": "integer", "f": "number"}
 
 
 def data_package(jobs: Iterable[JobRecord], folder: str, licence: str) -> dict[str, Any]:
-    """Describe the CSV files below a folder.
+    """Describe the CSV files that jobs made below a folder, where the description is to stand: it names tables from there.
 
-    `jobs`: that made them. `folder`: where the description is to stand; it names tables from there. `licence`: of the Open
-    Definition, such as ``MIT``. Returns JSON-serialisable.
+    `licence`: of the Open Definition, such as ``MIT``.
     """
     made = {file: job for job in jobs for file in job.outputs if file.endswith(".csv") and Path(file).is_relative_to(folder)}
     resources = [_resource(file, folder, made[file]) for file in sorted(made)]

@@ -33,11 +33,7 @@ if TYPE_CHECKING:
     from elastocal.io.records import JobRecord
 
 _VERSION = "1.1"
-_PROFILES = {
-    "process": "Process Run Crate",
-    "workflow": "Workflow Run Crate",
-    "provenance": "Provenance Run Crate",
-}
+_PROFILES = {key: f"{key.title()} Run Crate" for key in ("process", "workflow", "provenance")}
 _PROFILE_VERSION = "0.5"
 _CODE = {"@type": ["File", "SoftwareSourceCode"]}
 _COMPLETED = "http://schema.org/CompletedActionStatus"
@@ -65,6 +61,11 @@ class FinishedRun:
     packages: Sequence[Package]
     python: str
     others: Sequence[str] = ()
+
+    @property
+    def snakemake(self) -> str | None:
+        """Its version."""
+        return next((package.version for package in self.packages if package.name == "snakemake"), None)
 
 
 def run_crate(run: FinishedRun, words: Mapping[str, str]) -> dict[str, Any]:
@@ -122,16 +123,9 @@ def _describe(crate: ROCrate, run: FinishedRun, words: Mapping[str, str]) -> Non
 
 
 def _workflow(crate: ROCrate, run: FinishedRun, scripts: Mapping[str, str]) -> Entity:
-    python = _add(
-        crate,
-        "https://www.python.org/",
-        "SoftwareApplication",
-        name="Python",
-        version=run.python,
-        url="https://www.python.org/",
-    )
+    home = "https://www.python.org/"
+    python = _add(crate, home, "SoftwareApplication", name="Python", version=run.python, url=home)
     packages = [_add(crate, package.url, "SoftwareApplication", **_package_facts(package)) for package in run.packages]
-    snakemake = next((package.version for package in run.packages if package.name == "snakemake"), None)
     steps = [
         _add(crate, f"{run.workflow}#{rule}", "HowToStep", name=rule, position=str(number), workExample=_file(script))
         for number, (rule, script) in enumerate(scripts.items(), 1)
@@ -143,15 +137,9 @@ def _workflow(crate: ROCrate, run: FinishedRun, scripts: Mapping[str, str]) -> E
     for identifier, name, file in parameters.values():
         _add(crate, identifier, "FormalParameter", additionalType="File", name=name, workExample=_file(file))
         crate.get(quote(file))["exampleOfWork"] = _reference(identifier)
-    kinds = {"@type": ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"]}
-    workflow = crate.add_workflow(
-        _inside(run.workflow),
-        run.workflow,
-        main=True,
-        lang="snakemake",
-        lang_version=snakemake,
-        properties=_facts(run.workflow) | kinds,
-    )
+    facts = _facts(run.workflow) | {"@type": ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"]}
+    place, language = _inside(run.workflow), {"lang": "snakemake", "lang_version": run.snakemake}
+    workflow = crate.add_workflow(place, run.workflow, main=True, properties=facts, **language)
     workflow["version"] = run.origin.commit
     workflow["step"] = steps
     workflow["hasPart"] = [_file(file) for file in sorted(scripts.values())]
@@ -162,92 +150,44 @@ def _workflow(crate: ROCrate, run: FinishedRun, scripts: Mapping[str, str]) -> E
 
 
 def _job_action(crate: ROCrate, job: JobRecord, number: int) -> Entity:
+    facts = {"name": job.name, "description": f"{job.rule}; {job.origin.words}", "startTime": job.started, "endTime": job.ended}
     data = [file for file in job.inputs if not file.endswith(".py")]
-    return _action(
-        crate,
-        f"#job-{number}",
-        name=job.name,
-        description=f"{job.rule}; {job.origin.words}",
-        started=job.started,
-        ended=job.ended,
-        tool=_script(job),
-        read=data,
-        written=job.outputs,
-    )
+    return _action(crate, f"#job-{number}", facts, _file(_script(job)), data, job.outputs)
 
 
 def _run_action(crate: ROCrate, run: FinishedRun, workflow: Entity, read: Sequence[str], written: Sequence[str]) -> Entity:
-    return _action(
-        crate,
-        "#run",
-        name="run of the workflow",
-        description=f"{counted(len(run.jobs), 'job')}; {run.origin.words}",
-        started=min(job.started for job in run.jobs),
-        ended=max(job.ended for job in run.jobs),
-        tool=workflow.id,
-        read=read,
-        written=written,
-    )
+    facts = {
+        "name": "run of the workflow",
+        "description": f"{counted(len(run.jobs), 'job')}; {run.origin.words}",
+        "startTime": min(job.started for job in run.jobs),
+        "endTime": max(job.ended for job in run.jobs),
+    }
+    return _action(crate, "#run", facts, workflow, read, written)
+
+
+def _action(
+    crate: ROCrate, identifier: str, facts: Mapping[str, str], tool: Any, read: Iterable[str], written: Iterable[str]
+) -> Entity:
+    how = {"agent": _reference("#operator"), "actionStatus": _COMPLETED, "instrument": tool}
+    files = {"object": [_file(file) for file in read], "result": [_file(file) for file in written]}
+    return _add(crate, identifier, "CreateAction", **facts, **how, **files)
 
 
 def _orchestration(crate: ROCrate, run: FinishedRun, actions: Sequence[Entity], run_action: Entity) -> None:
     """Each rule's step and its jobs, and the engine that called them."""
-    version = next((package.version for package in run.packages if package.name == "snakemake"), "unknown")
-    home = "https://snakemake.github.io/"
+    home, version = "https://snakemake.github.io/", run.snakemake or "unknown"
     engine = _add(crate, f"{home}#engine", "SoftwareApplication", name="Snakemake", version=version, url=home)
     by_rule: dict[str, list[Entity]] = {}
     for job, action in zip(run.jobs, actions, strict=True):
         by_rule.setdefault(job.rule, []).append(action)
-    controls = [
-        _add(
-            crate,
-            f"#control-{rule}",
-            "ControlAction",
-            name=f"orchestration of {rule}",
-            instrument=_reference(f"{run.workflow}#{rule}"),
-            object=of_rule,
-        )
-        for rule, of_rule in by_rule.items()
-    ]
-    _add(
-        crate,
-        "#orchestration",
-        "OrganizeAction",
-        name="run of Snakemake",
-        startTime=run_action["startTime"],
-        endTime=run_action["endTime"],
-        agent=_reference("#operator"),
-        instrument=engine,
-        object=controls,
-        result=run_action,
-    )
-
-
-def _action(
-    crate: ROCrate,
-    identifier: str,
-    name: str,
-    description: str,
-    started: str,
-    ended: str,
-    tool: str,
-    read: Iterable[str],
-    written: Iterable[str],
-) -> Entity:
-    return _add(
-        crate,
-        identifier,
-        "CreateAction",
-        name=name,
-        description=description,
-        startTime=started,
-        endTime=ended,
-        agent=_reference("#operator"),
-        actionStatus=_COMPLETED,
-        instrument=_file(tool),
-        object=[_file(file) for file in read],
-        result=[_file(file) for file in written],
-    )
+    controls = []
+    for rule, of_rule in by_rule.items():
+        step = _reference(f"{run.workflow}#{rule}")
+        name = f"orchestration of {rule}"
+        controls.append(_add(crate, f"#control-{rule}", "ControlAction", name=name, instrument=step, object=of_rule))
+    facts = {"name": "run of Snakemake", "startTime": run_action["startTime"], "endTime": run_action["endTime"]}
+    how = {"agent": _reference("#operator"), "instrument": engine, "object": controls, "result": run_action}
+    _add(crate, "#orchestration", "OrganizeAction", **facts, **how)
 
 
 def _final(jobs: Sequence[JobRecord]) -> list[str]:
@@ -272,12 +212,7 @@ def _script(job: JobRecord) -> str:
 
 
 def _tool(rule: str, origin: Origin, required: Sequence[str]) -> dict[str, Any]:
-    return {
-        **_CODE,
-        "name": rule,
-        "version": origin.commit,
-        "softwareRequirements": [_file(file) for file in required],
-    }
+    return {**_CODE, "name": rule, "version": origin.commit, "softwareRequirements": [_file(file) for file in required]}
 
 
 def _facts(file: str) -> dict[str, Any]:
@@ -298,14 +233,11 @@ def _package_facts(package: Package) -> dict[str, str]:
 
 
 def _add(crate: ROCrate, id_: str, kind: str, /, **properties: Any) -> Entity:
-    references = {key: _linked(value) for key, value in properties.items()}
-    return crate.add(ContextEntity(crate, id_, properties={"@type": kind, **references}))
-
-
-def _linked(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_linked(each) for each in value]
-    return _reference(value.id) if hasattr(value, "id") else value
+    entity = crate.add(ContextEntity(crate, id_, properties={"@type": kind}))
+    for key, value in properties.items():
+        # Which makes references of entities.
+        entity[key] = value
+    return entity
 
 
 def _reference(identifier: str) -> dict[str, str]:

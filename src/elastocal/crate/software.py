@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 from dataclasses import dataclass
 from importlib.metadata import distributions
 from typing import TYPE_CHECKING
@@ -16,10 +15,7 @@ _CLASSIFIER = "License :: OSI Approved :: "
 
 @dataclass(frozen=True)
 class Package:
-    """An installed package.
-
-    `licence`: as the package states it, empty where it does not.
-    """
+    """An installed package, with its licence as it states it, empty where it does not."""
 
     name: str
     version: str
@@ -32,10 +28,7 @@ class Package:
 
 
 def installed_packages() -> list[Package]:
-    """All packages of the environment that this runs in.
-
-    Returns by name, each once.
-    """
+    """All packages of the environment that this runs in, by name, each once."""
     found: dict[str, Package] = {}
     for distribution in distributions():
         metadata = distribution.metadata
@@ -43,11 +36,6 @@ def installed_packages() -> list[Package]:
         # Of two on the path the first is imported.
         found.setdefault(name, Package(name, distribution.version, _licence(metadata)))
     return [found[name] for name in sorted(found)]
-
-
-def python_version() -> str:
-    """Version of the interpreter."""
-    return platform.python_version()
 
 
 def _licence(metadata: PackageMetadata) -> str:

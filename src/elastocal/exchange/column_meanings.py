@@ -210,11 +210,7 @@ def find_rotation(text: TextTable, columns: Mapping[str, str], mapped: Mapping[s
 
 def _check_external_axes(text: TextTable, columns: Mapping[str, str], mapped: Mapping[str, str]) -> None:
     """Ask where angles ``E1`` to ``E3`` may be external axes, as other columns look like the orientation."""
-    plain = {
-        recognized_name: header
-        for header in text.columns
-        if (recognized_name := header.split("[")[0].split("(")[0].strip().upper())
-    }
+    plain = {re.split(r"[\[(]", header)[0].strip().upper(): header for header in text.columns}
     guessed = [columns[name] for name in EULER if name in columns and name not in mapped]
     others = [[plain[letter] for letter in letters] for letters in _OTHER_ANGLES if all(letter in plain for letter in letters)]
     more = [header for name, header in plain.items() if name in ("E4", "E5", "E6")]
@@ -228,10 +224,7 @@ def _check_external_axes(text: TextTable, columns: Mapping[str, str], mapped: Ma
 def check_complete(
     text: TextTable, columns: Mapping[str, str], angles: Sequence[str], needed: Sequence[str], robot: Robot | None
 ) -> None:
-    """Refuse a table without all joint angles of the robot, or without one of the columns that are needed.
-
-    `columns`: headers by name. `angles`: names of those that are joint angles.
-    """
+    """Refuse a table without all joint angles of the robot (`angles`), or without one of the columns that are needed."""
     if not angles:
         named = f" or as the robot has them: {', '.join(robot.joint_names)}" if robot and robot.joint_names else ""
         allowed = (
@@ -243,8 +236,7 @@ def check_complete(
         found = f"{counted(len(angles), 'joint')}: {', '.join(columns[name] for name in angles)}"
         raise InputError(text.path, "header", found, f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out")
     last = robot.joints if robot else int(angles[-1][1:])
-    groups = [[f"q{j}" for j in range(1, last + 1)], needed]
-    for group in groups:
+    for group in ([f"q{j}" for j in range(1, last + 1)], needed):
         if missing := [name for name in group if name not in columns]:
             allowed = f"--column {missing[0]}=NAME; not yet used: {_list_unused(text, columns)}"
             raise InputError(text.path, "header", f"no column {', '.join(missing)}", allowed)

@@ -69,10 +69,7 @@ _KNOWN |= {name: name for name in (*EULER, *MATRIX, *HOMOGENEOUS)}
 
 
 def kind_of(name: str) -> tuple[str, ...]:
-    """Kinds of quantities that a column may hold.
-
-    `name`: as this module calls columns. Returns keys of `UNITS`.
-    """
+    """Kinds of quantities that a column may hold, keys of `UNITS`, by the name that this module gives it."""
     if re.fullmatch(r"q[0-9]+", name):
         # A prismatic joint reports a length.
         return ANGLE, LENGTH

@@ -256,12 +256,8 @@ def _try_cells(line: str, separator: str) -> list[str]:
 
 
 def _split_cells(line: str, separator: str, source: str, number: int) -> list[str]:
-    """Cells of one line.
-
-    `separator`: a name in `SEPARATORS`, or the mark itself. `source`: named in errors. `number`: of the line. Raises
-    `InputError`: quotes that are not in pairs, a cell of more than 100,000 characters.
-    """
-    mark = SEPARATORS.get(separator, separator)
+    """Cells of one line; quotes that are not in pairs and a cell of more than 100,000 characters are refused."""
+    mark = SEPARATORS[separator]
     if mark == " ":
         if '"' not in line:
             return line.split()

@@ -41,6 +41,8 @@ _ANGLES, _LENGTHS, _LIMITS = ("theta_offset", "alpha"), ("d", "a", "cx", "cy", "
 _PLAIN = ("compliance_urad_per_Nm", "mass_kg")
 _WORDS = ("joint", "type", "point")
 _NEEDED = ("d", "a", "alpha")
+# By which the unit is stated of what turns, and of what does not.
+_OPTIONS = {True: "--angles deg or rad", False: "--lengths m or mm"}
 _PI = re.compile(r"([+-]?)(\d+(?:\.\d+)?)?\*?pi(?:/(\d+(?:\.\d+)?))?", re.ASCII | re.IGNORECASE)
 # The chain of more has no room in a robot file.
 MOST_ROWS = 500
@@ -128,14 +130,8 @@ _Rows = tuple[dict[str, str], list[tuple[str, dict[str, Any]]], list[str]]
 
 def _csv_rows(path: str | Path, source: str, options: DhOptions) -> _Rows:
     """Columns with the units that a row under them has, rows by where they stand, and what was left out."""
-    text = read_text_table(
-        path,
-        _has_known_column,
-        Dialect(decimal=options.decimal),
-        options.ignore,
-        wanted="columns d, a and alpha, such as d_m or d_mm",
-        units_in=read_units,
-    )
+    wanted = "columns d, a and alpha, such as d_m or d_mm"
+    text = read_text_table(path, _has_known_column, Dialect(decimal=options.decimal), options.ignore, wanted, read_units)
     if text.dialect.decimal == "comma" and options.decimal is None:
         raise InputError(source, "", "numbers with commas", "--decimal comma where the comma is the decimal mark, else points")
     rows = zip(*text.columns.values(), strict=True)
@@ -197,8 +193,7 @@ def _find_meaning(column: str, below: str, options: DhOptions, source: str) -> _
     length = unit if unit in _LENGTH_UNITS else options.lengths
     meaning = _Meaning(name, (turns and angle) or "", (shifts and length) or "")
     if not (meaning.angle or meaning.length):
-        option = "--angles deg or rad" if turns else "--lengths m or mm"
-        allowed = f"{option}, or {name}_{'deg' if turns else 'mm'} and such"
+        allowed = f"{_OPTIONS[turns]}, or {name}_{'deg' if turns else 'mm'} and such"
         raise InputError(source, "header", f"no unit of {column!r}", allowed)
     return meaning
 
@@ -221,9 +216,8 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
         column, meaning = column_of[name], meanings[column_of[name]]
         turns = name in _ANGLES or (name in _LIMITS and kind != PRISMATIC)
         if name not in _PLAIN and not (meaning.angle if turns else meaning.length):
-            option = "--angles deg or rad" if turns else "--lengths m or mm"
             found = f"a limit without a unit of {'angles' if turns else 'lengths'}"
-            raise InputError(source, f"{where}, {column}", found, option)
+            raise InputError(source, f"{where}, {column}", found, _OPTIONS[turns])
         value = _number(text(name), turns and meaning.angle == "rad")
         largest = MOST_TURNS * (2.0 * math.pi if meaning.angle == "rad" else 360.0) if turns else LARGEST_NUMBER
         if value is None or abs(value) > largest:
@@ -249,20 +243,8 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
         raise InputError(source, f"{where}, cx, cy, cz", "no centre of the mass", "three numbers, in the frame of the row")
     x, y, z = (part or 0.0 for part in centre)
     theta, d, a, alpha = (number(name) or 0.0 for name in ("theta_offset", "d", "a", "alpha"))
-    return DhRow(
-        where,
-        text("joint"),
-        kind,
-        theta,
-        d,
-        a,
-        alpha,
-        None if low is None or high is None else (low, high),
-        number("compliance_urad_per_Nm"),
-        mass,
-        (x, y, z),
-        text("point"),
-    )
+    limits, compliance = None if low is None or high is None else (low, high), number("compliance_urad_per_Nm")
+    return DhRow(where, text("joint"), kind, theta, d, a, alpha, limits, compliance, mass, (x, y, z), text("point"))
 
 
 def _number(text: str, of_pi: bool) -> float | None:

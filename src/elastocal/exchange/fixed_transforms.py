@@ -13,10 +13,7 @@ _DECIMALS = 12
 
 
 def displacement_words(transform: np.ndarray) -> list[str]:
-    """A homogeneous transform in words.
-
-    `transform` (4, 4).
-    """
+    """A homogeneous transform (4, 4) in words."""
     yaw, pitch, roll = yaw_pitch_roll(transform[:3, :3])
     shifts = [shift_word(axis, amount) for axis, amount in zip("xyz", transform[:3, 3], strict=True)]
     return [word for word in (*shifts, turn_word("z", yaw), turn_word("y", pitch), turn_word("x", roll)) if word]
@@ -63,11 +60,9 @@ def turn_word(letter: str, angle_rad: float) -> str | None:
 
 
 def yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:
-    """Angles of R = Rz(yaw) Ry(pitch) Rx(roll), rad.
+    """Angles of R (3, 3) = Rz(yaw) Ry(pitch) Rx(roll), rad.
 
     Near a pitch of 90 deg yaw and roll are not separate; the roll is read of what the yaw leaves, so that the product is right.
-
-    `rotation` (3, 3).
     """
     level = math.hypot(rotation[0, 0], rotation[1, 0])
     yaw = math.atan2(rotation[1, 0], rotation[0, 0]) if level > 10.0**-_DECIMALS else 0.0

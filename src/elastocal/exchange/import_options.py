@@ -42,10 +42,7 @@ class ImportOptions(Dialect):
 
 
 def read_import_options(path: str | Path) -> ImportOptions:
-    """Options of an earlier import.
-
-    Raises `InputError`: no YAML, an unknown key or a value that none may have.
-    """
+    """Options of an earlier import; an InputError names an unknown key or a value that none may have."""
     document = read_document(path) or {}
     check_document(document, "measurement_import", Path(path).as_posix())
     known = {field.name for field in fields(ImportOptions)}
@@ -53,10 +50,7 @@ def read_import_options(path: str | Path) -> ImportOptions:
 
 
 def import_options_text(options: ImportOptions, source: str | Path) -> str:
-    """Text of the options of an import.
-
-    `source`: the table that was imported.
-    """
+    """Text of the options with which a table, `source`, was imported."""
     digest = hashlib.sha256(Path(source).read_bytes()).hexdigest()
     document: dict[str, Any] = {"source": Path(source).name, "sha256": digest}
     document |= {key: value for key, value in asdict(options).items() if value is not None}
@@ -67,9 +61,8 @@ def import_options_text(options: ImportOptions, source: str | Path) -> str:
 def sheet_options(text: TextTable, options: ImportOptions) -> ImportOptions:
     """Options of an import with the units of a sheet of `plan` that a spreadsheet saved, where the table is one.
 
-    Its columns are those of measurements.csv, in its units; stated ones go first.
-
-    An InputError names the row in which ``q1_deg`` is not ``q1``: one of them was edited.
+    Its columns are those of measurements.csv, in its units; stated ones go first. An InputError names the row in which
+    ``q1_deg`` is not ``q1``: one of them was edited.
     """
     headers = {header for header in text.columns if header}
     beside = headers & sheet_columns(_MOST_JOINTS) - {TICK}

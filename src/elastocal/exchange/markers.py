@@ -40,10 +40,7 @@ _Markers = dict[str, dict[str, str]]
 
 
 def markers_in(headers: Iterable[str]) -> _Markers:
-    """Headers by the names of their quantities, of each marker that has a position in every row.
-
-    The marker of headers without one, such as ``x``, is called "".
-    """
+    """Headers by the names of their quantities, of each marker with a position; that of headers such as ``x`` is called ""."""
     found: _Markers = {}
     for header in headers:
         if part := _marker_and_name(split_unit(header)[0]):

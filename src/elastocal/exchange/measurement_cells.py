@@ -19,6 +19,8 @@ _LARGEST_TIME = 1e19
 _EPOCH_S = 6.3e8, 4.1e9
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 _DATES = ("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M")
+# To Python a time without a date is of this day.
+_MIDNIGHT = datetime(1900, 1, 1, tzinfo=UTC)
 # Of a pose, load, repeat or session; as in measurements.csv.
 _LARGEST_ORDINAL = 2**31 - 1
 
@@ -72,15 +74,11 @@ class CellReader:
     def unit_of_epoch(self, name: str) -> str | None:
         """Unit in which all numbers are times of this age since 1970, which no campaign lasts; None where they are not."""
         values = np.array([plain_number(cell, _LARGEST_TIME) or 0.0 for cell in self.cells(name)])
-        small = (values.min(), values.max())
-        return next(
-            (
-                unit
-                for unit in ("ms", "us", "ns")
-                if all(_EPOCH_S[0] <= each * UNITS[TIME][unit] <= _EPOCH_S[1] for each in small)
-            ),
-            None,
-        )
+        for unit in ("ms", "us", "ns"):
+            seconds = values * UNITS[TIME][unit]
+            if _EPOCH_S[0] <= seconds.min() and seconds.max() <= _EPOCH_S[1]:
+                return unit
+        return None
 
     def numbers(self, name: str) -> np.ndarray:
         """ndarray (N,), SI units."""
@@ -149,8 +147,6 @@ def _clock_times(cells: Sequence[str]) -> np.ndarray | None:
             continue
         if written in _DATES:
             return np.array([time.timestamp() for time in times])
-        seconds = np.array(
-            [(time - times[0].replace(hour=0, minute=0, second=0, microsecond=0)).total_seconds() for time in times]
-        )
+        seconds = np.array([(time - _MIDNIGHT).total_seconds() for time in times])
         return seconds + 86400.0 * np.concatenate([[0], np.cumsum(np.diff(seconds) < -43200.0)])
     return None

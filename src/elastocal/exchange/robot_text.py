@@ -52,10 +52,9 @@ class Imported:
 
 
 def check_imported(document: dict[str, Any], path: str | Path, options: str, notes: Sequence[str]) -> Imported:
-    """Check the contents of a robot file that were made from another file.
+    """Check the contents of a robot file that were made from another file, `path`, which was read as `options` say.
 
-    `path`: the other file. `options`: how it was read. Raises `InputError` where the robot is none that a robot file may
-    describe.
+    An InputError refuses a robot that no robot file may describe.
     """
     source = Path(path).as_posix()
     check_document(document, "robot", source)
@@ -93,10 +92,7 @@ def robot_text(result: Imported) -> str:
 
 
 def write_robot(result: Imported, path: str | Path) -> None:
-    """Write a robot file; it appears whole or not at all.
-
-    Raises `InputError`: a place that cannot be written to.
-    """
+    """Write a robot file, which appears whole or not at all; a place that cannot be written to is refused."""
     try:
         write_text(path, robot_text(result))
     except OSError as error:
@@ -142,10 +138,7 @@ _WHOLE_WORDS: dict[str, Any] = {"break_on_hyphens": False, "break_long_words": F
 
 
 def refuse_existing(path: str | Path, force: bool) -> None:
-    """Refuse a path where something is already.
-
-    `force`: whether a file there may be replaced. Raises `InputError`.
-    """
+    """Refuse a path where something is already, but for a file with `force`."""
     if Path(path).is_dir() or not Path(path).resolve().parent.is_dir():
         raise InputError(path, "", "no place for a file", "a file in a folder that is there")
     check_places(path)

@@ -32,10 +32,7 @@ _JOINTS = {
 
 
 def robot_from_kinematics(document: Mapping[str, Any], path: str | Path, name: str | None = None) -> Imported:
-    """The robot of a kinematics file, its links in the order of the arm.
-
-    Raises `InputError` for another key than those of the format or a cell that is no number.
-    """
+    """The robot of a kinematics file, its links in the order of the arm; other keys and what is no number are refused."""
     source = Path(path).as_posix()
     described = document[KINEMATICS]
     if not isinstance(described, dict):
@@ -53,11 +50,7 @@ def robot_from_kinematics(document: Mapping[str, Any], path: str | Path, name: s
         words += [*displacement_words(_transform(origin, f"{KINEMATICS}.{link}", source)), f"Rz(q{number})"]
     words.append(f"[{point_name([*links][-1])}]")
     names = [_JOINTS.get(link, link) for link in links]
-    contents = {
-        "name": name or Path(path).stem,
-        "joint_names": names,
-        "chain": " ".join(words),
-    }
+    contents = {"name": name or Path(path).stem, "joint_names": names, "chain": " ".join(words)}
     notes = [
         f"read: {', '.join(f'q{n} is {name} of {link!r}' for n, (name, link) in enumerate(zip(names, links, strict=True), 1))}",
         *(["not used: hash"] if "hash" in described else []),
@@ -72,10 +65,10 @@ def _transform(origin: object, where: str, source: str) -> np.ndarray:
     if not isinstance(origin, dict) or set(origin) != set(_KEYS):
         found = ", ".join(map(str, origin)) if isinstance(origin, dict) else type(origin).__name__
         raise InputError(source, where, found or "nothing", ", ".join(_KEYS))
-    values = {}
+    values: list[float] = []
     for key in _KEYS:
         value = plain_number(str(origin[key]))
         if value is None:
             raise InputError(source, f"{where}.{key}", repr(origin[key]), A_NUMBER)
-        values[key] = value
-    return origin_transform([values[key] for key in _KEYS[:3]], [values[key] for key in _KEYS[3:]])
+        values.append(value)
+    return origin_transform(values[:3], values[3:])

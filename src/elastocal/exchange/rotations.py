@@ -10,6 +10,13 @@ from scipy.spatial.transform import Rotation
 from elastocal.exchange.column_names import EULER, HOMOGENEOUS, MATRIX, QUATERNION, VECTOR
 
 NO_ROTATION, VECTORS, QUATERNIONS, MATRICES, HOMOGENEOUS_MATRICES = "none", "vector", "quaternion", "matrix", "homogeneous"
+_COLUMNS: dict[str, tuple[str, ...]] = {
+    NO_ROTATION: (),
+    VECTORS: VECTOR,
+    QUATERNIONS: QUATERNION,
+    MATRICES: MATRIX,
+    HOMOGENEOUS_MATRICES: HOMOGENEOUS,
+}
 EULER_ANGLES = "euler:"
 ALLOWED = (
     "none, vector, quaternion, matrix, homogeneous, or euler: with three axes such as euler:ZYX (about axes that turn with the "
@@ -26,7 +33,7 @@ def is_rotation(text: str) -> bool:
     if sequence != text:
         repeated = any(one == other for one, other in itertools.pairwise(sequence))
         return _SEQUENCE.fullmatch(sequence) is not None and not repeated
-    return text in (NO_ROTATION, VECTORS, QUATERNIONS, MATRICES, HOMOGENEOUS_MATRICES)
+    return text in _COLUMNS
 
 
 def columns_of_rotation(notation: str, there: Collection[str]) -> tuple[str, ...]:
@@ -39,13 +46,7 @@ def columns_of_rotation(notation: str, there: Collection[str]) -> tuple[str, ...
         axes = notation.removeprefix(EULER_ANGLES).lower()
         by_axis = tuple(f"r{axis}" for axis in axes)
         return by_axis if len(set(axes)) == 3 and all(name in there for name in by_axis) else EULER
-    return {
-        NO_ROTATION: (),
-        VECTORS: VECTOR,
-        QUATERNIONS: QUATERNION,
-        MATRICES: MATRIX,
-        HOMOGENEOUS_MATRICES: HOMOGENEOUS,
-    }[notation]
+    return _COLUMNS[notation]
 
 
 def rotation_vectors(notation: str, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

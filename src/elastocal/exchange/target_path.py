@@ -48,10 +48,9 @@ class TargetPath:
 
 
 def read_target_path(path: str | Path, joints: int) -> TargetPath:
-    """Read and check a file of wanted poses.
+    """Read a file of wanted poses of a robot with so many joints.
 
-    `joints`: of the robot. Raises `InputError`: a column that is missing, unknown or there in part, or a cell that is no finite
-    number; a position that no arm reaches.
+    An InputError refuses a column that is missing, unknown or there in part, what is no number, and what no arm reaches.
     """
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
     approach = tuple(f"approach{j}" for j in range(1, joints + 1))
@@ -91,10 +90,7 @@ class CorrectedTargets:
 
 
 def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
-    """Read a file that `elastocal correct` wrote; other columns than those of `CorrectedTargets` do not matter.
-
-    Raises `InputError`: a column that is missing, or a cell that is no finite number.
-    """
+    """Read a file that `elastocal correct` wrote; other columns than those of `CorrectedTargets` do not matter."""
     read = _cells(path)
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
     for name in (*_POSE, *angles, _STATUS):

@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 
@@ -46,17 +47,12 @@ class Carried:
 class UrdfChain:
     """The chain between two links.
 
-    `words`: in the notation, with measuring points. `joints`: those of q1, q2, ... `links`: links on the chain.
+    `notation`: with measuring points, in a line. `joints`: those of q1, q2, ... `links`: links on the chain.
     """
 
-    words: tuple[str, ...]
+    notation: str
     joints: tuple[Joint, ...]
     links: dict[str, Carried]
-
-    @property
-    def notation(self) -> str:
-        """The chain in a line."""
-        return " ".join(self.words)
 
 
 def parent_joints(urdf: Urdf) -> dict[str, Joint]:
@@ -70,6 +66,11 @@ def joints_above(urdf: Urdf, link: str) -> Iterator[Joint]:
     while link in above:
         yield above[link]
         link = above[link].parent
+
+
+def path_to(urdf: Urdf, tip: str, base: str | None) -> list[Joint]:
+    """The joints from a link, or from the root of the tree where it does not carry the tip, to the tip."""
+    return [*takewhile(lambda joint: joint.child != base, joints_above(urdf, tip))][::-1]
 
 
 def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
@@ -104,7 +105,7 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
             words.append(f"[{marked[joint.child]}]")
         links[joint.child] = place
     named = {joint.name: joint for joint in path}
-    return UrdfChain(tuple(words), tuple(named[name] for name in numbers), links)
+    return UrdfChain(" ".join(words), tuple(named[name] for name in numbers), links)
 
 
 def point_name(link: str) -> str:
@@ -139,14 +140,9 @@ def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
     for key, name in (("base", base), ("tip", tip)):
         if name not in names:
             raise InputError(source, key, repr(name), f"a link: {closest_first(name, names)}")
-    above = parent_joints(urdf)
-    path, at = [], tip
-    while at != base:
-        if at not in above:
-            raise InputError(source, f"base {base!r}, tip {tip!r}", _relation(urdf, base, tip), "a tip that the base carries")
-        path.append(above[at])
-        at = above[at].parent
-    path.reverse()
+    path = path_to(urdf, tip, base)
+    if base != (path[0].parent if path else tip):
+        raise InputError(source, f"base {base!r}, tip {tip!r}", _relation(urdf, base, tip), "a tip that the base carries")
     if not any(joint.kind in _MOVING for joint in path):
         raise InputError(source, f"base {base!r}, tip {tip!r}", "no joint that moves between them", "links with joints between")
     for joint in path:

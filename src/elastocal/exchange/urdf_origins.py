@@ -9,7 +9,6 @@ are those of the URDF, before and after.
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import takewhile
 from pathlib import Path
 from xml.parsers import expat
 
@@ -18,7 +17,7 @@ import numpy as np
 from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.exchange.fixed_transforms import axis_rotation, elementary, yaw_pitch_roll
-from elastocal.exchange.urdf_chain import UrdfChain, chain_between, joints_above, point_name
+from elastocal.exchange.urdf_chain import UrdfChain, chain_between, path_to, point_name
 from elastocal.exchange.urdf_reading import LARGEST_BYTES, Joint, Urdf, read_urdf
 from elastocal.io.texts import read_bytes
 from elastocal.mechanics.chain import Chain, Transform, parse_chain
@@ -52,7 +51,7 @@ def write_calibrated_origins(path: str | Path, nominal: Robot, calibrated: Robot
     if b"\0" in content:
         raise InputError(source, "", "UTF-16 or UTF-32", "a URDF in UTF-8, or in another encoding that has ASCII as it is")
     base, tip = _ends_of(urdf, nominal, source)
-    origins = _origins(_path(urdf, base, tip), nominal, calibrated)
+    origins = _origins(path_to(urdf, tip, base), nominal, calibrated)
     return CorrectedUrdf(_edit(content, origins), len(origins), base, tip)
 
 
@@ -70,7 +69,7 @@ def _ends_of(urdf: Urdf, robot: Robot, source: str) -> tuple[str, str]:
         raise InputError(source, "", f"no link {wanted!r}, the robot's last measuring point", _THE_SAME)
     faults = []
     for tip in tips:
-        for joint in reversed(_path(urdf, None, tip)):
+        for joint in reversed(path_to(urdf, tip, None)):
             try:
                 found, chain = nominal_chain(urdf, joint.parent, tip, source)
             except InputError:
@@ -105,10 +104,6 @@ def _difference(chain: Chain, other: Chain, names: list[str]) -> tuple[int, str,
         if not last and moving[number] != their_moving[number]:
             return number, key, "another axis than in the robot file"
     return None
-
-
-def _path(urdf: Urdf, base: str | None, tip: str) -> list[Joint]:
-    return [*takewhile(lambda joint: joint.child != base, joints_above(urdf, tip))][::-1]
 
 
 def _stretches(chain: Chain) -> tuple[list[np.ndarray], list[Transform]]:
@@ -155,22 +150,16 @@ def _edit(content: bytes, origins: Mapping[str, np.ndarray]) -> bytes:
     for start, tag, name in _places(content):
         if name not in origins:
             continue
-        end = start + len(tag)
-        origin = origins[name]
-        yaw, pitch, roll = yaw_pitch_roll(origin[:3, :3])
-        values = {b"xyz": origin[:3, 3], b"rpy": np.array([roll, pitch, yaw])}
-        if tag[1:].split(None, 1)[0].rpartition(b":")[2] == b"origin":
-            for attribute, numbers in values.items():
-                tag = _set_attribute(tag, attribute, _words(numbers))
-            parts += [content[done:start], tag]
-            done = end
-        else:
-            close = content.index(b">", end) + 1
-            parts += [
-                content[done:close],
-                b"<origin" + b"".join(b' %b="%b"' % (k, _words(v)) for k, v in values.items()) + b"/>",
-            ]
-            done = close
+        end, begin, close = start + len(tag), start, b""
+        if tag[1:].split(None, 1)[0].rpartition(b":")[2] != b"origin":
+            # The joint's own tag, behind which an origin is written.
+            begin = end = content.index(b">", end) + 1
+            tag, close = b"<origin", b"/>"
+        values = {b"xyz": origins[name][:3, 3], b"rpy": np.array(yaw_pitch_roll(origins[name][:3, :3]))[::-1]}
+        for attribute, numbers in values.items():
+            tag = _set_attribute(tag, attribute, _words(numbers))
+        parts += [content[done:begin], tag, close]
+        done = end
     return b"".join([*parts, content[done:]])
 
 

@@ -79,10 +79,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Urdf:
-    """A tree of links: every name once, every joint between two links that are there.
-
-    `left_out`: what else the file has, by the names of its elements.
-    """
+    """A tree of links: every name once, every joint between two of them; `left_out` names other elements of the file."""
 
     name: str
     links: tuple[Link, ...]
@@ -91,10 +88,7 @@ class Urdf:
 
 
 def read_urdf(path: str | Path) -> Urdf:
-    """Links, joints and masses of a URDF file.
-
-    Raises `InputError` for a file that is missing, too large, no URDF, or one whose joints and links do not hold together.
-    """
+    """Links, joints and masses of a URDF file; one whose joints and links do not hold together is refused."""
     source = Path(path).as_posix()
     root = _root_of(read_bytes(path, LARGEST_BYTES, "a URDF file"), source)
     links, joints = root.findall("link"), root.findall("joint")

@@ -24,20 +24,14 @@ _FEWEST_ALIKE = 3
 
 @dataclass(frozen=True)
 class Weights:
-    """Masses of a robot file, and what is to be said of them.
-
-    `masses`: entries of ``masses``.
-    """
+    """Entries of ``masses`` of a robot file, and what is to be said of them."""
 
     masses: list[dict[str, Any]]
     notes: tuple[str, ...]
 
 
 def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD) -> Weights:
-    """Masses and centres of what each joint carries.
-
-    `relative_std`: how well they are known.
-    """
+    """Masses and centres of what each joint carries; `relative_std` is how well they are known."""
     moments: dict[int, np.ndarray] = {}
     at_zero, passive = set(), set()
     for link in urdf.links:
@@ -64,10 +58,7 @@ def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD)
 
 
 def gravity_in_base(urdf: Urdf, base: str) -> list[float] | None:
-    """Gravity in the axes of a link, m/s², where the root of the tree stands upright and the joints before it are at zero.
-
-    Returns None where it points down the link's z axis.
-    """
+    """Gravity in a link's axes, m/s², None down its z axis: the tree's root is upright and joints before it are at zero."""
     transform = np.eye(4)
     for joint in joints_above(urdf, base):
         transform = joint.origin @ transform

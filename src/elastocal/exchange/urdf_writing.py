@@ -71,8 +71,8 @@ def urdf_of(robot: Robot, comment: str = "") -> str:
 
 def _joint(root: Xml.Element, name: str, kind: str, parent: str, child: str, at: np.ndarray) -> Xml.Element:
     element = Xml.SubElement(root, "joint", name=name, type=kind)
-    yaw, pitch, roll = yaw_pitch_roll(at[:3, :3])
-    Xml.SubElement(element, "origin", xyz=_numbers(at[:3, 3]), rpy=_numbers(np.array([roll, pitch, yaw])))
+    turn = np.array(yaw_pitch_roll(at[:3, :3]))[::-1]
+    Xml.SubElement(element, "origin", xyz=_numbers(at[:3, 3]), rpy=_numbers(turn))
     Xml.SubElement(element, "parent", link=parent)
     Xml.SubElement(element, "child", link=child)
     return element

@@ -56,7 +56,7 @@ def remove_partials(folder: str | Path) -> None:
 def atomic_write(path: str | Path, empty: bool = False) -> Iterator[str]:
     """Write to a name beside a file that nobody can foresee, then rename; if the block raises, nothing is left behind.
 
-    Raises an OSError where the block wrote nothing, unless the file may be `empty`.
+    That it wrote nothing is an OSError, unless the file may be `empty`.
     """
     check_places(path)
     partial = _beside(path)

@@ -18,8 +18,7 @@ def read_frame(path: str | Path, schema: TableSchema, columns: Sequence[str] | N
 def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
     """Tables of many strategies in one frame, headed by robot, noise_um and strategy (its name, not that of its file).
 
-    `schema`: number of joints to TableSchema. Returns columns of robots with fewer joints are empty for the joints that they
-    lack.
+    `schema` is that of a number of joints; columns of joints that a robot lacks are empty.
     """
     frames = [pd.DataFrame({"robot": [], "noise_um": [], "strategy": []})]
     for path in paths:
@@ -35,10 +34,7 @@ def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema])
 
 
 def read_studies(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
-    """Tables of further studies of several robots in one frame, headed by the robot that their provenance says.
-
-    `paths`: one at least. `schema`: number of joints to TableSchema.
-    """
+    """Tables of further studies, one at least, in one frame, headed by the robot that their provenance says."""
     frames = []
     for path in paths:
         origin = read_provenance(path)
@@ -48,10 +44,7 @@ def read_studies(paths: Iterable[str | Path], schema: Callable[[int], TableSchem
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, digits: int = 9) -> None:
-    """Write a data frame; the file appears whole or not at all.
-
-    `digits`: significant ones of numbers.
-    """
+    """Write a data frame with so many significant digits; the file appears whole or not at all."""
     write_text(path, frame.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 

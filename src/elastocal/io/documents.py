@@ -101,19 +101,12 @@ _NOT_XML = "YAML; a URDF becomes a robot file by `elastocal import urdf FILE --b
 
 
 def read_document(path: str | Path) -> Any:
-    """Contents of a YAML file.
-
-    Raises `InputError`: a file that is missing or is no YAML, such as a URDF.
-    """
+    """Contents of a YAML file; one that is missing or `parsed` refuses is an InputError."""
     return parsed(read_text(path, LARGEST_BYTES), path)
 
 
 def parsed(text: str, source: str | Path) -> Any:
-    """Contents of a YAML text.
-
-    `source`: named in errors. Raises `InputError`: no YAML, such as a URDF, or YAML that is unclear or out of bounds; the line
-    is named.
-    """
+    """Contents of a YAML text; an InputError names the line of what is no YAML, unclear or out of bounds, such as a URDF."""
     if text.lstrip("\ufeff \r\n\t").startswith("<"):
         raise InputError(source, "", "XML", _NOT_XML)
     try:
@@ -180,11 +173,7 @@ def read_schema(name: str) -> dict[str, Any]:
 
 
 def check_document(document: Any, schema: str, source: str) -> None:
-    """Check a document against a schema.
-
-    `schema`: name of the schema, as in `read_schema`. `source`: the document's file, named in errors. Raises `InputError`:
-    names the first key at fault, what was found and what is allowed.
-    """
+    """Check a document of the file `source` against a schema, as `read_schema` names it; the first key at fault is refused."""
     validator = _Validator(read_schema(schema), format_checker=_FORMATS)
     errors = islice(validator.iter_errors(document), _MOST_FAULTS)
     if error := min(errors, key=lambda error: [str(part) for part in error.absolute_path], default=None):
@@ -319,11 +308,7 @@ def document_path(folder: str | Path, kind: str, name: str) -> str:
 
 
 def named_document(folder: str | Path, kind: str, schema: str, name: str, source: str) -> dict[str, Any]:
-    """Read and check a document that a configuration names.
-
-    `kind`: subfolder: robots, strategies, campaigns. `schema`: as in `check_document`. `name`: of the file, without its ending.
-    `source`: file that names it, for errors. Raises `InputError`: no such file, or a document that its schema refuses.
-    """
+    """Read and check a document that a configuration, `source`, names: that of `name` without its ending in ``folder/kind``."""
     path = Path(document_path(folder, kind, name))
     known = sorted(file.stem for file in Path(folder, kind).glob("*.yaml") if file.is_file())
     # By its name alone: a path would lead out of the folder.

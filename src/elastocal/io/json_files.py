@@ -16,8 +16,5 @@ def read_json(path: str | Path) -> Any:
 
 
 def write_json(path: str | Path, contents: Any, **options: Any) -> None:
-    """Write a JSON file that people can read too; it appears whole or not at all.
-
-    `contents`: JSON-serialisable. `**options`: passed on to ``json.dumps``.
-    """
+    """Write a JSON file that people can read too, with options of ``json.dumps``; it appears whole or not at all."""
     write_text(path, json.dumps(contents, indent=1, **options) + "\n")

@@ -18,7 +18,6 @@ class Origin:
     """What a file was made from.
 
     `commit`: of the repository, with ``-dirty`` behind it where sources were edited since; ``unknown`` outside of a checkout.
-    `configuration_sha256`: from `configuration_sha256`.
     """
 
     commit: str
@@ -32,18 +31,12 @@ class Origin:
 
 
 def canonical_json(value: Any) -> str:
-    """The one JSON text of a value: keys sorted, no spaces, so that equal values have equal digests.
-
-    `value`: JSON-serialisable.
-    """
+    """The one JSON text of a value: keys sorted, no spaces, so that equal values have equal digests."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def configuration_sha256(configuration: Any) -> str:
-    """SHA-256 of the canonical JSON of a configuration, in UTF-8.
-
-    `configuration`: with everything that it refers to, such as the documents of robots.
-    """
+    """SHA-256 of the canonical JSON of a configuration with everything that it refers to, such as the documents of robots."""
     return hashlib.sha256(canonical_json(configuration).encode()).hexdigest()
 
 

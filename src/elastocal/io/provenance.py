@@ -18,11 +18,7 @@ class Settings(Protocol):
 
 
 def provenance(settings: Settings, **more: Any) -> dict[str, Any]:
-    """Provenance of an output.
-
-    `settings` (): the configuration leaves that made the table, the seed among them. `**more`: further facts, such as the noise
-    level. Returns JSON-serialisable and the same for the same settings.
-    """
+    """Provenance of an output as JSON has it: the configuration leaves that made it, the seed among them, and further facts."""
     kept = {name: value for name, value in settings.items() if name != SOURCES_DIGEST}
     leaves = json.loads(json.dumps(kept, sort_keys=True, default=list))
     digest = hashlib.sha256(json.dumps(leaves, sort_keys=True).encode()).hexdigest()[:16]

@@ -31,10 +31,9 @@ def check_file(path: str | Path, kind: str = "the path of a readable file") -> i
 
 
 def read_bytes(path: str | Path, largest: int, kind: str = "the path of a readable file") -> bytes:
-    """Contents of a file.
+    """Contents of a file of at most so many bytes; `kind` is what it should be, for messages.
 
-    `largest`: bytes that it may have. `kind`: what the file should be, for messages. Raises `InputError`: no file, none that
-    may be read, a larger one, or a pipe or device, which might never end.
+    An InputError refuses what is not there or may not be read, and a pipe or device, which might never end.
     """
     try:
         if check_file(path, kind) <= largest:
@@ -53,19 +52,12 @@ def read_bytes(path: str | Path, largest: int, kind: str = "the path of a readab
 
 
 def read_text(path: str | Path, largest: int, kind: str = "the path of a readable file") -> str:
-    """Contents of a file in UTF-8, without the byte order mark that spreadsheets write.
-
-    `path`, `largest`, `kind`: as in `read_bytes`. Raises `InputError`: as `read_bytes`, and a text in another encoding, with
-    the line of the first byte at fault.
-    """
+    """Contents of a file in UTF-8, see `read_bytes`, without the byte order mark that spreadsheets write."""
     return decoded(read_bytes(path, largest, kind), path)
 
 
 def decoded(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> str:
-    """Text of the contents of a file.
-
-    `path`: named in errors. Raises `InputError`: another encoding.
-    """
+    """Text of the contents of a file; an InputError names the line of what is in another encoding."""
     try:
         return content.decode(encoding)
     except UnicodeDecodeError as error:
@@ -76,10 +68,6 @@ def decoded(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> st
 
 
 def plain_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
-    """A decimal number as people write it.
-
-    `largest`: size that it may have. Returns None for anything else: nothing, words, not-a-number, infinity, digits with
-    underscores, a larger number.
-    """
+    """A decimal number as people write it; None for words, not-a-number, digits with underscores, and what is larger."""
     value = float(text) if len(text) <= _LONGEST_NUMBER and _NUMBER.fullmatch(text) else math.inf
     return value if abs(value) <= largest else None
