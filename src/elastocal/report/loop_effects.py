@@ -11,15 +11,7 @@ from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report.first_page import LEAST_SHOWN, MOST_NAMES, OF_DATA, cost_words, location_words
 from elastocal.report.loop_parameters import MOSTLY_PRIOR
-from elastocal.report.wording import (
-    as_sentence,
-    capital,
-    length,
-    members_words,
-    probability_words,
-    scaled,
-    words,
-)
+from elastocal.report.wording import as_sentence, capital, length, members_words, probability_words, scaled, words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
