@@ -104,9 +104,8 @@ def test_what_the_form_of_the_model_leaves_open_is_in_every_figure(turned):
 
 
 def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_knows_the_base(turned):
-    value = replace(
-        turned, estimate=replace(turned.estimate, coefficients=(*turned.estimate.coefficients[:-1], np.array([1e-3])))
-    )
+    coefficients = (*turned.estimate.coefficients[:-1], np.array([1e-3]))
+    value = replace(turned, estimate=replace(turned.estimate, coefficients=coefficients))
     angles = value.robot.reported_angles(STATES.joint_angles)
     position, rotation = forward(value, angles)
     nominal = Rotation.from_rotvec([0.0, 0.0, -1e-3]).as_matrix()
@@ -123,19 +122,11 @@ def test_statements_and_scopes_come_back_from_json(turned):
     assert accuracy_from(accuracy.document()) == accuracy
     back = scope_from(known.scope.document())
     np.testing.assert_array_equal(back.absorbed, known.scope.absorbed)
-    assert replace(back, origin=0, absorbed=0, absorbed_before=0) == replace(
-        known.scope, origin=0, absorbed=0, absorbed_before=0
-    )
+    one, other = (replace(each, origin=0, absorbed=0, absorbed_before=0) for each in (back, known.scope))
+    assert one == other
 
 
 def test_a_sentence_says_whose_how_large_how_sure_and_what_became_of_the_noise(turned):
     found = accuracy_sentence(predict_errors(set_scope(turned, True), np.zeros((3, 6)), NEUTRAL).accuracy("the targets"))
-    for words in (
-        "Predicted",
-        "robot's own frame",
-        "RMS over the targets (3)",
-        "95 % sure",
-        "at the worst",
-        "noise is not in it",
-    ):
-        assert words in found
+    said = ("Predicted", "robot's own frame", "RMS over the targets (3)", "95 % sure", "at the worst", "noise is not in it")
+    assert all(words in found for words in said), found

@@ -107,9 +107,8 @@ def test_covariance_is_that_of_poses_over_drawn_parameters(fanuc):
     for number in range(2):
         sample = np.cov(np.array(drawn)[:, number].T)
         deviation = np.sqrt(np.diag(expected[number]))
-        np.testing.assert_allclose(
-            sample / np.outer(deviation, deviation), expected[number] / np.outer(deviation, deviation), atol=0.2
-        )
+        scale = np.outer(deviation, deviation)
+        np.testing.assert_allclose(sample / scale, expected[number] / scale, atol=0.2)
 
 
 def test_rows_do_not_depend_on_the_part_in_which_they_come(fanuc, monkeypatch):

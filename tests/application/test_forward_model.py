@@ -40,9 +40,8 @@ def test_a_robot_with_weights_and_effects_comes_back_as_it_was(name):
     angles, operating = states(calibrated.robot)
     for one, other in zip(forward(calibrated, angles, operating), forward(back, angles, operating), strict=True):
         np.testing.assert_array_equal(other, one)
-    np.testing.assert_array_equal(
-        prediction_covariance(back, angles, operating), prediction_covariance(calibrated, angles, operating)
-    )
+    found, expected = (prediction_covariance(each, angles, operating) for each in (back, calibrated))
+    np.testing.assert_array_equal(found, expected)
     np.testing.assert_array_equal(back.noise.joint_rad, calibrated.noise.joint_rad)
 
 

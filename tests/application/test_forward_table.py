@@ -23,11 +23,9 @@ def test_nominal_pose_and_error_together_are_where_the_robot_is(calibrated):
     assert len(table) == 128
     position, rotation = forward(calibrated, table[["q1", "q2", "q3"]].to_numpy(), HANGING)
     np.testing.assert_allclose(table[["x", "y", "z"]].to_numpy() + table[["dx", "dy", "dz"]].to_numpy(), position, atol=1e-12)
-    turn, nominal = (
-        Rotation.from_rotvec(table[names].to_numpy().copy()) for names in (["drx", "dry", "drz"], ["rx", "ry", "rz"])
-    )
-    turned = turn * nominal
-    np.testing.assert_allclose(turned.as_matrix(), rotation, atol=1e-12)
+    names = ["drx", "dry", "drz"], ["rx", "ry", "rz"]
+    turn, nominal = (Rotation.from_rotvec(table[each].to_numpy().copy()) for each in names)
+    np.testing.assert_allclose((turn * nominal).as_matrix(), rotation, atol=1e-12)
 
 
 def test_angles_fill_the_limits_evenly(calibrated):

@@ -8,10 +8,6 @@ from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_
 from elastocal.mechanics.kinematics import poses
 
 
-def robot_of(name):
-    return analysed(name)
-
-
 def find_poses(robot, angles):
     return poses(robot.chain, angles, robot.chain.end_effector)
 
@@ -23,7 +19,7 @@ def draw_angles(robot, count, seed=1, share=0.8):
 
 @pytest.mark.parametrize("name", ["gp180", "ur10", "fanuc_cpa", "iiwa14"])
 def test_refined_angles_reach_the_poses_from_nearby(name):
-    robot = robot_of(name)
+    robot = analysed(name)
     angles = draw_angles(robot, 200)
     found, left = refine(robot, *find_poses(robot, angles), angles + 0.05)
     assert (left < SOLVED_M).mean() > 0.98
@@ -33,7 +29,7 @@ def test_refined_angles_reach_the_poses_from_nearby(name):
 
 
 def test_what_is_out_of_reach_stays_unsolved():
-    robot = robot_of("gp180")
+    robot = analysed("gp180")
     position, rotation = find_poses(robot, draw_angles(robot, 3))
     found, left = refine(robot, position * 5.0, rotation, draw_angles(robot, 3))
     assert (left > 0.1).all()
@@ -41,7 +37,7 @@ def test_what_is_out_of_reach_stays_unsolved():
 
 
 def test_a_smooth_path_stays_smooth_and_within_limits():
-    robot = robot_of("gp180")
+    robot = analysed("gp180")
     share = np.linspace(0.0, 1.0, 80)[:, None]
     bent = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
     angles = robot.joint_limits.mean(axis=1) + bent + 0.3 * np.sin(3.0 * share * np.arange(1, 7))
@@ -52,14 +48,14 @@ def test_a_smooth_path_stays_smooth_and_within_limits():
 
 
 def test_single_poses_are_found_without_a_start():
-    robot = robot_of("ur10")
+    robot = analysed("ur10")
     angles = draw_angles(robot, 60, 3)
     _, left = along_path(robot, *find_poses(robot, angles))
     assert (left < SOLVED_M).mean() > 0.95
 
 
 def test_whole_turns_bring_angles_near_the_middle_or_a_start():
-    robot = robot_of("ur10")
+    robot = analysed("ur10")
     middle = robot.joint_limits.mean(axis=1)
     turned = remove_turns(robot, middle + 0.3 + 4 * np.pi)
     np.testing.assert_allclose(turned, middle + 0.3)
@@ -67,12 +63,12 @@ def test_whole_turns_bring_angles_near_the_middle_or_a_start():
 
 
 def test_limits_count_beyond_rounding_alone():
-    robot = robot_of("gp180")
+    robot = analysed("gp180")
     high = robot.joint_limits[:, 1]
     assert not find_beyond_limits(robot, high + 1e-12).any()
     assert find_beyond_limits(robot, high + 1e-6).all()
 
 
 def test_the_reach_is_that_of_the_chain_stretched_out():
-    robot = robot_of("ur10")
+    robot = analysed("ur10")
     assert reach_m(robot) == pytest.approx(sum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T"))

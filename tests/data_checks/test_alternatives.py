@@ -69,11 +69,17 @@ ELSEWHERE = Rotation.from_rotvec([0.3, -0.5, 1.2]), np.array([2.0, 0.6, -0.2])
 
 
 def with_measured(campaign, position=None, vectors=None):
-    measurements = campaign.measurements
-    position = measurements.position if position is None else position
-    return replace(
-        measurements, position=position, rotation_vector=measurements.rotation_vector if vectors is None else vectors
-    )
+    changed = {"position": position, "rotation_vector": vectors}
+    return replace(campaign.measurements, **{name: values for name, values in changed.items() if values is not None})
+
+
+def with_turned_mount(campaign, turn, moved_m=0.0):
+    """Of the last target, which is also moved along its z axis."""
+    mine = campaign.measurements.target[:, None] == 3
+    measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
+    place = np.where(mine, measured.apply([0.0, 0.0, moved_m]), 0.0)
+    vectors = np.where(mine, (measured * turn).as_rotvec(), measured.as_rotvec())
+    return with_measured(campaign, campaign.measurements.position + place, vectors)
 
 
 def in_another_frame(campaign):
@@ -193,8 +199,8 @@ def test_a_wrong_frame_and_a_wrong_sense_are_both_named(fanuc, joint):
 def known_targets(fanuc, factor=1.0, which=slice(None)):
     """A campaign whose targets sit 0.1 m or so off their points, written so many times as large."""
     offsets = 0.1 * np.array([[1.0, 0.3, -0.5], [-0.4, 1.0, 0.2], [0.3, 0.4, 1.0], [1.0, -1.0, 0.5]])
-    transforms = fanuc.chain.points
-    chain = replace(fanuc.chain, points=tuple(replace(p, offset_m=tuple(o)) for p, o in zip(transforms, offsets, strict=True)))
+    points = tuple(replace(p, offset_m=tuple(o)) for p, o in zip(fanuc.chain.points, offsets, strict=True))
+    chain = replace(fanuc.chain, points=points)
     rng, plain = np.random.default_rng(4), made(fanuc, 1, Plan(poses=20))
     position = np.empty_like(plain.measurements.position)
     for number, point in enumerate(chain.points):
@@ -203,11 +209,8 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
     written = offsets.copy()
     written[which] *= factor
     targets = tuple(replace(t, offset_m=tuple(o)) for t, o in zip(plain.targets, written, strict=True))
-    return replace(
-        plain,
-        targets=targets,
-        measurements=replace(plain.measurements, position=position + 6e-5 * rng.standard_normal(position.shape)),
-    )
+    seen = replace(plain.measurements, position=position + 6e-5 * rng.standard_normal(position.shape))
+    return replace(plain, targets=targets, measurements=seen)
 
 
 def test_target_offsets_as_they_are_are_no_fault(fanuc):
@@ -251,11 +254,8 @@ def test_the_first_joint_far_off_its_zero_stops_nothing(fanuc):
 def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
     """In a frame that nobody knows, axes and rotation vectors exchanged together are mirrored in one way or another."""
     campaign = made(fanuc, 1, Plan(poses=20, tracker=True))
-    order = [1, 0, 2]
-    (fault,) = find(
-        campaign,
-        with_measured(campaign, campaign.measurements.position[:, order], campaign.measurements.rotation_vector[:, order]),
-    )
+    exchanged = (values[:, [1, 0, 2]] for values in (campaign.measurements.position, campaign.measurements.rotation_vector))
+    (fault,) = find(campaign, with_measured(campaign, *exchanged))
     assert fault.name == "swapped_axes" and len(fault.alternatives) >= 3
     assert all("rotation vectors likewise" in words for words in fault.alternatives)
 
@@ -268,13 +268,8 @@ def test_measurements_of_nothing_are_mended_by_nothing(campaign):
 def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_one_place(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20, tracker=True, oriented=False))
     angles = 0.3 + 1e-3 * np.random.default_rng(2).normal(size=(20, 6))
-    rng = np.random.default_rng(3)
-    measurements = replace(
-        campaign.measurements,
-        joint_angles=angles[campaign.measurements.pose],
-        position=rng.normal(0.0, 1.0, (20, 3))[campaign.measurements.pose],
-    )
-    assert find(campaign, measurements) == []
+    position, pose = np.random.default_rng(3).normal(0.0, 1.0, (20, 3)), campaign.measurements.pose
+    assert find(campaign, replace(campaign.measurements, joint_angles=angles[pose], position=position[pose])) == []
 
 
 @pytest.mark.parametrize("degrees", [8, 92, 180])
@@ -285,11 +280,7 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
     campaign = made(fanuc, 1, Plan(poses=20))
     assert find(campaign, campaign.measurements) == []
     turn = Rotation.from_rotvec([0.0, 0.6 * np.radians(degrees), 0.8 * np.radians(degrees)])
-    measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
-    mine = campaign.measurements.target == 3
-    vectors = np.where(mine[:, None], (measured * turn).as_rotvec(), measured.as_rotvec())
-    place = np.where(mine[:, None], measured.apply([0.0, 0.0, moved_m]), 0.0)
-    written = with_measured(campaign, campaign.measurements.position + place, vectors)
+    written = with_turned_mount(campaign, turn, moved_m)
     (fault,) = find(campaign, written)
     assert (fault.name, fault.decisive) == ("wrong_target", True)
     assert f"T6DoF would be turned by {degrees}" in fault.detail and "rotation: unknown" in fault.detail
@@ -314,11 +305,6 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
 @pytest.mark.parametrize(("degrees", "named"), [(4, True), (2, False)])
 def test_a_slightly_turned_mount_is_a_warning_as_the_zero_of_a_joint_may_be_it(fanuc, degrees, named):
     campaign = made(fanuc, 1, Plan(poses=20))
-    turn = Rotation.from_rotvec([0.0, 0.0, np.radians(degrees)])
-    mine = campaign.measurements.target == 3
-    measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
-    found = find(
-        campaign, with_measured(campaign, vectors=np.where(mine[:, None], (measured * turn).as_rotvec(), measured.as_rotvec()))
-    )
+    found = find(campaign, with_turned_mount(campaign, Rotation.from_rotvec([0.0, 0.0, np.radians(degrees)])))
     assert [(fault.name, fault.decisive) for fault in found] == [("wrong_target", False)] * named
     assert all("T6DoF would be turned by 4°" in fault.detail and "rotation: unknown" in fault.detail for fault in found)

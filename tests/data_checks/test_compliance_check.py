@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.data_checks.compliance_check import (
-    MOST_OFF_NOMINAL,
-    MOST_OFF_USUAL,
-    compliance_warnings,
-)
+from elastocal.data_checks.compliance_check import MOST_OFF_NOMINAL, MOST_OFF_USUAL, compliance_warnings
 
 NOMINAL = 1e-6 * np.array([0.5, 1.0, 2.0])
 ERROR = 0.02 * NOMINAL

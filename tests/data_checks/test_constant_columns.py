@@ -24,9 +24,8 @@ def test_positions_that_stand_still_are_named(campaign, kept, words):
 
 
 def test_angles_that_stand_still_while_the_measurements_move_are_named(campaign):
-    (fault,) = find(
-        campaign, replace(campaign.measurements, joint_angles=np.full_like(campaign.measurements.joint_angles, 0.4))
-    )
+    still = np.full_like(campaign.measurements.joint_angles, 0.4)
+    (fault,) = find(campaign, replace(campaign.measurements, joint_angles=still))
     assert fault.detail.startswith("the joint angles are the same in all 12 poses")
 
 
@@ -48,9 +47,6 @@ def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
 
 def test_one_pose_read_again_and_again_is_no_fault(campaign):
     measurements, first = campaign.measurements, campaign.measurements.position[: len(campaign.targets)]
-    still = replace(
-        measurements,
-        joint_angles=np.full_like(measurements.joint_angles, 0.4),
-        position=first[measurements.target] + 1e-5 * measurements.pose[:, None],
-    )
+    position = first[measurements.target] + 1e-5 * measurements.pose[:, None]
+    still = replace(measurements, joint_angles=np.full_like(measurements.joint_angles, 0.4), position=position)
     assert find(campaign, still) == []

@@ -9,15 +9,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import median_abs_deviation
 from support import PinocchioPoint
 
-from elastocal.data_checks.placement import (
-    placed,
-    placed_by,
-    rms,
-    robust_sigma,
-    robustly_placed,
-    spread,
-    trimmed_rms,
-)
+from elastocal.data_checks.placement import placed, placed_by, rms, robust_sigma, robustly_placed, spread, trimmed_rms
 from elastocal.fitting.observations import single_observations
 
 EXACT = Plan(poses=12, loads=1, noise=0.0, force=0.0)

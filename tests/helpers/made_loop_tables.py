@@ -126,9 +126,8 @@ def experiment_rows(effect="link_elasticity", count=10):
     """Rows of next_experiment.csv."""
     rows = []
     for number in range(count):
-        row = {"effect": effect, "pose": number, "load": 1, "point": "6DoF"} | {
-            f"q{joint}": -0.1 * joint for joint in range(1, 7)
-        }
+        row = {"effect": effect, "pose": number, "load": 1, "point": "6DoF"}
+        row |= {f"q{joint}": -0.1 * joint for joint in range(1, 7)}
         row |= {"fx": 910.1, "fy": -0.2, "fz": -411.8, "mx": -205.9, "my": 0.0, "mz": 455.1}
         rows.append(row | {"separation": 10.0 + number, "separation_without": 6.0})
     return rows
@@ -145,17 +144,9 @@ def effect_entry(
     cost_m=8.5e-5,
 ):
     """An entry of the effects of verdict.json."""
-    named = [
-        {
-            "name": f"{member} {parameter}",
-            "value": 1.2e-4 * (1 + number),
-            "std_error": 3e-6,
-            "unit": "rad",
-            "prior_std": 1e-5,
-            "held": False,
-        }
-        for number, (member, parameter) in enumerate((m, p) for m in members for p in parameters)
-    ]
+    known = {"std_error": 3e-6, "unit": "rad", "prior_std": 1e-5, "held": False}
+    names = [f"{member} {parameter}" for member in members for parameter in parameters]
+    named = [{"name": each, "value": 1.2e-4 * (1 + number)} | known for number, each in enumerate(names)]
     locations = locations or [(f"joint {joint}", 1.0) for joint in joints] or [("", 1.0)]
     return {
         "name": name,
@@ -176,12 +167,9 @@ def effect_entry(
 
 def fault_entry():
     """A fault of the data among the effects of verdict.json."""
-    return {
-        "name": "wrong_unit",
+    return effect_entry("wrong_unit", (), (), alternatives=["a load that is 1000 times larger"], adopted=False) | {
         "family": "data",
-        "joints": [],
         "detail": "the loads fit as if they were written in kilonewtons",
-        "members": [],
         "probability": None,
         "locations": [],
         "parameters": [
@@ -189,11 +177,6 @@ def fault_entry():
             {"name": "poses compared", "value": 12.0, "std_error": None, "unit": "–"},
         ],
         "p_value": None,
-        "heldout_gain": None,
-        "adopted": False,
-        "cost_m": None,
-        "alternatives": ["a load that is 1000 times larger"],
-        "angle_to_nearest_deg": None,
         "evidence": [0.5, 1e-4],
     }
 

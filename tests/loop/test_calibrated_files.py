@@ -3,6 +3,7 @@
 import hashlib
 import json
 import shutil
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -70,26 +71,21 @@ def another_seed(folder):
     path.write_text(path.read_text().replace("seed: 1", "seed: 2"))
 
 
-def moved_row(row):
-    def change(folder):
-        table = pd.read_csv(folder / "measurements.csv")
-        table.loc[row, "x"] += 1e-9
-        table.to_csv(folder / "measurements.csv", index=False)
-
-    return change
+def moved_row(folder, row):
+    table = pd.read_csv(folder / "measurements.csv")
+    table.loc[row, "x"] += 1e-9
+    table.to_csv(folder / "measurements.csv", index=False)
 
 
-def no_measurements(folder):
-    (folder / "measurements.csv").unlink()
+CHANGES = {
+    "another seed": another_seed,
+    "no measurements": lambda folder: (folder / "measurements.csv").unlink(),
+    "another table": lambda folder: (folder / "measurements.parquet").touch(),
+    **{f"row {row} moved": partial(moved_row, row=row) for row in range(0, 60, 12)},
+}
 
 
-def another_table(folder):
-    (folder / "measurements.parquet").touch()
-
-
-@pytest.mark.parametrize(
-    "change", [another_seed, no_measurements, another_table, *(moved_row(row) for row in range(0, 60, 12))]
-)
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
 def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(checkout, tmp_path, change):
     shutil.copytree(checkout / "made", tmp_path / "changed")
     change(tmp_path / "changed")

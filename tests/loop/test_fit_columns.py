@@ -36,6 +36,10 @@ TARGETS = (
 )
 
 
+def fit_of(model, estimate, held, covariance):
+    return Fit(model, estimate, NOISE, held, covariance, np.ones(1), None, np.zeros((1, 3)), None, None)
+
+
 def there_and_back(path, schema, columns):
     write_table(path, schema, [columns], {})
     return read_table(path, schema)
@@ -51,7 +55,7 @@ def test_estimates_come_back_from_their_table(kind, tmp_path):
     count = len(parameters(model, estimate))
     held = np.arange(count) % 3 == 0
     covariance = np.diag(np.arange(count, dtype=float) * ~held)
-    fitted = Fit(model, estimate, NOISE, held, covariance, np.ones(1), None, np.zeros((1, 3)), None, None)
+    fitted = fit_of(model, estimate, held, covariance)
     columns = there_and_back(tmp_path / "p.parquet", PARAMETERS, parameter_columns(fitted))
     back = estimate_from(columns, model, estimate.sessions)
     assert back.sessions == estimate.sessions
@@ -92,8 +96,7 @@ def made_fit(held, covariance):
     """A fit of two gears that have play, with a given covariance."""
     model = made_model(chain_of("Rz(q1) Tx(1) Ry(q2) Tx(0.5) [hand]"), TARGET_ON_HAND, rows=3, fitted_frames=False)
     model = model.with_effects([candidates_on(model.sites)[f"joint_offset@{joint}"] for joint in (1, 2)])
-    estimate = made_estimate(model)
-    return Fit(model, estimate, NOISE, np.array(held), np.array(covariance), np.ones(1), None, np.zeros((1, 3)), None, None)
+    return fit_of(model, made_estimate(model), np.array(held), np.array(covariance))
 
 
 def test_a_correlation_is_the_covariance_over_both_deviations():
@@ -122,16 +125,15 @@ def test_a_target_at_a_known_place_keeps_that_place_and_is_in_no_table():
 
 
 def test_the_covariance_comes_back_from_both_tables(tmp_path):
-    model = made_model(
-        chain_of("Tz(0.4) Rz(q1) Tx(0.7) [elbow] Ry(q2) Tx(0.6) [hand]"), TARGET_ON_HAND, rows=3, identified=True
-    )
+    chain = chain_of("Tz(0.4) Rz(q1) Tx(0.7) [elbow] Ry(q2) Tx(0.6) [hand]")
+    model = made_model(chain, TARGET_ON_HAND, rows=3, identified=True)
     model = model.with_effects([candidates_on(model.sites)["joint_offset@1"]])
     estimate = made_estimate(model, sessions=(0,), seed=1)
     count = len(parameters(model, estimate))
     root = np.random.default_rng(2).standard_normal((count, count))
     held = np.arange(count) == 1
     covariance = root @ root.T * np.outer(~held, ~held)
-    fitted = Fit(model, estimate, NOISE, held, covariance, np.ones(1), None, np.zeros((1, 3)), None, None)
+    fitted = fit_of(model, estimate, held, covariance)
     tables = (
         there_and_back(tmp_path / "p.parquet", PARAMETERS, parameter_columns(fitted)),
         there_and_back(tmp_path / "c.parquet", CORRELATIONS, correlation_columns(fitted)),

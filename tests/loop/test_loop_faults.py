@@ -1,10 +1,10 @@
 """Whatever is wrong with the measurements, the loop ends with a verdict that says so and with a report."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+from analysed_robots import ROBOTS
 from loop_scripts import run_loop
 from made_folders import made_folder, made_table
 from scipy.spatial.transform import Rotation
@@ -16,6 +16,7 @@ PLACE, TURN = np.array([2.0, 0.6, -0.2]), np.array([0.3, -0.5, 1.2])
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 POSE = {"measured": "pose", "noise": {"position_m": 6e-5, "orientation_rad": 6e-5}}
 OFFSET = [0.0, 0.0, 0.008]
+ELSEWHERE = "the robot would stand 2.1 m away"
 
 
 def scaled(table, names, factor):
@@ -40,13 +41,8 @@ FAULTS = {
     "loads turned": (lambda t: scaled(t, WRENCH, -1), {}, "wrong_sign", "the loads fit turned round"),
     "kilonewtons": (lambda t: scaled(t, WRENCH, 1e-3), {}, "wrong_unit", "kilonewtons"),
     "kilogram-force": (lambda t: scaled(t, WRENCH, 1 / 9.80665), {}, "wrong_unit", "kilogram-force"),
-    "tracker's frame": (
-        in_tracker_frame,
-        {},
-        "wrong_frame",
-        "measurements do not lie in the base frame: the robot would stand 2.1 m away",
-    ),
-    "tracker's frame, poses": (in_tracker_frame, POSE, "wrong_frame", "the robot would stand 2.1 m away"),
+    "tracker's frame": (in_tracker_frame, {}, "wrong_frame", f"measurements do not lie in the base frame: {ELSEWHERE}"),
+    "tracker's frame, poses": (in_tracker_frame, POSE, "wrong_frame", ELSEWHERE),
     "x and y exchanged": (lambda t: t | {"x": t["y"], "y": t["x"]}, {}, "swapped_axes", "x = y, y = x"),
     "z turned": (lambda t: scaled(t, "z", -1), {}, "swapped_axes", "z = -z"),
     "positions ten times": (lambda t: scaled(t, "xyz", 10), {}, "wrong_unit", "0.1 times the written positions"),
@@ -75,6 +71,10 @@ def folder_of(path, robot, change, settings):
 REPORTED = ("joint 3 turned", "poses zero", "nonsense")
 
 
+def verdict_of(folder):
+    return diagnosed(folder, ROBOTS, 1)
+
+
 def check(verdict, name, words):
     (effect,) = verdict["effects"]
     assert (effect["name"], effect["family"], verdict["verdict"]) == (name, "data", "named")
@@ -84,47 +84,43 @@ def check(verdict, name, words):
 
 
 @pytest.mark.parametrize("fault", [fault for fault in FAULTS if fault not in REPORTED])
-def test_a_decisive_fault_ends_in_a_verdict_that_names_it(fault, kuka, config_folder, tmp_path):
+def test_a_decisive_fault_ends_in_a_verdict_that_names_it(fault, kuka, tmp_path):
     change, settings, name, words = FAULTS[fault]
-    folder = folder_of(tmp_path / "made", kuka, change, settings)
-    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 1)
+    verdict = verdict_of(folder_of(tmp_path / "made", kuka, change, settings))
     json.dumps(verdict, allow_nan=False)
     check(verdict, name, words)
 
 
-def reported(folder, config_folder, out):
+def reported(folder, out):
     """The verdict of a campaign that went through the scripts to its report."""
-    run_loop(folder, config_folder / "robots", out)
+    run_loop(folder, ROBOTS, out)
     assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
     assert "<title>Calibration report: made</title>" in (out / "page.html").read_text(encoding="utf-8")
     return json.loads((out / "verdict.json").read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("fault", REPORTED)
-def test_a_decisive_fault_ends_in_a_verdict_and_in_a_report(fault, kuka, config_folder, tmp_path):
+def test_a_decisive_fault_ends_in_a_verdict_and_in_a_report(fault, kuka, tmp_path):
     change, settings, name, words = FAULTS[fault]
-    folder = folder_of(tmp_path / "made", kuka, change, settings)
-    check(reported(folder, config_folder, tmp_path / "out"), name, words)
+    check(reported(folder_of(tmp_path / "made", kuka, change, settings), tmp_path / "out"), name, words)
 
 
-def test_data_that_are_right_end_in_a_verdict_and_in_a_report(kuka, config_folder, tmp_path):
-    verdict = reported(made_folder(tmp_path / "made", kuka), config_folder, tmp_path / "out")
+def test_data_that_are_right_end_in_a_verdict_and_in_a_report(kuka, tmp_path):
+    verdict = reported(made_folder(tmp_path / "made", kuka), tmp_path / "out")
     assert verdict["probabilities"] is not None and not any(effect["family"] == "data" for effect in verdict["effects"])
 
 
-def test_the_transform_that_fits_is_told_with_a_wrong_frame(kuka, config_folder, tmp_path):
+def test_the_transform_that_fits_is_told_with_a_wrong_frame(kuka, tmp_path):
     """Translation to the 60 µm of the measurements over their root, and deflections; rotation likewise."""
-    folder = folder_of(tmp_path / "made", kuka, in_tracker_frame, POSE)
-    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 1)
+    verdict = verdict_of(folder_of(tmp_path / "made", kuka, in_tracker_frame, POSE))
     told = {value["name"]: (value["value"], value["unit"]) for value in verdict["effects"][0]["parameters"]}
-    for axis, place, turn in zip("xyz", PLACE, TURN, strict=True):
-        value, unit = told[f"{axis} of the base in the frame of the measurements"]
-        assert unit == "m" and abs(value - place) < 5e-4
-        value, unit = told[f"rotation vector {axis} of the base in the frame of the measurements"]
-        assert unit == "rad" and abs(value - turn) < 5e-4
+    for prefix, expected, unit in (("", PLACE, "m"), ("rotation vector ", TURN, "rad")):
+        for axis, value in zip("xyz", expected, strict=True):
+            found = told[f"{prefix}{axis} of the base in the frame of the measurements"]
+            assert found == (pytest.approx(value, abs=5e-4), unit)
 
 
-def test_a_target_offset_in_millimetres_is_named(kuka, config_folder, tmp_path):
+def test_a_target_offset_in_millimetres_is_named(kuka, tmp_path):
     """Offsets of 8 mm along z in the file of the measurements, 8 where metres are asked for: more is refused at the door."""
     table = made_table(kuka, "made")
     vectors = np.column_stack([table[f"r{axis}"] for axis in "xyz"])
@@ -133,14 +129,13 @@ def test_a_target_offset_in_millimetres_is_named(kuka, config_folder, tmp_path):
     for factor, name, words in ((1000.0, "wrong_unit", "look like millimetres"), (1.0, None, "")):
         offset = [factor * value for value in OFFSET]
         targets = {point: {"point": point, "offset_m": offset} for point in ("3DoF", "6DoF")}
-        folder = made_folder(tmp_path / f"made{factor:g}", kuka, table=table, targets=targets, **POSE)
-        verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 1)
+        verdict = verdict_of(made_folder(tmp_path / f"made{factor:g}", kuka, table=table, targets=targets, **POSE))
         faults = [effect for effect in verdict["effects"] if effect["family"] == "data"]
         assert [effect["name"] for effect in faults] == ([name] if name else [])
         assert all(words in effect["detail"] for effect in faults)
 
 
-def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, config_folder, tmp_path):
+def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, tmp_path):
     """Unloaded, each target once in a pose, beside a noise of a decimetre: there is no fault, and nothing shows."""
     table = made_table(kuka, "made")
     keys = np.column_stack([table["pose"], np.unique(table["target"], return_inverse=True)[1]])
@@ -151,21 +146,20 @@ def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, config_folder, tm
     targets = {point: {"point": point, "offset_m": "unknown"} for point in ("3DoF", "6DoF")}
     unknown = {"targets": targets, "frame": "tracker", "compliance": "nominal", "noise": {"position_m": 0.1}}
     folder = made_folder(tmp_path / "made", kuka, table=kept, **unknown)
-    verdict = reported(folder, config_folder, tmp_path / "out")
+    verdict = reported(folder, tmp_path / "out")
     assert verdict["verdict"] == "not_testable" and verdict["effects"] == []
 
 
 @pytest.mark.parametrize(("factor", "words"), [(-1.0, "negative"), (1 / 9.80665, "times nominal")])
-def test_compliances_that_no_robot_has_are_a_warning(factor, words, kuka_extended, config_folder, tmp_path):
+def test_compliances_that_no_robot_has_are_a_warning(factor, words, kuka_extended, tmp_path):
     """Of a robot whose links bend too, which the declared one lacks: no single unit explains its deflections."""
-    folder = folder_of(tmp_path / "made", kuka_extended, lambda t: scaled(t, WRENCH, factor), POSE)
-    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 1)
+    verdict = verdict_of(folder_of(tmp_path / "made", kuka_extended, lambda t: scaled(t, WRENCH, factor), POSE))
     (warning,) = (text for text in verdict["warnings"] if "joint compliances" in text)
     assert words in warning and "±" in warning
 
 
-def test_a_robot_in_millimetres_is_refused_in_one_line(kuka, config_folder, tmp_path):
-    text = (config_folder / "robots" / "kuka.yaml").read_text(encoding="utf-8")
+def test_a_robot_in_millimetres_is_refused_in_one_line(kuka, tmp_path):
+    text = (ROBOTS / "kuka.yaml").read_text(encoding="utf-8")
     lengths = "{l1: 675, l2: 350, l3: 1150, l4: -41, l5: 1200, l6: 240}"
     lines = [f"lengths_m: {lengths}" if line.startswith("lengths_m") else line for line in text.splitlines()]
     folder = made_folder(tmp_path / "made", kuka)
@@ -173,6 +167,6 @@ def test_a_robot_in_millimetres_is_refused_in_one_line(kuka, config_folder, tmp_
     (folder / "campaign.yaml").write_text(document.replace("robot: kuka", "robot: mine.yaml"), encoding="utf-8")
     (folder / "mine.yaml").write_text("\n".join(lines), encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        diagnosed(folder.as_posix(), Path(config_folder / "robots").as_posix(), 1)
+        verdict_of(folder)
     (line,) = str(caught.value).splitlines()
     assert "mine.yaml: line 4, lengths_m.l1: found 675" in line and "metres, not millimetres" in line

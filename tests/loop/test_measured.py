@@ -37,12 +37,10 @@ def corrected_folder(folder, robot, error_m=1e-4, frame="base", offset=(0.0, 0.0
     seen = position + rotation @ np.array(offset) + error_m * DRAWN[0] + np.sqrt(3.0) * noise_m * DRAWN[1]
     if frame == "tracker":
         seen = seen @ Rotation.from_rotvec([0.3, -1.0, 2.0]).as_matrix().T + [4.0, -2.0, 1.0]
-    rows = pd.DataFrame(
-        np.column_stack([angles, np.zeros((COUNT, 6)), seen]),
-        columns=[*names[:6], *(["fx", "fy", "fz", "mx", "my", "mz", "x", "y", "z"])],
-    )
-    rows.insert(0, "pose", np.arange(1, COUNT + 1))
-    rows.assign(load=0, repeat=0, target="T").to_csv(folder / "measurements.csv", index=False)
+    read = [*names[:6], "fx", "fy", "fz", "mx", "my", "mz", "x", "y", "z"]
+    rows = pd.DataFrame(np.column_stack([angles, np.zeros((COUNT, 6)), seen]), columns=read)
+    rows = rows.assign(pose=np.arange(1, COUNT + 1), load=0, repeat=0, target="T")
+    rows.to_csv(folder / "measurements.csv", index=False)
     point = robot.chain.end_effector.name
     target = {"point": point, "offset_m": stated or [0, 0, 0]}
     document = {"campaign": "after", "robot": "kuka", "measured": "position", "frame": frame, "targets": {"T": target}}
@@ -50,8 +48,8 @@ def corrected_folder(folder, robot, error_m=1e-4, frame="base", offset=(0.0, 0.0
     return folder
 
 
-def truth(error_m):
-    return error_m * np.sqrt((DRAWN[0] ** 2).sum(axis=1).mean())
+def change_table(path, change):
+    change(pd.read_csv(path)).to_csv(path, index=False)
 
 
 @pytest.mark.parametrize(
@@ -70,7 +68,7 @@ def test_the_error_is_that_of_the_robot_without_the_trackers_noise(tmp_path, kuk
     assert (accuracy.kind, accuracy.frame) == ("measured", "base" if frame == "base" else "robot")
     assert accuracy.offset_removed == (stated is not None)
     # The placement takes up 6 or 9 of 120 numbers of the errors too.
-    assert accuracy.rms_m == pytest.approx(truth(1e-4), rel=0.1)
+    assert accuracy.rms_m == pytest.approx(1e-4 * np.sqrt((DRAWN[0] ** 2).sum(axis=1).mean()), rel=0.1)
     assert accuracy.rms_m < accuracy.rms_bound_m < 1.5 * accuracy.rms_m
     assert np.sqrt((found.errors.distance**2).mean()) > accuracy.rms_m
 
@@ -82,38 +80,26 @@ def test_noise_alone_is_no_error(tmp_path, kuka, diagnosed):
 
 def test_a_base_that_is_off_its_declaration_is_an_error(tmp_path, kuka, diagnosed):
     folder = corrected_folder(tmp_path / "after", kuka)
-    rows = pd.read_csv(folder / "measurements.csv")
-    rows["z"] += 5e-4
-    rows.to_csv(folder / "measurements.csv", index=False)
+    change_table(folder / "measurements.csv", lambda rows: rows.assign(z=rows["z"] + 5e-4))
     assert measured_errors(folder, ROBOTS, diagnosed).accuracy.rms_m > 4.5e-4
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("table", "change", "message"),
     [
-        (lambda rows: rows.assign(q1=rows["q1"] + 1e-2), "row 1: found other joint angles"),
-        (lambda rows: rows.assign(pose=rows["pose"] + 1), "1..40, the rows of targets.csv"),
-        (lambda rows: rows[:8], "12 or more"),
+        ("measurements.csv", lambda rows: rows.assign(q1=rows["q1"] + 1e-2), "row 1: found other joint angles"),
+        ("measurements.csv", lambda rows: rows.assign(pose=rows["pose"] + 1), "1..40, the rows of targets.csv"),
+        ("measurements.csv", lambda rows: rows[:8], "12 or more"),
+        ("targets.csv", lambda rows: rows.drop(columns="x"), "no column 'x'"),
+        ("targets.csv", lambda rows: rows.assign(status="unreachable"), "a target that was not corrected"),
+        ("targets.csv", lambda rows: rows.assign(y="here"), "'here'"),
     ],
 )
-def test_measurements_elsewhere_than_at_the_targets_are_refused(tmp_path, kuka, diagnosed, change, message):
+def test_measurements_elsewhere_and_targets_that_correct_did_not_write_are_refused(
+    tmp_path, kuka, diagnosed, table, change, message
+):
     folder = corrected_folder(tmp_path / "after", kuka)
-    change(pd.read_csv(folder / "measurements.csv")).to_csv(folder / "measurements.csv", index=False)
-    with pytest.raises(InputError, match=message):
-        measured_errors(folder, ROBOTS, diagnosed)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda rows: rows.drop(columns="x"), "no column 'x'"),
-        (lambda rows: rows.assign(status="unreachable"), "a target that was not corrected"),
-        (lambda rows: rows.assign(y="here"), "'here'"),
-    ],
-)
-def test_targets_that_correct_did_not_write_are_refused(tmp_path, kuka, diagnosed, change, message):
-    folder = corrected_folder(tmp_path / "after", kuka)
-    change(pd.read_csv(folder / "targets.csv")).to_csv(folder / "targets.csv", index=False)
+    change_table(folder / table, change)
     with pytest.raises(InputError, match=message):
         measured_errors(folder, ROBOTS, diagnosed)
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from analysed_robots import ROBOTS
 from made_folders import made_folder, made_table
 from scipy.spatial.transform import Rotation
 from small_data import service_arm_folder
@@ -11,9 +12,13 @@ from small_data import service_arm_folder
 from elastocal.loop.overview import overview
 
 
+def overview_of(folder):
+    return overview(folder, ROBOTS)
+
+
 @pytest.fixture(scope="module")
-def facts(kuka, config_folder, tmp_path_factory):
-    return overview(made_folder(tmp_path_factory.mktemp("o") / "made", kuka), config_folder / "robots")
+def facts(kuka, tmp_path_factory):
+    return overview_of(made_folder(tmp_path_factory.mktemp("o") / "made", kuka))
 
 
 def test_what_was_read_is_counted(facts):
@@ -33,52 +38,49 @@ def test_springs_have_their_errors_and_candidates_their_reasons(facts):
     assert any("held-out poses say little" in sentence for sentence in facts["suspicious"])
 
 
-def test_a_decisive_fault_is_said_and_the_campaign_is_not_diagnosable(kuka, config_folder, tmp_path):
+def test_a_decisive_fault_is_said_and_the_campaign_is_not_diagnosable(kuka, tmp_path):
     table = made_table(kuka, "made")
     table["q3"] = -table["q3"]
-    facts = overview(made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots")
+    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table))
     assert not facts["diagnosable"]
     assert any(fault["decisive"] and "joint 3" in fault["sentence"] for fault in facts["faults"])
 
 
-def test_loads_along_one_line_are_suspicious(kuka, config_folder, tmp_path):
+def test_loads_along_one_line_are_suspicious(kuka, tmp_path):
     table = made_table(kuka, "made")
-    for name in ("fx", "fy"):
-        table[name] = np.zeros_like(table[name])
-    facts = overview(made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots")
+    table |= {name: 0.0 * table[name] for name in ("fx", "fy")}
+    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table))
     assert any("along one line" in sentence for sentence in facts["suspicious"])
 
 
-def test_held_out_values_change_nothing_that_is_said(kuka, config_folder, tmp_path, facts):
+def test_held_out_values_change_nothing_that_is_said(kuka, tmp_path, facts):
     """The wall: their readings may be anything."""
     document = {"poses": [11, 12, 13]}
     results = []
     for number, off in enumerate((0.0, 1e-3)):
         table = made_table(kuka, "made")
-        held = np.isin(table["pose"], document["poses"])
-        table["x"] = table["x"] + off * held
-        folder = made_folder(tmp_path / f"made{number}", kuka, "made", table=table, holdout=document)
-        results.append(overview(folder, config_folder / "robots"))
+        table["x"] = table["x"] + off * np.isin(table["pose"], document["poses"])
+        results.append(overview_of(made_folder(tmp_path / f"made{number}", kuka, table=table, holdout=document)))
     assert results[0] == results[1]
 
 
 @pytest.mark.parametrize(
     ("many", "said"), [(4, "all 4 validation poses repeat"), (2, "2 of 4 validation poses repeat"), (0, "")]
 )
-def test_poses_held_out_that_repeat_those_fitted_are_suspicious(kuka, config_folder, tmp_path, many, said):
+def test_poses_held_out_that_repeat_those_fitted_are_suspicious(kuka, tmp_path, many, said):
     """Whatever they are measured at says nothing of other poses."""
     table, document = made_table(kuka, "made"), {"poses": [10, 11, 12, 13]}
     for pose in range(many):
         for joint in range(1, 7):
             angles = table[f"q{joint}"]
             angles[table["pose"] == 10 + pose] = angles[table["pose"] == pose][0] + 1e-4
-    facts = overview(made_folder(tmp_path / "made", kuka, table=table, holdout=document), config_folder / "robots")
+    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table, holdout=document))
     found = [sentence for sentence in facts["suspicious"] if "repeat configurations that were fitted" in sentence]
     assert len(found) == bool(said) and all(said in sentence and "nothing of other poses" in sentence for sentence in found)
 
 
-def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_takes(config_folder, tmp_path, facts):
-    found = overview(service_arm_folder(tmp_path / "made", 1), config_folder / "robots")
+def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_takes(tmp_path, facts):
+    found = overview_of(service_arm_folder(tmp_path / "made", 1))
     (said,) = [sentence for sentence in found["suspicious"] if "poses are few" in sentence]
     least = int(said.split("Measure about ")[1].split(" ")[0])
     assert said.startswith(f"24 poses are few for {found['parameters']} parameters, of which they determine about")
@@ -87,7 +89,7 @@ def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_t
     assert not any("poses are few" in sentence for sentence in facts["suspicious"])
 
 
-def test_a_fitted_mount_is_listed_and_a_known_one_is_not(kuka, config_folder, tmp_path):
+def test_a_fitted_mount_is_listed_and_a_known_one_is_not(kuka, tmp_path):
     turn = Rotation.from_rotvec([0.0, 0.3, 1.5])
     table = made_table(kuka, "made")
     mine = np.array(table["target"]) == "6DoF"
@@ -98,7 +100,7 @@ def test_a_fitted_mount_is_listed_and_a_known_one_is_not(kuka, config_folder, tm
         targets = {"3DoF": {"point": "3DoF", "offset_m": [0, 0, 0]}, "6DoF": {"point": "6DoF", "offset_m": [0, 0, 0]}}
         targets["6DoF"] |= {} if rotation is None else {"rotation": rotation}
         folder = tmp_path / f"made{len(list(tmp_path.iterdir()))}"
-        found = overview(made_folder(folder, kuka, table=table, measured="pose", targets=targets), config_folder / "robots")
+        found = overview_of(made_folder(folder, kuka, table=table, measured="pose", targets=targets))
         assert [mount["target"] for mount in found["mounts"]] == mounts
         assert found["diagnosable"] == (rotation is not None)
         if mounts:

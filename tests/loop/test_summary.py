@@ -18,13 +18,8 @@ def errors(before, after=None, pose=None, repeat=None, session=0):
     before = np.asarray(before, float)
     after = before if after is None else np.asarray(after, float)
     count = len(before)
-    table = {
-        "session": np.full(count, session),
-        "pose": np.arange(count) if pose is None else pose,
-        "load": 0,
-        "target": 0,
-        "repeat": np.zeros(count, int) if repeat is None else repeat,
-    }
+    table = {"session": np.full(count, session), "pose": np.arange(count) if pose is None else pose}
+    table |= {"load": 0, "target": 0, "repeat": np.zeros(count, int) if repeat is None else repeat}
     for stage, values in (("before", before), ("after", after)):
         table |= {f"{stage}_dx": 1e-3 * values, f"{stage}_dy": 0.0, f"{stage}_dz": 0.0}
     return pd.DataFrame(table)
@@ -64,11 +59,8 @@ def test_loads_and_targets_of_a_pose_are_measurements_of_their_own():
 def test_each_session_has_a_row_of_its_own():
     both = pd.concat([errors([1.0, 1.0], session=0), errors([3.0, 3.0], session=5)])
     table = rows_of(one=both, other=errors([2.0, 2.0]))
-    assert list(zip(table.campaign, table.session, table.before_rms_mm.round(9), strict=True)) == [
-        ("one", 0, 1.0),
-        ("one", 5, 3.0),
-        ("other", 0, 2.0),
-    ]
+    found = list(zip(table.campaign, table.session, table.before_rms_mm.round(9), strict=True))
+    assert found == [("one", 0, 1.0), ("one", 5, 3.0), ("other", 0, 2.0)]
 
 
 def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verdicts():

@@ -4,10 +4,10 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from analysed_robots import ROBOTS
 from made_folders import PLAN, made_folder, made_table
 from small_data import service_arm_folder
 
@@ -18,7 +18,6 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in, diagnosed
 from elastocal.report.first_page import sentences
 
-ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 # Loads in both senses, for what comes with the load and is in no catalogue.
 BOTH_SENSES = replace(PLAN, poses=40, ladder=(0, 1, -1))
 USUAL = replace(PLAN, poses=30)
@@ -55,32 +54,37 @@ def hidden(table):
 
 
 UNKNOWN = {point: {"point": point, "offset_m": "unknown"} for point in PLAN.points}
+NOTHING_KNOWN = {"targets": UNKNOWN, "frame": "tracker", "compliance": "nominal", "noise": {"position_m": 0.05}}
 KINDS = {
     "adequate": (lambda table: table, USUAL, {}),
     "named": (offset, USUAL, {}),
     "several": (offset_and_harmonic, USUAL, {}),
     "class": (offset_that_creeps, USUAL, {}),
     "unexplained": (foreign, BOTH_SENSES, {}),
-    "not_testable": (
-        hidden,
-        PLAN,
-        {"targets": UNKNOWN, "frame": "tracker", "compliance": "nominal", "noise": {"position_m": 0.05}},
-    ),
+    "not_testable": (hidden, PLAN, NOTHING_KNOWN),
 }
 NAMES = {"named": ["joint_offset"], "several": ["joint_offset", "transmission_harmonic"], "class": ["joint_offset"]}
 
 
+def in_order(table):
+    """Pose by pose, as people measure."""
+    order = np.lexsort((table["repeat"], table["load"], table["pose"]))
+    return {name: table[name][order] for name in table}
+
+
 def folder_of(path, robot, kind):
     change, plan, settings = KINDS[kind]
-    table = change(made_table(robot, "made", seed=3, plan=plan))
-    # Pose by pose, as people measure.
-    order = np.lexsort((table["repeat"], table["load"], table["pose"]))
-    return made_folder(path / "made", robot, table={name: table[name][order] for name in table}, **settings)
+    table = in_order(change(made_table(robot, "made", seed=3, plan=plan)))
+    return made_folder(path / "made", robot, table=table, **settings)
+
+
+def verdict_of(path, robot, kind):
+    return diagnosed(folder_of(path, robot, kind), ROBOTS, 1)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_verdict_is(kind, kuka, tmp_path):
-    verdict = diagnosed(folder_of(tmp_path, kuka, kind).as_posix(), ROBOTS.as_posix(), 1)
+    verdict = verdict_of(tmp_path, kuka, kind)
     json.dumps(verdict, allow_nan=False)
     probabilities, heldout = verdict["probabilities"], verdict["heldout"]
     assert verdict["verdict"] == kind, probabilities
@@ -101,10 +105,9 @@ def test_verdict_is(kind, kuka, tmp_path):
 
 
 def test_the_verdict_is_the_same_for_one_seed(kuka, tmp_path):
-    folder = folder_of(tmp_path, kuka, "adequate").as_posix()
-    one, other = (diagnosed(folder, ROBOTS.as_posix(), 7) for _ in range(2))
-    assert one == other
-    assert diagnosed(folder, ROBOTS.as_posix(), 9)["probabilities"]["alarm_p_value"] != one["probabilities"]["alarm_p_value"]
+    folder = folder_of(tmp_path, kuka, "adequate")
+    one, again, other = (diagnosed(folder, ROBOTS, seed) for seed in (7, 7, 9))
+    assert one == again and one["probabilities"]["alarm_p_value"] != other["probabilities"]["alarm_p_value"]
 
 
 def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp_path):
@@ -112,9 +115,7 @@ def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp
     folder = folder_of(tmp_path, kuka, "named")
     case, held_out = cases_in(folder, ROBOTS)
     unseen = set(zip(held_out.campaign.measurements.session, held_out.campaign.measurements.pose, strict=True))
-    table = offset(made_table(kuka, "made", seed=3, plan=USUAL))
-    order = np.lexsort((table["repeat"], table["load"], table["pose"]))
-    table = {name: table[name][order] for name in table}
+    table = in_order(offset(made_table(kuka, "made", seed=3, plan=USUAL)))
     mine = np.array([(0, pose) in unseen or (1, pose) in unseen for pose in table["pose"]])
     assert 0 < mine.sum() < len(mine)
     for name, change in (("x", 1.0), ("z", -0.5), ("q2", 0.3), ("fx", 300.0 * (table["load"] != 0))):
@@ -148,7 +149,7 @@ def test_diagnosing_process_opens_no_sealed_file(kuka, tmp_path):
     sealed = tmp_path / "sealed" / "case_1.json"
     sealed.parent.mkdir()
     sealed.write_text("{}", encoding="utf-8")
-    done = subprocess.run([sys.executable, "-c", WATCHED, folder.as_posix(), ROBOTS.as_posix()], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", WATCHED, folder, ROBOTS], capture_output=True, text=True)
     assert not done.returncode, done.stderr
     opened = done.stdout.splitlines()
     assert any(path.endswith("campaign.yaml") for path in opened)
@@ -172,8 +173,7 @@ def test_a_lost_beam_changes_nothing_in_what_is_stated_of_the_accuracy(kuka, tmp
     for name in ("clean", "spoilt"):
         if name == "spoilt":
             table = table | {"x": table["x"] + np.where(np.isin(np.arange(len(table["x"])), [5, 60]), 0.05, 0.0)}
-        folder = made_folder(tmp_path / name, kuka, name, table=table)
-        stated.append(diagnosed(folder.as_posix(), ROBOTS.as_posix(), 1))
+        stated.append(diagnosed(made_folder(tmp_path / name, kuka, name, table=table), ROBOTS, 1))
     assert stated[1]["gross_errors"]
     assert stated[1]["accuracy"]["rms_m"] == pytest.approx(stated[0]["accuracy"]["rms_m"], rel=0.1)
 
@@ -182,7 +182,7 @@ def test_a_lost_beam_changes_nothing_in_what_is_stated_of_the_accuracy(kuka, tmp
 def test_what_contradicts_an_adequate_model_is_stated_of_no_other(kind, stated, kuka, tmp_path, monkeypatch):
     """Where an alarm was raised it is the residual that is unexplained, and the report says that."""
     monkeypatch.setattr("elastocal.diagnosis.diagnose.contradictions", lambda *_: ["a contradiction"])
-    verdict = diagnosed(folder_of(tmp_path, kuka, kind).as_posix(), ROBOTS.as_posix(), 1)
+    verdict = verdict_of(tmp_path, kuka, kind)
     assert (verdict["verdict"], verdict["contradictions"]) == ("unexplained", stated)
     text = " ".join(sentences(verdict))
     assert ("the declared model cannot be right: a contradiction" in text) == bool(stated)

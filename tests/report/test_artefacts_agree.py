@@ -17,8 +17,8 @@ from made_loop_tables import candidate_table, residual_table
 
 from elastocal.errors import InputError
 from elastocal.io.records import check_sources, jobs_behind
+from elastocal.report.loop_facts import write_loop_report
 from elastocal.report.loop_page import loop_page, write_loop_page
-from elastocal.report.loop_pages import write_loop_report
 from elastocal.report.outcome import outcome
 
 PICTURES = ["arrows", "before_after", "residuals", "candidates", "confounding"]

@@ -98,18 +98,10 @@ def test_cases_are_counted_by_group_and_robot_with_their_sum(facts):
 
 
 def test_the_protocol_names_what_was_sealed_before_the_analysis(facts):
-    protocol = facts["protocol"]
     # sha256sum of the manifest's one line.
     digest = "3ae7965672b1e6c5db56e64bfa3e60e5110d2e1190a8e73418f9f5372eb1ee81"
-    assert protocol == {
-        "cases": "8",
-        "size": "quick",
-        "seed": "7",
-        "truths": "1",
-        "digest": digest,
-        "levels": "50",
-        "outside": "refraction",
-    }
+    counted = {"cases": "8", "size": "quick", "seed": "7", "truths": "1"}
+    assert facts["protocol"] == counted | {"digest": digest, "levels": "50", "outside": "refraction"}
 
 
 def test_effects_have_their_shares_with_intervals_and_their_size(facts):

@@ -2,15 +2,14 @@
 
 import pytest
 import typst
+from compiled_pages import assert_within_margins, pages_of
 from drawn_figures import empty_pictures
 from made_blind_documents import oracle, silence, truth
 from made_blind_facts import MEASURED, PROOF, facts_of
-from matplotlib.image import imread
 
 from elastocal_proof.report.blind_pages import write_blind_report
 
 FIGURES = ("targets", "power", "reliability", "confusion", "errors", "coverage", "sweep")
-MARGIN_OF_PAGE = 20 / 210
 
 
 @pytest.fixture(scope="module")
@@ -22,21 +21,10 @@ def pictures(tmp_path_factory):
     "entries", [PROOF, ((truth(robot="kuka"), silence(), oracle(1.0)),)], ids=["proof", "robots of the tuning alone"]
 )
 def test_the_report_is_a_pdf_within_its_margins(entries, pictures, tmp_path, monkeypatch):
-    compiled = typst.compile
-
-    def with_pixels(source, output, format, root):
-        compiled(source, output=f"{tmp_path}/page-{{0p}}.png", format="png", root=root, ppi=40)
-        return compiled(source, output=output, format=format, root=root)
-
-    monkeypatch.setattr(typst, "compile", with_pixels)
+    pages = pages_of(monkeypatch)
     write_blind_report(f"{tmp_path}/blind.pdf", facts_of(tmp_path, *entries, follow_up=MEASURED), pictures)
     assert (tmp_path / "blind.pdf").read_bytes().startswith(b"%PDF")
-    pages = [imread(file)[:, :, :3] for file in sorted(tmp_path.glob("page-*.png"))]
-    assert pages
-    for page in pages:
-        margin = int(page.shape[1] * MARGIN_OF_PAGE)
-        assert (page[:, :margin] > 0.99).all() and (page[:, -margin:] > 0.99).all()
-        assert (page[:, margin:-margin] < 0.5).any()
+    assert_within_margins(pages)
 
 
 def test_a_report_without_one_of_its_figures_is_not_written(pictures, tmp_path):

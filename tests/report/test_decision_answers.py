@@ -2,18 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from made_study_tables import (
-    TITLES,
-    break_even,
-    claims,
-    costs,
-    few,
-    joint,
-    kinds,
-    measured,
-    simulated,
-    stiffness,
-)
+from made_study_tables import TITLES, break_even, claims, costs, few, joint, kinds, measured, simulated, stiffness
 
 from elastocal.report.decision_answers import (
     break_even_rows,
@@ -40,8 +29,7 @@ def test_table_4_has_a_row_for_each_estimator_and_columns_for_each_kind():
 def test_one_estimator_under_two_names_has_one_row():
     twice = measured()
     again = twice[twice.strategy == "6DoF"].assign(
-        strategy="6DoF again",
-        k_sigma_fixed_joints_20_percent=lambda frame: frame.k_sigma_20_percent,
+        strategy="6DoF again", k_sigma_fixed_joints_20_percent=lambda frame: frame.k_sigma_20_percent
     )
     table = pd.concat([twice, again], ignore_index=True)
     assert "6DoF again" not in [row["strategy"] for row in measured_rows(table, TITLES)]
@@ -79,11 +67,8 @@ def test_designs_are_given_by_load_with_what_is_not_observable():
 
 def test_a_strategy_without_a_prior_has_one_row():
     rows = few_rows(few(), TITLES)
-    assert [(row["strategy"], row["error"]) for row in rows[:3]] == [
-        ("6DoF", "any"),
-        ("6DoF shrunk", "10"),
-        ("6DoF shrunk", "100"),
-    ]
+    told = [(row["strategy"], row["error"]) for row in rows[:3]]
+    assert told == [("6DoF", "any"), ("6DoF shrunk", "10"), ("6DoF shrunk", "100")]
 
 
 def test_kinds_are_compared_at_equal_scalars():

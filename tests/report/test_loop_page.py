@@ -12,7 +12,7 @@ from made_loop_facts import CAMPAIGNS, facts_of, plainly
 from made_loop_tables import candidate_table, residual_table
 
 from elastocal.io.origin import Origin
-from elastocal.loop.residual_tables import worst_measurement
+from elastocal.loop.residual_tables import angles_of, worst_measurement
 from elastocal.mechanics.kinematics import corners
 from elastocal.report import loop_page as module
 from elastocal.report.loop_page import loop_page, write_loop_page
@@ -93,8 +93,7 @@ def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_r
     table, verdict = residual_table(), CAMPAIGNS["named"]
     other = replace(kuka, reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]), reported_offset=np.full(6, 0.3))
     _, data = loop_page(facts_of(verdict), table, candidate_table(), other)
-    angles = np.column_stack([table[f"q{joint}"] for joint in range(1, 7)])[:1]
-    np.testing.assert_allclose(data["outlines"][0], corners(kuka.chain, angles)[:, 0], atol=1e-4)
+    np.testing.assert_allclose(data["outlines"][0], corners(kuka.chain, angles_of(table, 6)[:1])[:, 0], atol=1e-4)
 
 
 def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at_targets_of_the_drawn_pose(kuka):
@@ -103,7 +102,7 @@ def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at
     table |= {"held_out": table["pose"] >= 3, "pose": table["pose"] % 3}
     _, data = loop_page(facts_of(verdict), table, candidate_table(), kuka)
     assert data["poses"] == ["0", "1", "2", "0, validation", "1, validation", "2, validation"]
-    joints = np.column_stack([table[f"q{joint}"] for joint in range(1, 7)])
+    joints = angles_of(table, 6)
     for outline, rows in zip(data["outlines"], data["targets"], strict=True):
         assert sorted(table["target"][rows]) == [0, 1]
         for row in rows:
@@ -155,9 +154,9 @@ def test_a_candidate_of_several_shapes_has_the_factor_of_the_best_and_the_probab
     assert [row | {"words": ""} for row in once] == [row | {"words": ""} for row in both]
 
 
-def test_the_page_names_its_origin_at_the_foot(kuka, tmp_path):
-    write_loop_page(tmp_path / "report.html", *page_of(kuka), Origin("c0ffee", "d16e57", 7))
-    assert "Made from commit c0ffee, configuration SHA-256 d16e57, seed 7." in (tmp_path / "report.html").read_text("utf-8")
+def test_the_page_names_its_origin_at_the_foot(written):
+    origin = f"Made from commit {'c0ffee' * 7}, configuration SHA-256 {'d16e57aa' * 8}, seed 7."
+    assert origin in written.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("campaign", ["not_testable", "fault of the data"])
@@ -196,18 +195,16 @@ def test_texts_of_other_people_stay_texts(kuka, tmp_path):
     page, data = page_of(kuka)
     evil = "</script><script>alert(1)</script>"
     data = data | {"poses": [evil]}
-    write_loop_page(tmp_path / "report.html", page | {"robot": evil}, data)
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "alert(1)</script>" not in text.replace("&lt;/script&gt;", "") and data_in(tmp_path / "report.html")["poses"] == [
-        evil
-    ]
+    path = tmp_path / "report.html"
+    write_loop_page(path, page | {"robot": evil}, data)
+    assert "alert(1)</script>" not in path.read_text(encoding="utf-8").replace("&lt;/script&gt;", "")
+    assert data_in(path)["poses"] == [evil]
 
 
 def test_the_page_names_nothing_that_a_browser_would_fetch(written):
     text = re.sub(r"<script>.*?</script>", "", written.read_text(encoding="utf-8"), flags=re.DOTALL)
-    assert (
-        re.findall(r'(?:src|href)="(?!data:)([^"]*)', text) == ["report.pdf"] and "@import" not in text and "url(" not in text
-    )
+    assert re.findall(r'(?:src|href)="(?!data:)([^"]*)', text) == ["report.pdf"]
+    assert "@import" not in text and "url(" not in text
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Debian's chromium is not installed")

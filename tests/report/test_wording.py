@@ -3,14 +3,7 @@
 import pytest
 
 from elastocal.diagnosis.words import listed
-from elastocal.report.wording import (
-    length,
-    members_words,
-    millimetres,
-    plain,
-    probability_words,
-    scaled,
-)
+from elastocal.report.wording import length, members_words, millimetres, plain, probability_words, scaled
 
 
 @pytest.mark.parametrize(
@@ -34,12 +27,7 @@ def test_values_come_in_units_that_suit_them(value, error, unit, expected):
 
 
 def test_joints_count_up_and_those_of_which_the_same_is_told_stand_together():
-    keys = [
-        "transmission_harmonic@10[orders 1-2]",
-        "transmission_harmonic@2[orders 13-18]",
-        "transmission_harmonic@2[orders 3-6]",
-        "transmission_harmonic@4[orders 1-2]",
-    ]
+    keys = [f"transmission_harmonic@{key}" for key in ("10[orders 1-2]", "2[orders 13-18]", "2[orders 3-6]", "4[orders 1-2]")]
     assert members_words(keys) == "joint 2: orders 3-6, orders 13-18; joints 4 and 10: orders 1-2"
     assert members_words(["cross_compliance@1+2", "cross_compliance@2+3"]) == "joints 1 and 2; joints 2 and 3"
     assert members_words([f"cross_compliance@{k}+{k + 1}" for k in range(1, 6)], 2) == "joints 1 and 2; joints 2 and 3; 3 more"
@@ -52,11 +40,8 @@ def test_no_probability_is_zero_or_one():
 
 
 def test_lengths():
-    assert [length(value).replace("\u00a0", " ") for value in (1.2345e-4, 0.9999e-3, 0.0213)] == [
-        "123 µm",
-        "1.00 mm",
-        "21.3 mm",
-    ]
+    stated = [length(value).replace("\u00a0", " ") for value in (1.2345e-4, 0.9999e-3, 0.0213)]
+    assert stated == ["123 µm", "1.00 mm", "21.3 mm"]
     assert length(None) == "unknown"
     assert [millimetres(value) for value in (1.5e-5, 0.9999e-3, 1.184e-3, 0.0213)] == ["0.015", "1.00", "1.18", "21.3"]
     assert plain(0.000123) == "0.000123" and plain(1234.5) == "1234"

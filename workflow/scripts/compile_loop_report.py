@@ -10,9 +10,8 @@ from elastocal.loop.diagnosis_tables import final_parameters
 from elastocal.loop.residual_tables import read_residuals
 from elastocal.loop.schemas import CANDIDATES, STEPS
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.report.loop_facts import loop_facts
+from elastocal.report.loop_facts import loop_facts, write_loop_report
 from elastocal.report.loop_page import loop_page, write_loop_page
-from elastocal.report.loop_pages import write_loop_report
 
 
 def compile_loop_report(job: Job) -> None:

@@ -16,41 +16,35 @@ from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import REPLICATES, metrics
 
 _PLAIN = (
+    *("expectations", "table2", "per_dataset", "extended", "solvers"),
     *("joint", "studies", "break_even", "costs", "few", "kinds", "stiffness", "budget", "pairs", "needed", "designs"),
     *("places", "scores", "score_pairs", "tubes", "observability", "geometry", "weighting"),
 )
-# Each table that answers questions, and how it is read: what looks like a number may be none.
+# Each table, and how it is read: what looks like a number may be none.
 _TABLES = {name: {} for name in _PLAIN} | {
+    "comparison": {"dtype": {"table": str}},
     "claims": {"keep_default_na": False, "na_values": {"p": [""]}},
     "ladder": {"dtype": {"link_springs": str}},
     "simulated": {"dtype": {"unobservable": str}},
 }
+# Of every cell.
+_LONG = {"metrics": metrics, "replicates": lambda joints: REPLICATES, "noisiest": metrics}
 
 
 def state_answers(job: Job) -> None:
     settings = job.params
     names = brief_names(settings.names)
     titles = {robot: names[robot] for robot in settings.robots}
-    facts = answers(
-        comparison=pd.read_csv(job.input.comparison, dtype={"table": str}),
-        expectations=pd.read_csv(job.input.expectations),
-        table2=pd.read_csv(job.input.table2),
-        per_dataset=pd.read_csv(job.input.per_dataset),
-        extended=pd.read_csv(job.input.extended),
-        solvers=pd.read_csv(job.input.solvers),
-        metrics=read_long(job.input.metrics, metrics),
-        replicates=read_long(job.input.replicates, lambda joints: REPLICATES),
-        noisiest=read_long(job.input.noisiest, metrics),
-        titles=titles,
-        cells=settings.cells,
-    )
+    tables = {name: pd.read_csv(getattr(job.input, name), **how) for name, how in _TABLES.items()}
+    tables |= {name: read_long(getattr(job.input, name), schema) for name, schema in _LONG.items()}
+    facts = answers(tables, titles, settings.cells)
     strategies = [strategy_from_document(document) for document in settings.strategies]
     classical, length = settings.cells["classical_strategy"], settings.cells["length"]
     asked = Asked(titles, strategies, classical, settings.best, length, settings.accuracy_um, settings.joint_range)
     citation = read_document(job.input.citation)
     cited = {"date": str(citation["date-released"]), "version": citation["version"], "license": citation["license"]}
     facts |= {"citation": {"authors": ", ".join(each["name"] for each in citation["authors"])} | cited}
-    facts |= answer_questions({name: pd.read_csv(getattr(job.input, name), **how) for name, how in _TABLES.items()}, asked)
+    facts |= answer_questions(tables, asked)
     facts |= {
         "titles": titles,
         "names": names,

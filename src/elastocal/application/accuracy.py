@@ -310,21 +310,18 @@ def root_mean_square(displacement: np.ndarray) -> float:
 
 def accuracy_sentence(accuracy: Accuracy) -> str:
     """One sentence with everything that an accuracy statement has, the same wherever it stands."""
-    kind, offset = (
-        accuracy.kind.capitalize(),
-        " and of a constant offset at the end effector" if accuracy.offset_removed else "",
-    )
-    sure = f"{100 * accuracy.confidence:g} %"
+    offset = " and of a constant offset at the end effector" if accuracy.offset_removed else ""
 
     def value(size: float, bound: float | None) -> str:
-        return millimetres(size) + ("" if bound is None else f" ({sure} sure: below {millimetres(bound)})")
+        sure = "" if bound is None else f" ({100 * accuracy.confidence:g} % sure: below {millimetres(bound)})"
+        return millimetres(size) + sure
 
     frame = FRAMES[accuracy.frame]
     frame = frame[:-1] + offset + ")" if accuracy.frame == ROBOT else frame + (" (after" + offset[4:] + ")" if offset else "")
+    rms, worst = value(accuracy.rms_m, accuracy.rms_bound_m), value(accuracy.worst_m, accuracy.worst_bound_m)
     text = (
-        f"{kind} position error of the corrected robot {frame}: {value(accuracy.rms_m, accuracy.rms_bound_m)} RMS over "
-        f"{accuracy.region} ({accuracy.poses}), {value(accuracy.worst_m, accuracy.worst_bound_m)} at the worst of them; "
-        f"{accuracy.noise}."
+        f"{accuracy.kind.capitalize()} position error of the corrected robot {frame}: {rms} RMS over {accuracy.region} "
+        f"({accuracy.poses}), {worst} at the worst of them; {accuracy.noise}."
     )
     if accuracy.left_out:
         names = ", ".join(accuracy.left_out)

@@ -172,7 +172,7 @@ def forward(
     rotation : ndarray (N, 3, 3)
     """
     position, rotation = np.empty((len(reported_angles), 3)), np.empty((len(reported_angles), 3, 3))
-    for part in _parts(len(reported_angles)):
+    for part in parts(len(reported_angles)):
         coordinates = coordinates_at_rest(calibrated, reported_angles[part], operating.part(part))
         position[part], rotation[part] = end_effector(calibrated, coordinates)
     return position, rotation
@@ -186,10 +186,8 @@ def coordinates_at_rest(
     `calibrated`, `reported_angles`, `operating`: as in `forward`. `near` (N, C): coordinates at which the loads are taken, of
     states that differ little; by fixed-point iteration without. Returns (N, C).
     """
-    model, estimate = calibrated.model, calibrated.estimate
-    return displaced_coordinates(
-        model, estimate, conditions(model, estimate, states_of(calibrated, reported_angles, operating), near)
-    )
+    fitted, states = (calibrated.model, calibrated.estimate), states_of(calibrated, reported_angles, operating)
+    return displaced_coordinates(*fitted, conditions(*fitted, states, near))
 
 
 def end_effector(calibrated: CalibratedRobot, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -236,7 +234,7 @@ def pose_sensitivities(
     """Displacement and rotation of the poses of `forward` by the parameters, ndarray (N, 6, P); as `prediction_covariance`."""
     model, estimate = calibrated.model, calibrated.estimate
     found = np.zeros((len(reported_angles), 6, len(calibrated.covariance)))
-    for part in _parts(len(reported_angles)):
+    for part in parts(len(reported_angles)):
         seen = observations_of(states_of(calibrated, reported_angles[part], operating.part(part)))
         around = conditions(model, estimate, seen.states, None if at_rest is None else at_rest[part])
         found[part] = linearize(model, estimate, seen, around).sensitivities
@@ -273,7 +271,8 @@ def observations_of(states: States) -> Observations:
     return Observations(states, np.arange(count), np.zeros(count, int), *nowhere)
 
 
-def _parts(count: int) -> list[slice]:
+def parts(count: int) -> list[slice]:
+    """So many states in parts that fit the cache."""
     return [slice(start, min(start + AT_ONCE, count)) for start in range(0, count, AT_ONCE)]
 
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
 _OFFSET, _RATIO, GEOMETRY, SPRINGS = "joint_offset", "transmission_ratio", "link_geometry", "joint_compliance"
-_FOLDED = (_OFFSET, _RATIO, GEOMETRY, SPRINGS, declared_weight.EFFECT)
 
 
 @dataclass(frozen=True)

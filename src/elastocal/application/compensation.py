@@ -16,12 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import (
-    AT_ONCE,
-    OperatingConditions,
-    coordinates_at_rest,
-    end_effector,
-)
+from elastocal.application.calibrated import coordinates_at_rest, end_effector, parts
 from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits, reach_m, refine, remove_turns
 from elastocal.exchange.target_path import OK
 from elastocal.mechanics.kinematics import jacobians
@@ -30,7 +25,7 @@ from elastocal.mechanics.pose_differences import pose_differences
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
 
 OUTSIDE_LIMITS, UNREACHABLE, SINGULAR = "outside limits", "unreachable", "singular"
 # Newton's steps: each leaves a five-hundredth, and more near singular postures.
@@ -82,17 +77,16 @@ def find_joint_targets(
         near = robot.model_angles(start)
         nominal, left = refine(robot, position, rotation, near)
         nominal = remove_turns(robot, nominal, near)
-    slices = [slice(first, first + AT_ONCE) for first in range(0, len(position), AT_ONCE)]
 
     def of(part: slice) -> Correction:
         return _find_chunk_targets(calibrated, position[part], rotation[part], operating.part(part), nominal[part], left[part])
 
-    parts = []
+    done = []
     with ThreadPoolExecutor(2) as pool:
-        for found in pool.map(of, slices):
-            parts.append(found)
-            progress(sum(len(part.status) for part in parts))
-    return Correction(*(np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])))
+        for found in pool.map(of, parts(len(position))):
+            done.append(found)
+            progress(sum(len(each.status) for each in done))
+    return Correction(*(np.concatenate([getattr(each, name) for each in done]) for name in vars(done[0])))
 
 
 def _find_chunk_targets(

@@ -14,8 +14,7 @@ from elastocal.application.accuracy import root_mean_square
 from elastocal.application.calibrated import forward, nominal_forward
 
 if TYPE_CHECKING:
-    from elastocal.application.accuracy import root_mean_square
-from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
 
 # Rows in whose neighbourhood the error of interpolation is measured, and of how many neighbours one interpolates.
 _TRIED, _NEIGHBOURS = 256, 60

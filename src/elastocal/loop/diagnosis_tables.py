@@ -14,7 +14,7 @@ from elastocal.diagnosis.verdict import mechanisms_of_models
 from elastocal.fitting.case import noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
 from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
-from elastocal.loop.schemas import MODELS
+from elastocal.loop.schemas import CANDIDATES, MODELS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -117,12 +117,12 @@ def model_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
     }
 
 
-def candidate_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
+def candidate_columns(diagnosis: Diagnosis) -> dict[str, list[Any]]:
     """Columns of the candidates table: those tested by falling Bayes factor, then the others with the reason."""
     evidence, candidates = diagnosis.evidence, diagnosis.case.candidates
-    rows: list[tuple[Candidate, float, float, float, float, float, bool, str]] = []
+    rows, untestable = [], dict.fromkeys(candidates, "the measurements are at fault")
     if evidence:
-        problem = evidence.linearized.problem
+        problem, untestable = evidence.linearized.problem, evidence.linearized.untestable
         factors = initial_screening(problem)[1]
         inclusion = np.zeros(len(problem.units))
         for model, probability in zip(evidence.posterior.models, evidence.posterior.probabilities, strict=True):
@@ -134,28 +134,26 @@ def candidate_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]
             unit = problem.units[number]
             if unit.candidate:
                 gram = problem.statistics.gram[0][np.ix_(unit.columns, unit.columns)]
-                shape = unit.shapes[0] if unit.shapes else np.nan
-                figures = (factors[number], inclusion[number], np.linalg.eigvalsh(gram)[-1], angles[number], number in chosen)
-                rows.append((unit.candidate, shape, *figures, ""))
-    tested = {row[0].key for row in rows}
-    untestable = evidence.linearized.untestable if evidence else dict.fromkeys(candidates, "the measurements are at fault")
-    for key, candidate in candidates.items():
-        if key not in tested:
-            rows.append((candidate, np.nan, np.nan, np.nan, np.nan, np.nan, False, untestable[key]))
-    return {
-        "candidate": [row[0].key for row in rows],
-        "effect": [row[0].effect for row in rows],
-        "family": [row[0].family for row in rows],
-        "joints": ["+".join(map(str, row[0].joints)) for row in rows],
-        "shape": np.array([row[1] for row in rows], float),
-        "parameters": np.array([len(row[0].parameters) for row in rows], int),
-        "log_bayes_factor": np.array([row[2] for row in rows], float),
-        "probability": np.array([row[3] for row in rows], float),
-        "noncentrality": np.array([row[4] for row in rows], float),
-        "angle_deg": np.array([row[5] for row in rows], float),
-        "chosen": np.array([row[6] for row in rows], bool),
-        "note": [row[7] for row in rows],
-    }
+                figures = {
+                    "shape": unit.shapes[0] if unit.shapes else np.nan,
+                    "log_bayes_factor": factors[number],
+                    "probability": inclusion[number],
+                    "noncentrality": np.linalg.eigvalsh(gram)[-1],
+                    "angle_deg": angles[number],
+                    "chosen": number in chosen,
+                }
+                rows.append(_candidate(unit.candidate) | figures)
+    tested = {row["candidate"] for row in rows}
+    rows += [_candidate(candidate) | {"note": untestable[key]} for key, candidate in candidates.items() if key not in tested]
+    return {column.name: [row[column.name] for row in rows] for column in CANDIDATES.columns}
+
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    """A row of the candidates table of one that was not tested."""
+    unknown = dict.fromkeys(("shape", "log_bayes_factor", "probability", "noncentrality", "angle_deg"), np.nan)
+    named = {"candidate": candidate.key, "effect": candidate.effect, "family": candidate.family}
+    joints = {"joints": "+".join(map(str, candidate.joints)), "parameters": len(candidate.parameters)}
+    return named | joints | unknown | {"chosen": False, "note": ""}
 
 
 def confounding_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:

@@ -86,18 +86,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     if not decisive:
         fitted = calibrate_on_case(case, declared.model, declared.estimate, declared.covariance, noise)
         facts["accuracy"] = campaign_accuracy(fitted, states).document()
-    return (
-        facts
-        | _testable(case, declared)
-        | {
-            "suspicious": [
-                *warnings,
-                *warnings_of(left_out),
-                *_suspicious(campaign, facts, case, settings),
-                *repeat_warnings(training, held_out),
-            ]
-        }
-    )
+    suspicious = [*warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case, settings)]
+    return facts | _testable(case, declared) | {"suspicious": [*suspicious, *repeat_warnings(training, held_out)]}
 
 
 def _poses(session: np.ndarray, pose: np.ndarray) -> int:

@@ -19,10 +19,7 @@ _STAGES = ("before", "after")
 
 
 def campaign_rows(
-    verdicts: Mapping[str, Mapping[str, Any]],
-    residuals: Mapping[str, pd.DataFrame],
-    folds: dict[str, list[str]],
-    seed: int,
+    verdicts: Mapping[str, Mapping[str, Any]], residuals: Mapping[str, pd.DataFrame], folds: dict[str, list[str]], seed: int
 ) -> pd.DataFrame:
     """One row for each campaign and session, and one for all folds of a campaign together.
 

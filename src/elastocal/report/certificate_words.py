@@ -182,23 +182,22 @@ def what_to_do(document: Mapping[str, Any]) -> str:
     """What follows for whoever runs the robot."""
     decision = document["conformity"]["decision"]
     first, last = document["held_out"][0], document["held_out"][-1]
-    change = document["comparison"]
-    moved = ""
-    if change is not None and change["p_value"] < _LEVEL:
-        moved = f" The robot moves differently than in {change['campaign']}: use the corrections of this campaign from now on."
-    elif change is not None:
-        moved = f" No change since {change['campaign']} can be shown: its corrections may stay in use."
+    verb = "keeps" if document["accuracy"]["kind"] == MEASURED else "is predicted to keep"
+    advice = {
+        "pass": f"Use the robot with corrected targets (elastocal correct): it {verb} the tolerance.",
+        "fail": "Correct the targets all the same, which lowers the error; for this tolerance the robot is not good enough, or "
+        "too little is known of it: the error budget says which.",
+        "undecided": "Use corrected targets, and measure the robot at them before the tolerance is relied upon.",
+    }[decision]
     if last["rms_m"] >= first["rms_m"]:
-        return "Do not correct the robot by this campaign: on validation poses it would be no better." + moved
-    if decision == "pass":
-        verb = "keeps" if document["accuracy"]["kind"] == MEASURED else "is predicted to keep"
-        return f"Use the robot with corrected targets (elastocal correct): it {verb} the tolerance." + moved
-    if decision == "fail":
-        return (
-            "Correct the targets all the same, which lowers the error; for this tolerance the robot is not good enough, or too "
-            "little is known of it: the error budget says which." + moved
-        )
-    return "Use corrected targets, and measure the robot at them before the tolerance is relied upon." + moved
+        advice = "Do not correct the robot by this campaign: on validation poses it would be no better."
+    change = document["comparison"]
+    if change is None:
+        return advice
+    moved = f"No change since {change['campaign']} can be shown: its corrections may stay in use."
+    if change["p_value"] < _LEVEL:
+        moved = f"The robot moves differently than in {change['campaign']}: use the corrections of this campaign from now on."
+    return f"{advice} {moved}"
 
 
 def iso_rows(found: Mapping[str, Any], measured: Mapping[str, Any] | None) -> list[list[str]]:
@@ -214,7 +213,7 @@ def iso_rows(found: Mapping[str, Any], measured: Mapping[str, Any] | None) -> li
     if repeats is None:
         return [*rows, ["pose repeatability RP", "unknown", "no pose was approached again"]]
     low, high = (length(value) for value in repeats["position_interval_m"])
-    taken = f"{counted(repeats['approaches'], 'approach', 'approaches')} to {counted(repeats['poses'], 'pose')}"
+    taken = _taken(repeats)
     rows.append(["pose repeatability RP, position", f"{length(repeats['position_m'])} ({low} to {high})", taken])
     if repeats["orientation_rad"] is not None:
         rows.append(["pose repeatability RP, orientation", f"{plain(MICRO * repeats['orientation_rad'])} µrad", taken])
@@ -230,20 +229,23 @@ def iso_warning(repeats: Mapping[str, Any] | None) -> str:
         return "No pose was approached again, so that no repeatability can be stated."
     if repeats["poses"] >= ISO_POSES and repeats["approaches"] >= ISO_CYCLES * repeats["poses"]:
         return ""
-    taken = f"{counted(repeats['approaches'], 'approach', 'approaches')} to {counted(repeats['poses'], 'pose')}"
-    return f"{taken} are fewer than the standard asks for: the values are an indication and no test after ISO 9283."
+    return f"{_taken(repeats)} are fewer than the standard asks for: the values are an indication and no test after ISO 9283."
+
+
+def _taken(repeats: Mapping[str, Any]) -> str:
+    return f"{counted(repeats['approaches'], 'approach', 'approaches')} to {counted(repeats['poses'], 'pose')}"
 
 
 def workspace_rows(maps: list[Mapping[str, Any]]) -> list[list[str]]:
     """Rows of the table of the workspace: load, uncorrected, bound, bound inside the fitted range, share outside."""
+
+    def quantiles(found: Mapping[str, float] | None) -> str:
+        return "–" if found is None else f"{length(found['median_m'])} / {length(found['p95_m'])}"
+
     return [
         [
             f"{each['force_N']:.0f} N hanging" if each["force_N"] else "none",
-            f"{length(each['uncorrected']['median_m'])} / {length(each['uncorrected']['p95_m'])}",
-            f"{length(each['bound']['median_m'])} / {length(each['bound']['p95_m'])}",
-            "–"
-            if each["bound_inside"] is None
-            else f"{length(each['bound_inside']['median_m'])} / {length(each['bound_inside']['p95_m'])}",
+            *(quantiles(each[name]) for name in ("uncorrected", "bound", "bound_inside")),
             percent(each["share_outside"]),
         ]
         for each in maps
@@ -252,21 +254,19 @@ def workspace_rows(maps: list[Mapping[str, Any]]) -> list[list[str]]:
 
 def comparison_facts(found: Mapping[str, Any]) -> dict[str, Any]:
     """Sentence and rows of the comparison with another campaign."""
-    changed = found["p_value"] < _LEVEL
     apart, largest, expected = (length(found[name]) for name in ("rms_m", "largest_m", "expected_m"))
     sentence = (
         f"Over the workspace the robots of both campaigns lie {apart} RMS apart ({largest} at most), rigid motions of the base "
         f"aside; {expected} would be expected if nothing had changed (p = {plain(found['p_value'], 2)}). "
-    ) + ("The robot has changed." if changed else "No change can be shown.")
+    ) + ("The robot has changed." if found["p_value"] < _LEVEL else "No change can be shown.")
     if found["changes"]:
         sentence += " What differs, parameter by parameter, most certain first (p adjusted for all by Holm):"
     else:
         sentence += " The campaigns identify different parameters, which are therefore not compared one by one."
-    rows = [_change(change) for change in found["changes"][:_SHOWN_CHANGES]]
     return {
         "campaign": found["campaign"],
         "sentence": sentence,
-        "rows": rows,
+        "rows": [_change(change) for change in found["changes"][:_SHOWN_CHANGES]],
         "more": max(len(found["changes"]) - _SHOWN_CHANGES, 0),
     }
 
@@ -275,14 +275,8 @@ def _change(change: Mapping[str, Any]) -> list[str]:
     """A parameter: where and what it is, before, after, the difference with its standard error, p."""
     unit = change["unit"]
     where = share_name(change["owner"]) if change["owner"] in _SHARES else candidate_words(change["owner"])
-    numbers = [
-        " ".join(scaled(value, error, unit))
-        for value, error in (
-            (change["before"], None),
-            (change["after"], None),
-            (change["after"] - change["before"], change["std_error"]),
-        )
-    ]
+    known = (change["before"], None), (change["after"], None), (change["after"] - change["before"], change["std_error"])
+    numbers = [" ".join(scaled(value, error, unit)) for value, error in known]
     what = parameter_words(effect_of(change["owner"]), change["name"])
     return [f"{capital(where)}: {what}", *numbers, plain(change["p_value"], 2)]
 
@@ -296,15 +290,14 @@ def _with_interval(step: Mapping[str, Any], metric: str) -> str:
 
 
 def _limits(line: Mapping[str, Any]) -> str:
-    return (
-        "–" if line["low_m"] is None or line["rms_m"] < _NOTHING_M else f"{length(line['low_m'])} to {length(line['high_m'])}"
-    )
+    known = line["low_m"] is not None and line["rms_m"] >= _NOTHING_M
+    return f"{length(line['low_m'])} to {length(line['high_m'])}" if known else "–"
 
 
 def _share(line: Mapping[str, Any]) -> str:
-    hidden = line["name"] == "repeatability" and not line["rms_m"]
     if 0.0 < line["rms_m"] < _NOTHING_M:
         return f"below {length(_NOTHING_M, 1)}"
+    hidden = line["name"] == "repeatability" and not line["rms_m"]
     return "hidden by the tracker's noise" if hidden else length(line["rms_m"])
 
 

@@ -10,16 +10,8 @@ from elastocal.diagnosis.words import alternative_words, listed, parameter_words
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report.first_page import LEAST_SHOWN, MOST_NAMES, OF_DATA, cost_words, location_words
-from elastocal.report.loop_parameters import mostly_prior
-from elastocal.report.wording import (
-    as_sentence,
-    capital,
-    length,
-    members_words,
-    probability_words,
-    scaled,
-    words,
-)
+from elastocal.report.loop_parameters import MOSTLY_PRIOR
+from elastocal.report.wording import as_sentence, capital, length, members_words, probability_words, scaled, words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -122,7 +114,7 @@ def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str
     if entry["unit"] == "–" and float(entry["value"]).is_integer():
         row[1] = grouped(int(entry["value"]))
     prior = entry.get("prior_std")
-    if prior and mostly_prior(entry["std_error"], prior):
+    if prior and entry["std_error"] > MOSTLY_PRIOR * prior:
         return [*row, "mostly the prior"]
     searched = "the best of those tried" if entry.get("shape") else ""
     return [*row, "measurements" if entry["std_error"] else searched]

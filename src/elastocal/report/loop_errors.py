@@ -23,21 +23,16 @@ _MOST_BLOCKS = 12
 
 def step_rows(steps: Sequence[Mapping[str, Any]], floor_m: float | None) -> dict[str, Any]:
     """Rows of the table before and after; each error as a list of lines: value, interval, multiple of the noise floor."""
-    largest = max(step["heldout_max_m"] for step in steps)
-    factor, unit = (MILLI, "mm") if largest >= 1e-3 else (MICRO, "µm")
-    digits = (lambda value: f"{factor * value:.3f}") if unit == "mm" else (lambda value: f"{factor * value:.0f}")
+    factor, unit = _error_unit([step["heldout_max_m"] for step in steps])
     rows = []
     for step in steps:
         cells = []
         for metric in METRICS:
-            low, high = (step[f"heldout_{metric}_m_{end}"] for end in ("low", "high"))
             multiple = [f"{step[f'heldout_{metric}_over_floor']:.2f} × floor"] if floor_m else []
-            interval = "–" if np.isnan(low) else f"≥ {digits(low)}" if np.isinf(high) else f"[{digits(low)}, {digits(high)}]"
-            cells.append([digits(step[f"heldout_{metric}_m"]), interval, *multiple])
-        name, number = in_words(step["step"]), str(int(step["parameters"]))
-        rows.append(
-            {"name": name, "kind": step["kind"], "parameters": number, "training": digits(step["train_rms_m"]), "cells": cells}
-        )
+            error = _number(factor * step[f"heldout_{metric}_m"], unit)
+            cells.append([error, _interval(step, f"heldout_{metric}_m", factor, unit), *multiple])
+        row = {"name": in_words(step["step"]), "kind": step["kind"], "parameters": str(int(step["parameters"]))}
+        rows.append(row | {"training": _number(factor * step["train_rms_m"], unit), "cells": cells})
     return {"unit": unit, "rows": rows}
 
 
@@ -61,14 +56,8 @@ def split_rows(splits: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             for stage in ("before", "after")
         ]
         fall = [f"{_number(100 * row['reduction'], '%')} %", _interval(row, "reduction", 100, "%")]
-        rows.append(
-            {
-                "name": what,
-                "together": together,
-                "poses": str(int(row["poses"])),
-                "cells": [*errors, fall] if changed else errors[:1],
-            }
-        )
+        cells = [*errors, fall] if changed else errors[:1]
+        rows.append({"name": what, "together": together, "poses": str(int(row["poses"])), "cells": cells})
     return {"unit": unit, "rows": rows, "left_out": left_out, "changed": changed}
 
 

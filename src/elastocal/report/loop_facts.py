@@ -1,8 +1,9 @@
-"""Everything that the report of a campaign states, worded, from the files that the loop wrote."""
+"""Everything that the report of a campaign states, worded, from the files that the loop wrote, and its pages."""
 
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
@@ -25,6 +26,7 @@ from elastocal.report.loop_experiment import experiment_facts
 from elastocal.report.loop_measurements import NOISE_SOURCES, made, measured, misfit_sentence, noise_rows
 from elastocal.report.loop_method import method, setting_rows, untestable_rows
 from elastocal.report.loop_parameters import compliance_rows, held_rows, left_to_priors, other_parameters
+from elastocal.report.typesetting import compile_document
 from elastocal.report.wording import as_sentence, length, minus
 
 if TYPE_CHECKING:
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     import numpy as np
+
+    from elastocal.io.origin import Origin
 
 
 def loop_facts(
@@ -89,6 +93,16 @@ def loop_facts(
         "settings": setting_rows(verdict["settings"]),
         "found": [effect["name"] for effect in verdict["effects"]],
     }
+
+
+def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence[str], origin: Origin | None = None) -> None:
+    """Compile the report of a campaign; the file appears whole or not at all.
+
+    `path`: the PDF. `facts`: from `loop_facts`. `figures`: PDF files, named before_after, residuals, arrows, candidates and,
+    where there are pairs, confounding. `origin`: named in the foot of each page.
+    """
+    names = [Path(figure).stem for figure in figures]
+    compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures, origin)
 
 
 def _accuracy(verdict: Mapping[str, Any]) -> str:

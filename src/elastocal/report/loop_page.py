@@ -39,10 +39,7 @@ _FACTS = (
 
 
 def loop_page(
-    facts: Mapping[str, Any],
-    table: Mapping[str, np.ndarray],
-    candidates: Mapping[str, np.ndarray],
-    robot: Robot,
+    facts: Mapping[str, Any], table: Mapping[str, np.ndarray], candidates: Mapping[str, np.ndarray], robot: Robot
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """What the page of a campaign says, and what it draws.
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, overload
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from elastocal.diagnosis.words import candidate_words, listed, parameter_words
 from elastocal.effects.protocol import effect_of
@@ -15,8 +13,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Any
 
-# A standard error above this share of the prior's adds nothing to the prior.
-_OF_THE_PRIOR = 0.7
+    import numpy as np
+
+# Where a standard error is above this share of the prior's, the measurements say hardly more than the prior.
+MOSTLY_PRIOR = 0.7
 # More than these would fill pages that nobody reads; the tables have them all.
 _MOST_OTHERS = 40
 
@@ -47,7 +47,7 @@ def other_parameters(verdict: Mapping[str, Any], parameters: Mapping[str, np.nda
     counts: Counter[str] = Counter()
     columns = (parameters[name] for name in ("owner", "parameter", "value", "std_error", "unit", "held", "prior_std"))
     for owner, name, value, error, unit, held, prior in zip(*columns, strict=True):
-        if held or owner in mine or owner in ("fit", "joint_compliance") or mostly_prior(error, prior):
+        if held or owner in mine or owner in ("fit", "joint_compliance") or error > MOSTLY_PRIOR * prior:
             continue
         kind = owner.split(" ")[0] if owner.startswith(("frame ", "target ")) else "declared"
         counts[kind] += 1
@@ -76,21 +76,5 @@ def left_to_priors(parameters: Mapping[str, np.ndarray]) -> list[str]:
 
     `parameters` (N,): of the final model. Returns owner and name, as in ``held`` of verdict.json.
     """
-    mine = mostly_prior(parameters["std_error"], parameters["prior_std"]) & ~parameters["held"].astype(bool)
+    mine = (parameters["std_error"] > MOSTLY_PRIOR * parameters["prior_std"]) & ~parameters["held"].astype(bool)
     return [f"{owner} {name}" for owner, name in zip(parameters["owner"][mine], parameters["parameter"][mine], strict=True)]
-
-
-@overload
-def mostly_prior(std_error: float, prior_std: float) -> bool: ...
-
-
-@overload
-def mostly_prior(std_error: np.ndarray, prior_std: np.ndarray) -> np.ndarray: ...
-
-
-def mostly_prior(std_error: float | np.ndarray, prior_std: float | np.ndarray) -> bool | np.ndarray:
-    """Whether a standard error says hardly more than the prior's.
-
-    `std_error`, `prior_std` (N,). Returns (N,) of bool.
-    """
-    return std_error > _OF_THE_PRIOR * prior_std

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from elastocal.report.answers import ratio_words, with_error
 from elastocal.study.ranks import REFERENCE
-from elastocal.study.tables import word_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -43,7 +43,7 @@ def score_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, st
                 row[metric] = "–"
                 if metric in cells.index:
                     cell = cells.loc[metric]
-                    row[metric] = f"{word_value(cell.value, cell.value_std_error)} ({cell['rank']})"
+                    row[metric] = f"{with_error(cell, 'value')} ({cell['rank']})"
             rows.append(row)
     return rows
 
@@ -60,8 +60,7 @@ def staged_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, s
         for robot in robots:
             cell = mine[(mine.robot == robot) & (mine.strategy == strategy)].iloc[0]
             # An estimator under another name, and the classical strategy itself.
-            same = cell.ratio_low == cell.ratio_high
-            row[robot] = "the same" if same else f"{cell.ratio:.3f} ({cell.ratio_low:.3f} to {cell.ratio_high:.3f})"
+            row[robot] = "the same" if cell.ratio_low == cell.ratio_high else ratio_words(cell)
         rows.append(row)
     return rows
 

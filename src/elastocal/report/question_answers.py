@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.report.answers import ratio_words, with_error, worded
 from elastocal.study.question_tables import CHOSEN
 from elastocal.study.tables import word_value
 
@@ -23,6 +24,24 @@ _INDEX_NAMES = {
     "O4": "O4, noise amplification",
     "O5": "O5, harmonic mean",
     "bound": "the bound itself",
+}
+# Noise, then leak.
+_GEOMETRY = {
+    "robot": "{robot}",
+    "estimator": "{estimator}",
+    "rms": "{rms_um:.0f}",
+    "noise": "{noise_um:.0f}",
+    "leak": "{leak_um:.0f}",
+    "compliance": "{compliance_noise_percent:.1f}; {compliance_leak_percent:.0f}",
+    "zero": "{zero_noise_urad:.0f}; {zero_leak_urad:.0f}",
+}
+_WEIGHTING = {
+    "robot": "{robot}",
+    "orientation": "{orientation_ratio:g}",
+    "range": "{per_metre_um:g}",
+    "equal": "{equal_um:.1f}",
+    "weighted": "{weighted_um:.1f}",
+    "ratio": "{ratio:.2f}",
 }
 
 
@@ -63,18 +82,10 @@ def ladder_rows(ladder: pd.DataFrame) -> list[dict[str, str]]:
     rows = []
     for (noise, length), cell in ladder.groupby(["noise_um", "length"]):
         by = cell.set_index("link_springs")
-        steps = by.drop(index=CHOSEN)
-        best = str(steps.rms_um.idxmin())
-        rows.append(
-            {
-                "noise": f"{noise:g}",
-                "length": f"{length}",
-                "joints": word_value(by.rms_um["0"], by.rms_um_std_error["0"]),
-                "best": word_value(by.rms_um[best], by.rms_um_std_error[best]),
-                "springs": best,
-                "chosen": word_value(by.rms_um[CHOSEN], by.rms_um_std_error[CHOSEN]),
-            }
-        )
+        best = str(by.drop(index=CHOSEN).rms_um.idxmin())
+        joints, left, chosen = (with_error(by.loc[springs], "rms_um") for springs in ("0", best, CHOSEN))
+        row = {"noise": f"{noise:g}", "length": f"{length}", "joints": joints}
+        rows.append(row | {"best": left, "springs": best, "chosen": chosen})
     return rows
 
 
@@ -94,8 +105,7 @@ def budget_rows(budget: pd.DataFrame, pairs: pd.DataFrame, length: int, robots: 
             row = {"robot": robot, "points": points, "same": _at(cell, length), "configurations": f"{many}"}
             row |= {"equal": _at(cell, many), "ratio": ""}
             if len(against):
-                found = against.iloc[0]
-                row["ratio"] = f"{found.ratio:.3f} ({found.ratio_low:.3f} to {found.ratio_high:.3f})"
+                row["ratio"] = ratio_words(against.iloc[0])
             rows.append(row)
     return rows
 
@@ -107,16 +117,10 @@ def needed_rows(needed: pd.DataFrame, accuracy_um: float, robots: Iterable[str])
     """
     rows = []
     for row in needed[(needed.accuracy_um == accuracy_um) & needed.robot.isin([*robots])].itertuples():
-        interval = f"{_length(row.configurations_low)} to {_length(row.configurations_high)}"
-        rows.append(
-            {
-                "robot": str(row.robot),
-                "points": str(row.points),
-                "configurations": f"{_length(row.configurations)} ({interval})",
-                "bound": _length(row.configurations_by_bound),
-                "measurements": _length(row.measurements),
-            }
-        )
+        low, high = _length(row.configurations_low), _length(row.configurations_high)
+        found = {"robot": str(row.robot), "points": str(row.points)}
+        found |= {"configurations": f"{_length(row.configurations)} ({low} to {high})"}
+        rows.append(found | {"bound": _length(row.configurations_by_bound), "measurements": _length(row.measurements)})
     return rows
 
 
@@ -134,17 +138,9 @@ def design_facts(designs: pd.DataFrame, length: int, accuracy_um: float, titles:
         at = int(sizes[np.argmin(np.abs(sizes - length))])
         rms = mine[mine.configurations == at].set_index("design").rms_um
         chosen = mine[(mine.design == "I") & (mine.rms_um <= accuracy_um)].configurations
-        found.append(
-            {
-                "title": title,
-                "length": f"{at}",
-                "random": f"{rms['random']:.1f}",
-                "chosen": f"{rms['I']:.1f}",
-                "gain": f"{rms['random'] / rms['I']:.2f}",
-                "efficiency": f"{100 * (rms['bound'] / rms['I']) ** 2:.0f}",
-                "chosen_needed": f"{chosen.min()}" if len(chosen) else "more than all",
-            }
-        )
+        row = {"title": title, "length": f"{at}", "random": f"{rms['random']:.1f}", "chosen": f"{rms['I']:.1f}"}
+        row |= {"gain": f"{rms['random'] / rms['I']:.2f}", "efficiency": f"{100 * (rms['bound'] / rms['I']) ** 2:.0f}"}
+        found.append(row | {"chosen_needed": f"{chosen.min()}" if len(chosen) else "more than all"})
     return found
 
 
@@ -167,45 +163,13 @@ def observability_rows(observability: pd.DataFrame, robots: Iterable[str]) -> li
 
 
 def geometry_rows(geometry: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
-    """Estimators of geometry and compliances.
-
-    `geometry`: from `question_tables.geometry_table`. Returns robot, estimator, rms, noise, leak, compliance and zero: noise
-    and leak.
-    """
-    rows = []
-    for row in geometry[geometry.robot.isin([*robots])].itertuples():
-        rows.append(
-            {
-                "robot": str(row.robot),
-                "estimator": str(row.estimator),
-                "rms": f"{row.rms_um:.0f}",
-                "noise": f"{row.noise_um:.0f}",
-                "leak": f"{row.leak_um:.0f}",
-                "compliance": f"{row.compliance_noise_percent:.1f}; {row.compliance_leak_percent:.0f}",
-                "zero": f"{row.zero_noise_urad:.0f}; {row.zero_leak_urad:.0f}",
-            }
-        )
-    return rows
+    """Estimators of geometry and compliances, from `question_tables.geometry_table`."""
+    return worded(geometry[geometry.robot.isin([*robots])], _GEOMETRY)
 
 
 def weighting_rows(weighting: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
-    """What equal weights cost.
-
-    `weighting`: from `question_tables.weighting_table`. Returns robot, orientation, range, equal, weighted, ratio.
-    """
-    rows = []
-    for row in weighting[weighting.robot.isin([*robots])].itertuples():
-        rows.append(
-            {
-                "robot": str(row.robot),
-                "orientation": f"{row.orientation_ratio:g}",
-                "range": f"{row.per_metre_um:g}",
-                "equal": f"{row.equal_um:.1f}",
-                "weighted": f"{row.weighted_um:.1f}",
-                "ratio": f"{row.ratio:.2f}",
-            }
-        )
-    return rows
+    """What equal weights cost, from `question_tables.weighting_table`."""
+    return worded(weighting[weighting.robot.isin([*robots])], _WEIGHTING)
 
 
 def stated(settings: Mapping[str, float | Sequence[float]]) -> dict[str, str]:
@@ -226,12 +190,13 @@ def place_facts(places: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[st
     found = []
     for robot, title in titles.items():
         mine = places[places.robot == robot]
-        least, largest = mine.iloc[int(mine.ratio.argmin())], mine.iloc[int(mine.ratio.argmax())]
+        ends = mine.iloc[int(mine.ratio.argmin())], mine.iloc[int(mine.ratio.argmax())]
+        least, largest = (f"{end.ratio:.2f} ({end.ratio_low:.2f} to {end.ratio_high:.2f}; {_where(end)})" for end in ends)
         found.append(
             {
                 "title": title,
-                "least": f"{least.ratio:.2f} ({least.ratio_low:.2f} to {least.ratio_high:.2f}; {_where(least)})",
-                "largest": f"{largest.ratio:.2f} ({largest.ratio_low:.2f} to {largest.ratio_high:.2f}; {_where(largest)})",
+                "least": least,
+                "largest": largest,
                 "better": str(int((mine.ratio_high < 1).sum())),
                 "places": str(len(mine)),
                 "turned": f"{mine.seen_turned_percent.max():.0f}",
@@ -250,7 +215,7 @@ def tube_rows(tubes: pd.DataFrame) -> list[dict[str, str]]:
         {
             "diameter": f"{row.diameter_mm:.0f}",
             **{name: f"{row[f'{name}_mm']:.2f} ± {row[f'{name}_mm_between']:.2f}" for name in ("mean", "std", "max")},
-            "left": word_value(row.left_um, row.left_um_std_error),
+            "left": with_error(row, "left_um"),
         }
         for _, row in tubes.iterrows()
     ]

@@ -52,14 +52,10 @@ def test_a_joint_that_slipped_is_seen_and_named_first(calibrated):
     slipped = replace(calibrated, estimate=replace(calibrated.estimate, coefficients=tuple(values)))
     found = comparison(calibrated, slipped)
     assert found.p_value == pytest.approx(1 / (1 + DRAWS)) and found.rms_m > 3 * found.expected_m
-    assert (found.changes[0].owner, found.changes[0].name) == (
-        "joint_offset@3",
-        calibrated.model.effects[number].parameters[0].name,
-    )
-    assert found.changes[0].after - found.changes[0].before == pytest.approx(
-        values[number][0] - calibrated.estimate.coefficients[number][0]
-    )
-    assert found.changes[0].p_value < 1e-6 < found.changes[1].p_value
+    first, second = found.changes[:2]
+    assert (first.owner, first.name) == ("joint_offset@3", calibrated.model.effects[number].parameters[0].name)
+    assert first.after - first.before == pytest.approx(values[number][0] - calibrated.estimate.coefficients[number][0])
+    assert first.p_value < 1e-6 < second.p_value
 
 
 def test_the_same_campaign_has_not_changed(calibrated):

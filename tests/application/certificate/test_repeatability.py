@@ -46,9 +46,8 @@ def test_orientations_count_where_they_are_measured(fanuc):
 
 def test_only_targets_of_the_end_effector_count_unless_there_is_none(fanuc):
     data = measure(fanuc, 20, 4)
-    off = (
-        np.where((data.target == 1)[:, None], 100.0, 1.0) * 1e-4 * np.random.default_rng(1).standard_normal(data.position.shape)
-    )
+    size = np.where((data.target == 1)[:, None], 1e-2, 1e-4)
+    off = size * np.random.default_rng(1).standard_normal(data.position.shape)
     worse = replace(data, position=data.position + off)
     assert repeatability(worse, TARGETS, "6DoF").position_m < 1e-3
     assert repeatability(worse, TARGETS, "2DoF").position_m > 1e-2

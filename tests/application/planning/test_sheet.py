@@ -1,6 +1,7 @@
 """The sheet that is filled in: its rows, and a campaign that the reader takes once it is filled."""
 
 import numpy as np
+import pytest
 import yaml
 from analysed_robots import ROBOTS
 from made_surveys import made_candidates, made_survey
@@ -12,35 +13,36 @@ from elastocal.campaigns.reading import read_campaign
 from elastocal_proof.blind.rehearsal import filled_sheet, hidden_robot
 
 
-def make_plan():
+@pytest.fixture(scope="module")
+def planned():
+    """A survey, its plan and its sheet."""
     survey = made_survey()
-    return survey, choose_plan(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    return survey, plan, sheet(survey, plan)
 
 
-def test_each_state_of_each_pose_is_a_row_and_the_first_poses_are_repeated():
-    survey, plan = make_plan()
-    table = sheet(survey, plan)
+def test_each_state_of_each_pose_is_a_row_and_the_first_poses_are_repeated(planned):
+    table = planned[2]
     assert len(table) == 3 * 18 + 2 * (REPEATS - 1) * REPEATED_POSES
     assert table[["x", "y", "z"]].isna().all().all() and "rx" not in table
     assert set(table.loc[table["repeat"] > 0, "pose"]) == set(range(1, REPEATED_POSES + 1))
     np.testing.assert_allclose(table.loc[table["load"] == 0, ["fx", "fy", "fz"]], 0.0)
 
 
-def test_a_filled_sheet_is_a_campaign_that_holds_out_its_random_poses(tmp_path):
-    survey, plan = make_plan()
+def test_a_filled_sheet_is_a_campaign_that_holds_out_its_random_poses(planned, tmp_path):
+    survey, plan, table = planned
     document = campaign_document("cell", "ur10", survey, plan)
     (tmp_path / "campaign.yaml").write_text(yaml.safe_dump(document))
     robot, _ = hidden_robot(ROBOTS / "ur10.yaml", 1, ["payload"])
-    filled_sheet(sheet(survey, plan), document, robot, 1).to_csv(tmp_path / "measurements.csv", index=False)
+    filled_sheet(table, document, robot, 1).to_csv(tmp_path / "measurements.csv", index=False)
     campaign = read_campaign(tmp_path, ROBOTS)
     assert campaign.holdout["poses"] == [15, 16, 17, 18] or campaign.holdout["poses"]
     assert campaign.targets[0].offset_m is None
     assert len(np.unique(campaign.measurements.pose)) == 18
 
 
-def test_angles_of_a_sheet_are_those_that_a_controller_shows_and_each_row_can_be_ticked():
-    survey, plan = make_plan()
-    table = sheet(survey, plan)
+def test_angles_of_a_sheet_are_those_that_a_controller_shows_and_each_row_can_be_ticked(planned):
+    _, plan, table = planned
     assert (table[TICK] == "").all()
     for joint in range(1, 7):
         np.testing.assert_array_equal(table[f"q{joint}_deg"], table[f"q{joint}_deg"].round(3))

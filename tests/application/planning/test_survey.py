@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_surveys import made_candidates, made_survey
+from made_surveys import PULL, made_candidates, made_survey
 
+from elastocal.application.planning.plan import Loads
 from elastocal.application.planning.survey import accuracy_rows, information, model_of, observe
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
@@ -41,16 +42,12 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
     np.testing.assert_allclose(std, np.sqrt(np.diag(expected)), rtol=0.02)
 
 
-def test_a_survey_without_loads_says_nothing_of_compliances():
-    from elastocal.application.planning.plan import Loads
-
-    assert not any(owner == "joint_compliance" for owner, _ in information_names(made_survey(loads=Loads(0.0, False))))
-    assert any(owner == "joint_compliance" for owner, _ in information_names(made_survey()))
-
-
-def information_names(survey):
+@pytest.mark.parametrize(("loads", "named"), [(Loads(0.0, False), False), (PULL, True)])
+def test_a_survey_without_loads_says_nothing_of_compliances(loads, named):
+    survey = made_survey(loads=loads)
     some = made_candidates(survey, 3)
-    return information(survey, some.joint_angles, some.force).names
+    names = information(survey, some.joint_angles, some.force).names
+    assert any(owner == "joint_compliance" for owner, _ in names) == named
 
 
 def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_known():

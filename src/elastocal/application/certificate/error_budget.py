@@ -62,7 +62,9 @@ def error_budget(
         limits: tuple[float | None, float | None] = (None, None)
         chosen = np.flatnonzero(np.isin(owners, mine))
         if mine and rms > 0.0:
-            limits = _limits(gram[np.ix_(chosen, chosen)], values[chosen], _covariance(calibrated, chosen), rms, draws, stream)
+            places = _linear(calibrated)[chosen]
+            covariance = calibrated.covariance[np.ix_(places, places)]
+            limits = _limits(gram[np.ix_(chosen, chosen)], values[chosen], covariance, rms, draws, stream)
         if rms > 0.0:
             shares.append(Share(name, rms, *limits))
     shares.sort(key=lambda share: -share.rms_m)
@@ -131,11 +133,6 @@ def _linear(calibrated: CalibratedRobot) -> np.ndarray:
         for linear, shape in zip(estimate.coefficients, estimate.shapes, strict=True)
     ]
     return np.flatnonzero(np.concatenate([np.zeros(0, bool), *kinds]))
-
-
-def _covariance(calibrated: CalibratedRobot, chosen: np.ndarray) -> np.ndarray:
-    places = _linear(calibrated)[chosen]
-    return calibrated.covariance[np.ix_(places, places)]
 
 
 def _limits(

@@ -9,8 +9,8 @@ import numpy as np
 
 from elastocal.application.accuracy import remove_rigid_motion, root_mean_square
 from elastocal.application.planning.criteria import Criterion, mean_squares
-from elastocal.application.planning.exchange import add_prior, choose_greedily, exchange_candidates, matrix_of
-from elastocal.application.planning.plan import find_allowed_candidates
+from elastocal.application.planning.exchange import choose_greedily, exchange_candidates, matrix_of
+from elastocal.application.planning.plan import accuracy_curve, find_allowed_candidates
 from elastocal.application.planning.survey import accuracy_rows, information, model_of, observe
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
@@ -53,7 +53,7 @@ def gains(survey: Survey, cell: Cell, loads: Loads, poses: int, count: int, seed
     chosen = exchange_candidates(rows, choose_greedily(rows, poses, rule), rule)
     planned = _left(matrix_of(rows, chosen), weight)
     orders = [draws.choice(len(rows), _LONGEST, replace=False) for _ in range(_ORDERS)]
-    curves = np.array([_curve(rows, order, weight) for order in orders])
+    curves = np.array([accuracy_curve(rows, order, weight) for order in orders])
     needed = np.array([np.argmax(curve <= planned) + 1 if (curve <= planned).any() else _LONGEST for curve in curves])
     found: dict[str, Any] = {"poses": poses, "planned_mm": 1e3 * planned}
     for name, values in (("random_mm", 1e3 * curves[:, poses - 1]), ("random_poses", needed)):
@@ -92,12 +92,6 @@ def _worth_elsewhere(survey: Survey, some: Candidates, chosen: list[int], seed: 
 
 def _left(matrix: np.ndarray, weight: np.ndarray) -> float:
     return float(np.sqrt(np.trace(np.linalg.solve(matrix, weight))))
-
-
-def _curve(rows: np.ndarray, order: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    each = rows[order].astype(float)
-    totals = add_prior(np.cumsum(each.transpose(0, 2, 1) @ each, axis=0))
-    return np.sqrt(np.trace(np.linalg.solve(totals, weight), axis1=1, axis2=2))
 
 
 def _fitted_error(survey: Survey, design: Candidates, places: Candidates, seed: int) -> float:

@@ -136,13 +136,14 @@ def choose_plan(survey: Survey, some: Candidates, poses: int, held_out: int, kin
     worth = efficiency(rule, matrix_of(rows, chosen), best_value(rows, poses, rule, chosen))
     rest = np.setdiff1d(np.arange(count), chosen)
     judged = draws.choice(rest, held_out, replace=False)
-    order = _best_first(rows, chosen, weight)
-    random = np.array([_curve(rows, draws.choice(count, poses, replace=False), weight) for _ in range(_RANDOM)])
+    # The chosen, each that which lowers the error most.
+    order = [chosen[place] for place in choose_greedily(rows[chosen], poses, Criterion(weight))]
+    random = np.array([accuracy_curve(rows, draws.choice(count, poses, replace=False), weight) for _ in range(_RANDOM)])
     return Plan(
         some.at(tour(some.joint_angles, chosen)),
         some.at(tour(some.joint_angles, judged.tolist())),
         worth,
-        _curve(rows, order, weight),
+        accuracy_curve(rows, order, weight),
         random,
     )
 
@@ -184,16 +185,8 @@ def tour(joint_angles: np.ndarray, chosen: list[int]) -> list[int]:
     return [chosen[place] for place in order]
 
 
-def _best_first(rows: np.ndarray, chosen: list[int], weight: np.ndarray) -> list[int]:
-    """The chosen in the order in which each lowers the error most."""
-    places = choose_greedily(rows[chosen], len(chosen), Criterion(weight))
-    return [chosen[place] for place in places]
-
-
-def _curve(rows: np.ndarray, order: list[int] | np.ndarray, weight: np.ndarray) -> np.ndarray:
+def accuracy_curve(rows: np.ndarray, order: list[int] | np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Accuracy with the first 1, 2, .. of some configurations, ndarray (len(order),), m."""
-    total, found = np.zeros((rows.shape[2], rows.shape[2])), []
-    for place in order:
-        total += rows[place].T @ rows[place]
-        found.append(np.sqrt(max(np.trace(np.linalg.solve(add_prior(total.copy()), weight)), 0.0)))
-    return np.array(found)
+    each = rows[order].astype(float)
+    totals = add_prior(np.cumsum(each.transpose(0, 2, 1) @ each, axis=0))
+    return np.sqrt(np.trace(np.linalg.solve(totals, weight), axis1=1, axis2=2).clip(min=0.0))
