@@ -14,8 +14,7 @@ import pandas as pd
 
 from elastocal.random_streams import stream
 from elastocal_proof.blind.rates import rate
-from elastocal_proof.blind.robots import PROOF, TUNED
-from elastocal_proof.blind.scores import NONE, kind_of, wrong_setup
+from elastocal_proof.blind.scores import NONE, PROOF, TUNED, kind_of, wrong_setup
 from elastocal_proof.plant.defects import OUTSIDE
 
 if TYPE_CHECKING:

@@ -10,12 +10,13 @@ from scipy.optimize import linear_sum_assignment
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 from elastocal.effects.protocol import effect_of
 from elastocal_proof.blind.cases import TUNED as TUNED_ON
-from elastocal_proof.blind.robots import PROOF, TUNED
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 NONE = "none"
+# The two kinds of robots: those on which it is proved, and those on which the method was tuned.
+PROOF, TUNED = "proof", "tuned"
 SILENT = (ADEQUATE, NOT_TESTABLE)
 # The effect by which a diagnosis says that the base is not where it is declared.
 _MISPLACED = "base_placement"
@@ -74,6 +75,11 @@ def judged_apart_from_setup(truth: Mapping[str, Any], verdict: Mapping[str, Any]
 def kind_of(robot: str) -> str:
     """Whether a robot belongs to the proof or was tuned on."""
     return TUNED if robot in TUNED_ON else PROOF
+
+
+def leading(kinds: Iterable[str]) -> str:
+    """Which kind of robots a figure shows: that of the proof, or where there is none the one that was tuned on."""
+    return PROOF if PROOF in set(kinds) else TUNED
 
 
 def _each_is_held(true: Sequence[str], effects: Sequence[Mapping[str, Any]]) -> bool:

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from elastocal.figures.style import PALETTE, note, panels, styled
-from elastocal_proof.blind.robots import PROOF, TUNED, leading
+from elastocal_proof.blind.scores import PROOF, TUNED, leading
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.figures.style import PALETTE, note, panels, styled
-from elastocal_proof.blind.robots import PROOF, TUNED
+from elastocal_proof.blind.scores import PROOF, TUNED
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,8 +13,7 @@ from elastocal.report.wording import plain, words
 from elastocal_proof.blind.case_rows import EXACT_ALIASES
 from elastocal_proof.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARED, USUAL_DESIGN
 from elastocal_proof.blind.confusion import CLASS_WITH, CLASS_WITHOUT
-from elastocal_proof.blind.robots import PROOF, TUNED, leading
-from elastocal_proof.blind.scores import NONE
+from elastocal_proof.blind.scores import NONE, PROOF, TUNED, leading
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping
