@@ -34,19 +34,11 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
 
     [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
     """
-    case = truth["case"]
     kind, effects = judged_apart_from_setup(truth, verdict)
-    names, true = [effect["name"] for effect in effects], list(case["effects"])
+    names, true = [effect["name"] for effect in effects], list(truth["case"]["effects"])
     stated = bool(true) and kind in (NAMED, CLASS, SEVERAL)
     right = stated and sorted(names) == sorted(true)
-    return {
-        "case": truth["campaign"],
-        "group": case["group"],
-        "robot": case["robot"],
-        "robots": kind_of(case["robot"]),
-        "setting": case["setting"],
-        "truth": " + ".join(true) or NONE,
-        "level": max(case["levels"], default=0.0),
+    return head_of(truth) | {
         "verdict": kind,
         "found": " + ".join(names) or NONE,
         "detected": kind not in SILENT,
@@ -55,6 +47,14 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
         "holds_truth": stated and _each_is_held(true, effects),
         "wrong_name": kind == NAMED and names != true,
     }
+
+
+def head_of(truth: Mapping[str, Any]) -> dict[str, Any]:
+    """Where a case belongs and what is true of it; `truth`: a sealed document."""
+    case = truth["case"]
+    head = {"case": truth["campaign"], "group": case["group"], "robot": case["robot"], "robots": kind_of(case["robot"])}
+    head |= {"setting": case["setting"], "truth": " + ".join(case["effects"]) or NONE}
+    return head | {"level": max(case["levels"], default=0.0)}
 
 
 def wrong_setup(truth: Mapping[str, Any]) -> set[str]:
