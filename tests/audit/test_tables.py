@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_audits import CONFIGURATION, ROBOT, failed
+from made_audits import CONFIGURATION, ROBOT, failed, failed_table
 from scipy.stats import t as student
 
 from elastocal_proof.audit import tables
@@ -85,7 +85,5 @@ def test_pairs_follow_from_the_scores(run, column, value, expected):
     scores = [("a", "dev_um", 4.0), ("b", "dev_um", 2.0), ("a", "rms_um", 5.0), ("b", "rms_um", 4.0)]
     rows = [{"robot": "two", "metric": metric, "strategy": name, "value": value} for name, metric, value in scores]
     pd.DataFrame(rows).to_csv(run.folder / "reports/tables/strategy_scores.csv", index=False)
-    file = "reports/tables/strategy_pairs.csv"
     by_rms = PAIR | {"metric": "rms_um", "ratio": 1.25, "ratio_low": 1.0, "ratio_high": 1.5625}
-    pd.DataFrame([PAIR | {column: value}, by_rms]).to_csv(run.folder / file, index=False)
-    assert failed(tables.tables(run, file, "strategy_pairs")) == expected
+    assert failed_table(run, tables, "strategy_pairs", pd.DataFrame([PAIR | {column: value}, by_rms])) == expected
