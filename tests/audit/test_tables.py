@@ -41,6 +41,19 @@ def test_a_row_that_is_there_twice_or_too_many_is_found(run, name):
     assert failed(tables.tables(run, "reports/tables/table1.csv", "table1")) == ["rows"]
 
 
+@pytest.mark.parametrize(
+    ("column", "expected"), [("", []), ("rms_um", ["column rms_um"]), ("zero_leak_urad", ["column zero_leak_urad"])]
+)
+def test_columns_are_formulas_over_the_files_of_robots(run, column, expected):
+    (run.folder / "results/geometry").mkdir(parents=True)
+    row = {"estimator": "at once", "noise": 3e-6, "leak": 4e-6, "compliance_noise": 7.0, "compliance_leak": 0.0}
+    pd.DataFrame([row | {"zero_noise": 1e-6, "zero_leak": 2e-6}]).to_parquet(run.folder / "results/geometry/two.parquet")
+    row = {"robot": "two", "estimator": "at once", "rms_um": 5.0, "noise_um": 3.0, "leak_um": 4.0, "zero_noise_urad": 1.0}
+    row |= {"zero_leak_urad": 2.0, "compliance_noise_percent": 7.0, "compliance_leak_percent": 0.0}
+    changed = {column: 1.001 * row[column]} if column else {}
+    assert failed_table(run, tables, "geometry", pd.DataFrame([row | changed])) == expected
+
+
 @pytest.mark.parametrize(("value", "holds"), [("0.8", True), ("0.7", False), ("0.80 ± 0.01", True), ("0.81 ± 0.01", False)])
 @pytest.mark.parametrize("ending", ["md", "tex"])
 def test_a_printed_value_is_that_of_the_csv_to_its_digits(run, value, holds, ending):
