@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from elastocal_proof.plant.bad_rows import BadReading
     from elastocal_proof.plant.physical_robot import PhysicalRobot
 
+    _Commanded = tuple[np.ndarray, np.ndarray, np.ndarray]
+
 UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE = "uncorrected", "geometry", "declared", "found", "true"
 MODELS = (UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE)
 UNLOADED, LOADED, MILLING = "unloaded", "loaded", "milling"
@@ -127,7 +129,7 @@ def closed_loop(
         DECLARED: calibrate_by_fit(found.declared, robot),
         FOUND: calibrated_by(found, without_gross_errors(found, held_out)[1]),
     }
-    commanded = {UNCORRECTED: (wanted.start, np.zeros(count), np.ones(count, bool))}
+    commanded: dict[str, _Commanded] = {UNCORRECTED: (wanted.start, np.zeros(count), np.ones(count, bool))}
     commanded |= {name: _by_model(model, wanted, operating) for name, model in models.items()}
     commanded[TRUE] = _by_plant(plant, robot, wanted, seed)
     rows = [
@@ -218,15 +220,13 @@ def bow(robot: Robot, length_m: float, count: int, draws: np.random.Generator) -
     raise RuntimeError(f"{robot.name}: no posture in {_TRIES} in which the path lies within the limits")
 
 
-def _by_model(
-    calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _by_model(calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions) -> _Commanded:
     """Commands by a model, the errors that it states, and whether a pose could be corrected."""
     found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
     return found.joint_angles, predict_errors(calibrated, found.joint_angles, operating, draws=0).error_m, found.status == OK
 
 
-def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> _Commanded:
     """As `_by_model`, by Newton's method on the plant without its chance, which states no error."""
     certain = replace(plant, drives=tuple(law for law in plant.drives if not isinstance(law, Repeatability)))
     commands = wanted.start.copy()

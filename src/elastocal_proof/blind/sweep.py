@@ -51,7 +51,7 @@ def against_angle(cases: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for mine in (cases.assign(pair="all", bin=bins), cases.assign(bin=bins)):
         for (pair, angle), part in mine.groupby(["pair", "bin"]):
-            row = {"pair": pair, "angle_up_to_deg": angle, "cases": len(part)}
+            row: dict[str, Any] = {"pair": pair, "angle_up_to_deg": angle, "cases": len(part)}
             for name in OUTCOMES:
                 row |= headed(name, rate(part["outcome"] == name))
             rows.append(row)
