@@ -1,13 +1,6 @@
 """What an audit reads of a run."""
 
 import numpy as np
-import pytest
-from made_audits import made_run
-
-
-@pytest.fixture
-def run(tmp_path):
-    return made_run(tmp_path)
 
 
 def test_experiments_and_deflections_have_the_axes_of_data_sets_and_configurations(run):

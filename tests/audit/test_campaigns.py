@@ -6,12 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from audited_campaigns import altered, failed_once_altered
 from made_audits import CONFIGURATION, ROBOT, failed
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal_proof.audit import campaigns
-from elastocal_proof.audit.audited import WRENCH, Audited
+from elastocal_proof.audit.audited import Audited
 
 FOLDER, REPORTS = "results/loop/cell", "reports/loop/cell"
 
@@ -100,42 +101,13 @@ def test_a_model_states_its_parts_or_of_a_smooth_error_and_laws_one_alone(run, u
     assert failed(campaigns.models(run, f"{FOLDER}/models.parquet", "cell")) == found
 
 
-@pytest.mark.parametrize(
-    ("wrong", "named", "expected"),
-    [(False, "payload", []), (True, "payload", ["heldout errors after"]), (True, "setup_step", [])],
-)
-def test_errors_before_and_after_are_those_of_the_means_of_repeats(run, wrong, named, expected):
-    """Two of a state, approached from the same side; of a model that goes with the row each has a prediction of its own."""
-    columns = [f"{state}_d{axis}" for state in ("before", "after") for axis in "xyz"]
-    frame = pd.DataFrame(1e-4 * np.random.default_rng(2).normal(size=(16, 6)), columns=columns)
-    approach = np.repeat([[1.0], [-1.0]], 2, axis=1).ravel()
-    key = {"session": 0, "pose": np.arange(16) // 4, "load": 0, "target": 0, "row": np.arange(1, 17)}
-    frame = frame.assign(**key, repeat=np.arange(16) % 4, held_out=np.arange(16) > 7, q1=0.1, x=1.0, y=0.0, z=0.0)
-    frame = frame.assign(**dict.fromkeys(WRENCH, 0.0), gross_error=False)
-    frame.to_parquet(run.folder / REPORTS / "residuals.parquet")
-    sheet = frame[["session", "pose", "load", "target", "row", "x", "y", "z"]].assign(approach1=np.tile(approach, 4))
-    sheet[:8].to_parquet(run.folder / FOLDER / "training.parquet")
-    sheet[8:].to_parquet(run.folder / FOLDER / "held_out.parquet")
-    rows = []
-    for name in ("before", "after"):
-        row = {"kind": "declared" if name == "before" else "effect"}
-        pairs = frame[[f"{name}_d{axis}" for axis in "xyz"]].to_numpy().reshape(8, 2, 3).mean(axis=1)
-        for part, kept in (("train", slice(4)), ("heldout", slice(4, 8))):
-            errors = np.linalg.norm(pairs[kept], axis=1)
-            row |= {
-                f"{part}_mean_m": errors.mean(),
-                f"{part}_rms_m": np.sqrt((errors**2).mean()),
-                f"{part}_max_m": errors.max(),
-            }
-        rows.append(row)
-    table = pd.DataFrame(rows)
-    table.loc[1, "heldout_rms_m"] *= 0.999 if wrong else 1.0
-    table.to_csv(run.folder / REPORTS / "before_after.csv", index=False)
-    described = {"held_out": None, "robot": ROBOT, "campaign": {"frame": "tracker", "declared": [], "targets": {}}}
-    (run.folder / FOLDER / "campaign.json").write_text(json.dumps(described))
-    (run.folder / REPORTS / "verdict.json").write_text(json.dumps({"effects": [{"name": named}], "gross_errors": []}))
-    (run.folder / FOLDER / "diagnosis.json").write_text(json.dumps({"document": {"gross_errors": []}}))
-    assert failed(campaigns.residuals(run, f"{REPORTS}/residuals.parquet", "cell")) == expected
+@pytest.mark.parametrize(("named", "expected"), [("link_elasticity", ["heldout errors after"]), ("setup_step", [])])
+def test_errors_before_and_after_are_those_of_the_means_of_repeats(diagnosed, named, expected):
+    """Of a model that goes with the row each repeat has a prediction of its own."""
+    with altered(diagnosed, f"{REPORTS}/verdict.json", ["effects", 0, "name"], lambda _: named):
+        table, cell = f"{REPORTS}/before_after.csv", ("heldout_rms_m", -1)
+        found = failed_once_altered(diagnosed, table, cell, lambda value: 0.999 * value, f"{REPORTS}/residuals.parquet")
+    assert found == expected
 
 
 PLAN = {

@@ -1,17 +1,12 @@
 """Simulated data that were altered are found; such as they were drawn hold."""
 
 import pytest
-from made_audits import altered, failed, made_run
+from made_audits import altered, failed
 
 from elastocal_proof.audit import data
 
 EXPERIMENTS, IDEAL = "data/simulated/two/experiments.parquet", "data/simulated/two/ideal.parquet"
 MEASURED = "data/simulated/two/100um/measured.parquet"
-
-
-@pytest.fixture
-def run(tmp_path):
-    return made_run(tmp_path)
 
 
 def test_data_as_they_were_drawn_hold(run):

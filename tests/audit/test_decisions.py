@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_audits import CONFIGURATION, ROBOT, STRATEGY, failed, made_run
+from made_audits import CONFIGURATION, ROBOT, STRATEGY, failed, failed_table, made_run
 
 from elastocal.study.costs import break_even_table, configurations_needed, cost_table
 from elastocal.study.study_tables import measured_table
@@ -61,16 +61,15 @@ def test_costs_follow_from_the_budget(run, budget, column, expected):
     table = cost_table(frames, sets, 4.0, weights)
     if column:
         table.loc[3, column] *= 1.001
-    table.to_csv(run.folder / "reports/tables/costs.csv", index=False)
-    assert failed(decisions.tables(run, "reports/tables/costs.csv", "costs")) == expected
+    assert failed_table(run, decisions, "costs", table) == expected
 
 
 @pytest.mark.parametrize(("factor", "expected"), [(1.0, []), (1.001, ["column break_even"])])
 def test_a_break_even_follows_from_the_budget(run, budget, factor, expected):
     frames, sets, weights = budget
     table = break_even_table(frames, sets, [4.0], weights)
-    table.assign(break_even=factor * table.break_even).to_csv(run.folder / "reports/tables/break_even.csv", index=False)
-    assert failed(decisions.tables(run, "reports/tables/break_even.csv", "break_even")) == expected
+    table = table.assign(break_even=factor * table.break_even)
+    assert failed_table(run, decisions, "break_even", table) == expected
 
 
 @pytest.mark.parametrize(("factor", "expected"), [(1.0, []), (1.001, ["column dev_5_um"])])
@@ -85,8 +84,8 @@ def test_table_4_over_studies_follows_from_the_studies(run, factor, expected):
     frame = pd.DataFrame(rows)
     frame.drop(columns="robot").to_parquet(run.folder / "results/studies/as_configured/two.parquet")
     table = measured_table({"pose": frame}, 5, {"k_sigma": 1.0, "deviation": 2.0})
-    table.assign(dev_5_um=factor * table.dev_5_um).to_csv(run.folder / "reports/tables/table4_studies.csv", index=False)
-    assert failed(decisions.tables(run, "reports/tables/table4_studies.csv", "table4_studies")) == expected
+    table = table.assign(dev_5_um=factor * table.dev_5_um)
+    assert failed_table(run, decisions, "table4_studies", table) == expected
 
 
 @pytest.mark.parametrize(
@@ -99,8 +98,7 @@ def test_the_joint_test_counts_the_comparison_and_ranks_among_the_studies(run, c
     comparison.to_csv(run.folder / "reports/tables/comparison.csv")
     row = {"joints": "fixed joints", "cells": 3, "differ": 1, "below": 1, "statistic": -2 * np.log(p_values).sum()}
     row |= {"below_p": 1 / 3, "statistic_p": 2 / 3, "studies": 2}
-    pd.DataFrame([row | changed]).to_csv(run.folder / "reports/tables/joint_test.csv", index=False)
-    assert failed(decisions.tables(run, "reports/tables/joint_test.csv", "joint_test")) == expected
+    assert failed_table(run, decisions, "joint_test", pd.DataFrame([row | changed])) == expected
 
 
 @pytest.mark.parametrize(
@@ -108,8 +106,7 @@ def test_the_joint_test_counts_the_comparison_and_ranks_among_the_studies(run, c
 )
 def test_a_claim_that_is_an_order_has_the_share_of_studies_as_p(run, changed, expected):
     row = {"number": 1, "literal": "x", "ours": "best in 3 of 16 studies", "p": 4 / 17, "verdict": "holds in part"}
-    pd.DataFrame([row | changed]).to_csv(run.folder / "reports/tables/claims.csv", index=False)
-    assert failed(decisions.tables(run, "reports/tables/claims.csv", "claims")) == expected
+    assert failed_table(run, decisions, "claims", pd.DataFrame([row | changed])) == expected
 
 
 @pytest.mark.parametrize("wrong", [False, True])

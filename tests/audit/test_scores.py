@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from made_audits import made_run
 
 from elastocal_proof.audit.scores import average, errors_of, fixed_joints, moment
 
 
-def test_the_true_compliances_leave_no_error(tmp_path):
-    run = made_run(tmp_path)
+def test_the_true_compliances_leave_no_error(run):
     truth = run.arm("two").compliance
     assert errors_of(run, "two", truth[None]).max() < 1e-12
     off = errors_of(run, "two", 1.1 * truth[None])[0]

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_audits import CONFIGURATION, ROBOT, failed
+from made_audits import CONFIGURATION, ROBOT, failed, failed_table
 from scipy.stats import t as student
 
 from elastocal_proof.audit import tables
@@ -39,6 +39,19 @@ def test_a_row_that_is_there_twice_or_too_many_is_found(run, name):
     file = run.folder / "reports/tables/table1.csv"
     file.write_text(file.read_text("utf-8") + f"{name},0.5,0.8\n", encoding="utf-8")
     assert failed(tables.tables(run, "reports/tables/table1.csv", "table1")) == ["rows"]
+
+
+@pytest.mark.parametrize(
+    ("column", "expected"), [("", []), ("rms_um", ["column rms_um"]), ("zero_leak_urad", ["column zero_leak_urad"])]
+)
+def test_columns_are_formulas_over_the_files_of_robots(run, column, expected):
+    (run.folder / "results/geometry").mkdir(parents=True)
+    row = {"estimator": "at once", "noise": 3e-6, "leak": 4e-6, "compliance_noise": 7.0, "compliance_leak": 0.0}
+    pd.DataFrame([row | {"zero_noise": 1e-6, "zero_leak": 2e-6}]).to_parquet(run.folder / "results/geometry/two.parquet")
+    row = {"robot": "two", "estimator": "at once", "rms_um": 5.0, "noise_um": 3.0, "leak_um": 4.0, "zero_noise_urad": 1.0}
+    row |= {"zero_leak_urad": 2.0, "compliance_noise_percent": 7.0, "compliance_leak_percent": 0.0}
+    changed = {column: 1.001 * row[column]} if column else {}
+    assert failed_table(run, tables, "geometry", pd.DataFrame([row | changed])) == expected
 
 
 @pytest.mark.parametrize(("value", "holds"), [("0.8", True), ("0.7", False), ("0.80 ± 0.01", True), ("0.81 ± 0.01", False)])
@@ -85,7 +98,5 @@ def test_pairs_follow_from_the_scores(run, column, value, expected):
     scores = [("a", "dev_um", 4.0), ("b", "dev_um", 2.0), ("a", "rms_um", 5.0), ("b", "rms_um", 4.0)]
     rows = [{"robot": "two", "metric": metric, "strategy": name, "value": value} for name, metric, value in scores]
     pd.DataFrame(rows).to_csv(run.folder / "reports/tables/strategy_scores.csv", index=False)
-    file = "reports/tables/strategy_pairs.csv"
     by_rms = PAIR | {"metric": "rms_um", "ratio": 1.25, "ratio_low": 1.0, "ratio_high": 1.5625}
-    pd.DataFrame([PAIR | {column: value}, by_rms]).to_csv(run.folder / file, index=False)
-    assert failed(tables.tables(run, file, "strategy_pairs")) == expected
+    assert failed_table(run, tables, "strategy_pairs", pd.DataFrame([PAIR | {column: value}, by_rms])) == expected

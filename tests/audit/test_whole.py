@@ -1,8 +1,7 @@
 """The whole audit of a folder."""
 
-import pandas as pd
 import pytest
-from audited_campaigns import audit_of, diagnosed_campaign
+from audited_campaigns import altered, audit_of, diagnosed_campaign
 from made_audits import CONFIGURATION, failed
 from planted_errors import forge
 from support import refused
@@ -80,10 +79,6 @@ def weighing(tmp_path_factory):
 )
 def test_one_number_altered_is_found(weighing, file, column, row, change, expected):
     """A residual by 0.1 µm, or by 10 µm where only means are known; a compliance by a thousandth of itself."""
-    before = (weighing / file).read_bytes()
-    frame = pd.read_parquet(weighing / file)
-    frame.loc[frame.index[row], column] = change(frame[column].iloc[row])
-    frame.to_parquet(weighing / file)
-    found = failed(audit_of(weighing))
-    (weighing / file).write_bytes(before)
+    with altered(weighing, file, (column, row), change):
+        found = failed(audit_of(weighing))
     assert any(name.startswith(expected) for name in found), found

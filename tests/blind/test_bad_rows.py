@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
-
 from elastocal.io.storage import read_table, write_table
 from elastocal.study.configuration import parsed
 from elastocal_proof.blind import bad_rows as module

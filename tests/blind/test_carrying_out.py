@@ -1,13 +1,11 @@
 """A further experiment does what was proposed, on the same robot, and changes nothing that was read before."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
-
-pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
+from analysed_robots import ROBOTS
 
 from elastocal.campaigns.holdout import split
 from elastocal.campaigns.reading import read_campaign
@@ -16,7 +14,6 @@ from elastocal_proof.blind.cases import Case, design_of, make_case
 from elastocal_proof.blind.follow_up import ARMS, LADDER, POSES, folder_name
 from elastocal_proof.plant.arm import arm_from_file
 
-ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 CASE = Case("lost motion", "single", "kuka", ("lost_motion",), (50.0,), "usual", 187654321)
 STATES = max(POSES)
 

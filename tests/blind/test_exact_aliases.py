@@ -1,12 +1,8 @@
 """The aliases that the scores set aside are exact on the design of the blind cases, and no others are."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
-
+from analysed_robots import ROBOTS
 
 from elastocal.campaigns.columns import columns_of
 from elastocal.fitting.case import case_from, noise_from
@@ -18,7 +14,6 @@ from elastocal.loop.loading import load_campaign
 from elastocal_proof.blind.case_rows import EXACT_ALIASES
 from elastocal_proof.blind.cases import Case, make_case
 
-ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 _SINE, _ROUNDING = 1e-6, 1e-7
 # Weight acts on the arm as it is bent: of a non-centrality of 200 a share of this, squared, leaves a thousandth.
 _BENT = 2e-3

@@ -11,8 +11,10 @@ from analysed_robots import ROBOTS
 
 from elastocal.campaigns.holdout import split
 from elastocal.campaigns.reading import read_campaign
+from elastocal.errors import InputError
 from elastocal_proof.blind.folders import (
     campaign_document,
+    load_ground_truth,
     robot_document,
     write_blind_campaign,
     write_dynamic_campaign,
@@ -133,8 +135,6 @@ def test_the_record_is_sealed_outside_of_the_folder_by_its_hash(tmp_path, fanuc_
     digest = write_truth(sealed, record, tmp_path / "blind" / "case0")
     assert digest == hashlib.sha256(sealed.read_bytes()).hexdigest()
     assert json.loads(sealed.read_text()) == record
-    with pytest.raises(ValueError, match="must not lie"):
-        write_truth(tmp_path / "blind" / "case0" / "record.json", record, tmp_path / "blind" / "case0")
 
 
 def test_the_analysis_reads_the_folder_of_a_moving_arm(tmp_path, fanuc_specimen):
@@ -193,3 +193,29 @@ def test_the_sealed_record_has_the_specimens_own_compliances_and_noise(tmp_path,
     assert np.abs(np.array(record["compliance_urad_per_Nm"]) / [1.23, 0.37, 0.46, 2.68, 2.70, 2.72] - 1).min() > 1e-4
     assert record["noise"] == {"sigma_m": 2e-5, "sigma_m_per_m": 5e-6, "sigma_rad": 3e-5}
     assert record["measurements"] == len(read_campaign(tmp_path / "c", ROBOTS).measurements)
+
+
+@pytest.fixture
+def sealed(tmp_path):
+    files = []
+    for name in ("case_b", "case_a"):
+        files.append(tmp_path / f"{name}.json")
+        files[-1].write_text(f'{{"campaign": "{name}"}}', encoding="utf-8")
+    lines = [f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in files]
+    (tmp_path / "manifest.sha256").write_text("".join(lines), encoding="utf-8")
+    return files, tmp_path / "manifest.sha256"
+
+
+def test_ground_truths_come_by_the_names_of_their_cases(sealed):
+    assert load_ground_truth(*sealed) == {name: {"campaign": name} for name in ("case_a", "case_b")}
+    assert list(load_ground_truth(*sealed)) == ["case_a", "case_b"]
+
+
+def test_a_ground_truth_that_was_changed_or_not_published_is_refused(sealed, tmp_path):
+    files, manifest = sealed
+    files[0].write_text('{"campaign": "case_c"}', encoding="utf-8")
+    with pytest.raises(InputError, match=r"case_b\.json.*as sealed"):
+        load_ground_truth(files, manifest)
+    (tmp_path / "case_d.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match=r"case_d\.json"):
+        load_ground_truth([tmp_path / "case_d.json"], manifest)

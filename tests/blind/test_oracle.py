@@ -1,13 +1,11 @@
 """The oracle knows the effect and its joints, and is judged like the engine."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+from analysed_robots import ROBOTS
 from scipy.stats import chi2
-
-pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.case import noise_facts
@@ -16,8 +14,6 @@ from elastocal.loop.whole import cases_in, diagnosed
 from elastocal.mechanics.sites import sites_of
 from elastocal_proof.blind.cases import Case, make_case
 from elastocal_proof.blind.oracle import members_of, oracle
-
-ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 
 
 def keys(effect, joints, chain):

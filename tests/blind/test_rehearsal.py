@@ -3,17 +3,16 @@
 import numpy as np
 import pandas as pd
 import pytest
-from analysed_robots import ROBOTS
+from analysed_robots import ROBOTS, analysed
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
-from elastocal.io.documents import read_document
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.robot_file import robot_from_document
 from elastocal_proof.blind.rehearsal import filled_sheet, hidden_robot, reached
 
 UR10 = ROBOTS / "ur10.yaml"
 WRENCH = ["fx", "fy", "fz", "mx", "my", "mz"]
+FLANGE = "6DoF"
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +31,8 @@ def sheet_of(angles, targets=("T",), forces=None):
     return pd.DataFrame(rows)
 
 
-def document(point, frame="base", offset=(0.0, 0.0, 0.0), measured="pose"):
-    return {"targets": {"T": {"point": point, "offset_m": offset}}, "frame": frame, "measured": measured}
+def document(frame="base", offset=(0.0, 0.0, 0.0)):
+    return {"targets": {"T": {"point": FLANGE, "offset_m": offset}}, "frame": frame, "measured": "pose"}
 
 
 @pytest.fixture(scope="module")
@@ -41,15 +40,10 @@ def angles():
     return np.random.default_rng(1).uniform(-1, 1, (5, 6))
 
 
-@pytest.fixture(scope="module")
-def declared():
-    return robot_from_document(read_document(UR10))
-
-
-def test_a_sheet_is_filled_near_where_the_declared_robot_is(robot, angles, declared):
-    point = declared.chain.end_effector
-    filled = filled_sheet(sheet_of(angles), document(point.name), robot, 1)
-    position, rotation = poses(declared.chain, declared.model_angles(angles), point)
+def test_a_sheet_is_filled_near_where_the_declared_robot_is(robot, angles):
+    declared = analysed("ur10")
+    filled = filled_sheet(sheet_of(angles), document(), robot, 1)
+    position, rotation = poses(declared.chain, declared.model_angles(angles), declared.chain.end_effector)
     off = np.linalg.norm(filled[["x", "y", "z"]].to_numpy() - position, axis=1)
     assert off.max() < 0.02
     assert off.min() > 1e-5
@@ -57,17 +51,15 @@ def test_a_sheet_is_filled_near_where_the_declared_robot_is(robot, angles, decla
     assert turn.magnitude().max() < 0.05
 
 
-def test_the_same_seed_fills_in_the_same_and_another_one_other_noise(robot, angles, declared):
-    name = declared.chain.end_effector.name
-    one, again, other = (filled_sheet(sheet_of(angles), document(name), robot, seed) for seed in (1, 1, 2))
+def test_the_same_seed_fills_in_the_same_and_another_one_other_noise(robot, angles):
+    one, again, other = (filled_sheet(sheet_of(angles), document(), robot, seed) for seed in (1, 1, 2))
     pd.testing.assert_frame_equal(one, again)
     assert 1e-6 < np.abs(one["x"] - other["x"]).max() < 1e-3
 
 
-def test_rows_of_one_state_are_read_of_one_arm_at_rest(robot, angles, declared):
+def test_rows_of_one_state_are_read_of_one_arm_at_rest(robot, angles):
     """Two targets of known distance keep it but for the noise, in whatever order the rows come."""
-    name = declared.chain.end_effector.name
-    targets = {"A": {"point": name, "offset_m": [0.1, 0, 0]}, "B": {"point": name, "offset_m": [0, 0, 0]}}
+    targets = {"A": {"point": FLANGE, "offset_m": [0.1, 0, 0]}, "B": {"point": FLANGE, "offset_m": [0, 0, 0]}}
     filled = filled_sheet(
         sheet_of(angles, ("A", "B")).sample(frac=1, random_state=3),
         {"targets": targets, "frame": "base", "measured": "position"},
@@ -80,18 +72,16 @@ def test_rows_of_one_state_are_read_of_one_arm_at_rest(robot, angles, declared):
     assert "rx" not in filled
 
 
-def test_a_reflector_of_unknown_offset_sits_at_one_place_within_a_decimetre(robot, angles, declared):
-    point = declared.chain.end_effector
-    known, unknown = (filled_sheet(sheet_of(angles), document(point.name, offset=o), robot, 1) for o in ([0, 0, 0], "unknown"))
+def test_a_reflector_of_unknown_offset_sits_at_one_place_within_a_decimetre(robot, angles):
+    known, unknown = (filled_sheet(sheet_of(angles), document(offset=o), robot, 1) for o in ([0, 0, 0], "unknown"))
     turn = Rotation.from_rotvec(known[["rx", "ry", "rz"]].to_numpy())
     apart = turn.inv().apply((unknown[["x", "y", "z"]] - known[["x", "y", "z"]]).to_numpy())
     np.testing.assert_allclose(apart, np.broadcast_to(apart[0], apart.shape), atol=5e-4)
     assert 0.01 < np.abs(apart[0]).max() < 0.1
 
 
-def test_a_mount_is_turned_as_stated_and_anywhere_where_it_is_unknown(robot, angles, declared):
-    point = declared.chain.end_effector.name
-    stated = {"point": point, "offset_m": [0, 0, 0]}
+def test_a_mount_is_turned_as_stated_and_anywhere_where_it_is_unknown(robot, angles):
+    stated = {"point": FLANGE, "offset_m": [0, 0, 0]}
     targets = {"A": stated, "B": stated | {"rotation": [0, 0, 1.2]}, "C": stated | {"rotation": "unknown"}}
     described = {"targets": targets, "frame": "base", "measured": "pose"}
     filled = filled_sheet(sheet_of(angles, tuple(targets)), described, robot, 1)
@@ -101,34 +91,30 @@ def test_a_mount_is_turned_as_stated_and_anywhere_where_it_is_unknown(robot, ang
     assert np.ptp(mounts[1], axis=0).max() < 1e-3 and np.linalg.norm(mounts[1][0]) > 0.1
 
 
-def test_readings_in_the_frame_of_the_tracker_keep_distances(robot, angles, declared):
-    name = declared.chain.end_effector.name
-    base, own = (
-        filled_sheet(sheet_of(angles), document(name, frame), robot, 1)[["x", "y", "z"]] for frame in ("base", "tracker")
-    )
+def test_readings_in_the_frame_of_the_tracker_keep_distances(robot, angles):
+    base, own = (filled_sheet(sheet_of(angles), document(frame), robot, 1)[["x", "y", "z"]] for frame in ("base", "tracker"))
     np.testing.assert_allclose(np.linalg.norm(own.diff(), axis=1)[1:], np.linalg.norm(base.diff(), axis=1)[1:], atol=1e-12)
     assert np.linalg.norm(own - base, axis=1).min() > 1.0
 
 
-def test_a_load_deflects_the_arm_along_it(robot, angles, declared):
-    name = declared.chain.end_effector.name
-    filled = filled_sheet(sheet_of(angles, forces=[(0, 0, 0), (0, 0, -100)]), document(name), robot, 1)
+def test_a_load_deflects_the_arm_along_it(robot, angles):
+    filled = filled_sheet(sheet_of(angles, forces=[(0, 0, 0), (0, 0, -100)]), document(), robot, 1)
     z = filled.pivot(index="pose", columns="load", values="z")
     assert (z[1] - z[0]).mean() < -1e-4
 
 
-def test_commands_reach_what_a_sheet_reads_but_for_noise(robot, angles, declared):
-    filled = filled_sheet(sheet_of(angles), document(declared.chain.end_effector.name), robot, 1)
+def test_commands_reach_what_a_sheet_reads_but_for_noise(robot, angles):
+    filled = filled_sheet(sheet_of(angles), document(), robot, 1)
     position, _ = reached(robot, angles, np.zeros((5, 6)), 9)
     off = filled[["x", "y", "z"]].to_numpy() - position
     assert 1e-6 < np.abs(off).max() < 5e-4
 
 
-def test_a_moment_without_its_force_is_refused_with_its_row(robot, angles, declared):
+def test_a_moment_without_its_force_is_refused_with_its_row(robot, angles):
     sheet = sheet_of(angles)
     sheet.loc[2, "mz"] = 3.0
     with pytest.raises(InputError, match="moment of row 3"):
-        filled_sheet(sheet, document(declared.chain.end_effector.name), robot, 1)
+        filled_sheet(sheet, document(), robot, 1)
 
 
 def test_the_hidden_effect_follows_from_the_seed_or_is_named(tmp_path):

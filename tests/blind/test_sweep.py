@@ -1,13 +1,10 @@
 """The confounding sweep: designs and angles of its cases, and what is counted."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from analysed_robots import ROBOTS
 from made_verdicts import truth, verdict_of
 from scipy.stats import beta
-
-pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
 from elastocal_proof.blind.cases import (
     SIZES,
@@ -23,7 +20,6 @@ from elastocal_proof.blind.sweep import against_angle, swept
 from elastocal_proof.plant.campaigns import schedule_of
 from elastocal_proof.plant.defects import Defect, with_defects
 
-ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 ONE = Counts(none=2, single=0, outside=0, pair=0, setting=0, sweep=1, robots=("kuka",))
 
 

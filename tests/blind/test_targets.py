@@ -28,7 +28,6 @@ def test_rates_have_clopper_pearson_intervals_and_are_held_against_their_targets
 
 def test_false_alarms_are_held_against_their_upper_limit_and_leave_hard_settings_out():
     hard = (truth(group="setting", setting="outliers_5_percent"), PAYLOAD, oracle(1.0))
-    hard[0]["case"]["group"] = "setting"
     few = summary(*[(truth(), silence(), oracle(1.0))] * 20, hard)
     row = few.loc[("proof", "false alarms with no effect")]
     assert (row.hits, row.cases, row.holds) == (0, 20, False)
@@ -93,13 +92,9 @@ def test_effects_that_make_held_out_errors_worse_count_against_all_that_were_ado
 
 
 def test_each_hard_setting_has_its_false_alarms_and_its_own_target():
-    def null(setting):
-        document = truth(setting=setting)
-        document["case"]["group"] = "setting"
-        return document
-
-    alarms = [(null("force_3kN"), PAYLOAD, oracle(1.0))] * 2
-    table = summary(*alarms, *[(null("force_3kN"), silence(), oracle(1.0))] * 18, (null("on_a_wall"), PAYLOAD, oracle(1.0)))
+    pulled, other = (truth(group="setting", setting=setting) for setting in ("force_3kN", "on_a_wall"))
+    alarms = [(pulled, PAYLOAD, oracle(1.0))] * 2
+    table = summary(*alarms, *[(pulled, silence(), oracle(1.0))] * 18, (other, PAYLOAD, oracle(1.0)))
     row = table.loc[("proof", "false alarms, force 3kN")]
     assert (row.hits, row.cases, row.target, row.holds) == (2, 20, "at most 6 %", False)
     assert table.loc[("proof", "false alarms, off line centres")].cases == 0
@@ -153,8 +148,7 @@ def test_stated_probabilities_are_held_against_how_often_they_are_so():
 def test_settings_tell_false_alarms_effects_and_hidden_effects_apart():
     design = {"covariates": []}
     hidden = truth(("hysteresis", 1), group="setting", setting="without_covariates", level=200.0, design=design)
-    null = truth(setting="outliers_5_percent")
-    null["case"]["group"] = "setting"
+    null = truth(group="setting", setting="outliers_5_percent")
     table = by_setting(
         frame(
             (hidden, silence(), oracle(1.0)),

@@ -1,12 +1,29 @@
-"""Arms of the plant at random angles under random forces, and where they come to rest."""
+"""Arms of the plant in one line; arms at random angles under random forces, and where they come to rest."""
+
+import re
 
 import numpy as np
 
+from elastocal_proof.plant.arm import arm_from_document
 from elastocal_proof.plant.multibody import machine_of
 from elastocal_proof.plant.statics import Loading, equilibrium
 from elastocal_proof.plant.structure import Structure
 
 STATES = 100
+
+
+def arm_of(chain, **more):
+    """An arm from a chain of drives q1 to qn, of compliances 1 to n, which turn half a turn either way."""
+    joints = len({*re.findall(r"q\d+", chain)})
+    document = {"name": "test", "chain": chain, "compliance_urad_per_Nm": [*range(1, joints + 1)]}
+    return arm_from_document(document | {"joint_limits_deg": [[-180, 180]] * joints} | more)
+
+
+def driven_to(machine, angles):
+    """Coordinates of a machine whose drives stand at some angles and whose springs are at rest."""
+    coordinates = np.zeros((len(angles), machine.model.nq))
+    coordinates[:, machine.drive] = angles
+    return coordinates
 
 
 def angles_and_wrenches(arm, force=1000.0, seed=0):

@@ -1,10 +1,12 @@
 """Small campaigns of the plant, diagnosed, with their files where the pipeline puts them, and what an audit finds in these."""
 
+import json
 import sys
+from contextlib import contextmanager
 
 import pandas as pd
 from analysed_robots import ROBOTS
-from made_audits import CONFIGURATION
+from made_audits import CONFIGURATION, failed
 
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
@@ -62,8 +64,37 @@ def diagnosed_campaign(top, robot, effects=(), weighs=False, **design):
     return top
 
 
-def audit_of(top):
-    """Findings of all files of the campaign `cell`, every row looked at."""
+def audit_of(top, *files):
+    """Findings of files of the campaign `cell`, all of them by default, every row looked at."""
     run = Audited(top, CONFIGURATION, {}, {}, sys.maxsize)
-    files = [path.relative_to(top).as_posix() for path in sorted(top.glob("re*/loop/cell/*"))]
+    files = files or [path.relative_to(top).as_posix() for path in sorted(top.glob("re*/loop/cell/*"))]
     return [finding for file in files for _, check, arguments in checks_of(file) for finding in check(run, file, **arguments)]
+
+
+@contextmanager
+def altered(top, file, at, change):
+    """The block finds one value of a file changed: of a document by its keys, of a table by column and row."""
+    path = top / file
+    before = path.read_bytes()
+    if path.suffix == ".json":
+        document = inner = json.loads(before)
+        *way, last = at
+        for key in way:
+            inner = inner[key]
+        inner[last] = change(inner[last])
+        path.write_text(json.dumps(document), encoding="utf-8")
+    else:
+        column, row = at
+        table = pd.read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
+        table.loc[table.index[row], column] = change(table[column].iloc[row])
+        table.to_csv(path, index=False) if path.suffix == ".csv" else table.to_parquet(path)
+    try:
+        yield
+    finally:
+        path.write_bytes(before)
+
+
+def failed_once_altered(top, file, at, change, *audited):
+    """What does not hold of some files, the altered one by default."""
+    with altered(top, file, at, change):
+        return failed(audit_of(top, *(audited or (file,))))

@@ -23,29 +23,8 @@ VALUES = st.recursive(
     SCALARS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(SCALARS, inner, max_size=4), max_leaves=8
 )
 # Pieces of YAML of which a random text rarely holds two.
-PIECES = [
-    "&a ",
-    "*a",
-    "!!python/object:os.system ",
-    "<<: ",
-    "? ",
-    "- ",
-    "\n",
-    "\n  ",
-    "{",
-    "[",
-    "}",
-    "]",
-    '"',
-    "'",
-    "#",
-    "|",
-    ": ",
-    "\t",
-    "%",
-    "---\n",
-    "\0",
-]
+PIECES = ["&a ", "*a", "!!python/object:os.system ", "<<: ", "? ", "- ", "\n", "\n  "]
+PIECES += [*"{[}]\"'#|", ": ", "\t", "%", "---\n", "\0"]
 BYTES = st.one_of(
     st.binary(max_size=200),
     st.lists(st.sampled_from(PIECES) | st.text(max_size=4), max_size=40)

@@ -72,6 +72,14 @@ def altered(run, file, column, row, by):
         kept.cache_clear()
 
 
+def failed_table(run, room, name, table):
+    """What of a table of the study does not hold once it is written; `room`: the module that follows it."""
+    file = f"reports/tables/{name}.csv"
+    (run.folder / file).parent.mkdir(parents=True, exist_ok=True)
+    table.to_csv(run.folder / file, index=False)
+    return failed(room.tables(run, file, name))
+
+
 def failed(findings):
     """What of the findings does not hold."""
     return [finding.checked for finding in findings if not finding.holds]

@@ -7,8 +7,9 @@ from elastocal_proof.blind.case_rows import case_row
 JOINTS = 6
 
 
-def truth(*places, group="single", level=50.0, robot="m900ib700", setting="usual", **changes):
+def truth(*places, group=None, level=50.0, robot="m900ib700", setting="usual", **changes):
     """A sealed document; a place is an effect with its joints, such as ("joint_offset", 3)."""
+    group = group or ("single" if places else "none")
     defects = [
         {
             "effect": effect,
@@ -21,7 +22,7 @@ def truth(*places, group="single", level=50.0, robot="m900ib700", setting="usual
         for effect, *joints in places
     ]
     case = {
-        "group": group if places else "none",
+        "group": group,
         "robot": robot,
         "setting": setting,
         "effects": [defect["effect"] for defect in defects],

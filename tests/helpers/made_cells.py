@@ -38,18 +38,9 @@ def measured():
             wrench = load * (100.0 + np.arange(6) + pose)
             for repeat in range(REPEATS):
                 for target in ("A", "B"):
-                    servo = rng.uniform(-1e-4, 1e-4, 3)
-                    measurements = rng.uniform(-1, 1, 6)
-                    cells = (
-                        pose,
-                        load,
-                        repeat,
-                        target,
-                        *(angles[pose] + servo),
-                        *wrench,
-                        *measurements,
-                        *rng.choice([-1, 1], 3),
-                    )
+                    at = angles[pose] + rng.uniform(-1e-4, 1e-4, 3)
+                    seen, approach = rng.uniform(-1, 1, 6), rng.choice([-1, 1], 3)
+                    cells = (pose, load, repeat, target, *at, *wrench, *seen, *approach)
                     rows.append((*cells, 60.0 * len(rows), 20.0 + 0.01 * len(rows)))
     names = ["pose", "load", "repeat", "target", "q1", "q2", "q3", *WRENCH, *"xyz", "rx", "ry", "rz"]
     names += ["approach1", "approach2", "approach3", "time_s", "temperature_c"]

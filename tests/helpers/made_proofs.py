@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -50,16 +51,9 @@ def audited_proofs(folder):
 
 def made_proofs(folder):
     """Write all of it, with the checksums that jobs would have kept."""
-    for name in ("data/sealed/some_1", "results/blind/oracle", "reports/blind", "results/closed_loop", "reports/closed_loop"):
-        (folder / name).mkdir(parents=True)
-    for name in (
-        "results/bad_rows",
-        "reports/bad_rows",
-        "results/planning",
-        "reports/planning",
-        "results/league/one/random",
-        "reports/league/small",
-    ):
+    beside = [f"{part}/{name}" for part in ("results", "reports") for name in ("closed_loop", "bad_rows", "planning")]
+    of_league = ["results/league/one/random", "reports/league/small"]
+    for name in ("data/sealed/some_1", "results/blind/oracle", "reports/blind", *beside, *of_league):
         (folder / name).mkdir(parents=True)
     _blind(folder)
     _closed_loop(folder)
@@ -76,14 +70,8 @@ def made_proofs(folder):
 def _cases():
     """Ground truths with verdicts and oracles: right, in a class, wrong, silent, of every group that is scored."""
     draws = np.random.default_rng(3)
-    groups = [
-        ("single", 200.0),
-        ("single", 50.0),
-        ("setting", 50.0),
-        ("several_joints", 200.0),
-        ("outside", 200.0),
-        ("none", 0.0),
-    ]
+    groups = [("single", 200.0), ("single", 50.0), ("setting", 50.0)]
+    groups += [("several_joints", 200.0), ("outside", 200.0), ("none", 0.0)]
     for number in range(90):
         group, level = groups[number % len(groups)]
         joint, right = 1 + number % 6, draws.random() < 0.7
@@ -97,8 +85,6 @@ def _cases():
             setting="force_3kN" if group == "setting" else "usual",
             campaign=f"case_{number:03}",
         )
-        if not places:
-            document["case"]["group"] = "none" if group == "none" else "setting"
         for defect in document["defects"]:
             defect["parameters"] = {"offset": 1e-4}
         size = 1e-4 * (1 + 0.3 * draws.standard_normal())
@@ -144,25 +130,25 @@ def _blind(folder):
         write_csv(folder / f"reports/blind/{name}.csv", table)
 
 
+def made_moves(cases=8, poses=50, seed=1, reached=1.0):
+    """Poses of cases of the closed loop, errors normal and of a size for each model; a share `reached` of each is no noise."""
+    draws, sizes = np.random.default_rng(seed), dict(zip(MODELS, (3e-3, 2e-3, 2e-4, 1.1e-4, 1e-4), strict=True))
+    rows = []
+    for case, part, model in product(range(cases), PARTS, MODELS):
+        off = np.linalg.norm(sizes[model] / np.sqrt(3) * draws.standard_normal((poses, 3)), axis=1)
+        row = {"effect": "payload", "seed": case, "verdict": "named", "named": case % 2 == 0, "part": part, "model": model}
+        row |= {"pose": np.arange(poses), "reached_error_m": reached * off, "measured_error_m": off}
+        rows.append(pd.DataFrame(row | {"predicted_std_m": sizes[model], "corrected": True}))
+    return pd.concat(rows, ignore_index=True)
+
+
 def _closed_loop(folder):
-    draws = np.random.default_rng(2)
-    sizes = dict(zip(MODELS, (3e-3, 2e-3, 2e-4, 1.1e-4, 1e-4), strict=True))
-    blocks = []
-    for case in range(8):
-        for part in PARTS:
-            for model in MODELS:
-                off, count = sizes[model] / np.sqrt(3) * draws.standard_normal((30, 3)), 30
-                columns = {"effect": ["payload"] * count, "seed": np.full(count, case), "verdict": ["named"] * count}
-                columns |= {"named": np.full(count, case % 2 == 0), "part": [part] * count, "model": [model] * count}
-                columns |= {"pose": np.arange(count)} | {f"q{joint}": np.zeros(count) for joint in range(1, 7)}
-                columns |= {
-                    "reached_error_m": 0.5 * np.linalg.norm(off, axis=1),
-                    "measured_error_m": np.linalg.norm(off, axis=1),
-                }
-                corrected = (np.arange(count) != 3) | (model != "geometry")
-                blocks.append(columns | {"predicted_std_m": np.full(count, sizes[model]), "corrected": corrected})
-    write_table(folder / "results/closed_loop/kuka.parquet", of_blind.closed_loop(6), blocks, _ORIGIN)
-    errors = case_errors({"kuka": pd.concat([pd.DataFrame(block) for block in blocks], ignore_index=True)})
+    moves = made_moves(poses=30, seed=2, reached=0.5)
+    moves.loc[(moves["pose"] == 3) & (moves["model"] == "geometry"), "corrected"] = False
+    block = {name: column.to_numpy() for name, column in moves.items()}
+    block |= {f"q{joint}": np.zeros(len(moves)) for joint in range(1, 7)}
+    write_table(folder / "results/closed_loop/kuka.parquet", of_blind.closed_loop(6), [block], _ORIGIN)
+    errors = case_errors({"kuka": moves})
     write_csv(folder / "reports/closed_loop/cases.csv", errors)
     write_csv(folder / "reports/closed_loop/closed_loop.csv", summary(errors, SEED))
     write_csv(folder / "reports/closed_loop/goals.csv", goals(errors))

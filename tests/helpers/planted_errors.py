@@ -10,6 +10,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from elastocal.io.data_frames import write_csv
 from elastocal.io.origin import Origin
 from elastocal.io.records import JobRecord, write_records
 from elastocal.io.storage import read_blocks, write_table
@@ -72,27 +73,37 @@ def copied(folder, file, source):
     forge(folder, file)
 
 
+def tabulated(folder, file, frame):
+    """A table in place of a CSV file."""
+    write_csv(folder / file, frame)
+    forge(folder, file)
+
+
 def cell(folder, file, column, factor, row=0):
     """One cell of a CSV file multiplied."""
     frame = pd.read_csv(folder / file)
     frame.loc[row, column] *= factor
-    frame.to_csv(folder / file, index=False, float_format="%.9g", lineterminator="\n")
-    forge(folder, file)
+    tabulated(folder, file, frame)
 
 
-def said(folder, file, column, value, row=0):
-    """One cell of a CSV file that says something else."""
+def first_cell(folder, file, column, factor):
+    """The first cell of a column that is not zero, multiplied."""
+    values = pd.read_csv(folder / file)[column].fillna(0)
+    cell(folder, file, column, factor, int(np.flatnonzero(values)[0]))
+
+
+def said(folder, file, column, value):
+    """The first cell of a column that says something else than a value, saying that."""
     frame = pd.read_csv(folder / file)
-    assert frame.loc[row, column] != value
-    frame.loc[row, column] = value
-    frame.to_csv(folder / file, index=False, float_format="%.9g", lineterminator="\n")
-    forge(folder, file)
+    other = frame[column].dropna() != value
+    assert other.any()
+    frame.loc[other.idxmax(), column] = value
+    tabulated(folder, file, frame)
 
 
 def shortened(folder, file, row):
     """A CSV file without one row."""
-    pd.read_csv(folder / file).drop(index=row).to_csv(folder / file, index=False, float_format="%.9g", lineterminator="\n")
-    forge(folder, file)
+    tabulated(folder, file, pd.read_csv(folder / file).drop(index=row))
 
 
 def flipped_byte(folder):
@@ -346,21 +357,12 @@ LEAGUE, MECHANISMS = "reports/league/small/league.csv", "reports/league/small/me
 
 
 def of_blind(name, column, factor):
-    """The first cell of a column of a table of the blind proof that is not zero, multiplied."""
-
-    def first(folder, file):
-        values = pd.read_csv(folder / file)[column].fillna(0)
-        cell(folder, file, column, factor, int(np.flatnonzero(values)[0]))
-
-    return planted(BLIND[name], first)
+    return planted(BLIND[name], first_cell, column, factor)
 
 
 # The same for what stands in reports of the blind proof, the closed loop, plans and the league.
 PLANTED_IN_PROOFS = {
-    "a case said to be detected": (
-        BLIND["cases"],
-        lambda f: said(f, BLIND["cases"], "named_right", True, row_where(f, "cases", "named_right", False)),
-    ),
+    "a case said to be detected": planted(BLIND["cases"], said, "named_right", True),
     "an error of a case altered": of_blind("cases", "after_rms_m", 0.99),
     "a p value of the oracle altered": of_blind("cases", "oracle_p_value", 2.0),
     "a stated probability altered": of_blind("probabilities", "stated", 0.99),
@@ -368,10 +370,7 @@ PLANTED_IN_PROOFS = {
     "a share of the reliability diagram altered": of_blind("reliability", "rate", 1.01),
     "a rate of the summary altered": of_blind("summary", "rate", 0.99),
     "a limit of the wrong quantile": of_blind("summary", "high", 0.98),
-    "a target that was missed said to be reached": (
-        BLIND["summary"],
-        lambda f: said(f, BLIND["summary"], "holds", True, row_where(f, "summary", "holds", False)),
-    ),
+    "a target that was missed said to be reached": planted(BLIND["summary"], said, "holds", True),
     "a target moved": of_blind("summary", "target_high", 1.2),
     "false alarms of a setting altered": of_blind("settings", "hits", 2),
     "a case counted twice in the confusion matrix": of_blind("confusion", "adequate", 2),
@@ -383,10 +382,7 @@ PLANTED_IN_PROOFS = {
     "a ratio to the floor altered": planted(TOGETHER, cell, "over_floor", 0.999, 3),
     "a case more within the goal": planted(GOALS, cell, "within", 2),
     "an interval of the goal by another method": planted(GOALS, cell, "share_low", 0.95),
-    "a verdict that bad rows changed said to be the same": (
-        SLIPS,
-        lambda f: said(f, SLIPS, "damaged_same", True, int(np.flatnonzero(~pd.read_csv(f / SLIPS)["damaged_same"])[0])),
-    ),
+    "a verdict that bad rows changed said to be the same": planted(SLIPS, said, "damaged_same", True),
     "a rate of bad rows altered": planted(RATES, cell, "low", 1.01, 0),
     "a worth of a plan altered": planted(GAINS, cell, "random_mm", 1.1),
     "poses in each other's folds": planted(FOLDS, rewritten, swapped_folds),
@@ -396,9 +392,3 @@ PLANTED_IN_PROOFS = {
     "a share of intervals altered": planted(LEAGUE, cell, "covered", 1.01, 2),
     "a share of a mechanism altered": planted(MECHANISMS, cell, "share_low", 1.01, 1),
 }
-
-
-def row_where(folder, name, column, value):
-    """The first row of a table of the blind proof in which a column has a value."""
-    frame = pd.read_csv(folder / BLIND[name])
-    return int(frame.index[frame[column].astype(str) == str(value)][0])

@@ -1,16 +1,9 @@
 """The same folds for every method."""
 
 import numpy as np
-import pytest
-from made_leagues import made_data_set
 
 from elastocal.campaigns.columns import measurements_from
 from elastocal_proof.league.folds import WITHIN, dealt, fold_of_each
-
-
-@pytest.fixture(scope="module")
-def data(kuka, config_folder, tmp_path_factory):
-    return made_data_set(tmp_path_factory.mktemp("folds"), kuka, config_folder / "robots")
 
 
 def test_every_pose_is_held_out_once_and_folds_are_of_one_size(data):

@@ -1,14 +1,26 @@
-"""Training and held-out poses of each fold never share a pose."""
+"""A data set comes back from its files; training and held-out poses of each fold never share a pose."""
 
+import numpy as np
 import pytest
 from made_leagues import made_data_set
 
-from elastocal_proof.league.rounds import held_out_rounds, training_rounds
+from elastocal.io.json_files import write_json
+from elastocal.io.storage import write_table
+from elastocal.loop.schemas import measurements
+from elastocal_proof.league.rounds import held_out_rounds, load_data_set, training_rounds
+from elastocal_proof.league.schemas import FOLDS
 
 
-@pytest.fixture(scope="module")
-def data(kuka, config_folder, tmp_path_factory):
-    return made_data_set(tmp_path_factory.mktemp("rounds"), kuka, config_folder / "robots")
+def test_descriptions_measurements_and_folds_come_back(data, tmp_path):
+    write_json(tmp_path / "campaign.json", data.descriptions)
+    write_table(tmp_path / "seen.parquet", measurements(6), [data.columns], {})
+    write_table(tmp_path / "folds.parquet", FOLDS, [data.dealt], {})
+    found = load_data_set(tmp_path / "campaign.json", tmp_path / "seen.parquet", tmp_path / "folds.parquet")
+    assert found.descriptions["campaign"] == data.descriptions["campaign"]
+    for name, values in data.columns.items():
+        np.testing.assert_array_equal(found.columns[name], values)
+    np.testing.assert_array_equal(found.dealt["blocks"], data.dealt["blocks"])
+    assert len(found.case().observations.states) == 24
 
 
 @pytest.mark.parametrize("split", ["random", "blocks"])

@@ -1,21 +1,15 @@
-"""Robots and campaigns for the plant's tests, which need MuJoCo: the extra `blind`, not among the pins of other tests."""
+"""Robots and campaigns for the plant's tests."""
 
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-try:
-    import mujoco  # noqa: F401 - only whether it is there
-except ImportError:
-    collect_ignore_glob = ["test_*.py"]
-else:
-    # By name, for without MuJoCo not even the names could be had.
-    arms, campaigns, robots, sizing = (
-        import_module(f"elastocal_proof.plant.{name}") for name in ("arm", "campaigns", "physical_robot", "sizing")
-    )
+from elastocal_proof.plant.arm import arm_from_file
+from elastocal_proof.plant.campaigns import Design, schedule_of
+from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.sizing import Yardstick
 
 
 @pytest.fixture(scope="session", params=["kuka", "fanuc", "abb", "gp180", "iiwa14"])
@@ -26,40 +20,40 @@ def name(request):
 
 @pytest.fixture(scope="session")
 def arm(name):
-    return arms.arm_from_file(ROBOTS / f"{name}.yaml")
+    return arm_from_file(ROBOTS / f"{name}.yaml")
 
 
 @pytest.fixture(scope="session")
 def fanuc_arm():
-    return arms.arm_from_file(ROBOTS / "fanuc.yaml")
+    return arm_from_file(ROBOTS / "fanuc.yaml")
 
 
 @pytest.fixture(scope="session")
 def fanuc_specimen(fanuc_arm):
-    return robots.specimen(fanuc_arm, 4)
+    return specimen(fanuc_arm, 4)
 
 
 @pytest.fixture(scope="session")
 def weightless(fanuc_arm):
     """The same, of an arm that weighs nothing: what only its loads and defects do."""
-    return robots.specimen(fanuc_arm, 4, weighs=False)
+    return specimen(fanuc_arm, 4, weighs=False)
 
 
 @pytest.fixture(scope="session")
 def small():
     """A short campaign."""
-    return campaigns.Design(poses=8, held_out=2, repeated_poses=3, repeats=2)
+    return Design(poses=8, held_out=2, repeated_poses=3, repeats=2)
 
 
 @pytest.fixture(scope="session")
 def schedule(fanuc_arm, small):
-    return campaigns.schedule_of(fanuc_arm, small, 2)
+    return schedule_of(fanuc_arm, small, 2)
 
 
 @pytest.fixture(scope="session")
 def yardstick(fanuc_specimen, schedule):
     # As slow as a campaign of usual length, in which a stand that is knocked is so between two of its poses.
-    return sizing.Yardstick(fanuc_specimen, replace(schedule, time_s=3.0 * schedule.time_s))
+    return Yardstick(fanuc_specimen, replace(schedule, time_s=3.0 * schedule.time_s))
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS, analysed
-from arms_at_rest import STATES, angles_and_wrenches, at_rest, loading_of
+from arms_at_rest import STATES, angles_and_wrenches, arm_of, at_rest, driven_to, loading_of
 from durations import growth
 from support import OTHER_CHAINS, robot_of
 
@@ -15,7 +15,7 @@ from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.links import extended_chain, spring_compliance
 from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.robot import Link, Tube
-from elastocal_proof.plant.arm import arm_from_document, arm_from_file, link_frames
+from elastocal_proof.plant.arm import arm_from_file, link_frames
 from elastocal_proof.plant.campaigns import usual_force_N
 from elastocal_proof.plant.statics import generalized_forces
 from elastocal_proof.plant.structure import Structure, TaperedTube
@@ -25,10 +25,8 @@ from elastocal_proof.plant.weights import declared_masses, on_stretches
 def deflections(arm, angles, wrench, **more):
     """Of each measuring point, m and rad, ndarray (points, S, 6)."""
     machine, bent = at_rest(arm, angles, wrench, **more)
-    rest = generalized_forces(
-        machine, np.where(np.isin(np.arange(machine.model.nq), machine.drive), bent.coordinates, 0.0), loading_of(angles)
-    )
-    position, rotation = rest[1].position, rest[1].rotation
+    rest = generalized_forces(machine, driven_to(machine, bent.coordinates[:, machine.drive]), loading_of(angles))[1]
+    position, rotation = rest.position, rest.rotation
     points = range(position.shape[1])
     return np.array(
         [pose_differences(bent.position[:, p], bent.rotation[:, p], position[:, p], rotation[:, p]) for p in points]
@@ -42,36 +40,28 @@ def linear_deflections(chain, coordinates, wrench, compliance):
     return np.array([np.einsum("sij,sj->si", poses_and_jacobians(chain, coordinates, p)[2], turn) for p in chain.points])
 
 
-@pytest.mark.parametrize("key", ["kuka", "fanuc", "abb", "ur10", "gp180", "iiwa14"])
-def test_poses_without_load_are_those_of_the_kinematics(key):
-    arm, robot = arm_from_file(ROBOTS / f"{key}.yaml"), analysed(key)
-    angles, wrench = angles_and_wrenches(arm)
-    _, rest = at_rest(arm, angles, 0.0 * wrench)
+def assert_unloaded_poses_alike(arm, robot, angles):
+    _, rest = at_rest(arm, angles, np.zeros((len(angles), 6)))
     for number, point in enumerate(robot.chain.points):
         position, rotation = poses(robot.chain, angles, point)
         np.testing.assert_allclose(rest.position[:, number], position, atol=1e-12)
         np.testing.assert_allclose(rest.rotation[:, number], rotation, atol=1e-12)
+
+
+@pytest.mark.parametrize("key", ["kuka", "fanuc", "abb", "ur10", "gp180", "iiwa14"])
+def test_poses_without_load_are_those_of_the_kinematics(key):
+    arm = arm_from_file(ROBOTS / f"{key}.yaml")
+    assert_unloaded_poses_alike(arm, analysed(key), angles_and_wrenches(arm)[0])
 
 
 @pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
 def test_joints_that_turn_backwards_fixed_rotations_and_points_inside_links_are_read_alike(name_of_chain):
     """Poses and deflections of chains of three to seven joints."""
     text = OTHER_CHAINS[name_of_chain]
-    robot = robot_of(text)
-    n = robot.joints
-    document = {
-        "name": "test",
-        "chain": text,
-        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
-        "joint_limits_deg": [[-180, 180]] * n,
-    }
-    arm = arm_from_document(document)
+    # Both have compliances 1 to n.
+    robot, arm = robot_of(text), arm_of(text)
     angles, wrench = angles_and_wrenches(arm, force=10.0)
-    _, rest = at_rest(arm, angles, 0.0 * wrench)
-    for number, point in enumerate(robot.chain.points):
-        position, rotation = poses(robot.chain, angles, point)
-        np.testing.assert_allclose(rest.position[:, number], position, atol=1e-12)
-        np.testing.assert_allclose(rest.rotation[:, number], rotation, atol=1e-12)
+    assert_unloaded_poses_alike(arm, robot, angles)
     wanted = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
     np.testing.assert_allclose(deflections(arm, angles, wrench), wanted, atol=2e-8)
 

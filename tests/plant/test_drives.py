@@ -69,6 +69,8 @@ def test_an_error_of_the_pose_is_the_same_in_all_its_measurements(visits):
     for pose in range(25):
         assert np.ptp(turn[poses == pose], axis=0).max() == 0.0
     assert np.unique(turn[:, 0]).size == 25
+    # 25 draws: their standard deviation is known to 14 %.
+    assert turn[::8, 0].std() == pytest.approx(1e-5, rel=0.4)
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -6,18 +6,12 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from arms_at_rest import arm_of
 from scipy.integrate import quad
 from support import refused
 
-from elastocal_proof.plant.arm import arm_from_document
 from elastocal_proof.plant.multibody import machine_of
 from elastocal_proof.plant.structure import Compensator, Mass, Structure, TaperedTube
-
-
-def arm_of(chain, joints=2):
-    compliance, limits = [float(joint) for joint in range(1, joints + 1)], [[-180, 180]] * joints
-    return arm_from_document({"name": "t", "chain": chain, "compliance_urad_per_Nm": compliance, "joint_limits_deg": limits})
-
 
 TWO = arm_of("Tz(0.4) Rz(q1) Tx(1) [A] Ry(q2) Tx(0.5) [B]")
 EVERYTHING = Structure(

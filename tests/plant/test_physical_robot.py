@@ -11,7 +11,7 @@ from elastocal_proof.plant.gears import Asymmetric
 from elastocal_proof.plant.load_cell import LoadCell
 from elastocal_proof.plant.multibody import machine_of
 from elastocal_proof.plant.physical_robot import Warmth, at_rest, driven, seen_poses, specimen
-from elastocal_proof.plant.tracker import EccentricNest, rotation_vector
+from elastocal_proof.plant.tracker import rotation_vector
 from elastocal_proof.plant.weights import declared_masses, on_stretches
 
 
@@ -114,19 +114,6 @@ def test_a_cells_bias_fixed_in_the_flange_pulls_along_the_axes_of_the_unloaded_f
     found, wanted = (seen_poses(one, done)[0] for one, done in ((robot, schedule), (weightless, less)))
     np.testing.assert_allclose(found, wanted, atol=1e-12)
     assert np.abs(found - seen_poses(weightless, schedule)[0]).max() > 1e-6
-
-
-def test_a_nest_off_centre_moves_the_flanges_target_alone(fanuc_specimen, schedule):
-    moved = seen_poses(replace(fanuc_specimen, nest=EccentricNest(5e-5)), schedule)[0] - seen_poses(fanuc_specimen, schedule)[0]
-    assert not moved[:, :-1].any()
-    np.testing.assert_allclose(np.linalg.norm(moved[:, -1], axis=1), 5e-5, rtol=1e-9)
-
-
-def test_an_equilibrium_to_begin_with_changes_no_pose(fanuc_specimen, schedule):
-    softer = replace(fanuc_specimen, compliance=1.01 * fanuc_specimen.compliance)
-    start = at_rest(fanuc_specimen, schedule)[1]
-    for found, wanted in zip(seen_poses(softer, schedule, start), seen_poses(softer, schedule), strict=True):
-        np.testing.assert_allclose(found, wanted, atol=1e-12)
 
 
 @pytest.mark.parametrize("rise", [-5.0, 0.0, 12.0])

@@ -7,10 +7,9 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from arms_at_rest import STATES, angles_and_wrenches, at_rest, loading_of
+from arms_at_rest import STATES, angles_and_wrenches, arm_of, at_rest, driven_to, loading_of
 from scipy.optimize import brentq
 
-from elastocal_proof.plant.arm import arm_from_document
 from elastocal_proof.plant.multibody import machine_of
 from elastocal_proof.plant.statics import Loading, equilibrium, generalized_forces, places
 from elastocal_proof.plant.structure import Compensator, Mass, Structure, TaperedTube
@@ -27,9 +26,7 @@ def test_weight_turns_the_joints_as_pinocchio_says(arm):
     load = Mass(arm.joints, 120.0, 1.0, (0.1, -0.05, 0.15))
     machine = machine_of(arm, Structure(masses=masses, payload=load))
     angles, _ = angles_and_wrenches(arm)
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
-    found = generalized_forces(machine, coordinates, loading_of(angles))[0][:, machine.gear]
+    found = generalized_forces(machine, driven_to(machine, angles), loading_of(angles))[0][:, machine.gear]
     model, parent = pin.Model(), 0
     for number, axis in enumerate(arm.axes):
         place = pin.SE3(arm.stretches[number].rotation, arm.stretches[number].vector_m)
@@ -52,9 +49,7 @@ def test_stretches_that_grow_each_by_its_own_move_targets_as_longer_links_do(arm
     angles, wrench = angles_and_wrenches(arm)
     growth = np.linspace(2e-4, -1e-4, arm.joints + 1)
     machine = machine_of(arm, Structure())
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
-    found = places(machine, coordinates, np.broadcast_to(growth, (STATES, arm.joints + 1))).position[:, -1]
+    found = places(machine, driven_to(machine, angles), np.tile(growth, (STATES, 1))).position[:, -1]
     longer = tuple(
         replace(s, vector_m=s.vector_m * (1 + g), points=tuple(replace(p, position_m=p.position_m * (1 + g)) for p in s.points))
         for s, g in zip(arm.stretches, growth, strict=True)
@@ -108,23 +103,18 @@ def test_a_compensator_pulls_by_the_derivative_of_its_energy(arm):
     # The anchor is stated in the frame before the shoulder's fixed rotation; none of these arms has one.
     step = 1e-5
     wanted = -(energy(angles[:, 1] + step) - energy(angles[:, 1] - step)) / (2 * step)
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
-    found = generalized_forces(machine, coordinates, loading_of(angles))[0][:, machine.gear]
+    found = generalized_forces(machine, driven_to(machine, angles), loading_of(angles))[0][:, machine.gear]
     np.testing.assert_allclose(found[:, 1], wanted, atol=1e-4)
     assert np.abs(np.delete(found, 1, axis=1)).max() < 1e-9
 
 
-def lever_of(length_m=1.0, compliance_urad_per_nm=50.0):
-    """One joint about y, its link forwards along x, and a measuring point at its end."""
-    text = f"Ry(q1) Tx({length_m}) [A]"
-    limits, compliance = [[-180, 180]], [compliance_urad_per_nm]
-    return arm_from_document({"name": "t", "chain": text, "compliance_urad_per_Nm": compliance, "joint_limits_deg": limits})
+# One joint about y, its link forwards along x, and a measuring point at its end.
+LEVER = arm_of("Ry(q1) Tx(1.0) [A]", compliance_urad_per_Nm=[50.0])
 
 
 def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
-    arm, mass, angles = lever_of(), 200.0, np.array([[-1.0], [0.0], [0.7], [np.pi / 2]])
-    found = at_rest(arm, angles, np.zeros((4, 6)), Structure(masses=(Mass(1, mass, 0.8),)))[1]
+    mass, angles = 200.0, np.array([[-1.0], [0.0], [0.7], [np.pi / 2]])
+    found = at_rest(LEVER, angles, np.zeros((4, 6)), Structure(masses=(Mass(1, mass, 0.8),)))[1]
     moment = mass * 9.80665 * 0.8
     # theta = C m g l cos(q + theta), to all orders; seven degrees at most.
     wanted = [brentq(lambda t, q=q: t - 50e-6 * moment * np.cos(q + t), -1.0, 1.0, xtol=1e-15) for q in angles[:, 0]]
@@ -134,17 +124,15 @@ def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
 
 
 def test_a_force_acts_at_the_deflected_flange_and_a_moment_wherever_it_is():
-    arm = lever_of()
     wrench = np.array([[300.0, 0.0, -800.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 500.0, 0.0]])
-    found = at_rest(arm, np.zeros((2, 1)), wrench)[1].coordinates[:, 1]
+    found = at_rest(LEVER, np.zeros((2, 1)), wrench)[1].coordinates[:, 1]
     # (cos t, 0, -sin t) x (300, 0, -800) about y.
     bent = brentq(lambda t: t - 50e-6 * (-300.0 * np.sin(t) + 800.0 * np.cos(t)), -1.0, 1.0, xtol=1e-15)
     np.testing.assert_allclose(found, [bent, 50e-6 * 500.0], atol=1e-11)
 
 
 def test_a_structural_spring_yields_by_its_compliance_its_law_and_its_offset():
-    arm = lever_of()
-    machine = machine_of(arm, Structure(base=(0.0, 0.0, 2e-8, 0.0, 0.0, 0.0)))
+    machine = machine_of(LEVER, Structure(base=(0.0, 0.0, 2e-8, 0.0, 0.0, 0.0)))
     index, wrench = machine.springs["base_z"], np.array([[0.0, 0.0, 1000.0, 0.0, 0.0, 0.0], [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]])
     offsets = {index: np.array([1e-5, 3e-5])}
     loading = Loading(np.full((2, 1), np.pi / 2), wrench, np.zeros((2, 2)), offsets)
@@ -156,8 +144,8 @@ def test_a_structural_spring_yields_by_its_compliance_its_law_and_its_offset():
 
 @pytest.mark.parametrize("mass", [0.0, 100.0])
 def test_gears_know_the_torque_before_the_load_came_on(mass):
-    arm, seen = lever_of(), []
-    machine = machine_of(arm, Structure(masses=(Mass(1, mass, 1.0),) if mass else ()))
+    seen = []
+    machine = machine_of(LEVER, Structure(masses=(Mass(1, mass, 1.0),) if mass else ()))
 
     def law(torque, unloaded):
         seen.append(unloaded.copy())
@@ -171,21 +159,21 @@ def test_an_arm_that_finds_no_rest_is_an_error_that_has_its_last_step():
     signs = cycle([0.01, -0.01])
     loading = Loading(np.zeros((1, 1)), np.zeros((1, 6)), np.zeros((1, 2)))
     with pytest.raises(RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"):
-        equilibrium(machine_of(lever_of(), Structure()), loading, lambda torque, _: 0 * torque + next(signs))
+        equilibrium(machine_of(LEVER, Structure()), loading, lambda torque, _: 0 * torque + next(signs))
 
 
 def test_a_start_near_the_rest_saves_sweeps_and_changes_nothing():
-    arm, angles = lever_of(), np.array([[0.1], [0.9]])
+    angles = np.array([[0.1], [0.9]])
     wrench = np.tile([0.0, 0.0, -900.0, 0.0, 0.0, 0.0], (2, 1))
-    machine, first = at_rest(arm, angles, wrench)
+    machine, first = at_rest(LEVER, angles, wrench)
     loading = Loading(angles, wrench, np.zeros((2, 2)))
-    again = equilibrium(machine, loading, lambda torque, _: arm.compliance * torque, start=first.coordinates[:, first.gear])
+    again = equilibrium(machine, loading, lambda torque, _: LEVER.compliance * torque, start=first.coordinates[:, first.gear])
     np.testing.assert_allclose(again.coordinates, first.coordinates, atol=1e-12)
     assert again.sweeps == 1 < first.sweeps
 
 
 def test_growth_of_one_state_is_in_no_other_and_the_model_keeps_its_own_lengths():
-    machine = machine_of(lever_of(), Structure())
+    machine = machine_of(LEVER, Structure())
     growth = np.array([[0.0, 0.0], [0.0, 1e-3], [0.0, 0.0], [0.0, -2e-3]])
     before = machine.model.body_pos.copy(), machine.model.site_pos.copy()
     found = places(machine, np.zeros((4, 2)), growth)
@@ -198,10 +186,8 @@ def test_forces_do_the_work_that_moving_each_coordinate_takes(fanuc_arm):
     """Virtual work: of the load, the weights and the compensator together, by differences of their energies."""
     machine = machine_of(fanuc_arm, everything(fanuc_arm))
     rng, model = np.random.default_rng(3), machine.model
-    coordinates = np.zeros((1, model.nq))
-    coordinates[:, machine.drive] = rng.uniform(-1, 1, 6)
-    push = np.array([[400.0, -700.0, 300.0, 0.0, 0.0, 0.0]])
-    loading = Loading(coordinates[:, machine.drive], push, np.zeros((1, 7)))
+    angles, push = rng.uniform(-1, 1, (1, 6)), np.array([[400.0, -700.0, 300.0, 0.0, 0.0, 0.0]])
+    coordinates, loading = driven_to(machine, angles), Loading(angles, push, np.zeros((1, 7)))
     force = generalized_forces(machine, coordinates, loading)[0][0]
 
     def energy(moved):

@@ -5,7 +5,7 @@ from arms_at_rest import angles_and_wrenches, at_rest, loading_of
 
 from elastocal_proof.plant.multibody import machine_of
 from elastocal_proof.plant.statics import generalized_forces
-from elastocal_proof.plant.structure import Compensator, Mass, Structure, TaperedTube
+from elastocal_proof.plant.structure import Mass, Structure, TaperedTube
 
 
 def test_by_default_an_arm_has_drives_and_gears_alone_and_no_weight(fanuc_arm):
@@ -39,10 +39,3 @@ def test_two_structures_share_no_springs_of_theirs():
     one, other = Structure(), Structure()
     one.tilt[1] = (1e-7, 1e-7)
     assert not other.tilt and not other.tubes and not other.wrong_turns
-
-
-def test_a_compensator_of_its_free_length_does_not_pull(fanuc_arm):
-    spring = Compensator((0.0, 0.0, -0.3), (0.2, 0.0, 0.0), 1e5, float(np.hypot(0.3, 0.2)))
-    machine = machine_of(fanuc_arm, Structure(compensator=spring))
-    force = generalized_forces(machine, np.zeros((1, 12)), loading_of(np.zeros((1, 6))))[0]
-    np.testing.assert_allclose(force, 0.0, atol=1e-9)

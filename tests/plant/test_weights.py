@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS
-from arms_at_rest import STATES, angles_and_wrenches
+from arms_at_rest import angles_and_wrenches, arm_of, driven_to
 
-from elastocal_proof.plant.arm import LinkMass, arm_from_document, arm_from_file, link_frames
+from elastocal_proof.plant.arm import LinkMass, arm_from_file, link_frames
 from elastocal_proof.plant.multibody import machine_of
 from elastocal_proof.plant.random_numbers import stream
 from elastocal_proof.plant.structure import Mass, Structure
@@ -29,11 +29,9 @@ def test_weight_by_levers_is_what_mujocos_model_has_whichever_way_gravity_pulls(
     masses = on_stretches(true_masses(declared_masses(arm), stream(1, "test")), arm)
     machine = machine_of(arm, Structure(masses=masses, gravity_m_s2=gravity))
     angles, _ = angles_and_wrenches(arm)
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
     found = gravity_torque(arm, masses, gravity, angles)
     data = mujoco.MjData(machine.model)
-    for row, torque in zip(coordinates[:20], found[:20], strict=True):
+    for row, torque in zip(driven_to(machine, angles)[:20], found[:20], strict=True):
         data.qpos[:] = row
         mujoco.mj_forward(machine.model, data)
         np.testing.assert_allclose(torque, -data.qfrc_bias[machine.gear], atol=1e-9 * np.abs(found).max())
@@ -44,27 +42,23 @@ def test_declared_centres_stand_in_the_frame_that_turns_with_their_joint(arm):
     declared = declared_masses(arm)
     machine = machine_of(arm, Structure(masses=on_stretches(declared, arm)))
     angles, _ = angles_and_wrenches(arm)
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
     data = mujoco.MjData(machine.model)
     origin, rotation = link_frames(arm, angles)
-    for state in range(10):
-        data.qpos[:] = coordinates[state]
+    for state, row in enumerate(driven_to(machine, angles)[:10]):
+        data.qpos[:] = row
         mujoco.mj_kinematics(machine.model, data)
         for mass in declared:
             wanted = origin[state, mass.link] + rotation[state, mass.link] @ mass.centre_m
             np.testing.assert_allclose(data.xipos[machine.links[mass.link]], wanted, atol=1e-9)
 
 
-def arm_of(chain="Tz(0.4) Ry(q1) Tx(2) Ry(q2) [elbow] Tx(1) [hand]", joints=2, **more):
-    compliance, limits = [1.0] * joints, [[-180, 180]] * joints
-    document = {"name": "t", "chain": chain, "compliance_urad_per_Nm": compliance, "joint_limits_deg": limits}
-    return arm_from_document(document | more)
+CHAIN = "Tz(0.4) Ry(q1) Tx(2) Ry(q2) [elbow] Tx(1) [hand]"
+TWO = arm_of(CHAIN)
 
 
 def test_weights_of_the_file_are_taken_as_they_stand():
     entries = [{"link": 1, "mass_kg": 12, "centre_m": [0.5, 0, 0], "relative_std": 0.03}]
-    assert declared_masses(arm_of(masses=entries)) == (LinkMass(1, 12.0, (0.5, 0.0, 0.0), 0.03),)
+    assert declared_masses(arm_of(CHAIN, masses=entries)) == (LinkMass(1, 12.0, (0.5, 0.0, 0.0), 0.03),)
 
 
 def test_where_the_file_has_none_each_link_behind_the_carousel_weighs_half_of_the_one_before():
@@ -83,9 +77,7 @@ def test_the_guessed_mass_of_an_arm_is_no_more_than_half_off_its_data_sheet(name
 
 def test_a_guessed_centre_is_before_the_middle_of_its_link_and_beside_it():
     # Of a reach of three metres.
-    np.testing.assert_allclose(
-        [m.centre_m for m in declared_masses(arm_of())], [[0, 0.03, 0.18], [0.9, 0.03, 0], [0.45, 0.03, 0]]
-    )
+    np.testing.assert_allclose([m.centre_m for m in declared_masses(TWO)], [[0, 0.03, 0.18], [0.9, 0.03, 0], [0.45, 0.03, 0]])
 
 
 @pytest.mark.parametrize(
@@ -110,7 +102,7 @@ def test_masses_of_specimens_scatter_about_the_declared_ones_as_these_are_known(
 
 
 def test_centres_off_the_line_move_across_it_alone_and_weights_stay():
-    arm, largest = arm_of(), 0.02
+    arm, largest = TWO, 0.02
     masses = (LinkMass(0, 9.0, (0.0, 0.0, 0.1), 0.1), LinkMass(1, 8.0, (0.5, 0.0, 0.0), 0.1)) * 100
     moved = off_the_line(masses, arm, largest, np.random.default_rng(4))
     shift = np.array([m.centre_m for m in moved]) - np.array([m.centre_m for m in masses])
@@ -129,16 +121,15 @@ def test_a_centre_at_a_joint_without_a_link_may_move_anywhere():
 
 @pytest.mark.parametrize("centre, along", [((0.5, 0.1, -0.2), 0.25), ((-0.3, 0.0, 0.1), 0.0), ((2.5, 0.0, 0.1), 1.0)])
 def test_a_weight_stands_on_its_stretch_and_aside_of_it_where_its_centre_is(centre, along):
-    arm = arm_of()
-    (mass,) = on_stretches((LinkMass(1, 8.0, centre, 0.1),), arm)
+    (mass,) = on_stretches((LinkMass(1, 8.0, centre, 0.1),), TWO)
     assert (mass.stretch, mass.mass_kg, mass.along) == (1, 8.0, pytest.approx(along))
-    np.testing.assert_allclose(mass.along * arm.stretches[1].vector_m + mass.aside_m, centre, atol=1e-15)
+    np.testing.assert_allclose(mass.along * TWO.stretches[1].vector_m + mass.aside_m, centre, atol=1e-15)
     if 0 < along < 1:
         assert mass.aside_m[0] == pytest.approx(0.0, abs=1e-15)
 
 
 def test_weight_turns_each_joint_by_mass_gravity_and_horizontal_lever():
-    arm, masses = arm_of(), (Mass(0, 99.0, 0.5), Mass(1, 10.0, 0.5), Mass(2, 4.0, 1.0))
+    arm, masses = TWO, (Mass(0, 99.0, 0.5), Mass(1, 10.0, 0.5), Mass(2, 4.0, 1.0))
     angles = np.array([[0.0, 0.0], [0.3, 0.9], [-1.2, 0.4]])
     upper, fore = np.cos(angles[:, 0]), np.cos(angles.sum(axis=1))
     # A positive turn about y lowers what lies forwards.
@@ -148,9 +139,9 @@ def test_weight_turns_each_joint_by_mass_gravity_and_horizontal_lever():
 
 
 def test_the_usual_torque_is_the_root_mean_square_over_the_range_of_angles():
-    still = replace(arm_of(), limits=np.radians([[60.0, 60.0], [0.0, 0.0]]))
+    still = replace(TWO, limits=np.radians([[60.0, 60.0], [0.0, 0.0]]))
     torque = 9.8 * 10.0 * 2.0 * 0.5
     np.testing.assert_allclose(usual_gravity_torque(still, (Mass(1, 10.0, 1.0),), (0.0, 0.0, -9.8)), [torque, 0.0])
     # Mean of cos^2 over whole turns is a half, to three standard errors of its 64 poses, sd(cos^2) = 1 / sqrt 8.
-    free = usual_gravity_torque(arm_of(), (Mass(1, 10.0, 1.0),), (0.0, 0.0, -9.8))[0] / 196.0
+    free = usual_gravity_torque(TWO, (Mass(1, 10.0, 1.0),), (0.0, 0.0, -9.8))[0] / 196.0
     assert free**2 == pytest.approx(0.5, abs=3 * np.sqrt(1 / 8 / 64))

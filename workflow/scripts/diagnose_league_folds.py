@@ -7,10 +7,8 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.io.json_files import write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
-from elastocal_proof.league.data_files import load_data_set
-from elastocal_proof.league.diagnosed_folds import fold_facts, fold_fits
-from elastocal_proof.league.mechanisms import mechanism_columns
-from elastocal_proof.league.rounds import training_rounds
+from elastocal_proof.league.fold_tables import fold_facts, fold_fits, mechanism_columns
+from elastocal_proof.league.rounds import load_data_set, training_rounds
 from elastocal_proof.league.schemas import FITS, MECHANISMS
 
 

@@ -5,11 +5,9 @@ from job import Job, run
 from elastocal.io.json_files import read_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
-from elastocal_proof.league.data_files import load_data_set
-from elastocal_proof.league.diagnosed_folds import physics_of_fold
-from elastocal_proof.league.entry_columns import entry_columns
+from elastocal_proof.league.fold_tables import entry_columns, physics_of_fold
 from elastocal_proof.league.methods import entered, method_from
-from elastocal_proof.league.rounds import held_out_rounds, training_rounds
+from elastocal_proof.league.rounds import held_out_rounds, load_data_set, training_rounds
 from elastocal_proof.league.schemas import ENTRIES, FITS
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from job import Job, run
 
 from elastocal.io.json_files import read_json, write_json
-from elastocal_proof.blind.ground_truth import load_ground_truth
+from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.limit import limit_of_sample
 from elastocal_proof.blind.oracle import oracle
 

@@ -12,7 +12,7 @@ from elastocal_proof.blind.calibration import reliability, statements
 from elastocal_proof.blind.case_rows import case_row
 from elastocal_proof.blind.confusion import confused
 from elastocal_proof.blind.coverage import covered, intervals_of
-from elastocal_proof.blind.ground_truth import load_ground_truth
+from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.power import powers, undetectable
 from elastocal_proof.blind.targets import by_setting, summarized
 

@@ -8,6 +8,7 @@ import pandas as pd
 
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
+from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.follow_up_scores import (
     followed,
     poses_needed,
@@ -17,7 +18,6 @@ from elastocal_proof.blind.follow_up_scores import (
     with_one_effect,
     with_prospects,
 )
-from elastocal_proof.blind.ground_truth import load_ground_truth
 
 
 def score_follow_ups(job: Job) -> None:

@@ -7,7 +7,7 @@ from job import Job, origin_of, run
 from elastocal.figures.style import save
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
-from elastocal_proof.blind.ground_truth import load_ground_truth
+from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.sweep import against_angle, swept
 from elastocal_proof.figures.sweep import sweep
 

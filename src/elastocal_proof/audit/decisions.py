@@ -175,21 +175,6 @@ def measurement_kinds(run: Audited) -> _Rows:
             yield row | find_root_mean(cell["mean_square"])
 
 
-def stiffness(run: Audited) -> _Rows:
-    for robot in run.reduced:
-        for row in run.table(f"results/stiffness/{robot}.parquet").to_dict("records"):
-            again = {"robot": robot, "force_N": row["force"], "softest_N_per_um": 1e-6 * row["softest"]}
-            names = ("first_order", "loaded", "by_k_c", "bias", "k_sigma")
-            yield (
-                again | {f"{name}_percent": row[name] for name in names} | {name: row[name] for name in ("offset_rank", "rank")}
-            )
-
-
-def starts(run: Audited) -> _Rows:
-    for robot in run.reduced:
-        yield from ({"robot": robot} | row for row in run.table(f"results/starts/{robot}.parquet").to_dict("records"))
-
-
 def simulated_designs(run: Audited, sizes: str) -> _Rows:
     for robot in run.reduced:
         frame = run.table(f"results/simulated_designs/{sizes}/{robot}.parquet")
@@ -210,8 +195,6 @@ TABLES: Mapping[str, tuple[Callable[[Audited], _Rows], tuple[str, ...]]] = {
     "break_even": (break_even, ("robot", "accuracy_um", "points")),
     "few_configurations": (few_configurations, ("robot", "nominal_error_percent", "strategy", "configurations")),
     "measurement_kinds": (measurement_kinds, ("robot", "kind", "configurations")),
-    "stiffness": (stiffness, ("robot", "force_N")),
-    "starts": (starts, ("robot", "start")),
     **{
         f"simulated_designs_{sizes}": (partial(simulated_designs, sizes=sizes), ("robot", "load", "design", "configurations"))
         for sizes in ("few", "every")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
+from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -179,11 +180,6 @@ def ladder(run: Audited) -> _Rows:
         yield row | find_root_mean(cell["mean_square"][cell["chosen"]])
 
 
-def designs(run: Audited) -> _Rows:
-    for head, at in find_groups(run, run.reduced, "designs", "joint_range", "design", "configurations"):
-        yield head | {f"{name}_um": 1e6 * at[name].iloc[0] for name in ("rms", "low", "high")}
-
-
 def observability(run: Audited) -> _Rows:
     for robot in run.reduced:
         ranked: Any = run.table(f"results/observability/{robot}.parquet").corr("spearman", numeric_only=True)
@@ -202,20 +198,38 @@ def places(run: Audited) -> _Rows:
         yield row | {f"seen_{name}_percent": 100 * cell[name].mean() for name in ("turned", "fixed")}
 
 
-def geometry(run: Audited) -> _Rows:
-    for head, cell in find_groups(run, run.reduced, "geometry", "estimator"):
-        at = cell.iloc[0]
-        row = head | {"rms_um": 1e6 * np.hypot(at["noise"], at["leak"])}
-        for name in ("noise", "leak"):
-            row |= {f"{name}_um": 1e6 * at[name], f"zero_{name}_urad": 1e6 * at[f"zero_{name}"]}
-            row[f"compliance_{name}_percent"] = at[f"compliance_{name}"]
-        yield row
+_PARTS, _SIZES = ("noise", "leak"), ("per_metre", "equal", "weighted")
+_SHARES = ("first_order", "loaded", "by_k_c", "bias", "k_sigma")
+# Tables that have a row for each row of the files of robots: columns that name a row, and columns by formulas over the file's.
+_FORMULAS: Mapping[str, tuple[tuple[str, ...], Mapping[str, str]]] = {
+    "designs": (
+        ("robot", "joint_range", "design", "configurations"),
+        {f"{name}_um": f"1e6 * {name}" for name in ("rms", "low", "high")},
+    ),
+    "geometry": (
+        ("robot", "estimator"),
+        {"rms_um": "1e6 * (noise ** 2 + leak ** 2) ** 0.5"}
+        | {f"{name}_um": f"1e6 * {name}" for name in _PARTS}
+        | {f"zero_{name}_urad": f"1e6 * zero_{name}" for name in _PARTS}
+        | {f"compliance_{name}_percent": f"compliance_{name}" for name in _PARTS},
+    ),
+    "weighting": (
+        ("robot", "orientation_ratio", "per_metre_um"),
+        {"ratio": "equal / weighted"} | {f"{name}_um": f"1e6 * {name}" for name in _SIZES},
+    ),
+    "stiffness": (
+        ("robot", "force_N"),
+        {"force_N": "force", "softest_N_per_um": "1e-6 * softest"} | {f"{name}_percent": name for name in _SHARES},
+    ),
+    "starts": (("robot", "start"), {}),
+}
 
 
-def weighting(run: Audited) -> _Rows:
-    for head, _ in find_groups(run, run.reduced, "weighting", "orientation_ratio", "per_metre", "equal", "weighted"):
-        row = head | {"ratio": head["equal"] / head["weighted"]}
-        yield row | {f"{name}_um": 1e6 * head[name] for name in ("per_metre", "equal", "weighted")}
+def by_formulas(run: Audited, name: str) -> _Rows:
+    for robot in run.reduced:
+        frame = run.table(f"results/{name}/{robot}.parquet").assign(robot=robot)
+        further = {column: frame.eval(formula) for column, formula in _FORMULAS[name][1].items()}
+        yield from frame.assign(**further).to_dict("records")
 
 
 def tubes(run: Audited) -> _Rows:
@@ -330,16 +344,14 @@ TABLES: Mapping[str, tuple[Callable[[Audited], _Rows], tuple[str, ...]]] = {
     "per_dataset": (per_dataset, ("strategy", "robot", "noise_um", "ds")),
     "budget": (budget, ("robot", "points", "configurations")),
     "ladder": (ladder, ("robot", "noise_um", "length", "link_springs")),
-    "designs": (designs, ("robot", "joint_range", "design", "configurations")),
     "observability": (observability, ("robot", "index")),
     "places": (places, ("robot", "joints", "along_m", "side")),
-    "geometry": (geometry, ("robot", "estimator")),
-    "weighting": (weighting, ("robot", "orientation_ratio", "per_metre_um")),
     "tubes": (tubes, ("robot", "diameter_mm")),
     "strategy_scores": (strategy_scores, ("robot", "metric", "strategy")),
     "strategy_pairs": (strategy_pairs, ("robot", "metric", "strategy", "other")),
     "comparison": (comparison, ("table", "robot", "strategy", "quantity")),
     "expectations": (expectations, ("robot", "strategy", "quantity")),
+    **{name: (partial(by_formulas, name=name), keys) for name, (keys, _) in _FORMULAS.items()},
 }
 
 _OF_CELLS = (strategy_pairs, comparison, expectations)

@@ -14,8 +14,7 @@ import pandas as pd
 
 from elastocal.random_streams import stream
 from elastocal_proof.blind.rates import rate
-from elastocal_proof.blind.robots import PROOF, TUNED
-from elastocal_proof.blind.scores import NONE, kind_of, wrong_setup
+from elastocal_proof.blind.scores import NONE, PROOF, TUNED, head_of, wrong_setup
 from elastocal_proof.plant.defects import OUTSIDE
 
 if TYPE_CHECKING:
@@ -44,16 +43,8 @@ def stated(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, An
     ranked = sorted(
         ((frozenset(entry["mechanisms"]), entry["probability"]) for entry in probabilities["sets"]), key=lambda e: -e[1]
     )
-    case, believed = truth["case"], credible(ranked)
-    top, probability = ranked[0]
-    return {
-        "case": truth["campaign"],
-        "robots": kind_of(case["robot"]),
-        "robot": case["robot"],
-        "group": case["group"],
-        "setting": case["setting"],
-        "truth": " + ".join(case["effects"]) or NONE,
-        "level": max(case["levels"], default=0.0),
+    believed, (top, probability) = credible(ranked), ranked[0]
+    return head_of(truth) | {
         "stated": probability,
         "top": " + ".join(sorted(top)) or NONE,
         "correct": is_true(top, truth),

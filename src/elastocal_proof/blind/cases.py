@@ -205,39 +205,24 @@ class Counts:
     purpose: str = ""
 
 
+_ONE_OF_EACH = Counts(
+    none=20,
+    single=1,
+    outside=1,
+    pair=4,
+    setting=1,
+    several_joints=1,
+    gear_gravity=1,
+    moved=1,
+    undeclared=1,
+    outside_levels=(_HIGH,),
+)
+_LEVELS_OF_PROOF = (25.0, 50.0, _HIGH)
 SIZES = {
     "smoke": Counts(none=2, single=0, outside=0, pair=1, setting=0, robots=("kuka",)),
-    "quick": Counts(
-        none=20,
-        single=1,
-        outside=1,
-        pair=4,
-        setting=1,
-        several_joints=1,
-        gear_gravity=1,
-        moved=1,
-        undeclared=1,
-        levels=(50.0,),
-        outside_levels=(_HIGH,),
-        robots=("fanuc",),
-    ),
+    "quick": replace(_ONE_OF_EACH, levels=(50.0,), robots=("fanuc",)),
     # To develop on: all groups on all robots that are not those of the proof. Its cases are in no other size.
-    "development": Counts(
-        none=20,
-        single=1,
-        outside=1,
-        pair=6,
-        setting=1,
-        hard=3,
-        several_joints=1,
-        gear_gravity=1,
-        moved=1,
-        undeclared=1,
-        levels=(25.0, 50.0, _HIGH),
-        outside_levels=(_HIGH,),
-        robots=TUNED,
-        purpose="development",
-    ),
+    "development": replace(_ONE_OF_EACH, pair=6, hard=3, levels=_LEVELS_OF_PROOF, robots=TUNED, purpose="development"),
     # On the two robots of the proof together 1000 nulls, at a true rate of 2.5 % a 95 % interval of 1.6 to 3.7 %, and 200 of
     # each hard setting; 16 cases of each effect at each level, 200 pairs at each, where 92 % have a lower limit of 87 %. On the
     # robots on which the method was developed a few of each, to compare.
@@ -253,23 +238,10 @@ SIZES = {
         gear_gravity=25,
         moved=5,
         undeclared=5,
-        levels=(25.0, 50.0, _HIGH),
+        levels=_LEVELS_OF_PROOF,
         outside_levels=(_HIGH,),
         robots=PROOF,
-        also=(
-            Counts(
-                none=30,
-                single=1,
-                outside=1,
-                pair=5,
-                setting=0,
-                several_joints=1,
-                gear_gravity=1,
-                levels=(50.0, _HIGH),
-                outside_levels=(_HIGH,),
-                robots=TUNED,
-            ),
-        ),
+        also=(replace(_ONE_OF_EACH, none=30, pair=5, setting=0, moved=0, undeclared=0, levels=(50.0, _HIGH), robots=TUNED),),
     ),
 }
 
@@ -286,16 +258,8 @@ def cases_of(counts: Counts, seed: int) -> list[Case]:
     ) -> None:
         if set((*effects, alternative)) & set(impossible_on(robot)):
             return
-        words = [
-            group,
-            robot,
-            *effects,
-            *(f"{level:g}" for level in levels),
-            setting,
-            str(number),
-            *([alternative] if alternative else []),
-        ]
-        key = "/".join(words)
+        words = [group, robot, *effects, *(f"{level:g}" for level in levels), setting, str(number)]
+        key = "/".join(words + [alternative] * bool(alternative))
         digest = hashlib.sha256(f"{counts.purpose or 'blind'}/{seed}/{key}".encode()).digest()
         found.append(Case(key, group, robot, effects, levels, setting, int.from_bytes(digest[:6], "little"), alternative))
 

@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from elastocal_proof.plant.bad_rows import BadReading
     from elastocal_proof.plant.physical_robot import PhysicalRobot
 
+    _Commanded = tuple[np.ndarray, np.ndarray, np.ndarray]
+
 UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE = "uncorrected", "geometry", "declared", "found", "true"
 MODELS = (UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE)
 UNLOADED, LOADED, MILLING = "unloaded", "loaded", "milling"
@@ -121,24 +123,21 @@ def closed_loop(
     robot = training.campaign.robot
     wanted = wanted_poses(robot, plant, seed)
     operating = OperatingConditions(wanted.wrench)
-    rows = []
+    count = len(wanted.part)
     models = {
         GEOMETRY: calibrate_by_fit(_geometry(training, found), replace(robot, masses=())),
         DECLARED: calibrate_by_fit(found.declared, robot),
         FOUND: calibrated_by(found, without_gross_errors(found, held_out)[1]),
     }
-    for name in MODELS:
-        if name == UNCORRECTED:
-            commands, stated, good = wanted.start, np.zeros(len(wanted.part)), np.ones(len(wanted.part), bool)
-        elif name == TRUE:
-            commands, good = _by_plant(plant, robot, wanted, seed)
-            stated = np.zeros(len(wanted.part))
-        else:
-            commands, stated, good = _by_model(models[name], wanted, operating)
-        rows.append(_moved(plant, wanted, commands, seed) | {"model": name, "predicted_std_m": stated, "corrected": good})
+    commanded: dict[str, _Commanded] = {UNCORRECTED: (wanted.start, np.zeros(count), np.ones(count, bool))}
+    commanded |= {name: _by_model(model, wanted, operating) for name, model in models.items()}
+    commanded[TRUE] = _by_plant(plant, robot, wanted, seed)
+    rows = [
+        _moved(plant, wanted, commands, seed) | {"model": name, "predicted_std_m": stated, "corrected": good}
+        for name, (commands, stated, good) in commanded.items()
+    ]
     named = effect in {entry["name"] for entry in found.document["effects"] if entry["adopted"]}
     head = {"effect": effect, "seed": seed, "verdict": found.document["verdict"], "named": named}
-    count = len(wanted.part)
     return {name: np.concatenate([np.broadcast_to((head | row)[name], count) for row in rows]) for name in (*head, *rows[0])}
 
 
@@ -221,15 +220,14 @@ def bow(robot: Robot, length_m: float, count: int, draws: np.random.Generator) -
     raise RuntimeError(f"{robot.name}: no posture in {_TRIES} in which the path lies within the limits")
 
 
-def _by_model(
-    calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _by_model(calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions) -> _Commanded:
+    """Commands by a model, the errors that it states, and whether a pose could be corrected."""
     found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
     return found.joint_angles, predict_errors(calibrated, found.joint_angles, operating, draws=0).error_m, found.status == OK
 
 
-def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Commands by Newton's method on the plant without its chance."""
+def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> _Commanded:
+    """As `_by_model`, by Newton's method on the plant without its chance, which states no error."""
     certain = replace(plant, drives=tuple(law for law in plant.drives if not isinstance(law, Repeatability)))
     commands = wanted.start.copy()
     inverse = np.linalg.pinv(jacobians(robot.chain, robot.model_angles(commands), robot.chain.end_effector))
@@ -238,7 +236,7 @@ def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> 
         step = (inverse @ off[..., None])[..., 0]
         commands = robot.reported_angles(robot.model_angles(commands) + step)
     off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
-    return commands, np.linalg.norm(off[:, :3], axis=1) < 1e-6
+    return commands, np.zeros(len(off)), np.linalg.norm(off[:, :3], axis=1) < 1e-6
 
 
 def _moved(plant: PhysicalRobot, wanted: Wanted, commands: np.ndarray, seed: int) -> dict[str, Any]:

@@ -31,17 +31,12 @@ def case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     frame = pd.concat([table.assign(robot=robot) for robot, table in tables.items()], ignore_index=True)
     pose = [*_CASE, "part", "pose"]
     frame = frame[frame.groupby(pose)["corrected"].transform("all")]
-    key = [*_CASE, "verdict", "named", "part"]
-    squares = frame.assign(square=frame["measured_error_m"] ** 2).groupby([*key, "model"])["square"].mean()
-    wide = np.sqrt(squares).unstack("model")[list(MODELS)].reset_index()
-    rest = frame.assign(square=frame["reached_error_m"] ** 2).groupby([*key, "model"])["square"].mean()
-    reached = np.sqrt(rest).unstack("model")[list(MODELS)].add_suffix("_reached").reset_index()
-    wide = wide.merge(reached, on=key)
-    mine = frame[frame["model"] == FOUND]
-    both = mine.assign(reached=mine["reached_error_m"] ** 2, predicted=mine["predicted_std_m"] ** 2)
-    means = both.groupby(key)[["reached", "predicted"]].mean()
-    wide = wide.merge((means["reached"] / means["predicted"]).rename("calibration").reset_index(), on=key)
-    return wide.assign(over_floor=wide[FOUND] / wide[TRUE])
+    key, columns = [*_CASE, "verdict", "named", "part", "model"], ["measured_error_m", "reached_error_m", "predicted_std_m"]
+    means = (frame[columns] ** 2).groupby([frame[name] for name in key]).mean().unstack("model")
+    measured, reached, predicted = (means[name] for name in columns)
+    errors = np.sqrt(measured[[*MODELS]]).join(np.sqrt(reached[[*MODELS]]).add_suffix("_reached"))
+    errors = errors.assign(calibration=reached[FOUND] / predicted[FOUND], over_floor=errors[FOUND] / errors[TRUE])
+    return errors.rename_axis(columns=None).reset_index()
 
 
 def summary(errors: pd.DataFrame, seed: int) -> pd.DataFrame:

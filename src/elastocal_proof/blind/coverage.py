@@ -13,7 +13,7 @@ from elastocal_proof.blind.rates import rate
 from elastocal_proof.blind.scores import NONE, kind_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
 COMPLIANCE = "joint_compliance"
 EXACT, FIRST_ORDER, OTHER_LAW = "exact", "to first order", "by another law"
@@ -52,9 +52,11 @@ def intervals_of(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> list[d
         "right": right,
         "level": max(case["levels"], default=0.0),
     }
+    springs = verdict["compliance_urad_per_Nm"]
+    of_springs = zip(truth["compliance_urad_per_Nm"], springs["after"], springs["std_error"], strict=True)
     values = [
         (COMPLIANCE, f"c{joint}", EXACT, true, value, error)
-        for joint, (true, value, error) in enumerate(_compliances(truth, verdict), 1)
+        for joint, (true, value, error) in enumerate(of_springs, 1)
         if error > 0
     ]
     for defect in truth["defects"]:
@@ -91,11 +93,6 @@ def covered(intervals: pd.DataFrame) -> pd.DataFrame:
     for keys, part in together.groupby(["robots", *_KEYS]):
         found.append(dict(zip(("robots", *_KEYS), keys, strict=True)) | rate(part.holds))
     return pd.DataFrame(found, columns=columns)
-
-
-def _compliances(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> Iterable[tuple[float, float, float]]:
-    stated = verdict["compliance_urad_per_Nm"]
-    return zip(truth["compliance_urad_per_Nm"], stated["after"], stated["std_error"], strict=True)
 
 
 def _joints_of(key: str) -> list[int]:

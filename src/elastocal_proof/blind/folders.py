@@ -14,7 +14,9 @@ import numpy as np
 import yaml
 
 from elastocal.campaigns.writing import write_campaign
+from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
+from elastocal.io.json_files import read_json
 from elastocal_proof.plant.campaigns import Design, measured_table
 from elastocal_proof.plant.dynamic import DYNAMIC, dynamic_table
 
@@ -165,3 +167,20 @@ def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, text)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def load_ground_truth(files: Iterable[Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
+    """Read sealed files, for the scores and the oracle only, whose hashes are those that were published.
+
+    `manifest`: a line ``sha256 name`` for each. Returns sealed documents by the name of the case, in its order. Raises
+    `InputError`: a file is not the one whose hash was published.
+    """
+    lines = Path(manifest).read_text(encoding="utf-8").splitlines()
+    published = {name: digest for digest, name in map(str.split, lines)}
+    truths = {}
+    for file in sorted(files, key=lambda file: file.name):
+        found = hashlib.sha256(file.read_bytes()).hexdigest()
+        if published.get(file.name) != found:
+            raise InputError(file, "", f"SHA-256 {found}", f"{published.get(file.name)}, as sealed")
+        truths[file.stem] = read_json(file)
+    return truths

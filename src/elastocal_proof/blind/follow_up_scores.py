@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest
 
 from elastocal.diagnosis.verdict import CLASS
 from elastocal_proof.blind.cases import GEAR_GRAVITY, SEVERAL_JOINTS, UNDECLARED
@@ -101,19 +100,15 @@ def promises_kept(cases: pd.DataFrame) -> pd.DataFrame:
 
 
 def rates(cases: pd.DataFrame) -> pd.DataFrame:
-    """How often the name is right, with Clopper-Pearson intervals [1].
+    """How often the name is right, with its interval.
 
     `cases`: of `followed`. Returns columns right_name to high are shares of the cases, the others counts.
-
-    [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
-        Biometrika 26, 1934.
     """
     rows = []
     for key, part in cases.groupby(["robots", "arm", "poses_added"]):
-        right, still, wrong = part["named_right"].sum(), (part["verdict"] == CLASS).sum(), part["wrong_name"].sum()
-        interval = binomtest(int(right), len(part)).proportion_ci(method="exact")
-        rest = len(part) - right - still - wrong
-        rows.append((*key, len(part), right / len(part), interval.low, interval.high, still, wrong, rest))
+        right, still, wrong = rate(part["named_right"]), (part["verdict"] == CLASS).sum(), part["wrong_name"].sum()
+        rest = len(part) - right["hits"] - still - wrong
+        rows.append((*key, len(part), right["rate"], right["low"], right["high"], still, wrong, rest))
     return pd.DataFrame(rows, columns=_COLUMNS)
 
 

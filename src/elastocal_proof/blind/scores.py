@@ -10,12 +10,13 @@ from scipy.optimize import linear_sum_assignment
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 from elastocal.effects.protocol import effect_of
 from elastocal_proof.blind.cases import TUNED as TUNED_ON
-from elastocal_proof.blind.robots import PROOF, TUNED
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 NONE = "none"
+# The two kinds of robots: those on which it is proved, and those on which the method was tuned.
+PROOF, TUNED = "proof", "tuned"
 SILENT = (ADEQUATE, NOT_TESTABLE)
 # The effect by which a diagnosis says that the base is not where it is declared.
 _MISPLACED = "base_placement"
@@ -33,19 +34,11 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
 
     [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
     """
-    case = truth["case"]
     kind, effects = judged_apart_from_setup(truth, verdict)
-    names, true = [effect["name"] for effect in effects], list(case["effects"])
+    names, true = [effect["name"] for effect in effects], list(truth["case"]["effects"])
     stated = bool(true) and kind in (NAMED, CLASS, SEVERAL)
     right = stated and sorted(names) == sorted(true)
-    return {
-        "case": truth["campaign"],
-        "group": case["group"],
-        "robot": case["robot"],
-        "robots": kind_of(case["robot"]),
-        "setting": case["setting"],
-        "truth": " + ".join(true) or NONE,
-        "level": max(case["levels"], default=0.0),
+    return head_of(truth) | {
         "verdict": kind,
         "found": " + ".join(names) or NONE,
         "detected": kind not in SILENT,
@@ -54,6 +47,14 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
         "holds_truth": stated and _each_is_held(true, effects),
         "wrong_name": kind == NAMED and names != true,
     }
+
+
+def head_of(truth: Mapping[str, Any]) -> dict[str, Any]:
+    """Where a case belongs and what is true of it; `truth`: a sealed document."""
+    case = truth["case"]
+    head = {"case": truth["campaign"], "group": case["group"], "robot": case["robot"], "robots": kind_of(case["robot"])}
+    head |= {"setting": case["setting"], "truth": " + ".join(case["effects"]) or NONE}
+    return head | {"level": max(case["levels"], default=0.0)}
 
 
 def wrong_setup(truth: Mapping[str, Any]) -> set[str]:
@@ -74,6 +75,11 @@ def judged_apart_from_setup(truth: Mapping[str, Any], verdict: Mapping[str, Any]
 def kind_of(robot: str) -> str:
     """Whether a robot belongs to the proof or was tuned on."""
     return TUNED if robot in TUNED_ON else PROOF
+
+
+def leading(kinds: Iterable[str]) -> str:
+    """Which kind of robots a figure shows: that of the proof, or where there is none the one that was tuned on."""
+    return PROOF if PROOF in set(kinds) else TUNED
 
 
 def _each_is_held(true: Sequence[str], effects: Sequence[Mapping[str, Any]]) -> bool:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest
 
+from elastocal_proof.blind.rates import headed, rate
 from elastocal_proof.blind.scores import outcome
 
 if TYPE_CHECKING:
@@ -31,43 +31,28 @@ def swept(truths: Mapping[str, Mapping[str, Any]], verdicts: Mapping[str, Mappin
     for name, truth in truths.items():
         if truth["case"]["group"] != "sweep":
             continue
-        row, alternative, angles = outcome(truth, verdicts[name]), truth["alternative"], _angles(verdicts[name])
-        pair = " / ".join(sorted((row["truth"], alternative["effect"])))
+        row, alternative = outcome(truth, verdicts[name]), truth["alternative"]
         result = "right" if row["named_right"] else "wrong" if row["wrong_name"] else "other"
         result = "class" if row["verdict"] == "class" and row["holds_truth"] else result
-        shown = (
-            row["truth"],
-            row["setting"],
-            alternative["angle_deg"],
-            min(angles, default=np.nan),
-            row["verdict"],
-            row["found"],
-        )
-        rows.append((name, row["robot"], pair, *shown, result))
+        angles = (effect["angle_to_nearest_deg"] for effect in verdicts[name]["effects"])
+        row |= {"case": name, "pair": " / ".join(sorted((row["truth"], alternative["effect"]))), "design": row["setting"]}
+        row |= {"angle_deg": alternative["angle_deg"], "outcome": result}
+        rows.append(row | {"verdict_angle_deg": min((angle for angle in angles if angle is not None), default=np.nan)})
     return pd.DataFrame(rows, columns=columns)
 
 
 def against_angle(cases: pd.DataFrame) -> pd.DataFrame:
-    """Shares of the outcomes in each bin of the angle, for each pair and for all.
+    """Shares of the outcomes in each bin of the angle, with their intervals, for each pair and for all.
 
-    `cases`: of `swept`. Returns with Clopper-Pearson intervals [1].
-
-    [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
-        Biometrika 26, 1934.
+    `cases`: of `swept`.
     """
     bins = np.array(ANGLES)[np.minimum(np.searchsorted(ANGLES, cases["angle_deg"]), len(ANGLES) - 1)]
     columns = ["pair", "angle_up_to_deg", "cases", *(f"{name}{end}" for name in OUTCOMES for end in ("", "_low", "_high"))]
     rows = []
     for mine in (cases.assign(pair="all", bin=bins), cases.assign(bin=bins)):
         for (pair, angle), part in mine.groupby(["pair", "bin"]):
-            rows.append((pair, angle, len(part), *(value for name in OUTCOMES for value in _share(part["outcome"] == name))))
+            row: dict[str, Any] = {"pair": pair, "angle_up_to_deg": angle, "cases": len(part)}
+            for name in OUTCOMES:
+                row |= headed(name, rate(part["outcome"] == name))
+            rows.append(row)
     return pd.DataFrame(rows, columns=columns)
-
-
-def _share(hits: pd.Series) -> tuple[float, float, float]:
-    interval = binomtest(int(hits.sum()), len(hits)).proportion_ci(method="exact")
-    return hits.mean(), interval.low, interval.high
-
-
-def _angles(verdict: Mapping[str, Any]) -> list[float]:
-    return [effect["angle_to_nearest_deg"] for effect in verdict["effects"] if effect["angle_to_nearest_deg"] is not None]

@@ -14,8 +14,7 @@ from elastocal_proof.blind.calibration import calibration_error
 from elastocal_proof.blind.cases import GEAR_GRAVITY, HARD, MOVED, SEVERAL_JOINTS, UNDECLARED
 from elastocal_proof.blind.limit import COMPARED
 from elastocal_proof.blind.rates import rate
-from elastocal_proof.blind.robots import PROOF, TUNED
-from elastocal_proof.blind.scores import NONE
+from elastocal_proof.blind.scores import NONE, PROOF, TUNED
 from elastocal_proof.plant.defects import OUTSIDE
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from elastocal.figures.style import PALETTE, panels, styled
-from elastocal_proof.blind.robots import leading
+from elastocal_proof.blind.scores import leading
 
 if TYPE_CHECKING:
     import pandas as pd

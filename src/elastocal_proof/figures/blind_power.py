@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 
 from elastocal.figures.style import PALETTE, ink_on, note, panels, styled
 from elastocal_proof.blind.confusion import PAIR, WORDS
-from elastocal_proof.blind.robots import leading
+from elastocal_proof.blind.scores import leading
 
 if TYPE_CHECKING:
     import pandas as pd

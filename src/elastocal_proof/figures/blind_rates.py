@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from elastocal.figures.style import PALETTE, note, panels, styled
-from elastocal_proof.blind.robots import PROOF, TUNED, leading
+from elastocal_proof.blind.scores import PROOF, TUNED, leading
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     import pandas as pd
     from matplotlib.artist import Artist
@@ -30,38 +30,6 @@ _COMPARABLE = {
 _AIM = "#cfe8d5"
 _LINE = 40
 _PER_CENT, _FARTHEST = 100.0, 10.0
-
-
-class _Aim(NamedTuple):
-    """What a row of the summary aims at."""
-
-    quantity: str
-    target_low: float
-    target_high: float
-
-
-class _Rate(NamedTuple):
-    """What a row of the summary has reached."""
-
-    quantity: str
-    rate: float
-    low: float
-    high: float
-
-
-class _Coverage(NamedTuple):
-    """What is drawn of a row of the coverage table."""
-
-    kind: str
-    effect: str
-    comparable: str
-    rate: float
-    low: float
-    high: float
-    cases: int
-
-
-_Row = TypeVar("_Row", bound="NamedTuple")
 
 
 @styled
@@ -104,9 +72,9 @@ def coverage_by_effect(coverage: pd.DataFrame) -> Figure:
         return note("This run has no interval that a true value can be compared with.")
     of_effects = rows[rows.kind == "effect"].sort_values(["effect"])
     order = [
-        *_rows(_Coverage, rows[rows.kind != "effect"]),
-        *_rows(_Coverage, of_effects[of_effects.effect == "all"]),
-        *_rows(_Coverage, of_effects[of_effects.effect != "all"]),
+        *_rows(rows[rows.kind != "effect"]),
+        *_rows(of_effects[of_effects.effect == "all"]),
+        *_rows(of_effects[of_effects.effect != "all"]),
     ]
     figure, axes = panels(1, 1, 34 + 5.2 * max(len(order), 2))
     axis = axes[0, 0]
@@ -134,12 +102,12 @@ def coverage_by_effect(coverage: pd.DataFrame) -> Figure:
     return figure
 
 
-def _rows(kind: type[_Row], table: pd.DataFrame) -> list[_Row]:
-    """Rows of a table, as far as the kind of row needs them."""
-    return [kind._make(row) for row in table[[*kind._fields]].itertuples(index=False, name=None)]
+def _rows(table: pd.DataFrame) -> Iterator[Any]:
+    """Rows of a table; their attributes are its columns."""
+    return table.itertuples()
 
 
-def _coverage_name(row: _Coverage) -> str:
+def _coverage_name(row: Any) -> str:
     if row.kind == "effect":
         return "parameters of all effects" if row.effect == "all" else row.effect.replace("_", " ")
     return "joint " + row.kind.replace("compliance, ", "compliances, ")
@@ -147,7 +115,7 @@ def _coverage_name(row: _Coverage) -> str:
 
 def _dots(axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[float], float]) -> None:
     robots = [key for key in LOOKS if key in set(rows.robots)]
-    for aim in _rows(_Aim, rows.drop_duplicates("quantity")):
+    for aim in _rows(rows.drop_duplicates("quantity")):
         place: float = names.index(aim.quantity)
         # A target without an upper end goes as far as anything is drawn.
         low, high = scaled(aim.target_low), scaled(min(aim.target_high, _FARTHEST))
@@ -155,7 +123,7 @@ def _dots(axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[fl
         axis.barh(place, max(high - low, 0.8), left=low - (0.4 if high == low else 0.0), height=0.86, color=_AIM, zorder=0)
     for number, key in enumerate(robots):
         color, marker, _ = LOOKS[key]
-        for row in _rows(_Rate, rows[rows.robots == key]):
+        for row in _rows(rows[rows.robots == key]):
             place = names.index(row.quantity) + 0.32 * (number - (len(robots) - 1) / 2)
             if not np.isfinite(row.rate):
                 # The interval of nothing is everything, which would look like a result.

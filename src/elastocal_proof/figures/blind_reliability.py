@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.figures.style import PALETTE, note, panels, styled
-from elastocal_proof.blind.robots import PROOF, TUNED
+from elastocal.figures.style import note, panels, styled
+from elastocal_proof.figures.blind_rates import LOOKS
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
-
-_LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D", "robots on which it was developed")}
 
 
 @styled
@@ -26,9 +24,9 @@ def reliability_diagram(reliability: pd.DataFrame) -> Figure:
     figure, axes = panels(2, 1, 118, height_ratios=(3, 1), sharex=True)
     shares, counts = axes[0, 0], axes[1, 0]
     shares.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=":")
-    present = [robots for robots in _LOOKS if robots in set(rows.robots)]
+    present = [robots for robots in LOOKS if robots in set(rows.robots)]
     for number, robots in enumerate(present):
-        color, marker, label = _LOOKS[robots]
+        color, marker, label = LOOKS[robots]
         part = rows[rows.robots == robots]
         errors = [part.rate - part.low, part.high - part.rate]
         shares.errorbar(part.stated, part.rate, errors, color=color, marker=marker, markersize=4.5, linewidth=1.2, label=label)

@@ -1,4 +1,4 @@
-"""Training and held-out poses of each fold of a data set, from its tables."""
+"""A data set of the league from its files, and training and held-out poses of each of its folds."""
 
 from __future__ import annotations
 
@@ -9,10 +9,16 @@ import numpy as np
 
 from elastocal.campaigns.columns import measurements_from
 from elastocal.fitting.case import Case, case_from
+from elastocal.io.json_files import read_json
+from elastocal.io.storage import read_table
+from elastocal.loop.schemas import measurements
+from elastocal.mechanics.robot_file import joint_count
 from elastocal_proof.league.folds import SESSION, fold_of_each
+from elastocal_proof.league.schemas import FOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
     from typing import Any
 
     Columns = Mapping[str, np.ndarray]
@@ -34,6 +40,13 @@ class DataSet:
         """A case of some of the measurements, ndarray of bool (N,), or of all."""
         kept = self.columns if chosen is None else {name: values[chosen] for name, values in self.columns.items()}
         return case_from(self.descriptions, kept)
+
+
+def load_data_set(descriptions_path: str | Path, measurements_path: str | Path, folds_path: str | Path) -> DataSet:
+    """Read a data set from files as `deal_league_folds` wrote them."""
+    descriptions = read_json(descriptions_path)
+    joints = joint_count(descriptions["robot"], descriptions["source"])
+    return DataSet(descriptions, read_table(measurements_path, measurements(joints)), read_table(folds_path, FOLDS))
 
 
 def training_rounds(split: str, data: DataSet) -> Iterator[tuple[int, Case]]:

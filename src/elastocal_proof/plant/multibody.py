@@ -162,13 +162,9 @@ def _indexed(arm: Arm, structure: Structure, tree: _Tree, xml: str) -> Machine:
 
 def _stretches_of(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Stretches of all bodies and of all sites: a body behind a drive is placed by the stretch before it."""
-    arms, bodies = 0, []
-    for number in range(model.nbody):
-        behind_drive = model.body(number).name.startswith("arm")
-        bodies.append(arms)
-        arms += behind_drive
-    within = np.array(bodies) + [model.body(number).name.startswith("arm") for number in range(model.nbody)]
-    return np.array(bodies), within[model.site_bodyid]
+    behind_drive = np.array([model.body(number).name.startswith("arm") for number in range(model.nbody)], int)
+    within = behind_drive.cumsum()
+    return within - behind_drive, within[model.site_bodyid]
 
 
 @lru_cache(maxsize=4)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -13,12 +13,13 @@ from elastocal.report.wording import plain, words
 from elastocal_proof.blind.case_rows import EXACT_ALIASES
 from elastocal_proof.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARED, USUAL_DESIGN
 from elastocal_proof.blind.confusion import CLASS_WITH, CLASS_WITHOUT
-from elastocal_proof.blind.robots import PROOF, TUNED, leading
-from elastocal_proof.blind.scores import NONE
+from elastocal_proof.blind.scores import NONE, PROOF, TUNED, leading
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping
     from typing import Any
+
+    from elastocal_proof.plant.campaigns import Design
 
 _OUTSIDE = "outside:"
 _GROUPS = {
@@ -36,21 +37,6 @@ _GROUPS = {
 _VERDICTS_OUTSIDE = ("wrong name", "class", "several", "unexplained", "adequate")
 _OUTCOMES_OF_RELATIVES = ("right", "class", "wrong", "other")
 _ABSENT = "–"
-
-
-class _Design(Protocol):
-    """The design of a campaign, as far as the report states it."""
-
-    @property
-    def poses(self) -> int: ...
-    @property
-    def held_out(self) -> int: ...
-    @property
-    def ladder(self) -> tuple[float, ...]: ...
-    @property
-    def repeats(self) -> int: ...
-    @property
-    def repeated_poses(self) -> int: ...
 
 
 def blind_facts(tables: Mapping[str, pd.DataFrame], manifest: str, size: str, seed: int) -> dict[str, Any]:
@@ -98,7 +84,7 @@ def _rows_of(table: pd.DataFrame) -> Iterator[Any]:
     return table.itertuples()
 
 
-def _design(design: _Design) -> dict[str, str]:
+def _design(design: Design) -> dict[str, str]:
     return {
         "poses": f"{design.poses}",
         "held_out": f"{design.held_out}",

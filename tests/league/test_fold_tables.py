@@ -1,4 +1,6 @@
-"""Diagnoses of folds come back from their files as the fits that they were."""
+"""What is kept of a fold comes back from its tables: entries, and diagnoses as the fits that they were."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -6,10 +8,24 @@ from made_folders import made_folder, made_table
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
+from elastocal.io.storage import read_table, write_table
 from elastocal.loop.whole import cases_in
-from elastocal_proof.league.diagnosed_folds import fold_facts, fold_fits, physics_of_fold
-from elastocal_proof.league.mechanisms import mechanism_columns
-from elastocal_proof.league.methods import DIAGNOSIS, GEOMETRY, Method
+from elastocal_proof.league.fold_tables import entry_columns, fold_facts, fold_fits, mechanism_columns, physics_of_fold
+from elastocal_proof.league.methods import DIAGNOSIS, GEOMETRY, Method, entered, fitted_physics
+from elastocal_proof.league.rounds import held_out_rounds, training_rounds
+from elastocal_proof.league.schemas import ENTRIES, MECHANISMS
+
+
+def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
+    _, training = next(training_rounds("blocks", data))
+    fold, (held_out,) = next(held_out_rounds("blocks", data, []))
+    entry = entered(Method(GEOMETRY), fitted_physics(GEOMETRY, training), training, held_out, "blocks", 1)
+    path = tmp_path / "entries.parquet"
+    write_table(path, ENTRIES, [entry_columns(entry, fold, 0)], {})
+    found = read_table(path, ENTRIES)
+    np.testing.assert_array_equal(np.column_stack([found[f"d{axis}"] for axis in "xyz"]), entry.residual)
+    assert set(found["pose"]) == set(data.dealt["pose"][data.dealt["blocks"] == fold]) and set(found["fold"]) == {fold}
+    assert np.isnan(found["std_x"]).all()
 
 
 @pytest.fixture(scope="module")
@@ -38,3 +54,9 @@ def test_mechanisms_have_their_probability_and_the_share_that_they_explain(diagn
     # One milliradian where the noise is 60 um: nearly all of the error.
     assert 0.7 < columns["share"][0] <= 1.0
     assert (np.asarray(columns["share"])[1:] < 0.1).all()
+
+
+def test_a_fold_whose_data_are_at_fault_has_no_mechanisms():
+    columns = mechanism_columns(SimpleNamespace(evidence=None), 1)
+    assert list(columns) == [column.name for column in MECHANISMS.columns]
+    assert all(len(values) == 0 for values in columns.values())
