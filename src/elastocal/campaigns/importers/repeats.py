@@ -15,15 +15,12 @@ def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tup
     [1] Gower, J. C. and Ross, G. J. S., Minimum spanning trees and single linkage cluster analysis, Applied Statistics 18,
         1969.
     """
+    # At each start of Snakemake the rules ask importers for their files alone.
+    import pandas as pd
+
     count = len(joint_angles)
     pairs = scipy.spatial.KDTree(joint_angles).query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")
     graph = scipy.sparse.coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
     label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
-    first = np.unique(label, return_index=True)[1]
-    rank = np.argsort(np.argsort(first))
-    pose = rank[label]
-    order = np.argsort(pose, kind="stable")
-    starts = np.r_[0, np.flatnonzero(np.diff(pose[order])) + 1]
-    repeat = np.empty(count, np.int32)
-    repeat[order] = np.arange(count) - np.repeat(starts, np.diff(np.r_[starts, count]))
-    return pose.astype(np.int32), repeat
+    pose = pd.Series(pd.factorize(label)[0], dtype=np.int32)
+    return pose.to_numpy(), pose.groupby(pose).cumcount().to_numpy(np.int32)
