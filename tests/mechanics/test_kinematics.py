@@ -129,18 +129,7 @@ def test_poses_are_the_matrix_products_of_equations_1_to_4(key, chain_called):
 
 @pytest.mark.parametrize(
     "angle",
-    [
-        np.pi,
-        np.nextafter(np.pi, 4),
-        np.nextafter(np.pi, 0),
-        np.pi - 1e-9,
-        np.pi + 1e-7,
-        0.5 * np.pi,
-        2 * np.pi,
-        3 * np.pi,
-        0.0,
-        12.3,
-    ],
+    [np.nextafter(np.pi, 4), np.nextafter(np.pi, 0), np.pi - 1e-9, np.pi + 1e-7, *(np.pi * np.array([0, 0.5, 1, 2, 3])), 12.3],
 )
 def test_poses_hold_at_and_around_half_a_turn(kuka, angle):
     for sign in (1.0, -1.0):
