@@ -30,8 +30,3 @@ def test_groups_are_those_of_numpy_unique(rows):
 def test_no_row_is_no_group_and_one_row_is_one(rows):
     first, group = groups_of(np.zeros((rows, 2), int))
     assert (len(first), len(group)) == (rows, rows)
-
-
-def test_the_first_column_decides_before_the_second():
-    first, _ = groups_of(np.array([[2, 0], [1, 9]]))
-    assert first.tolist() == [1, 0]

@@ -122,6 +122,73 @@ def test_places_on_the_fanuc(fanuc, effect, places):
     assert found == [effect + place.replace("_", " ") for place in places.split(" ")]
 
 
+SIX = "dx dy dz rx ry rz"
+WAVES = "cos_1q sin_1q cos_2q sin_2q"
+WEIGHTS = "compliance_times_mass_at_end_of_link_{} ".format
+MOMENTS = "compliance_times_moment_{} ".format
+PARAMETERS = {
+    "joint_offset@1": "offset",
+    **dict.fromkeys(("link_geometry@1", "base_placement", "frame_drift", "setup_step"), SIX),
+    # Across the axis of the last joint, which is x.
+    "nest_eccentricity": "cos_y_2q sin_y_2q cos_z_2q sin_z_2q",
+    "tracker_scale": "scale",
+    "link_weight": "mass_at_end_of_link_2 mass_at_end_of_link_3",
+    # Of the next two links with a length; what is off along the axis of a joint hangs on it.
+    "link_weight@2[off the line]": WEIGHTS(2) + WEIGHTS(3) + MOMENTS("z_of_link_2") + MOMENTS("z_of_link_3"),
+    "link_weight@3[off the line]": WEIGHTS(3)
+    + WEIGHTS(6)
+    + MOMENTS("z_of_link_3")
+    + MOMENTS("y_of_link_6")
+    + MOMENTS("z_of_link_6"),
+    **{f"link_weight@{joint}[off the line]": WEIGHTS(6) + MOMENTS("y_of_link_6") + MOMENTS("z_of_link_6") for joint in (4, 5)},
+    "payload": "mass moment_x moment_y moment_z",
+    **dict.fromkeys(("compensator_torque@2", "compensator_stiffness@2"), WAVES),
+    "transmission_ratio@1": "per_q1",
+    "transmission_ratio@4": "per_q4 per_q3",
+    "transmission_order@1[order 1-2]": "cos_kq sin_kq",
+    "motor_eccentricity@1": "cos_1_motor sin_1_motor cos_2_motor sin_2_motor",
+    "link_elasticity@1": "bending_1_over_EI torsion_1_over_GJ",
+    # Across the axis of the joint.
+    "joint_tilt@1": "tilt_about_x tilt_about_y",
+    "joint_tilt@2": "tilt_about_x tilt_about_z",
+    "joint_tilt@4": "tilt_about_y tilt_about_z",
+    "base_compliance": "horizontal vertical tilt",
+    "cross_compliance@1+2": "compliance",
+    "joint_dependent_stiffness@1": "cos_q sin_q",
+    "flange_flexibility": "shift_x shift_y shift_z turn_x turn_y turn_z",
+    "stiffening@1": "beyond",
+    "lost_motion@1": "half_play",
+    "hysteresis@1": "half_width",
+    "force_misalignment[base axes]": "about_x about_y about_z",
+    "force_bias[base axes]": "along_x along_y along_z",
+    "application_point[base axes]": "shift_x shift_y shift_z",
+    "force_scale": "scale",
+    "thermal_growth[temperature]": "expansion",
+    "thermal_growth[time]": "final_growth",
+    # Across the link.
+    "temperature_gradient[column temperature]": "curvature_about_x curvature_about_y",
+    "temperature_gradient@1[time]": "curvature_about_y curvature_about_z",
+    "temperature_gradient[along time]": "growth_along",
+    # Along an axis across that of the joint, along its own, and about those across.
+    **{
+        f"bearing_runout@{joint}[{way}]": " ".join(f"{way}_{axis}_{wave}" for axis in axes for wave in WAVES.split())
+        for joint, own, across in ((1, "z", "xy"), (2, "y", "zx"), (4, "x", "yz"))
+        for way, axes in (("radial", across), ("axial", own), ("wobble", across))
+    },
+}
+
+
+@pytest.mark.parametrize("key", PARAMETERS)
+def test_parameters_on_the_fanuc(fanuc, key):
+    found = candidates_on(equipped(fanuc.chain))[key].parameters
+    assert [parameter.name for parameter in found] == PARAMETERS[key].split()
+
+
+def test_every_effect_has_its_parameters_listed():
+    """Those of the harmonics are of many orders, see `test_gear_effects`."""
+    assert {key.partition("@")[0].partition("[")[0] for key in PARAMETERS} == set(FAMILIES) - {"transmission_harmonic"}
+
+
 @pytest.mark.parametrize(
     ("whole", "part", "kept"),
     [

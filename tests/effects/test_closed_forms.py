@@ -19,7 +19,7 @@ from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses_and_jacobians
 
-CHAINS = {"fanuc": None, "fixed rotations": OTHER_CHAINS["fixed rotations"], "track": TRACK}
+CHAINS = {"fanuc": None, "track": TRACK} | {name: OTHER_CHAINS[name] for name in ("fixed rotations", "seven joints", "ur10")}
 STATES, GRAVITY = 4, np.array([0.0, 0.0, -9.80665])
 # Nodes of an integral along a link.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)

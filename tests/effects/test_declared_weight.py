@@ -110,17 +110,6 @@ def weight_of(robot, corrections):
     return (sum(mass.mass_kg for mass in robot.masses) + corrections[:, 0].sum()) * np.array(TILTED)
 
 
-def test_arm_stretched_out_sags_by_its_declared_weight_as_calculated_by_hand():
-    # 20 kg at 0.5 m from a level joint of 3e-6 rad/(N m): 98.07 N m, 0.2942 mrad down, about +y.
-    robot = replace(robot_of("Ry(q1) Tx(2) [end]", [3e-6]), masses=(Mass(1, 20.0, (0.5, 0.0, 0.0), 0.1),))
-    model = made_model(robot, (Target("A", "end", (0, 0, 0)),), fitted_frames=False, compliance=robot.compliance)
-    states = made_states(1, 1)
-    states.joint_angles[:], states.wrench[:] = 0.0, 0.0
-    estimate = made_estimate(model, size=0.0)
-    turned = displaced_coordinates(model, estimate, conditions(model, estimate, states))[0, 0]
-    assert turned == pytest.approx(3e-6 * 20 * 9.80665 * 0.5, rel=1e-6)
-
-
 @pytest.mark.parametrize("identified", [True, False], ids=["identified", "nominal"])
 def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load(fanuc, identified):
     robot = weighed(fanuc)

@@ -1,8 +1,8 @@
 """The springs of the declared model: each joint turns, or shifts, by its own torque alone."""
 
 import numpy as np
-from support import ODD_CHAINS, PinocchioPoint, chain_of, robot_of
-from synthetic import conditions_on, displacements, made_estimate, made_model, made_states
+from support import ODD_CHAINS, chain_of, robot_of
+from synthetic import made_estimate, made_model, made_states
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects import catalogue
@@ -19,17 +19,6 @@ def test_carriage_yields_to_the_force_along_its_track():
     # The carriage runs along -x.
     np.testing.assert_allclose(shifted - states.joint_angles[:, 0], -1e-8 * states.wrench[:, 0], rtol=1e-9)
     assert [p.unit for p in joint_compliance(model.sites).parameters] == ["m/N", *["rad/(N m)"] * 3]
-
-
-def test_each_spring_turns_its_joint_by_the_torque_of_the_load_by_pinocchio(fanuc):
-    states = made_states(6, 5, seed=1)
-    made = displacements(joint_compliance(sites_of(fanuc.chain)), conditions_on(fanuc.chain, states))
-    model = PinocchioPoint(fanuc.chain, fanuc.chain.end_effector)
-    torque = [model.pose_and_jacobian(q)[2].T @ w for q, w in zip(states.joint_angles, states.wrench, strict=True)]
-    expected = np.zeros_like(made)
-    for joint in range(6):
-        expected[joint, :, joint] = np.array(torque)[:, joint]
-    np.testing.assert_allclose(made, expected, rtol=0, atol=1e-10)
 
 
 def test_springs_are_no_effect_that_the_model_may_lack():

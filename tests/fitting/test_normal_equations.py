@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fitted_models import (
+    GANTRY_NOISES,
     TARGETS,
     gantry_covariance,
     gantry_model,
@@ -91,13 +92,6 @@ def test_products_by_factors_are_those_of_the_columns_written_out(fanuc, offset,
         found.append(measurements.normal_equations(weights))
     for by_factors, written_out in zip(*found, strict=True):
         np.testing.assert_allclose(by_factors, written_out, rtol=1e-9, atol=1e-9 * np.abs(written_out).max())
-
-
-GANTRY_NOISES = {
-    "sensor": Noise("declared", 1e-4, 1e-4, np.zeros(3)),
-    "joints": Noise("repeats", 1e-4, 1e-4, np.array([2e-4, 0.0, 5e-5])),
-    "poses": Noise("repeats", 1e-4, 1e-4, np.array([2e-4, 0.0, 5e-5]), pose_rad=1.5e-4),
-}
 
 
 @pytest.mark.parametrize("at_once", [None, 7])

@@ -224,9 +224,6 @@ def test_of_two_repeats_neither_leaves():
     assert fives.pose[1] == 0 and rows_lost(fives.select(np.flatnonzero(kept))) == []
 
 
-# To be taken away once the median of three, which is none of its own, is no longer counted among what is usual.
-
-
 @pytest.mark.parametrize("repeats", [3, 4, 5, 6, 9])
 def test_clean_noise_loses_nothing(repeats):
     """Of 3,600 poses: a rate of 1 in 1,000 is seen with a power of 0.97."""

@@ -94,23 +94,6 @@ def test_rows_of_one_and_of_many_columns_are_whitened_alike(case):
     np.testing.assert_allclose(by.apply(values[:, :, 1, 2]), found[:, :, 1, 2], rtol=1e-12)
 
 
-def test_whitened_simulated_noise_is_independent_and_of_unit_variance(case):
-    seen, jacobian = case
-    rng, draws = np.random.default_rng(4), 8000
-    total = np.zeros((len(seen), seen.rows, draws))
-    sensor = np.array([NOISE.position_m] * 3 + [NOISE.orientation_rad] * 3)[: seen.rows]
-    for repeat in range(4):
-        there = repeat < seen.states.repeats[seen.state]
-        joints = NOISE.joint_rad[:, None] * rng.standard_normal((7, 6, draws))
-        noise = jacobian @ joints[seen.state] + sensor[:, None] * rng.standard_normal(total.shape)
-        total += there[:, None, None] * noise
-    mean = total / seen.states.repeats[seen.state][:, None, None]
-    white = whitening(seen, jacobian, NOISE).apply(mean).reshape(-1, draws)
-    covariance = white @ white.T / draws
-    # Each entry has a standard error of 1 / sqrt(draws), on the diagonal sqrt(2) times that.
-    np.testing.assert_allclose(covariance, np.eye(len(white)), rtol=0, atol=6 * np.sqrt(2 / draws))
-
-
 def test_sensor_alone_only_divides(case):
     seen, jacobian = case
     values = np.random.default_rng(5).standard_normal((len(seen), seen.rows))

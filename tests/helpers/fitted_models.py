@@ -10,6 +10,7 @@ from synthetic import candidate_on, made_estimate, made_model, made_states, seen
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations
 
 TARGETS = Target("A", "6DoF", None), Target("B", "3DoF", None)
@@ -38,6 +39,11 @@ def bent(fanuc, seed, shape, key="thermal_growth[time]"):
 # A gantry carries its hand where its joints say: a law that shifts the joints is exactly linear, and an error of the joints is
 # an error of the position.
 GANTRY = "Tx(q1) Ty(q2) Tz(q3) [hand]"
+GANTRY_NOISES = {
+    "sensor": Noise("declared", 1e-4, 1e-4, np.zeros(3)),
+    "joints": Noise("repeats", 1e-4, 1e-4, np.array([2e-4, 0.0, 5e-5])),
+    "poses": Noise("repeats", 1e-4, 1e-4, np.array([2e-4, 0.0, 5e-5]), pose_rad=1.5e-4),
+}
 
 
 def waves(joint_angles, count, seed=0):

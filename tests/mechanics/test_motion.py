@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import ODD_CHAINS, OTHER_CHAINS, chain_of, random_angles
+from support import ODD_CHAINS, OTHER_CHAINS, random_angles
 
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.motion import motion
@@ -13,9 +13,9 @@ from elastocal.mechanics.motion import motion
 ROUNDING = 2e-14
 
 
-@pytest.mark.parametrize("name", ["kuka", *OTHER_CHAINS])
-def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench(name, request):
-    chain = chain_of(OTHER_CHAINS[name]) if name in OTHER_CHAINS else request.getfixturevalue(name).chain
+@pytest.mark.parametrize("name", ["kuka", *OTHER_CHAINS, *ODD_CHAINS])
+def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench(name, chain_called):
+    chain = chain_called(name)
     rng = np.random.default_rng(31)
     angles, wrench = random_angles(rng, chain, 7), rng.standard_normal((7, 6))
     points = [replace(point, offset_m=(0.1, -0.2, 0.3)) for point in chain.points]
@@ -31,19 +31,3 @@ def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench
         moment = wrench[:, 3:] + np.cross(position, wrench[:, :3])
         forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T)
         np.testing.assert_allclose(forces.T, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)
-
-
-@pytest.mark.parametrize("name", ODD_CHAINS)
-def test_motion_of_joints_that_shift_or_move_several_transforms_gives_the_same(name):
-    chain = chain_of(ODD_CHAINS[name])
-    q = np.random.default_rng(35).uniform(-1.5, 1.5, (5, chain.coordinates))
-    points = list(chain.points)
-    moved = motion(chain, q, points)
-    for number, point in enumerate(points):
-        jacobian = poses_and_jacobians(chain, q, point)[2]
-        found = moved.jacobian(point.after, moved.position[number])
-        np.testing.assert_allclose(np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING)
-        wrench = np.random.default_rng(36).standard_normal((5, 6))
-        moment = wrench[:, 3:] + np.cross(moved.position[number].T, wrench[:, :3])
-        forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T).T
-        np.testing.assert_allclose(forces, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)

@@ -13,9 +13,7 @@ _IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
 def columns_of(measurements: Measurements) -> dict[str, np.ndarray]:
     """Columns of the measurements table, dict of str to ndarray (N,)."""
     count, joints = measurements.joint_angles.shape
-    columns = {name: getattr(measurements, name) for name in _IDENTITY}
-    columns |= {f"q{j + 1}": measurements.joint_angles[:, j] for j in range(joints)}
-    columns |= dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))
+    columns = _identity(measurements) | _commanded(measurements)
     columns |= dict(zip("xyz", measurements.position.T, strict=True))
     columns |= dict(zip(("rx", "ry", "rz"), _or_missing(measurements.rotation_vector, (count, 3)).T, strict=True))
     approach = _or_missing(measurements.approach, (count, joints))
@@ -52,18 +50,25 @@ def residual_columns(
     `outside` (N,) of bool: whether each lies outside of the range of the poses fitted. `position` (N, 3): m, base axes.
     `stages` (N, rows): residuals "before", of the declared model, and "after", of the found one, m and rad. Returns (N,).
     """
-    count, joints = measurements.joint_angles.shape
-    columns = {name: getattr(measurements, name) for name in _IDENTITY}
+    count = len(measurements)
+    columns = _identity(measurements)
     columns |= {"held_out": np.full(count, held_out), "gross_error": np.full(count, gross_errors), "outside_range": outside}
-    columns |= {"time_s": _or_missing(measurements.time_s, (count,))}
-    columns |= {f"q{j + 1}": measurements.joint_angles[:, j] for j in range(joints)}
-    columns |= dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))
+    columns |= {"time_s": _or_missing(measurements.time_s, (count,))} | _commanded(measurements)
     columns |= dict(zip("xyz", position.T, strict=True))
     for stage, residual in stages.items():
         whole = np.full((count, 6), np.nan)
         whole[:, : residual.shape[1]] = residual
         columns |= {f"{stage}_{name}": whole[:, k] for k, name in enumerate(COMPONENT_NAMES)}
     return columns
+
+
+def _identity(measurements: Measurements) -> dict[str, np.ndarray]:
+    return {name: getattr(measurements, name) for name in _IDENTITY}
+
+
+def _commanded(measurements: Measurements) -> dict[str, np.ndarray]:
+    angles = {f"q{joint}": values for joint, values in enumerate(measurements.joint_angles.T, 1)}
+    return angles | dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))
 
 
 def _or_missing(values: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:

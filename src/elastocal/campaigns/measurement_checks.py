@@ -100,9 +100,8 @@ def _check_loads(measurements: Measurements, table: MeasurementFile) -> None:
 
 
 def _check_poses(measurements: Measurements, table: MeasurementFile) -> None:
-    pairs, pose_of = measured_poses(measurements)
-    first = np.full(len(pairs), len(measurements))
-    np.minimum.at(first, pose_of, np.arange(len(measurements)))
+    pose_of = measured_poses(measurements)[1]
+    first = np.unique(pose_of, return_index=True)[1]
     reported = table.numbers(table.angles)
     away = np.abs(reported - reported[first[pose_of]])
     wrong = away > SAME_POSE_RAD
@@ -122,8 +121,7 @@ def _check_times(measurements: Measurements, table: MeasurementFile) -> None:
     if measurements.time_s is None:
         return
     pairs, pose_of = measured_poses(measurements)
-    first, begun = np.full(len(pairs), len(measurements)), np.full(len(pairs), np.inf)
-    np.minimum.at(first, pose_of, np.arange(len(measurements)))
+    first, begun = np.unique(pose_of, return_index=True)[1], np.full(len(pairs), np.inf)
     np.minimum.at(begun, pose_of, measurements.time_s)
     for session in np.unique(pairs[:, 0]):
         members = np.flatnonzero(pairs[:, 0] == session)

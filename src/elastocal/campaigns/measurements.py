@@ -305,12 +305,15 @@ class MeasurementFile:
         wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
         if wrong.any():
             index = int(np.argmax(wrong))
-            raise self.cell_fault(index, name, show_cell(self.columns[name][index]), f"an integer, up to {2**31 - 1}")
+            raise self._value_fault(index, name, f"an integer, up to {2**31 - 1}")
         return values.astype(np.int32)
 
     def texts(self, name: str) -> list[str]:
         """list of str (N,)."""
         return [str(cell).strip() for cell in self.columns[name]]
+
+    def _value_fault(self, index: int, name: str, allowed: str) -> InputError:
+        return self.cell_fault(index, name, show_cell(self.columns[name][index]), allowed)
 
     def _check_shown(self, name: str, beside: str, scale: float) -> None:
         """Refuse a row in which what the controller shows is not what the joint angle is."""
@@ -321,23 +324,20 @@ class MeasurementFile:
         if wrong.any():
             index = int(np.argmax(wrong))
             allowed = f"{values[index]:.3f}, which is {name}, or a file without the column {beside}"
-            raise self.cell_fault(index, beside, show_cell(self.columns[beside][index]), allowed)
+            raise self._value_fault(index, beside, allowed)
 
     def _column(self, name: str) -> np.ndarray:
         try:
             values = _read_numbers(self.columns[name])
         except (ValueError, TypeError):
             index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
-            raise self.cell_fault(index, name, show_cell(self.columns[name][index]), "a number with a decimal point") from None
+            raise self._value_fault(index, name, "a number with a decimal point") from None
         # Not a number is no more than anything either.
         sound = np.abs(values) <= LARGEST_NUMBER
         if not sound.all():
-            index = int(np.argmin(sound))
-            raise self.cell_fault(
-                index, name, show_cell(self.columns[name][index]), f"a finite number, up to {LARGEST_NUMBER:g}"
-            )
+            raise self._value_fault(int(np.argmin(sound)), name, f"a finite number, up to {LARGEST_NUMBER:g}")
         if (place := find_beyond(name, values)) is not None:
-            raise self.cell_fault(place, name, show_cell(self.columns[name][place]), BOUNDS[name].allowed)
+            raise self._value_fault(place, name, BOUNDS[name].allowed)
         return values
 
 

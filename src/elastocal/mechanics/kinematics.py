@@ -108,7 +108,7 @@ def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[Meas
         frames = walk(chain, components[:, part], max(point.after for point in points))
         for number, point in enumerate(points):
             store_pose(place_point(frames, point), position[number, :, part], rotation[number, :, :, part])
-    return _each_batch_first(position, batch), _each_batch_first(rotation, batch)
+    return _batch_first(position, batch, 1), _batch_first(rotation, batch, 1)
 
 
 def corners(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
@@ -190,17 +190,11 @@ def _component_first_view(array: np.ndarray, axes: int) -> np.ndarray:
     return components.reshape(*components.shape[:axes], -1)
 
 
-def _batch_first(components: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
+def _batch_first(components: np.ndarray, batch: tuple[int, ...], before: int = 0) -> np.ndarray:
+    """Memory that is component first as it is handed out; `before`: axes that stay in front, such as one of points."""
     shape = components.shape[:-1]
     components = components.reshape(*shape, *batch)
-    return np.moveaxis(components, range(len(shape)), range(-len(shape), 0))
-
-
-def _each_batch_first(components: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
-    """As `_batch_first`, behind an axis of points."""
-    shape = components.shape[1:-1]
-    components = components.reshape(len(components), *shape, *batch)
-    return np.moveaxis(components, range(1, 1 + len(shape)), range(-len(shape), 0))
+    return np.moveaxis(components, range(before, len(shape)), range(before - len(shape), 0))
 
 
 def store_pose(frame: Frame, position: np.ndarray, rotation: np.ndarray) -> None:

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,10 +72,10 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
         reported_offset=np.array(offset, float) * _per_degree(chain),
         masses=_masses(document.get("masses", ()), n, source),
         gravity_m_s2=_gravity(document.get("gravity_m_s2", STANDING), source),
-        gear_ratio=_gear_ratio(document.get("gear_ratio"), n, source),
+        gear_ratio=_of_each_joint(document, "gear_ratio", n, source, "one or null"),
         compensator=_compensator(document.get("compensator"), n, source),
         payload_kg=document.get("payload_kg"),
-        joint_names=_joint_names(document.get("joint_names"), n, source),
+        joint_names=_of_each_joint(document, "joint_names", n, source, "one"),
         compliance_known="compliance_urad_per_Nm" in document,
     )
 
@@ -85,29 +86,25 @@ def document_of(robot: Robot) -> dict[str, Any]:
     `robot`: without elastic links: their tubes are no data of an arm but of a study. Returns keys as in ``schemas/robot.yaml``;
     optional ones only where they say something. Lengths stand in the chain as numbers.
     """
-    named = {} if robot.joint_names is None else {"joint_names": list(robot.joint_names)}
-    document: dict[str, Any] = {
+    counted_otherwise = (robot.reported_matrix != np.eye(robot.joints)).any() or robot.reported_offset.any()
+    reported = {
+        "matrix": robot.reported_matrix.tolist(),
+        "offset_deg": (robot.reported_offset / _per_degree(robot.chain)).tolist(),
+    }
+    document = {
         "name": robot.name,
-        **named,
+        "joint_names": robot.joint_names and list(robot.joint_names),
         "chain": notation(robot.chain),
         "joint_limits_deg": (robot.joint_limits / _per_degree(robot.chain)[:, None]).tolist(),
+        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist() if robot.compliance_known else None,
+        "reported_joints": reported if counted_otherwise else None,
+        "masses": [vars(mass) | {"centre_m": list(mass.centre_m)} for mass in robot.masses] or None,
+        "gravity_m_s2": list(robot.gravity_m_s2) if robot.gravity_m_s2 != STANDING else None,
+        "gear_ratio": robot.gear_ratio and list(robot.gear_ratio),
+        "compensator": robot.compensator and dict(vars(robot.compensator)),
+        "payload_kg": robot.payload_kg,
     }
-    if robot.compliance_known:
-        document["compliance_urad_per_Nm"] = (1e6 * robot.compliance).tolist()
-    if (robot.reported_matrix != np.eye(robot.joints)).any() or robot.reported_offset.any():
-        offset = (robot.reported_offset / _per_degree(robot.chain)).tolist()
-        document["reported_joints"] = {"matrix": robot.reported_matrix.tolist(), "offset_deg": offset}
-    if robot.masses:
-        document["masses"] = [vars(mass) | {"centre_m": list(mass.centre_m)} for mass in robot.masses]
-    if robot.gravity_m_s2 != STANDING:
-        document["gravity_m_s2"] = list(robot.gravity_m_s2)
-    if robot.gear_ratio is not None:
-        document["gear_ratio"] = list(robot.gear_ratio)
-    if robot.compensator is not None:
-        document["compensator"] = dict(vars(robot.compensator))
-    if robot.payload_kg is not None:
-        document["payload_kg"] = robot.payload_kg
-    return document
+    return {key: value for key, value in document.items() if value is not None}
 
 
 def joint_count(document: Mapping[str, Any], source: str = "robot") -> int:
@@ -131,10 +128,7 @@ def joint_limits(limits_deg: Sequence[Sequence[float]] | None, chain: Chain, sou
             joint = chain.prismatic.index(True) + 1
             raise InputError(source, "joint_limits_deg", f"nothing, but T.(q{joint})", "[lower, upper], for a track in metres")
         limits_deg = [UNLIMITED_DEG] * joints
-    if len(limits_deg) != joints:
-        raise InputError(
-            source, "joint_limits_deg", counted(len(limits_deg), "entry", "entries"), f"one for each of the {joints} joints"
-        )
+    _require_each(limits_deg, joints, "joint_limits_deg", source)
     for joint, (low, high) in enumerate(limits_deg):
         if low >= high:
             raise InputError(source, f"joint_limits_deg[{joint}]", str([low, high]), "[lower, upper]")
@@ -144,10 +138,14 @@ def joint_limits(limits_deg: Sequence[Sequence[float]] | None, chain: Chain, sou
 def _compliance(document: Mapping[str, Any], chain: Chain, source: str) -> np.ndarray:
     if "compliance_urad_per_Nm" not in document:
         return usual_compliance(chain, document.get("payload_kg"))
-    if len(document["compliance_urad_per_Nm"]) != chain.coordinates:
-        found = counted(len(document["compliance_urad_per_Nm"]), "entry", "entries")
-        raise InputError(source, "compliance_urad_per_Nm", found, f"one for each of the {chain.coordinates} joints")
+    _require_each(document["compliance_urad_per_Nm"], chain.coordinates, "compliance_urad_per_Nm", source)
     return 1e-6 * np.array(document["compliance_urad_per_Nm"], float)
+
+
+def _require_each(entries: Sequence[Any], joints: int, key: str, source: str, one: str = "one") -> None:
+    if len(entries) != joints:
+        allowed = f"{one} for each of the {joints} joints"
+        raise InputError(source, key, counted(len(entries), "entry", "entries"), allowed)
 
 
 def _per_degree(chain: Chain) -> np.ndarray:
@@ -156,7 +154,8 @@ def _per_degree(chain: Chain) -> np.ndarray:
 
 
 def _masses(described: Sequence[dict[str, Any]], joints: int, source: str) -> tuple[Mass, ...]:
-    masses = sorted((Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described), key=_link_of)
+    masses = [Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described]
+    masses.sort(key=attrgetter("link"))
     for index, entry in enumerate(described):
         if entry["link"] > joints:
             raise InputError(
@@ -168,32 +167,17 @@ def _masses(described: Sequence[dict[str, Any]], joints: int, source: str) -> tu
     return tuple(masses)
 
 
-def _link_of(mass: Mass) -> int:
-    return mass.link
-
-
 def _gravity(vector: Sequence[float], source: str) -> tuple[float, ...]:
     if math.hypot(*vector) < _LEAST_GRAVITY:
         raise InputError(source, "gravity_m_s2", str(list(vector)), f"a vector in base axes of {_LEAST_GRAVITY:g} m/s² or more")
     return tuple(map(float, vector))
 
 
-def _gear_ratio(ratios: Sequence[float | None] | None, joints: int, source: str) -> tuple[float | None, ...] | None:
-    if ratios is None:
+def _of_each_joint(document: Mapping[str, Any], key: str, joints: int, source: str, one: str) -> tuple[Any, ...] | None:
+    if document.get(key) is None:
         return None
-    if len(ratios) != joints:
-        raise InputError(
-            source, "gear_ratio", counted(len(ratios), "entry", "entries"), f"one or null for each of the {joints} joints"
-        )
-    return tuple(ratios)
-
-
-def _joint_names(names: Sequence[str] | None, joints: int, source: str) -> tuple[str, ...] | None:
-    if names is None:
-        return None
-    if len(names) != joints:
-        raise InputError(source, "joint_names", counted(len(names), "entry", "entries"), f"one for each of the {joints} joints")
-    return tuple(names)
+    _require_each(document[key], joints, key, source, one)
+    return tuple(document[key])
 
 
 def _compensator(described: Mapping[str, Any] | None, joints: int, source: str) -> Compensator | None:

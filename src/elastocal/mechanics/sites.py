@@ -25,6 +25,7 @@ from elastocal.mechanics.usual_values import usual_compliance, usual_payload_kg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Any
 
 # Below this a link is a point.
 _SHORTEST_M = 1e-6
@@ -172,31 +173,22 @@ def sites_of(holder: Robot | Chain) -> Sites:
     if isinstance(holder, Robot):
         usual = usual_compliance(holder.chain, holder.payload_kg)
         compliance = tuple(np.where(holder.compliance > 0.0, holder.compliance, usual).tolist())
-        known = (holder.masses, holder.gravity_m_s2, holder.gear_ratio, holder.compensator, holder.payload_kg, compliance)
-        return _sites_of(holder.chain, *known)
+        return _sites_of(
+            holder.chain,
+            masses=holder.masses,
+            gravity_m_s2=holder.gravity_m_s2,
+            gear_ratio=holder.gear_ratio,
+            compensator=holder.compensator,
+            payload_kg=holder.payload_kg,
+            compliance=compliance,
+        )
     return replace(_sites_of_chain(holder), compliance=tuple(usual_compliance(holder).tolist()))
 
 
 # Every part of a diagnosis asks for the sites of its robot; what a run has to do with are a few robots.
 @lru_cache(maxsize=64)
-def _sites_of(
-    chain: Chain,
-    masses: tuple[Mass, ...],
-    gravity_m_s2: tuple[float, ...],
-    gear_ratio: tuple[float | None, ...] | None,
-    compensator: Compensator | None,
-    payload_kg: float | None,
-    compliance: tuple[float, ...],
-) -> Sites:
-    return replace(
-        _sites_of_chain(chain),
-        masses=masses,
-        gravity_m_s2=gravity_m_s2,
-        gear_ratio=gear_ratio,
-        compensator=compensator,
-        payload_kg=payload_kg,
-        compliance=compliance,
-    )
+def _sites_of(chain: Chain, **known: Any) -> Sites:
+    return replace(_sites_of_chain(chain), **known)
 
 
 def _sites_of_chain(chain: Chain) -> Sites:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.mechanics.robot import STANDARD_GRAVITY
+
 if TYPE_CHECKING:
     from elastocal.mechanics.chain import Chain
 
@@ -21,7 +23,6 @@ _TRACK_M_PER_N = 2e-8
 _LOAD_KG_PER_M3 = 8.0
 # Wrists are rated for a load whose centre lies so far from the flange at least.
 _SHORTEST_LEVER_M = 0.2
-_GRAVITY = 9.80665
 
 
 def usual_payload_kg(chain: Chain) -> float:
@@ -37,10 +38,10 @@ def usual_compliance(chain: Chain, payload_kg: float | None = None) -> np.ndarra
 
     `payload_kg`: rated load; by `usual_payload_kg` without. Returns (n,): rad/(N m); of prismatic joints m/N.
     """
-    load_N = _GRAVITY * (usual_payload_kg(chain) if payload_kg is None else payload_kg)
+    load_N = STANDARD_GRAVITY * (usual_payload_kg(chain) if payload_kg is None else payload_kg)
     levers = np.maximum(_reach_behind(chain), _SHORTEST_LEVER_M)
     # A chain without lengths has a lever all the same, and a load of a kilogram.
-    return np.where(chain.prismatic, _TRACK_M_PER_N, _WIND_UP_RAD / (max(load_N, _GRAVITY) * levers))
+    return np.where(chain.prismatic, _TRACK_M_PER_N, _WIND_UP_RAD / (max(load_N, STANDARD_GRAVITY) * levers))
 
 
 def _reach_behind(chain: Chain) -> np.ndarray:

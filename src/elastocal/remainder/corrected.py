@@ -10,9 +10,10 @@ import numpy as np
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import sample_of, state_clusters
+from elastocal.fitting.prediction import target_points
+from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.remainder.catalogue import regressions
-from elastocal.remainder.inputs import inputs_of
-from elastocal.remainder.protocol import Part
+from elastocal.remainder.protocol import Inputs, Part
 from elastocal.remainder.tuning import tuned
 from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_residuals
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
     from elastocal.remainder.protocol import Regression, Setting
     from elastocal.remainder.tuning import Tuned
@@ -117,3 +119,25 @@ def _inner_parts(plan: Plan, fitted: Fit, observations: Observations, elsewhere:
             inputs_of(model, refit.there, refit.left_out, elsewhere),
             position_residuals(model, refit.there, refit.left_out),
         )
+
+
+def inputs_of(model: Model, estimate: Estimate, observations: Observations, elsewhere: bool) -> Inputs:
+    """Inputs of a regression, from the nominal chain and the places of the targets.
+
+    `estimate`: says where the targets sit. `elsewhere`: whether observations of another campaign are to be predicted: time then
+    carries nothing over. Returns without time or temperature where they were not recorded.
+    """
+    states, chain, joints = observations.states, model.sites.chain, model.sites.joints
+    coordinates = np.zeros((len(states), chain.coordinates))
+    coordinates[:, :joints] = states.joint_angles
+    jacobian = np.empty((len(observations), 3, chain.coordinates))
+    for number, point in enumerate(target_points(model, estimate)):
+        mask = observations.target == number
+        jacobian[mask] = poses_and_jacobians(chain, coordinates[observations.state[mask]], point)[2][:, :3]
+    recorded = () if elsewhere else (states.time_s, states.temperature_c)
+    others = [states.wrench, *(values[:, None] for values in recorded if values is not None)]
+    return Inputs(
+        states.joint_angles[observations.state],
+        np.hstack([np.hstack(others)[observations.state], estimate.target_offset[observations.target]]),
+        jacobian,
+    )

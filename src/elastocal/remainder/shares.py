@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.remainder.corrected import corrected
-from elastocal.remainder.intervals import CONFIDENCE, NORMAL_WIDTH
+from elastocal.remainder.tuning import CONFIDENCE, NORMAL_WIDTH
 from elastocal.validation.held_out import Errors, intervals, position_errors, summary
 from elastocal.validation.placing import placed
 

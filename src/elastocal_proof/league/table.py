@@ -10,7 +10,7 @@ import pandas as pd
 
 from elastocal.campaigns.groups import groups_of
 from elastocal.random_streams import stream
-from elastocal.remainder.intervals import NORMAL_WIDTH
+from elastocal.remainder.tuning import NORMAL_WIDTH
 from elastocal.validation.held_out import Errors, intervals, share_below_largest, summary
 from elastocal_proof.league.methods import DIAGNOSIS
 

@@ -37,13 +37,8 @@ def test_a_new_module_is_a_new_importer(tmp_path, monkeypatch):
     assert "just_added" in importers()
 
 
-@pytest.mark.parametrize("name", ["nobody", "repeats"])
+@pytest.mark.parametrize("name", ["nobody", "reflectors"])
 def test_a_name_of_none_is_refused_with_those_that_there_are(name):
     """What importers share is no importer."""
     with refused("mine.yaml", "importer", repr(name), "fanuc_cpa, fanuc_joint, fanuc_static, jacobi, motoman, ur10_ipa"):
         importer(name, "mine.yaml")
-
-
-def test_a_name_that_no_module_has_is_refused_early():
-    with refused("mine.yaml", "importer", "'nobody'", "fanuc_cpa"):
-        check_importer("nobody", "mine.yaml")

@@ -48,10 +48,3 @@ def test_poses_are_in_the_order_of_the_file(cpa, config_folder, tmp_path):
     fanuc_cpa.write_campaign(cpa[0], tmp_path / "campaign")
     measurements = read_campaign(tmp_path / "campaign", config_folder / "robots").measurements
     assert measurements.pose.tolist() == np.repeat(np.arange(POSES), 3).tolist() and not measurements.repeat.any()
-
-
-def test_text_in_another_encoding_is_refused(tmp_path):
-    path = tmp_path / "values.csv"
-    path.write_bytes(b"1 2 3 \xb0\n")
-    with refused(path, "line 1", "not UTF-8 (byte 6)"):
-        fanuc_cpa.read(path)

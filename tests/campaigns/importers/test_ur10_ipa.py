@@ -92,11 +92,3 @@ def test_missing_column_is_refused(series, name):
     series.write()
     with refused(series.path, "header", f"no column {name!r}"):
         ur10_ipa.read(series.path)
-
-
-@pytest.mark.parametrize("cell", ["", "1,2,3", "nan", "none"])
-def test_cell_that_is_no_number_is_refused(series, cell):
-    series.columns["measurement_z"] = [cell if row == 3 else 1.5 for row in range(len(series.angles))]
-    series.write()
-    with refused(series.path, "row 4, column measurement_z", repr(cell), "decimal comma"):
-        ur10_ipa.read(series.path)

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from elastocal.campaigns.importers import fanuc_cpa, fanuc_static
-from elastocal.campaigns.importers.reflectors import reflector_table, unloaded_document
-from elastocal.campaigns.importers.repeats import pose_and_repeat
+from elastocal.campaigns.importers.reflectors import pose_and_repeat, reflector_table, unloaded_document
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign as write_folder
 

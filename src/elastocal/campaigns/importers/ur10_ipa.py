@@ -9,8 +9,7 @@ import numpy as np
 import scipy
 
 from elastocal.campaigns.importers.csv_columns import numbers, read_columns, table
-from elastocal.campaigns.importers.reflectors import reflector_table, unloaded_document
-from elastocal.campaigns.importers.repeats import pose_and_repeat
+from elastocal.campaigns.importers.reflectors import pose_and_repeat, reflector_table, unloaded_document
 from elastocal.campaigns.public_data import PublicFile
 from elastocal.campaigns.writing import write_campaign as write_folder
 
