@@ -31,7 +31,7 @@ def test_bound_is_the_trace_with_the_explicit_inverse():
     rng = np.random.default_rng(1)
     rows, half = rng.standard_normal((4, 3, 9, 6)), rng.standard_normal((6, 6))
     information, moment = np.swapaxes(rows, -1, -2) @ rows, half @ half.T
-    found = squared_error_bounds(np.moveaxis(information, 1, -1), moment)
+    found = squared_error_bounds(information, moment)
     for index in np.ndindex(4, 3):
         assert found[index] == pytest.approx(np.trace(moment @ np.linalg.inv(information[index])), rel=1e-10)
 
@@ -40,11 +40,11 @@ def test_bound_is_infinite_where_the_information_is_singular_and_nowhere_else():
     rows = np.random.default_rng(2).standard_normal((2, 1, 4, 6))  # four measurements of six unknowns
     information = np.swapaxes(rows, -1, -2) @ rows
     information[1, 0] = np.eye(6)
-    np.testing.assert_allclose(squared_error_bounds(np.moveaxis(information, 1, -1), np.eye(6))[:, 0], [np.inf, 6.0])
+    np.testing.assert_allclose(squared_error_bounds(information, np.eye(6))[:, 0], [np.inf, 6.0])
 
 
 def test_bound_without_any_measurement_is_infinite():
-    assert squared_error_bounds(np.zeros((1, 6, 6, 1)), np.eye(6))[0, 0] == np.inf
+    assert squared_error_bounds(np.zeros((1, 1, 6, 6)), np.eye(6))[0, 0] == np.inf
 
 
 def test_bound_falls_with_every_configuration_and_every_point(robot):

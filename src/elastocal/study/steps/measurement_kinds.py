@@ -13,7 +13,7 @@ import numpy as np
 from elastocal.mechanics.elastostatics import joint_torques, loaded_point
 from elastocal.random_streams import draw
 from elastocal.study.experiments import Experiments
-from elastocal.study.identification import Measurements, condition_numbers, estimate_compliance, find_undetermined_prefixes
+from elastocal.study.identification import Measurements, condition_numbers, estimate_compliance
 from elastocal.study.metrics import mean_form, mean_square_errors
 from elastocal.study.steps.columns import prefix_index_columns
 from elastocal.study.steps.design import configuration_first
@@ -52,9 +52,8 @@ def kind_blocks(
         for kind, measured in found.items():
             measurements = {end: measured}
             compliance, triangles = estimate_compliance(strategy, measurements, n)
-            undetermined = find_undetermined_prefixes(strategy, measurements, condition_numbers(strategy, triangles))
             squares = mean_square_errors(form, compliance - study.robot.compliance[:, None])
-            squares[undetermined] = np.nan
+            squares[np.isnan(condition_numbers(strategy, measurements, triangles))] = np.nan
             yield {
                 **prefix_index_columns(sets, len(squares)),
                 "kind": kind,

@@ -29,7 +29,7 @@ def observability_columns(study: StudyInMemory) -> dict[str, np.ndarray]:
     strategy = Strategy("", (Stage((point,), tuple(range(n))),))
     error = estimate_compliance(strategy, measurements, n)[0][-1] - robot.compliance[:, None]
     information = prefix_information(measurements[point].regressor)[-1:]
-    scaled = np.moveaxis(information[0], -1, 0) * np.outer(robot.compliance, robot.compliance)
+    scaled = information[0] * np.outer(robot.compliance, robot.compliance)
     return {
         "data_set": sets,
         **observability(scaled, size.configurations),
