@@ -5,7 +5,7 @@ They are the same as those of the pipeline's steps: random streams have names, s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,6 +79,11 @@ class StudyInMemory:
     seed: int
     interpretation: Interpretation
     size: Size
+
+    def under(self, **loading: Any) -> StudyInMemory:
+        """The same study where the robot is moved and loaded otherwise, by attributes of `Loading`."""
+        changed = replace(self.interpretation.loading, **loading)
+        return replace(self, interpretation=replace(self.interpretation, loading=changed))
 
     def blocks(self, number: int = 0) -> Iterator[np.ndarray]:
         """Numbers of the data sets of a study, block by block, ndarray of int each."""
