@@ -1,20 +1,14 @@
 """Figures that hold the study against the paper's printed figures."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 
 from elastocal.figures.style import PALETTE, note, panels, styled
 from elastocal.study.printed import LEVEL
 from elastocal.study.tables import find_statistics
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 MILLI = 1e3
 _HEADS = {

@@ -1,17 +1,11 @@
 """Held-out errors of several campaigns, before and after, on one axis."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 
 from elastocal.counting import counted
 from elastocal.figures.style import PALETTE, label_decades, panels, styled
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 _STAGES = (("before", "declared model", PALETTE[1]), ("after", "with the effects found", PALETTE[0]))
 

@@ -1,16 +1,11 @@
 """The frames of Denavit-Hartenberg rows on a robot, as a picture."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from elastocal.figures.style import PALETTE, WIDTH_MM, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 _AXES = ("x", "y", "z")
 _COLORS = (PALETTE[1], PALETTE[2], PALETTE[0])

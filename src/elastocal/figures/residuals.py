@@ -1,21 +1,16 @@
 """Residuals of a campaign, before and after: against what the robot did, and as arrows where it stood."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from elastocal.figures.arm_map import draw_links
 from elastocal.figures.style import PALETTE, note, panels, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MICRO, MILLI = 1e6, 1e3
 _STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}

@@ -1,21 +1,16 @@
 """The sheet of paper that both schemes of a robot are drawn on: strokes, texts, labels that find room, the legend."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.patches import FancyBboxPatch
+from matplotlib.text import Text
 from matplotlib.textpath import TextPath
 
 from elastocal.figures.style import PALETTE
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from matplotlib.text import Text
 
 WIDTH_MM = 160.0
 MARGIN_MM = 3.0

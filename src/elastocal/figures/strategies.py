@@ -1,20 +1,14 @@
 """Figures that compare strategies and noise levels over the data set length."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from elastocal.figures.style import PALETTE, label_decades, line_style, panels, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    import pandas as pd
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MICRO = 1e6
 # Of the linear panels of the noise impact: what a reader compares with the wanted accuracy.

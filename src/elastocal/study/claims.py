@@ -7,17 +7,15 @@ holds in some of the studies, and its p value is the share of studies, this one 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from elastocal.study.metrics import length_to_reach
 from elastocal.study.printed import LEVEL, MICRO, Predicted
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 _ALL, _FIXED, _DEV = "k_sigma", "k_sigma_fixed_joints", "deviation"
 _BEST, _COMB, _PLAIN = "4-6DoF after 6+3DoF", "3+6DoF comb", "6DoF"

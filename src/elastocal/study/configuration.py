@@ -1,20 +1,16 @@
 """The study's configuration: checked as a whole before anything runs, with the robots and strategies that it names."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, document_path, named_document, parsed
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.identification import first_solvable_length
 from elastocal.study.strategies import check_strategy, strategy_from_document
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
 
 # A measuring point in chain notation.
 _POINT = re.compile(r"\[(\w*[A-Za-z]\w*)\]")

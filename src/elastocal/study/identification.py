@@ -7,19 +7,13 @@ forming them, so that prefixes of one or two configurations keep their digits.
 Matrices of all prefixes and data sets are stacked as (configurations, sets, rows, columns).
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.study.strategies import Stage, Strategy, drop_forgotten_stages
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
 
 # Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
 # the measurements do not determine the compliances.

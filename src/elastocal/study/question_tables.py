@@ -1,9 +1,8 @@
 """Tables of the research questions beyond the paper's strategies."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,9 +12,6 @@ from elastocal.study.budget_tables import MICRO, ratio_of_roots, root_mean
 from elastocal.study.designs import RANDOM
 from elastocal.study.observability import INDICES
 from elastocal.study.tables import find_statistics
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 CHOSEN = "by cross-validation"
 MILLI = 1e3
