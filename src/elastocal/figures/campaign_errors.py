@@ -30,9 +30,8 @@ def campaign_errors(table: pd.DataFrame) -> Figure:
     # A campaign with two sessions has two lines.
     names = names.where(~names.duplicated(keep=False), names + ", " + table["poses"].map(lambda count: counted(count, "pose")))
     axis.set_yticks(rows, names)
-    axis.set_xscale("log")
+    axis.set(xscale="log", xlabel="RMS position error of held-out poses (mm), with 95 % intervals")
     label_decades(axis.xaxis)
-    axis.set_xlabel("RMS position error of held-out poses (mm), with 95 % intervals")
     axis.grid(visible=False, axis="y")
     figure.legend(loc="outside lower center", ncols=2)
     return figure

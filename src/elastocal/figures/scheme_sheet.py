@@ -49,8 +49,8 @@ class Sheet:
 
     def text(self, place: Place, text: str, **style: Any) -> Text:
         """A text, centred on its place by default."""
-        style = {"ha": "center", "va": "center", "fontproperties": _FONT, "color": INK, "zorder": 8, **style}
-        return self.axes.text(place[0], place[1], text, **style)
+        usual: dict[str, Any] = {"ha": "center", "va": "center", "fontproperties": _FONT, "color": INK, "zorder": 8}
+        return self.axes.text(place[0], place[1], text, **usual | style)
 
     def label(
         self,
@@ -74,16 +74,8 @@ class Sheet:
             self.take(anchor, leader, 0.2)
         if frame:
             corner, extent = box[:2] + 0.3, size - 0.6
-            rounded = FancyBboxPatch(
-                (corner[0], corner[1]),
-                extent[0],
-                extent[1],
-                boxstyle="round,pad=0,rounding_size=0.8",
-                fc="white",
-                ec=frame,
-                lw=1.0,
-            )
-            rounded.set(zorder=7, gid=f"{gid}-box")
+            rounded = FancyBboxPatch((corner[0], corner[1]), *extent, boxstyle="round,pad=0,rounding_size=0.8")
+            rounded.set(fc="white", ec=frame, lw=1.0, zorder=7, gid=f"{gid}-box")
             self.axes.add_patch(rounded)
         self.text(centre, text, gid=gid)
 
