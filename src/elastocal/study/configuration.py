@@ -120,16 +120,14 @@ def _check_cells(config: Mapping[str, Any], source: str) -> None:
     for level in config["noise_um"]:
         if levels.setdefault(f"{level:g}", level) != level:
             raise InputError(source, "noise_um", f"{levels[f'{level:g}']} and {level}", "levels that differ in 6 digits")
-    if tables["classical_strategy"] not in config["strategies"]:
-        raise InputError(
-            source, "tables.classical_strategy", repr(tables["classical_strategy"]), f"one of strategies {config['strategies']}"
-        )
-    if tables["noise_um"] not in config["noise_um"]:
-        raise InputError(source, "tables.noise_um", str(tables["noise_um"]), f"one of noise_um {config['noise_um']}")
-    for index, length in enumerate(config["evaluation"]["lengths"]):
+    lengths = config["evaluation"]["lengths"]
+    for index, length in enumerate(lengths):
         if length > longest:
             raise InputError(source, f"evaluation.lengths[{index}]", str(length), f"up to configurations = {longest}")
-    if tables["length"] not in config["evaluation"]["lengths"]:
-        raise InputError(
-            source, "tables.length", str(tables["length"]), f"one of evaluation.lengths {config['evaluation']['lengths']}"
-        )
+    for key, name, allowed in (
+        ("classical_strategy", "strategies", config["strategies"]),
+        ("noise_um", "noise_um", config["noise_um"]),
+        ("length", "evaluation.lengths", lengths),
+    ):
+        if tables[key] not in allowed:
+            raise InputError(source, f"tables.{key}", repr(tables[key]), f"one of {name} {allowed}")

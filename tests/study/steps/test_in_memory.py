@@ -57,6 +57,13 @@ def test_a_reflector_is_a_target_that_the_point_carries(kuka, point):
     assert found.deflection.shape[0] == 6 and carried.independent_rows == 6
 
 
+def test_one_estimator_under_two_names_is_worked_out_once(kuka, strategies):
+    found = study_of(kuka).estimates([strategies[name] for name in ("6DoF", "6DoF-after-3DoF", "4-6DoF-after-3DoF")])
+    assert found["6DoF"] is found["6DoF after 3DoF"] and found["6DoF"] is not found["4-6DoF after 3DoF"]
+    (block,) = found["6DoF"]
+    assert block.shape == (4, 5, 6) and np.isfinite(block[:, -1]).all()
+
+
 DRAWN = Experiments(np.zeros((2, 3, 7)), np.ones((2, 3, 6)))
 
 
