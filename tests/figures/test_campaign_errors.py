@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from drawn_figures import row_labels
 
 from elastocal.figures.campaign_errors import campaign_errors
 
@@ -17,7 +18,7 @@ TABLE = pd.DataFrame(
 
 def test_each_campaign_has_both_errors_at_their_values():
     (axis,) = campaign_errors(TABLE).axes
-    assert [label.get_text() for label in axis.get_yticklabels()] == ["first one", "second"]
+    assert row_labels(axis) == ["first one", "second"]
     before, after = (container.lines[0].get_xydata() for container in axis.containers)
     np.testing.assert_allclose(before, [[0.4, 1], [2.0, 0]])
     np.testing.assert_allclose(after, [[0.2, 1], [1.9, 0]])
@@ -26,4 +27,4 @@ def test_each_campaign_has_both_errors_at_their_values():
 
 def test_sessions_of_one_campaign_stand_by_their_poses():
     (axis,) = campaign_errors(TABLE.assign(campaign="folds")).axes
-    assert [label.get_text() for label in axis.get_yticklabels()] == ["folds, 24 poses", "folds, 1 pose"]
+    assert row_labels(axis) == ["folds, 24 poses", "folds, 1 pose"]

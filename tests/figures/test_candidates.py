@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from drawn_figures import assert_nothing_cut_off, texts
+from drawn_figures import assert_nothing_cut_off, row_labels, texts
 from made_loop_tables import FAMILIES, candidate_table, confounding_table
 from made_loop_tables import probabilities as stated
 from matplotlib.colors import to_rgba
@@ -50,7 +50,7 @@ def test_leading_candidates_have_their_bayes_factor_in_the_colour_of_their_famil
     table["log_bayes_factor"][:2] = [40.0, 90.0]
     figure = probabilities(stated(), table)
     axis = figure.axes[1]
-    assert [label.get_text() for label in axis.get_yticklabels()][:2] == ["Effect 1 of joint 2", "Effect 2 of joint 3"]
+    assert row_labels(axis)[:2] == ["Effect 1 of joint 2", "Effect 2 of joint 3"]
     order = [1, 2, 3, 4, 5, 6, 7, 8, 0, 9, 10, 11, 12, 13, 14]
     bars = [bar for bar in axis.patches if bar.get_gid() != "chosen"]
     assert [bar.get_width() for bar in bars] == pytest.approx(table["log_bayes_factor"][order].tolist())
@@ -86,11 +86,6 @@ def test_confounding_annotates_every_pair_and_marks_what_was_found():
     bold = [label.get_text() for label in figure.axes[0].get_yticklabels() if label.get_fontweight() == "bold"]
     assert bold == ["Effect 0 of joint 1  1"]
     assert figure.axes[1].get_ylabel() == "angle between the contributions (°)"
-
-
-def test_what_was_found_is_on_the_shortlist_whatever_its_place():
-    chosen = np.arange(30) == 25
-    assert shortlist(list(range(30)), chosen, 5) == [0, 1, 2, 3, 25]
 
 
 def test_where_nothing_can_be_tested_the_figures_say_so():
@@ -144,7 +139,8 @@ def test_a_very_long_name_keeps_its_beginning_and_its_end_in_two_lines():
     assert short_name("effect_1@2") == "Effect 1 of joint 2"
 
 
-def test_a_shortlist_has_no_more_than_there_is_room_for():
+def test_a_shortlist_has_what_was_found_whatever_its_place_and_no_more_than_there_is_room_for():
+    assert shortlist(list(range(30)), np.arange(30) == 25, 5) == [0, 1, 2, 3, 25]
     assert shortlist([4, 2, 0, 1, 3], np.array([True, True, True, True, False]), 2) == [2, 0]
     assert shortlist([4, 2], np.zeros(5, bool), 3) == [4, 2]
 

@@ -1,6 +1,7 @@
 """The figure of the closed loop has a marker for each robot and model in each part."""
 
 import pandas as pd
+from drawn_figures import legend_entries, row_labels
 
 from elastocal_proof.blind.closed_loop import MODELS, PARTS
 from elastocal_proof.figures.closed_loop import closed_loop
@@ -15,8 +16,8 @@ def test_every_error_is_drawn_where_its_model_stands():
     ]
     figure = closed_loop(pd.DataFrame(rows))
     assert [axis.get_title() for axis in figure.axes] == ["unloaded", "under loads", "milling path"]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["gp180", "kuka"]
-    words = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert legend_entries(figure) == ["gp180", "kuka"]
+    words = row_labels(figure.axes[0])
     assert words[0] == "uncorrected" and words[-1].startswith("true model")
     drawn = figure.axes[0].containers[0].lines[0]
     assert drawn.get_xdata().tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]

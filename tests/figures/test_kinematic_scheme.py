@@ -2,7 +2,7 @@
 
 import pytest
 from drawn_figures import texts
-from drawn_schemes import CHAINS, assert_about_160_mm_wide_and_drawn_alike, assert_no_overlap, from_chain, from_file
+from drawn_schemes import DRAWN, assert_about_160_mm_wide_and_drawn_alike, assert_no_overlap
 from matplotlib.text import Text
 
 from elastocal.figures.kinematic_scheme import kinematic_scheme
@@ -18,26 +18,20 @@ def test_kinematic_scheme_names_all_of_kuka():
     expected = {f"joint-{n}": f"$q_{{{n}}}$" for n in range(1, 7)}
     expected |= {f"length-{n}": f"$l_{{{n}}}$ = {length} mm" for n, length in enumerate(lengths, start=1)}
     expected |= {f"point-{name}": name for name in ("2DoF", "3DoF", "4DoF", "6DoF")}
-    figure = kinematic_scheme(from_file("kuka"))
+    figure = kinematic_scheme(DRAWN["kuka"])
     assert labels(figure) == expected
     assert {"base frame", "$x$", "$z$"} <= set(texts(figure))
 
 
-@pytest.mark.parametrize("name", ["kuka", "fanuc", "kuka_extended"])
-def test_texts_of_robots_do_not_overlap(name):
-    assert_no_overlap(kinematic_scheme(from_file(name)))
-
-
-@pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
-def test_any_serial_chain_draws(chain):
-    robot = from_chain(chain)
+@pytest.mark.parametrize("robot", DRAWN.values(), ids=DRAWN)
+def test_any_serial_chain_draws_with_a_name_for_each_joint_and_none_on_another(robot):
     figure = kinematic_scheme(robot)
     assert {f"joint-{n}" for n in range(1, robot.joints + 1)} <= set(labels(figure))
     assert_no_overlap(figure)
 
 
 def test_targets_off_the_chain_draw_apart_from_it():
-    assert_no_overlap(kinematic_scheme(with_target_offset(from_file("fanuc"), (0.0, 0.1, 0.05))))
+    assert_no_overlap(kinematic_scheme(with_target_offset(DRAWN["fanuc"], (0.0, 0.1, 0.05))))
 
 
 def test_the_scheme_is_about_160_mm_wide_and_drawn_alike_each_time():

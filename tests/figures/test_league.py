@@ -2,6 +2,7 @@
 
 import pandas as pd
 import pytest
+from drawn_figures import legend_entries, row_labels
 from made_leagues import made_results
 
 from elastocal_proof.figures.league import league_picture, mechanism_picture
@@ -19,8 +20,8 @@ def table():
 def test_each_split_has_a_panel_and_each_method_a_mark_in_the_legend(table):
     figure = league_picture(table, METHODS)
     assert [axis.get_title() for axis in figure.axes] == ["random poses", "blocks of joint space", "another session"]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == [f"{name} in words" for name in METHODS]
-    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["one\n30 poses", "two\n40 poses"]
+    assert legend_entries(figure) == [f"{name} in words" for name in METHODS]
+    assert row_labels(figure.axes[0]) == ["one\n30 poses", "two\n40 poses"]
     assert len(league_picture(table[table["split"] == "blocks"], METHODS).axes) == 1
 
 
@@ -31,6 +32,6 @@ def mechanisms(probability):
 
 def test_mechanisms_that_are_nowhere_probable_are_left_out():
     figure = mechanism_picture(mechanisms(0.9))
-    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    labels = row_labels(figure.axes[0])
     assert len(labels) == 1 and "40 %" in [text.get_text() for text in figure.axes[0].texts]
     assert "No data set" in mechanism_picture(mechanisms(0.3)).axes[0].texts[0].get_text()

@@ -1,6 +1,7 @@
 """The picture of a plan names what is in it."""
 
 import numpy as np
+from drawn_figures import legend_entries
 from made_surveys import OPEN, made_candidates, made_survey
 
 from elastocal.application.planning.cell import Cell
@@ -14,10 +15,10 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
     cell = Cell((np.array([[1.0, 2.0], [0.0, 1.0], [0.0, 1.0]]),), np.array([3.0, 1.0, 1.0]), 0.1)
     figure = plan_picture(survey.robot, cell, plan)
     assert [axis.get_title() for axis in figure.axes] == ["from above", "from the side", "what each pose is worth"]
-    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    labels = legend_entries(figure)
     assert labels == ["to fit", "held out", "kept out of", "tracker", "base"]
     bare = plan_picture(survey.robot, OPEN, plan)
-    assert [text.get_text() for text in bare.legends[0].get_texts()] == ["to fit", "held out", "base"]
+    assert legend_entries(bare) == ["to fit", "held out", "base"]
     last = figure.axes[2].lines[-1].get_ydata()[-1]
     np.testing.assert_allclose(last, 1e3 * plan.accuracy_m[-1])
 

@@ -21,6 +21,10 @@ from elastocal.figures.residuals import (
 )
 
 
+def quivers(axis):
+    return [artist for artist in axis.get_children() if isinstance(artist, Quiver)]
+
+
 def labels_of(figure):
     return [axis.get_xlabel() for axis in figure.axes if axis.get_xlabel()]
 
@@ -54,10 +58,7 @@ def test_held_out_measurements_are_marked_apart():
 def test_one_stage_is_drawn_where_nothing_was_found():
     figure = residuals(residual_table(found=False))
     assert "with the effects found" not in texts(figure)
-    assert (
-        len([artist for artist in arrows(residual_table(found=False)).axes[0].get_children() if isinstance(artist, Quiver)])
-        == 1
-    )
+    assert len(quivers(arrows(residual_table(found=False)).axes[0])) == 1
 
 
 def test_many_points_are_pixels():
@@ -94,24 +95,9 @@ def test_no_line_crosses_a_gap():
     assert not np.isnan(running_quartiles(levels, levels, bins_of(levels))[1]).any()
 
 
-def test_arrows_stand_where_measurements_were_taken():
-    table = residual_table(poses=20, repeats=3)
-    figure = arrows(table)
-    before = next(
-        artist for artist in figure.axes[0].get_children() if isinstance(artist, Quiver) and artist.get_gid() == "before"
-    )
-    # Repeats are averaged: one arrow for each pose, load and target.
-    assert len(before.X) == 20 * 2 * 2
-    assert [axis.get_xlabel() for axis in figure.axes] == ["x (m)", "x (m)"]
-    assert [axis.get_ylabel() for axis in figure.axes] == ["z (m)", "y (m)"]
-    (key,) = figure.findobj(QuiverKey)
-    assert key.label == "200 µm"
-
-
 def test_large_campaigns_draw_one_state_of_each_cell():
     figure = arrows(residual_table(poses=500))
-    quivers = [artist for artist in figure.axes[0].get_children() if isinstance(artist, Quiver)]
-    assert max(len(quiver.X) for quiver in quivers) < 500
+    assert max(len(quiver.X) for quiver in quivers(figure.axes[0])) < 500
     assert any("one state of each cell" in text for text in texts(figure))
 
 
@@ -126,15 +112,9 @@ def test_residuals_of_one_pose_are_a_note():
     assert any("nothing to draw them against" in text for text in texts(residuals(table)))
 
 
-def drawn_arrows(figure, view, stage):
-    return next(
-        artist for artist in figure.axes[view].get_children() if isinstance(artist, Quiver) and artist.get_gid() == stage
-    )
-
-
 def state_means(table):
-    """Places and residuals (states, 3) in m, averaged over the repeats of each held-out flag, pose and load."""
-    keys = np.column_stack([table[name] for name in ("held_out", "pose", "load")])
+    """Places and residuals (states, 3) in m, averaged over the repeats of each held-out flag, pose, load and target."""
+    keys = np.column_stack([table[name] for name in ("held_out", "pose", "load", "target")])
     members = [(keys == key).all(axis=1) for key in np.unique(keys, axis=0)]
     return (
         np.array([[table[f"{start}{axis}"][mine].mean() for axis in "xyz"] for mine in members]) for start in ("", "before_d")
@@ -142,17 +122,17 @@ def state_means(table):
 
 
 def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_arrow_of_the_scale():
-    table = residual_table(poses=4, targets=1, repeats=3)
+    table = residual_table(poses=20, repeats=3)
     figure = arrows(table)
     (key,) = figure.findobj(QuiverKey)
-    size, unit = key.label.split()
-    assert unit == "µm"
+    assert key.label == "200 µm"
     place, off = state_means(table)
     for view, axes in ((0, [0, 2]), (1, [0, 1])):
-        quiver = drawn_arrows(figure, view, "before")
+        (quiver,) = [quiver for quiver in quivers(figure.axes[view]) if quiver.get_gid() == "before"]
+        assert figure.axes[view].get_xlabel() == "x (m)" and figure.axes[view].get_ylabel() == f"{'xyz'[axes[1]]} (m)"
         np.testing.assert_allclose(quiver.XY, place[:, axes])
         drawn = np.column_stack([quiver.U, quiver.V])
-        np.testing.assert_allclose(drawn, off[:, axes] * key.U / (1e-6 * float(size)), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(drawn, off[:, axes] * key.U / 200e-6, rtol=1e-9, atol=1e-12)
 
 
 def test_the_horizontal_components_are_turned_and_keep_their_length():

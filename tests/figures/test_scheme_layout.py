@@ -4,24 +4,22 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
-from drawn_schemes import CHAINS, from_chain, from_file
+from drawn_schemes import DRAWN
 
 from elastocal.figures.scheme_layout import DRAWING_MM, Joint, Point, Segment, lay_out, project_on_paper, view_of
 from elastocal.figures.scheme_sheet import SYMBOL_RADIUS_MM
 from elastocal.mechanics.robot import with_target_offset
 
-ROBOTS = {name: from_file(name) for name in ("kuka", "fanuc", "kuka_extended")}
-ROBOTS |= {name: from_chain(chain) for name, chain in CHAINS.items()}
 LAID_OUT = {}
 
 
-@pytest.fixture(params=ROBOTS)
+@pytest.fixture(params=DRAWN)
 def drawn(request):
     """A robot with its items and the direction on paper of what recedes."""
     name = request.param
     if name not in LAID_OUT:
-        LAID_OUT[name] = lay_out(ROBOTS[name].chain)
-    return ROBOTS[name], *LAID_OUT[name]
+        LAID_OUT[name] = lay_out(DRAWN[name].chain)
+    return DRAWN[name], *LAID_OUT[name]
 
 
 def of(kind, items):
@@ -51,15 +49,9 @@ def test_links_do_not_cross(drawn):
     assert not [pair for pair in combinations(of(Segment, items), 2) if cross(*pair)]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "kuka",
-        "fanuc",
-    ],
-)
+@pytest.mark.parametrize("name", ["kuka", "fanuc"])
 def test_a_robot_is_drawn_at_a_scale_at_which_it_fits_the_drawing(name):
-    items, _ = lay_out(ROBOTS[name].chain)
+    items, _ = lay_out(DRAWN[name].chain)
     places = [place for item in of(Segment, items) for place in (item.start, item.end)]
     assert (np.ptp(places, axis=0) <= DRAWING_MM).all()
 
@@ -111,7 +103,7 @@ def test_a_longer_link_is_not_drawn_shorter_than_one_that_carries_as_many_joints
 
 
 def test_measuring_points_stand_at_their_place_on_the_arm_and_only_an_offset_moves_them():
-    robot = ROBOTS["kuka"]
+    robot = DRAWN["kuka"]
     points = of(Point, LAID_OUT.get("kuka", lay_out(robot.chain))[0])
     assert [point.name for point in points] == [point.name for point in robot.chain.points]
     assert all(np.allclose(point.place, point.node) for point in points)
@@ -122,7 +114,7 @@ def test_measuring_points_stand_at_their_place_on_the_arm_and_only_an_offset_mov
 
 @pytest.mark.parametrize("name, right", [("kuka", 0), ("fanuc", 0), ("pitch about x", 1), ("three axes that meet", 0)])
 def test_the_view_is_that_in_which_most_joints_point_into_the_paper(name, right):
-    view = view_of(ROBOTS[name].chain)
+    view = view_of(DRAWN[name].chain)
     assert view[0, right] == 1 and view[1].tolist() == [0, 0, 1]
     # Right, up and towards the reader are right-handed, so into the paper is the other way.
     np.testing.assert_array_equal(np.cross(view[0], view[1]), -view[2])

@@ -35,6 +35,10 @@ def from_chain(chain):
     return robot_from_document({"name": "made up", "chain": chain, **known})
 
 
+DRAWN = {name: from_file(name) for name in ("kuka", "fanuc", "kuka_extended")}
+DRAWN |= {name: from_chain(chain) for name, chain in CHAINS.items()}
+
+
 def assert_no_overlap(figure):
     renderer = FigureCanvasAgg(figure).get_renderer()
     figure.draw(renderer)
@@ -49,6 +53,6 @@ def assert_no_overlap(figure):
 
 
 def assert_about_160_mm_wide_and_drawn_alike(scheme):
-    first, second = scheme(from_file("kuka_extended")), scheme(from_file("kuka_extended"))
+    first, second = scheme(DRAWN["kuka_extended"]), scheme(DRAWN["kuka_extended"])
     assert first.get_figwidth() * 25.4 == pytest.approx(160, abs=2)
     assert bytes(FigureCanvasAgg(first).print_to_buffer()[0]) == bytes(FigureCanvasAgg(second).print_to_buffer()[0])

@@ -1,5 +1,7 @@
 """Tables of the study made up for its report: two robots, two strategies, round figures."""
 
+from itertools import product
+
 import numpy as np
 import pandas as pd
 
@@ -16,31 +18,30 @@ STATED |= {"cutting_N": 500, "bar_m": 0.5, "acceptance_deg": 30}
 STRATEGIES = ("6DoF", "2DoF+6DoF")
 
 
+def rows_of(**columns):
+    """A row for every combination of what is listed, the first varying slowest."""
+    return pd.DataFrame(product(*columns.values()), columns=[*columns])
+
+
+def for_each_robot(frame):
+    return pd.concat([frame.assign(robot=robot) for robot in TITLES], ignore_index=True)
+
+
 def metrics(noise_um=200.0, nonpositive=0.0, spread=0.1):
     """At 10 and 20 configurations: dev of 6DoF 4 and 2 µm, of the other a quarter; 1 mm before calibration."""
-    rows = []
-    for robot in TITLES:
-        for strategy, part in zip(STRATEGIES, (1.0, 0.25), strict=True):
-            for length in (10, 20):
-                row = {"robot": robot, "noise_um": noise_um, "strategy": strategy, "length": length}
-                row |= {"deviation": part * 40e-6 / length, "deviation_std_error": part * 0.1e-6}
-                row |= {"initial_deviation": 1e-3, "nonpositive_share": nonpositive, "relative_spread": spread}
-                rows.append(row)
-    return pd.DataFrame(rows)
+    frame = rows_of(robot=TITLES, noise_um=[noise_um], strategy=STRATEGIES, length=[10, 20])
+    part = frame.strategy.map(dict(zip(STRATEGIES, (1.0, 0.25), strict=True)))
+    frame = frame.assign(deviation=part * 40e-6 / frame.length, deviation_std_error=part * 0.1e-6)
+    return frame.assign(initial_deviation=1e-3, nonpositive_share=nonpositive, relative_spread=spread)
 
 
 def per_dataset():
     """RMS errors of 6DoF 120 and 60 µm, of the other 80 and 40 µm; at another noise level other figures."""
-    rows = []
-    for noise_um in (200.0, 500.0):
-        for robot in TITLES:
-            for strategy, size in zip(STRATEGIES, (1200.0, 800.0), strict=True):
-                for ds in (10, 20):
-                    rms = size / ds * noise_um / 200.0
-                    row = {"robot": robot, "noise_um": noise_um, "strategy": strategy, "ds": ds, "rms_um": rms}
-                    row |= {"mean_um": 0.9 * rms, "mean_um_std_error": 0.5, "p95_um": 1.5 * rms, "p95_um_std_error": 1.2}
-                    rows.append(row | {"efficiency": 640.0 / size - 0.3, "efficiency_std_error": 0.012})
-    return pd.DataFrame(rows)
+    frame = rows_of(noise_um=[200.0, 500.0], robot=TITLES, strategy=STRATEGIES, ds=[10, 20])
+    size = frame.strategy.map(dict(zip(STRATEGIES, (1200.0, 800.0), strict=True)))
+    frame["rms_um"] = size / frame.ds * frame.noise_um / 200.0
+    frame = frame.assign(mean_um=0.9 * frame.rms_um, mean_um_std_error=0.5, p95_um=1.5 * frame.rms_um, p95_um_std_error=1.2)
+    return frame.assign(efficiency=640.0 / size - 0.3, efficiency_std_error=0.012)
 
 
 def comparison():
@@ -78,14 +79,9 @@ def ladder():
 
 
 def budget():
-    rows = [
-        ("6DoF", 1, 20, 79.0),
-        ("6DoF", 1, 40, 52.0),
-        ("3+6DoF", 2, 20, 57.0),
-    ]
+    rows = [("6DoF", 1, 20, 79.0), ("6DoF", 1, 40, 52.0), ("3+6DoF", 2, 20, 57.0)]
     names = ["points", "measurements_per_configuration", "configurations", "rms_um"]
-    frame = pd.DataFrame(rows, columns=names).assign(std_error_um=0.5, crlb_rms_um=50.0)
-    return pd.concat([frame.assign(robot=robot) for robot in TITLES], ignore_index=True)
+    return for_each_robot(pd.DataFrame(rows, columns=names).assign(std_error_um=0.5, crlb_rms_um=50.0))
 
 
 def pairs():
@@ -95,25 +91,16 @@ def pairs():
 
 def needed():
     names = ["robot", "points", "accuracy_um", "configurations", "configurations_low", "configurations_high"]
-    rows = [
-        ("kuka", "6DoF", 60.0, 32.0, 30.0, 34.0),
-        ("fanuc", "6DoF", 60.0, np.inf, 90.0, np.inf),
-        ("kuka", "6DoF", 40.0, 9, 9, 9),
-    ]
-    frame = pd.DataFrame(rows, columns=names)
+    rows = [("kuka", "6DoF", 60.0, 32.0, 30.0, 34.0), ("fanuc", "6DoF", 60.0, np.inf, 90.0, np.inf)]
+    frame = pd.DataFrame([*rows, ("kuka", "6DoF", 40.0, 9, 9, 9)], columns=names)
     return frame.assign(configurations_by_bound=frame.configurations, measurements=frame.configurations)
 
 
 def designs():
     values = {"random": (200.0, 80.0), "D": (90.0, 45.0), "A": (95.0, 50.0), "I": (88.0, 40.0), "bound": (80.0, 36.0)}
-    parts = [
-        pd.DataFrame({"robot": robot, "design": kind, "configurations": [4, 20], "rms_um": each})
-        for robot in TITLES
-        for kind, each in values.items()
-    ]
-    frame = pd.concat(parts, ignore_index=True)
-    frame = frame.assign(low_um=frame.rms_um, high_um=frame.rms_um)
-    return pd.concat([frame.assign(joint_range=name) for name in ("full_turn", "limits")], ignore_index=True)
+    frame = rows_of(joint_range=["full_turn", "limits"], robot=TITLES, design=values, configurations=[4, 20])
+    rms = [values[design][size == 20] for design, size in zip(frame.design, frame.configurations, strict=True)]
+    return frame.assign(rms_um=rms, low_um=rms, high_um=rms)
 
 
 def places():
@@ -121,8 +108,7 @@ def places():
     rows = [(1, 1.5, "+y", 1.40, 50.0, 15.0), (1, 1.5, "-y", 1.42, 0.0, 0.0), (6, 3.0, "flange", 1.06, 30.0, 4.0)]
     rows += [(6, 3.0, "bar +y", 1.05, 40.0, 5.0)]
     frame = pd.DataFrame(rows, columns=["joints", "along_m", "side", "ratio", "seen_turned_percent", "seen_fixed_percent"])
-    frame = frame.assign(ratio_low=frame.ratio - 0.02, ratio_high=frame.ratio + 0.02)
-    return pd.concat([frame.assign(robot=robot) for robot in TITLES], ignore_index=True)
+    return for_each_robot(frame.assign(ratio_low=frame.ratio - 0.02, ratio_high=frame.ratio + 0.02))
 
 
 def tubes():
@@ -133,26 +119,20 @@ def tubes():
 
 def strategy_scores():
     """A staged strategy that is worse by every metric but the sum over the joints that its last stage fixes."""
-    rows = []
-    for robot in TITLES:
-        for metric in METRIC_NAMES:
-            staged = 0.5 if metric.endswith("fixed_joints") else 1.2
-            for strategy, ratio, half in (("6DoF", 1.0, 0.0), ("staged", staged, 0.05)):
-                rank = 1 + ((ratio > 1) if staged > 1 else (ratio == 1))
-                rows.append((robot, metric, strategy, 75.0 * ratio, 0.5, ratio, ratio - half, ratio + half, int(rank)))
-    names = ["robot", "metric", "strategy", "value", "value_std_error", "ratio", "ratio_low", "ratio_high", "rank"]
-    return pd.DataFrame(rows, columns=names)
+    frame = rows_of(robot=TITLES, metric=METRIC_NAMES, strategy=["6DoF", "staged"])
+    better, staged = frame.metric.str.endswith("fixed_joints"), frame.strategy == "staged"
+    ratio = np.where(staged, np.where(better, 0.5, 1.2), 1.0)
+    frame = frame.assign(value=75.0 * ratio, value_std_error=0.5, ratio=ratio)
+    half = np.where(staged, 0.05, 0.0)
+    return frame.assign(ratio_low=ratio - half, ratio_high=ratio + half, rank=np.where(staged == better, 1, 2))
 
 
 def score_pairs():
-    rows = []
-    for robot in TITLES:
-        for metric in METRIC_NAMES:
-            turned = metric.endswith("fixed_joints") and robot == "kuka"
-            ratio = (2.0, 1.5, 2.5) if turned else (0.83, 0.80, 0.86)
-            rows.append((robot, metric, "6DoF", "staged", *ratio, 0.83, 0.80, 0.86, turned))
-    names = ["robot", "metric", "strategy", "other", "ratio", "ratio_low", "ratio_high"]
-    return pd.DataFrame(rows, columns=[*names, "rms_ratio", "rms_ratio_low", "rms_ratio_high", "reversed"])
+    frame = rows_of(robot=TITLES, metric=METRIC_NAMES, strategy=["6DoF"], other=["staged"])
+    turned = frame.metric.str.endswith("fixed_joints") & (frame.robot == "kuka")
+    for name, usual, other in (("ratio", 0.83, 2.0), ("ratio_low", 0.80, 1.5), ("ratio_high", 0.86, 2.5)):
+        frame[name], frame[f"rms_{name}"] = np.where(turned, other, usual), usual
+    return frame.assign(reversed=turned)
 
 
 def observability():
@@ -180,19 +160,15 @@ def weighting():
 
 def measured():
     """Table 4 over studies: the second strategy has a quarter of dev; averages of compliances and reflectors round figures."""
-    rows = []
-    for robot in TITLES:
-        for kind, factor in (("pose", 1.0), ("one reflector", 10.0), ("three reflectors", 0.5)):
-            for average, part in (("stiffness", 1.0), ("compliance", 0.25)):
-                for strategy, share in zip(STRATEGIES, (1.0, 0.25), strict=True):
-                    row = {"robot": robot, "strategy": strategy, "measured": kind, "average": average}
-                    for name, size in (("k_sigma", 4.0), ("k_sigma_fixed_joints", 2.0)):
-                        row |= {f"{name}_20_percent": size * factor * part, f"{name}_20_percent_std": 0.4}
-                        row |= {f"n_{name}_1_percent": 80.0 * factor, f"n_{name}_1_percent_std": 20.0}
-                    row |= {"dev_20_um": 8.0 * factor * part * share, "dev_20_um_std": 0.8}
-                    row |= {"n_dev_2_um": 90.0, "n_dev_2_um_std": 9.0, "rms_20_um": 80.0 * factor, "rms_20_um_std": 1.0}
-                    rows.append(row)
-    return pd.DataFrame(rows)
+    factors = {"pose": 1.0, "one reflector": 10.0, "three reflectors": 0.5}
+    frame = rows_of(robot=TITLES, measured=factors, average=["stiffness", "compliance"], strategy=STRATEGIES)
+    factor, part = frame.measured.map(factors), np.where(frame.average == "stiffness", 1.0, 0.25)
+    share = np.where(frame.strategy == STRATEGIES[0], 1.0, 0.25)
+    for name, size in (("k_sigma", 4.0), ("k_sigma_fixed_joints", 2.0)):
+        frame[f"{name}_20_percent"], frame[f"{name}_20_percent_std"] = size * factor * part, 0.4
+        frame[f"n_{name}_1_percent"], frame[f"n_{name}_1_percent_std"] = 80.0 * factor, 20.0
+    frame = frame.assign(dev_20_um=8.0 * factor * part * share, dev_20_um_std=0.8, n_dev_2_um=90.0, n_dev_2_um_std=9.0)
+    return frame.assign(rms_20_um=80.0 * factor, rms_20_um_std=1.0)
 
 
 def joint():
@@ -212,55 +188,43 @@ def claims():
 
 def break_even():
     row = {"accuracy_um": 60.0, "points": "3+6DoF", "against": "6DoF", "configurations": 18.2, "configurations_against": 31.7}
-    row |= {"break_even": 0.35, "break_even_low": 0.2, "break_even_high": np.inf}
-    return pd.DataFrame([row | {"robot": robot} for robot in TITLES])
+    return for_each_robot(pd.DataFrame([row | {"break_even": 0.35, "break_even_low": 0.2, "break_even_high": np.inf}]))
 
 
 def costs():
     rows = [("6DoF", 0.1, True), ("3+6DoF", 0.1, False), ("6DoF", 1.0, False), ("3+6DoF", 1.0, True)]
     frame = pd.DataFrame(rows, columns=["points", "configuration_cost", "cheapest"])
-    frame = frame.assign(cost=50.0, ratio=1.0, ratio_low=0.9, ratio_high=1.1)
-    return pd.concat([frame.assign(robot=robot) for robot in TITLES], ignore_index=True)
+    return for_each_robot(frame.assign(cost=50.0, ratio=1.0, ratio_low=0.9, ratio_high=1.1))
 
 
 def simulated():
-    rows = []
-    for robot in TITLES:
-        for load, hidden in (("random", np.nan), ("hanging", "1")):
-            for size in (6, 20):
-                for design, rms in (("random", 140.0), ("D", 66.0), ("A", 65.0), ("I", 59.0), ("test pose", 140.0)):
-                    row = {"robot": robot, "load": load, "design": design, "configurations": size, "unobservable": hidden}
-                    row |= {"rms_um": rms * 6 / size + 20, "rms_um_std_error": 0.8, "at_test_pose_um": rms, "gain": 140 / rms}
-                    rows.append(row)
-    return pd.DataFrame(rows)
+    rms = {"random": 140.0, "D": 66.0, "A": 65.0, "I": 59.0, "test pose": 140.0}
+    frame = rows_of(robot=TITLES, load=["random", "hanging"], configurations=[6, 20], design=rms)
+    there = frame.design.map(rms)
+    frame = frame.assign(unobservable=frame.load.map({"random": np.nan, "hanging": "1"}), at_test_pose_um=there)
+    return frame.assign(rms_um=there * 6 / frame.configurations + 20, rms_um_std_error=0.8, gain=140 / there)
 
 
 def few():
-    rows = []
-    for robot in TITLES:
-        for strategy, errors in (("6DoF", (10.0, 100.0)), ("6DoF shrunk", (10.0, 100.0))):
-            for error in errors:
-                for length in (2, 3, 10):
-                    rms = 1000.0 / length * (error / 100 if "shrunk" in strategy else 1)
-                    row = {"robot": robot, "nominal_error_percent": error, "strategy": strategy, "configurations": length}
-                    rows.append(row | {"rms_um": rms, "rms_um_std_error": 1.0, "median_um": rms})
-    return pd.DataFrame(rows)
+    frame = rows_of(
+        robot=TITLES, strategy=["6DoF", "6DoF shrunk"], nominal_error_percent=[10.0, 100.0], configurations=[2, 3, 10]
+    )
+    shrunk = np.where(frame.strategy == "6DoF shrunk", frame.nominal_error_percent / 100, 1.0)
+    rms = 1000.0 / frame.configurations * shrunk
+    return frame.assign(rms_um=rms, rms_um_std_error=1.0, median_um=rms)
 
 
 def kinds():
-    rows = []
-    for robot in TITLES:
-        for kind, scalars, lengths in (("pose", 6, (20,)), ("one reflector", 3, (20, 40))):
-            for length in lengths:
-                row = {"robot": robot, "kind": kind, "scalars_per_configuration": scalars, "configurations": length}
-                rows.append(row | {"scalars": scalars * length, "rms_um": 1600.0 / length, "rms_um_std_error": 0.5})
-    return pd.DataFrame(rows)
+    rows = [("pose", 6, 20), ("one reflector", 3, 20), ("one reflector", 3, 40)]
+    frame = pd.DataFrame(rows, columns=["kind", "scalars_per_configuration", "configurations"])
+    frame = frame.assign(scalars=frame.scalars_per_configuration * frame.configurations, rms_um=1600.0 / frame.configurations)
+    return for_each_robot(frame.assign(rms_um_std_error=0.5))
 
 
 def stiffness():
     row = {"force_N": 1000.0, "softest_N_per_um": 0.79, "first_order_percent": 0.05, "loaded_percent": 0.055}
     row |= {"by_k_c_percent": 0.06, "bias_percent": 0.02, "k_sigma_percent": 0.02, "offset_rank": 5, "rank": 6}
-    return pd.DataFrame([row | {"robot": robot} for robot in TITLES])
+    return for_each_robot(pd.DataFrame([row]))
 
 
 def question_facts():

@@ -5,43 +5,31 @@ from support import chain_of, refused
 
 from elastocal.study.strategies import check_strategy, drop_forgotten_stages, strategy_from_document
 
-FIXED_JOINTS = {
-    "6DoF": (0, 1, 2, 3, 4, 5),
-    "6DoF-after-3DoF": (0, 1, 2, 3, 4, 5),
-    "4-6DoF-after-3DoF": (0, 1, 2),
-    "6DoF-after-3+3DoF": (0, 1, 2, 3, 4, 5),
-    "3+6DoF-comb": (0, 1, 2, 3, 4, 5),
-    "4-6DoF-after-6+3DoF": (0, 1, 2),
-    "3-6DoF-after-2DoF": (0, 1),
-    "5-6DoF-after-4DoF": (0, 1, 2, 3),
-}
-POINTS = {
-    "6DoF": {"6DoF"},
-    "6DoF-after-3DoF": {"3DoF", "6DoF"},
-    "4-6DoF-after-3DoF": {"3DoF", "6DoF"},
-    "6DoF-after-3+3DoF": {"3DoF", "6DoF"},
-    "3+6DoF-comb": {"3DoF", "6DoF"},
-    "4-6DoF-after-6+3DoF": {"3DoF", "6DoF"},
-    "3-6DoF-after-2DoF": {"2DoF", "6DoF"},
-    "5-6DoF-after-4DoF": {"4DoF", "6DoF"},
+ALL = (0, 1, 2, 3, 4, 5)
+# Joints that the last stage takes over, else all, and points that are measured.
+PAPERS = {
+    "6DoF": (ALL, {"6DoF"}),
+    "6DoF-after-3DoF": (ALL, {"3DoF", "6DoF"}),
+    "4-6DoF-after-3DoF": ((0, 1, 2), {"3DoF", "6DoF"}),
+    "6DoF-after-3+3DoF": (ALL, {"3DoF", "6DoF"}),
+    "3+6DoF-comb": (ALL, {"3DoF", "6DoF"}),
+    "4-6DoF-after-6+3DoF": ((0, 1, 2), {"3DoF", "6DoF"}),
+    "3-6DoF-after-2DoF": ((0, 1), {"2DoF", "6DoF"}),
+    "5-6DoF-after-4DoF": ((0, 1, 2, 3), {"4DoF", "6DoF"}),
 }
 
 
 def test_the_repository_has_the_eight_strategies_of_the_paper(strategies):
-    assert set(strategies) == set(FIXED_JOINTS)
+    assert set(strategies) == set(PAPERS)
     for file, strategy in strategies.items():
         assert strategy.name.replace(" ", "-") == file
 
 
-@pytest.mark.parametrize("name", FIXED_JOINTS)
-def test_fixed_joints_are_those_that_the_last_stage_takes_over(strategies, name):
-    assert strategies[name].fixed_joints == FIXED_JOINTS[name]
-
-
-@pytest.mark.parametrize("name", POINTS)
-def test_points_are_those_that_the_paper_measures_each_once(strategies, name):
-    points = strategies[name].points
-    assert set(points) == POINTS[name] and len(points) == len(set(points))
+@pytest.mark.parametrize("name", PAPERS)
+def test_fixed_joints_are_those_that_the_last_stage_takes_over_and_each_point_is_named_once(strategies, name):
+    fixed, points = PAPERS[name]
+    assert strategies[name].fixed_joints == fixed
+    assert set(strategies[name].points) == points and len(strategies[name].points) == len(points)
 
 
 def test_a_stage_that_identifies_every_joint_forgets_those_before_it(strategies):
@@ -61,6 +49,7 @@ def test_joints_count_from_one_in_the_file_and_from_zero_inside():
     assert (stage.points, stage.identified, stage.fixed) == (("A",), (1, 2), (0,))
 
 
+CHAIN = chain_of("Rz(q1) Tx(1) Ry(q2) Tx(1) [A] Ry(q3) Tx(1) [B]")
 STAGED = [{"points": ["A"], "joints": [1, 2]}, {"points": ["B"], "joints": [3], "held": [1, 2]}]
 
 
@@ -85,13 +74,11 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faulty_strategy_is_refused_in_one_line(fault):
-    chain = chain_of("Rz(q1) Tx(1) Ry(q2) Tx(1) [A] Ry(q3) Tx(1) [B]")
     documents, key, words = FAULTS[fault]
     strategy = strategy_from_document({"name": fault, "stages": documents})
     with refused("strategies/x.yaml", f"{key}:", *words):
-        check_strategy(strategy, chain, "strategies/x.yaml")
+        check_strategy(strategy, CHAIN, "strategies/x.yaml")
 
 
 def test_a_strategy_without_fault_is_accepted():
-    chain = chain_of("Rz(q1) Tx(1) Ry(q2) Tx(1) [A] Ry(q3) Tx(1) [B]")
-    check_strategy(strategy_from_document({"name": "staged", "stages": STAGED}), chain, "x")
+    check_strategy(strategy_from_document({"name": "staged", "stages": STAGED}), CHAIN, "x")

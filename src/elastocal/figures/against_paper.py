@@ -1,20 +1,14 @@
 """Figures that hold the study against the paper's printed figures."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 
 from elastocal.figures.style import PALETTE, note, panels, styled
 from elastocal.study.printed import LEVEL
 from elastocal.study.tables import find_statistics
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 MILLI = 1e3
 _HEADS = {
@@ -40,17 +34,9 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
         for axis, quantity in zip(line, quantities, strict=True):
             cells = shown[(shown.robot == robot) & (shown.quantity == quantity)]
             rows = [strategies.index(strategy) for strategy in cells.strategy]
-            axis.errorbar(
-                cells.studies_mean,
-                rows,
-                xerr=2 * cells.studies_std,
-                fmt="o",
-                color=PALETTE[0],
-                markersize=3,
-                elinewidth=3,
-                alpha=0.6,
-                label="further studies, mean ± 2 standard deviations",
-            )
+            look = {"color": PALETTE[0], "markersize": 3, "elinewidth": 3, "alpha": 0.6}
+            name = "further studies, mean ± 2 standard deviations"
+            axis.errorbar(cells.studies_mean, rows, xerr=2 * cells.studies_std, fmt="o", label=name, **look)
             expected = _read_expected(expectations, robot, quantity)
             axis.plot(expected, [strategies.index(name) for name in expected.index], "|", color="black", markersize=8)
             for differs, colour, name in ((False, "white", "paper"), (True, PALETTE[1], "paper, differs (Holm)")):
@@ -62,12 +48,8 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
         line[0].set(yticks=range(len(strategies)), ylabel=title)
         line[0].set_yticklabels(strategies)
     handles = dict(zip(*reversed(axes[0, 0].get_legend_handles_labels()), strict=True))
-    figure.legend(
-        [*handles.values(), *axes[0, 0].lines[-3:-2]],
-        [*handles.keys(), "expectation in closed form"],
-        loc="outside lower center",
-        ncols=2,
-    )
+    handles["expectation in closed form"] = axes[0, 0].lines[-3]
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=2)
     return figure
 
 
@@ -95,9 +77,8 @@ def table2_samples(initial: Mapping[str, pd.DataFrame], reference: pd.DataFrame,
             axis.plot([q1, q3], [index, index], color=PALETTE[index], linewidth=5, solid_capstyle="butt")
             axis.plot(middle, index, "o", color="white", markersize=3)
             if (robot, f"deviation_{quantity}") in printed.index:
-                axis.plot(
-                    printed[robot, f"deviation_{quantity}"], index, "D", color="black", markersize=4, label="paper, Table 2"
-                )
+                there = printed[robot, f"deviation_{quantity}"]
+                axis.plot(there, index, "D", color="black", markersize=4, label="paper, Table 2")
         axis.set(title=quantity, xlabel="mm", yticks=range(len(initial)), ylim=(len(initial) - 0.5, -0.5), xlim=(0, None))
         axis.set_yticklabels([titles[robot] for robot in initial] if axis is axes[0, 0] else [])
         axis.grid(visible=False, axis="y")

@@ -1,21 +1,16 @@
 """What a second target is worth at every place of the arm, and how often a tracker sees it there."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from elastocal.figures.style import panels, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import pandas as pd
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 # Light to dark, so that it prints in grey.
 _COLOURS = "viridis_r"
@@ -54,21 +49,10 @@ def _draw_arm(axis: Axes, cells: pd.DataFrame, corners: np.ndarray, scale: Norma
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     on_links = cells[~cells.side.str.startswith("bar")]
     for joints, link in on_links.groupby("joints"):
-        by_place = link.groupby("along_m")[["ratio", "seen_turned_percent"]].agg(
-            {"ratio": "mean", "seen_turned_percent": "max"}
-        )
+        by_place = link.groupby("along_m").agg({"ratio": "mean", "seen_turned_percent": "max"})
         places = np.column_stack([np.interp(by_place.index, way, column) for column in plane.T])
-        axis.scatter(
-            places[:, 0],
-            places[:, 1],
-            c=by_place.ratio,
-            cmap=_COLOURS,
-            norm=scale,
-            s=34,
-            edgecolors="black",
-            linewidths=0.6,
-            zorder=2,
-        )
+        edge: dict[str, Any] = {"s": 34, "edgecolors": "black", "linewidths": 0.6, "zorder": 2}
+        axis.scatter(*places.T, c=by_place.ratio, cmap=_COLOURS, norm=scale, **edge)
         # One of a link tells of its neighbours.
         chosen = len(by_place) - 1 if joints == cells.joints.max() else len(by_place) // 2
         words = f"{by_place.ratio.iloc[chosen]:.2f}, seen {by_place.seen_turned_percent.iloc[chosen]:.0f} %"

@@ -1,13 +1,9 @@
 """A robot as it is seen from the side and a little from above, with its shadow on the plane of its base."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from matplotlib.axes import Axes
 
 _AZIMUTH, _ELEVATION = np.radians(-60.0), np.radians(20.0)
 _ARM, _EDGE, _SHADOW = "#8d9aa5", "#55636e", "#e3e3e3"

@@ -1,24 +1,19 @@
 """Errors on held-out poses, model by model."""
 
-from __future__ import annotations
-
 import textwrap
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from elastocal.diagnosis.words import in_words
 from elastocal.figures.residuals import MICRO, MILLI
 from elastocal.figures.style import PALETTE, panels, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
 LOOKS = {
@@ -30,6 +25,7 @@ LOOKS = {
 # Beyond this ratio the smallest bars would be lost on a linear axis.
 _LARGEST_RATIO = 25
 _LINE = 26
+_DIAMOND: dict[str, Any] = {"linestyle": "", "marker": "D", "color": "white", "markeredgecolor": "black", "markersize": 3.4}
 
 
 @styled
@@ -54,7 +50,7 @@ def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
             value, low, high = (scale * step[f"heldout_{metric}_m{end}"] for end in ("", "_low", "_high"))
             axis.barh(row, value, height=0.42, color=LOOKS[step["kind"]][0])
             _interval(axis, value, low, high, row)
-            axis.plot(scale * step[f"train_{metric}_m"], row, "D", color="white", markeredgecolor="black", markersize=3.4)
+            axis.plot(scale * step[f"train_{metric}_m"], row, **_DIAMOND)
         if noise_floor_m:
             axis.axvline(scale * noise_floor_m, color="black", linestyle=":", linewidth=1.2, gid="noise floor")
         axis.set(title=title, xlabel=f"error ({unit})")
@@ -88,11 +84,7 @@ def step_name(name: str, most: int = 3) -> str:
 def _legend(kinds: Collection[str], noise_floor_m: float | None) -> list[Artist]:
     handles: list[Artist] = [Patch(color=color, label=label) for kind, (color, label) in LOOKS.items() if kind in kinds]
     handles.append(Line2D([], [], color="black", linewidth=1.1, label="95 % interval over poses"))
-    handles.append(
-        Line2D(
-            [], [], linestyle="", marker="D", color="white", markeredgecolor="black", markersize=3.4, label="on fitted poses"
-        )
-    )
+    handles.append(Line2D([], [], **_DIAMOND, label="on fitted poses"))
     if noise_floor_m:
         handles.append(Line2D([], [], color="black", linestyle=":", linewidth=1.2, label="RMS that noise alone leaves"))
     return handles

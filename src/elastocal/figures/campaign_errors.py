@@ -1,17 +1,11 @@
 """Held-out errors of several campaigns, before and after, on one axis."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 
 from elastocal.counting import counted
 from elastocal.figures.style import PALETTE, label_decades, panels, styled
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 _STAGES = (("before", "declared model", PALETTE[1]), ("after", "with the effects found", PALETTE[0]))
 
@@ -36,9 +30,8 @@ def campaign_errors(table: pd.DataFrame) -> Figure:
     # A campaign with two sessions has two lines.
     names = names.where(~names.duplicated(keep=False), names + ", " + table["poses"].map(lambda count: counted(count, "pose")))
     axis.set_yticks(rows, names)
-    axis.set_xscale("log")
+    axis.set(xscale="log", xlabel="RMS position error of held-out poses (mm), with 95 % intervals")
     label_decades(axis.xaxis)
-    axis.set_xlabel("RMS position error of held-out poses (mm), with 95 % intervals")
     axis.grid(visible=False, axis="y")
     figure.legend(loc="outside lower center", ncols=2)
     return figure

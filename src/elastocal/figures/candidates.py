@@ -1,23 +1,18 @@
 """What may be missing in a model: probabilities of hypotheses, candidates one by one, and which of them contribute alike."""
 
-from __future__ import annotations
-
 import textwrap
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from elastocal.diagnosis.words import candidate_words, hypotheses_words
 from elastocal.effects.protocol import at_shapes
 from elastocal.figures.style import PALETTE, ink_on, note, panels, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
 # Hypotheses and candidates with a bar of their own.

@@ -1,16 +1,11 @@
 """The frames of Denavit-Hartenberg rows on a robot, as a picture."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from elastocal.figures.style import PALETTE, WIDTH_MM, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 _AXES = ("x", "y", "z")
 _COLORS = (PALETTE[1], PALETTE[2], PALETTE[0])
@@ -47,15 +42,9 @@ def dh_frames_picture(frames: np.ndarray, robot: str, names: Sequence[str]) -> F
         axis.text(origin[0], origin[1], origin[2] + 0.6 * length, ", ".join(those), fontsize=7.5, ha="center")
     middle = 0.5 * (origins.min(axis=0) + origins.max(axis=0))
     half = 0.5 * span + length
-    axis.set(
-        xlim=(middle[0] - half, middle[0] + half),
-        ylim=(middle[1] - half, middle[1] + half),
-        zlim=(middle[2] - half, middle[2] + half),
-        xlabel="x of the base (m)",
-        ylabel="y of the base (m)",
-        zlabel="z of the base (m)",
-        title=f"{robot}: numbered frames where the controller reports zero; joint k turns about z of frame k - 1",
-    )
+    for name, centre in zip(_AXES, middle, strict=True):
+        axis.set(**{f"{name}lim": (centre - half, centre + half), f"{name}label": f"{name} of the base (m)"})
+    axis.set_title(f"{robot}: numbered frames where the controller reports zero; joint k turns about z of frame k - 1")
     axis.set_box_aspect((1, 1, 1), zoom=1.1)
     axis.locator_params(nbins=5)
     axis.view_init(elev=18, azim=-62)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 from elastocal.effects.catalogue import effects
 from elastocal.effects.conditions import conditions_of
@@ -181,7 +182,5 @@ def _lines(axes: Axes, along: np.ndarray, moved: np.ndarray, dashes: str, label:
 
 def _dashes(axes: Axes) -> list:
     """One grey line for each kind of dashes; the colours are those of the last panel."""
-    from matplotlib.lines import Line2D
-
     kinds = {line.get_linestyle(): line.get_label() for line in axes.lines[::3]}
     return [Line2D([], [], color="#4D4D4D", linestyle=dashes, label=label) for dashes, label in kinds.items()]

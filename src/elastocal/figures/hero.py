@@ -41,13 +41,11 @@ def arm_with_errors(robot: Robot, table: Mapping[str, np.ndarray], heldout: Mapp
             axis.plot(*project_view(arm).T, color="#dde2e6", lw=1.2, zorder=0)
         draw_arm(axis, links, 11)
         start, tip = project_view(at), project_view(at + _TIMES * off)
-        axis.quiver(
-            *start.T, *(tip - start).T, angles="xy", scale_units="xy", scale=1, color=color, width=0.005, zorder=3, gid=stage
-        )
+        look = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.005, "zorder": 3}
+        axis.quiver(*start.T, *(tip - start).T, color=color, gid=stage, **look)
         axis.update_datalim(tip)
-        axis.set_title(
-            f"{1e3 * heldout[stage]['rms_m']:.2f} mm", fontsize=17, fontweight="bold", color=color, loc="left", pad=14
-        )
+        error = f"{1e3 * heldout[stage]['rms_m']:.2f} mm"
+        axis.set_title(error, fontsize=17, fontweight="bold", color=color, loc="left", pad=14)
         axis.text(0, 1.015, words, transform=axis.transAxes, fontsize=9, color="#444444")
         axis.set_aspect("equal")
         axis.set_axis_off()

@@ -54,23 +54,18 @@ def _view(axis: Axes, robot: Robot, cell: Cell, plan: Plan, across: int, up: int
         axis.plot(at[:, across], at[:, up], "os"[number], color=PALETTE[number], ms=3.5, label=name, zorder=2)
     for number, box in enumerate(cell.boxes):
         size = box[:, 1] - box[:, 0]
-        corner = box[across, 0], box[up, 0]
-        axis.add_patch(_rectangle(corner, size[across], size[up], "kept out of" if number == 0 else None))
+        look = {"facecolor": "#f2d7c9", "edgecolor": "#D55E00", "lw": 0.6, "zorder": 0}
+        label = "kept out of" if number == 0 else None
+        axis.add_patch(Rectangle((box[across, 0], box[up, 0]), size[across], size[up], label=label, **look))
     if cell.tracker_m is not None:
         axis.plot(cell.tracker_m[across], cell.tracker_m[up], "^", color=PALETTE[2], ms=6, label="tracker")
     axis.plot(0.0, 0.0, "k+", ms=8, label="base")
+    axis.set(xlabel=f"{'xyz'[across]} (m)", ylabel=f"{'xyz'[up]} (m)")
     axis.set_aspect("equal", adjustable="box")
-    axis.set_xlabel(f"{'xyz'[across]} (m)")
-    axis.set_ylabel(f"{'xyz'[up]} (m)")
     # Boxes may stand for a floor without an end: the arm says what is shown.
     reach = max(np.abs(link_points(robot, robot.model_angles(plan.fitted.joint_angles))).max(), 0.1)
     shown = [reach] if cell.tracker_m is None else [reach, float(np.abs(cell.tracker_m).max())]
-    axis.set_xlim(-1.1 * reach, 1.1 * max(shown))
-    axis.set_ylim(-1.1 * reach, 1.1 * reach)
-
-
-def _rectangle(corner: tuple[float, float], width: float, height: float, label: str | None) -> Rectangle:
-    return Rectangle(corner, width, height, facecolor="#f2d7c9", edgecolor="#D55E00", lw=0.6, label=label, zorder=0)
+    axis.set(xlim=(-1.1 * reach, 1.1 * max(shown)), ylim=(-1.1 * reach, 1.1 * reach))
 
 
 def _curves(axis: Axes, plan: Plan) -> None:
@@ -80,13 +75,11 @@ def _curves(axis: Axes, plan: Plan) -> None:
     axis.plot(count, middle, color=PALETTE[1], label="random poses, 5 to 95 %")
     axis.plot(count, 1e3 * plan.accuracy_m, color=PALETTE[0], label="this plan")
     # With too few poses hardly anything is known: nobody measures so few.
-    axis.set_ylim(0.5e3 * plan.accuracy_m[-1], _SHOWN_TIMES * 1e3 * plan.accuracy_m[-1])
-    axis.set_yscale("log")
+    end = 1e3 * plan.accuracy_m[-1]
+    axis.set(ylim=(0.5 * end, _SHOWN_TIMES * end), yscale="log", title="what each pose is worth")
+    axis.set(xlabel="poses", ylabel="position error left, RMS (mm)")
     label_decades(axis.yaxis)
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axis.set_xlabel("poses")
-    axis.set_ylabel("position error left, RMS (mm)")
-    axis.set_title("what each pose is worth")
     # Below the axis: the curves fill the panel.
     axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2))
 
@@ -112,9 +105,8 @@ def pose_pictures(robot: Robot, plan: Plan) -> list[Figure]:
             draw_arm(axis, links[pose], 3.0)
             axis.plot(*arms[pose][-1], "os"[judged], color=PALETTE[judged], ms=5)
             if force[pose].any():
-                axis.annotate(
-                    "", arms[pose][-1] + _PULL * half * pull[pose], arms[pose][-1], arrowprops={"arrowstyle": "->", "lw": 1.0}
-                )
+                tip = arms[pose][-1] + _PULL * half * pull[pose]
+                axis.annotate("", tip, arms[pose][-1], arrowprops={"arrowstyle": "->", "lw": 1.0})
             axis.set_title(f"{pose + 1}{' held out' if judged else ''}", fontsize=8, loc="left", pad=1)
             axis.set(xlim=middle[0] + np.array([-half, half]), ylim=middle[1] + np.array([-half, half]), aspect="equal")
         figures.append(figure)

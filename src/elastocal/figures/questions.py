@@ -1,20 +1,14 @@
 """Figures of the research questions: springs that pay, points at an equal budget, chosen configurations, metrics."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from elastocal.figures.style import PALETTE, label_decades, line_style, note, panels, styled
 from elastocal.study.budget_tables import QUANTILE
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 _DESIGNS = {"random": "random", "A": "A-optimal", "D": "D-optimal", "I": "I-optimal", "bound": "bound of all designs"}
 

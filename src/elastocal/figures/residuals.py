@@ -1,21 +1,17 @@
 """Residuals of a campaign, before and after: against what the robot did, and as arrows where it stood."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from elastocal.figures.arm_map import draw_links
 from elastocal.figures.style import PALETTE, note, panels, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MICRO, MILLI = 1e6, 1e3
 _STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
@@ -112,11 +108,8 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
         axis.set_anchor("N")
         axis.set_axisbelow(True)
     _scale_arrow(axes[0, 1], largest, length)
-    which = (
-        f"one state of each cell of {1e3 * cell_m:g} mm, that of the middle residual"
-        if cell_m
-        else "each arrow: mean of the repeats"
-    )
+    of_cells = f"one state of each cell of {1e3 * (cell_m or 0.0):g} mm, that of the middle residual"
+    which = of_cells if cell_m else "each arrow: mean of the repeats"
     handles = [Line2D([], [], color=_STAGES[stage][1], linewidth=2, label=_STAGES[stage][0]) for stage in stages]
     figure.legend(handles=handles, title=which, loc="outside lower center", ncols=2)
     return figure
@@ -249,11 +242,11 @@ def _legend(stages: Iterable[str], with_held_out: bool) -> list[Line2D]:
 
 def _states(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Mean place and residuals of each state and target."""
-    keys = np.column_stack([table[name] for name in ("held_out", "session", "pose", "load", "target")])
-    _, state = np.unique(keys, axis=0, return_inverse=True)
-    place = _means(state.ravel(), np.column_stack([table[axis] for axis in "xyz"]))
-    off = {stage: np.column_stack([table[f"{stage}_d{axis}"] for axis in "xyz"]) for stage in _STAGES}
-    return place, {stage: _means(state.ravel(), values) for stage, values in off.items()}
+    keys = ["held_out", "session", "pose", "load", "target"]
+    seen = [*"xyz", *(f"{stage}_d{axis}" for stage in _STAGES for axis in "xyz")]
+    means = pd.DataFrame({name: table[name] for name in keys + seen}).groupby(keys, dropna=False, observed=True).mean()
+    off = {stage: means[[f"{stage}_d{axis}" for axis in "xyz"]].to_numpy() for stage in _STAGES}
+    return means[[*"xyz"]].to_numpy(), off
 
 
 def _cell_side(extent: np.ndarray) -> float:
@@ -261,11 +254,6 @@ def _cell_side(extent: np.ndarray) -> float:
     side = extent.max() / _CELLS
     digit = 10.0 ** np.floor(np.log10(side))
     return float(np.ceil(side / digit) * digit)
-
-
-def _means(group: np.ndarray, values: np.ndarray) -> np.ndarray:
-    counts = np.bincount(group)
-    return np.column_stack([np.bincount(group, column) / counts for column in values.T])
 
 
 def _scale_arrow(axis: Axes, largest: float, length: float) -> None:

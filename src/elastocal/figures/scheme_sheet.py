@@ -1,21 +1,16 @@
 """The sheet of paper that both schemes of a robot are drawn on: strokes, texts, labels that find room, the legend."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.patches import FancyBboxPatch
+from matplotlib.text import Text
 from matplotlib.textpath import TextPath
 
 from elastocal.figures.style import PALETTE
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from matplotlib.text import Text
 
 WIDTH_MM = 160.0
 MARGIN_MM = 3.0
@@ -54,8 +49,8 @@ class Sheet:
 
     def text(self, place: Place, text: str, **style: Any) -> Text:
         """A text, centred on its place by default."""
-        style = {"ha": "center", "va": "center", "fontproperties": _FONT, "color": INK, "zorder": 8, **style}
-        return self.axes.text(place[0], place[1], text, **style)
+        usual: dict[str, Any] = {"ha": "center", "va": "center", "fontproperties": _FONT, "color": INK, "zorder": 8}
+        return self.axes.text(place[0], place[1], text, **usual | style)
 
     def label(
         self,
@@ -79,16 +74,8 @@ class Sheet:
             self.take(anchor, leader, 0.2)
         if frame:
             corner, extent = box[:2] + 0.3, size - 0.6
-            rounded = FancyBboxPatch(
-                (corner[0], corner[1]),
-                extent[0],
-                extent[1],
-                boxstyle="round,pad=0,rounding_size=0.8",
-                fc="white",
-                ec=frame,
-                lw=1.0,
-            )
-            rounded.set(zorder=7, gid=f"{gid}-box")
+            rounded = FancyBboxPatch((corner[0], corner[1]), *extent, boxstyle="round,pad=0,rounding_size=0.8")
+            rounded.set(fc="white", ec=frame, lw=1.0, zorder=7, gid=f"{gid}-box")
             self.axes.add_patch(rounded)
         self.text(centre, text, gid=gid)
 

@@ -1,20 +1,15 @@
 """Figures that compare strategies and noise levels over the data set length."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from elastocal.figures.style import PALETTE, label_decades, line_style, panels, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    import pandas as pd
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MICRO = 1e6
 # Of the linear panels of the noise impact: what a reader compares with the wanted accuracy.
@@ -120,9 +115,8 @@ def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[s
         column[1].set_xlabel(_LENGTH)
     axes[0, 0].set_ylabel(r"$k_\Sigma$ of the fixed joints (%)")
     axes[1, 0].set_ylabel("dev, equation 15 (µm)")
-    _legend_below(
-        figure, axes, "bands: ± one standard deviation between studies; one estimator under several names is drawn once"
-    )
+    spread = "bands: ± one standard deviation between studies"
+    _legend_below(figure, axes, f"{spread}; one estimator under several names is drawn once")
     return figure
 
 
@@ -145,9 +139,8 @@ def bias_and_accuracy(
             axis.plot(single.ds, single.rms_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, RMS")
             bound = {"color": "black", "marker": "_", "markersize": 7, "linestyle": "none", "zorder": 3 + index}
             axis.plot(single.ds, single.crlb_rms_um, label=f"{strategy}: Cramér-Rao bound, RMS", **bound)
-            axis.plot(
-                averaged.length, MICRO * averaged.deviation, color=color, linestyle="--", label=f"{strategy}: dev of the paper"
-            )
+            label = f"{strategy}: dev of the paper"
+            axis.plot(averaged.length, MICRO * averaged.deviation, color=color, linestyle="--", label=label)
         _limit(axis, accuracy_um, "µm")
         axis.set(title=title, xlabel=_LENGTH, xscale="log", yscale="log", xlim=(2, 100), ylim=(0.5, 2000))
         for plain in (axis.xaxis, axis.yaxis):
@@ -188,8 +181,9 @@ def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str
     mine = metrics[(metrics.robot == robot) & metrics.trustworthy]
     for index in _find_distinct(mine.pivot(index="length", columns="strategy", values=quantity), order):
         cell, style = mine[mine.strategy == order[index]], line_style(index)
-        axis.plot(cell.length, scale * cell[quantity], label=order[index], **style)
-        _band(axis, cell.length, scale * cell[quantity], scale * cell[f"{quantity}_std_error"], style["color"])
+        value, error = scale * cell[quantity], scale * cell[f"{quantity}_std_error"]
+        axis.plot(cell.length, value, label=order[index], **style)
+        axis.fill_between(cell.length, value - error, value + error, color=style["color"], alpha=0.12, linewidth=0)
     axis.set_xlim(2, 1.02 * metrics.length.max())
 
 
@@ -224,10 +218,5 @@ def _printed_marks(axis: Axes, printed: pd.DataFrame, robot: str, quantity: str,
 
 def _limit(axis: Axes, value: float, unit: str) -> None:
     axis.axhline(value, color="black", linewidth=0.7)
-    axis.annotate(
-        f"{value:g} {unit}", (1, value), (2, 0), ("axes fraction", "data"), "offset points", va="center", fontsize=7.5
-    )
-
-
-def _band(axis: Axes, length: pd.Series, value: pd.Series, error: pd.Series, color: str) -> None:
-    axis.fill_between(length, value - error, value + error, color=color, alpha=0.12, linewidth=0)
+    place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "xytext": (2, 0), "textcoords": "offset points"}
+    axis.annotate(f"{value:g} {unit}", (1, value), **place, va="center", fontsize=7.5)

@@ -1,15 +1,10 @@
 """Bootstrap weights: how often each data set and each test configuration counts in each replicate."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from elastocal.random_streams import draw
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 def bootstrap_weights(seed: int, key: str, data_sets: Sequence[int] | np.ndarray, replicates: int) -> np.ndarray:

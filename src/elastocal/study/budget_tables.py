@@ -1,14 +1,9 @@
 """Which points to measure and how many configurations: sets of points compared at an equal budget, data set by data set."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 MICRO = 1e6
 _BUDGET = ("robot", "points", "measurements_per_configuration", "configurations", "crlb_rms_um", "rms_um", "std_error_um")

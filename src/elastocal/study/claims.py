@@ -7,17 +7,15 @@ holds in some of the studies, and its p value is the share of studies, this one 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from elastocal.study.metrics import length_to_reach
 from elastocal.study.printed import LEVEL, MICRO, Predicted
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 _ALL, _FIXED, _DEV = "k_sigma", "k_sigma_fixed_joints", "deviation"
 _BEST, _COMB, _PLAIN = "4-6DoF after 6+3DoF", "3+6DoF comb", "6DoF"
@@ -188,11 +186,8 @@ def _table3(evidence: Evidence) -> Finding:
     comparison = evidence.tables["comparison"]
     mine = comparison[(comparison.table == "3") & comparison.p_value.notna()]
     below, p = int((mine.p_value < LEVEL).sum()), float(min(1.0, len(mine) * mine.p_value.min()))
-    return _one(
-        f"{below} of {len(mine)} compliances have p < {LEVEL}; smallest p after Bonferroni given",
-        HOLDS if p > LEVEL else FAILS,
-        p,
-    )
+    text = f"{below} of {len(mine)} compliances have p < {LEVEL}; smallest p after Bonferroni given"
+    return _one(text, HOLDS if p > LEVEL else FAILS, p)
 
 
 def _any_start(evidence: Evidence) -> Finding:
@@ -215,10 +210,10 @@ def _any_metric(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
 
 
 def _similar(evidence: Evidence) -> Finding:
-    text = _each(
-        evidence, lambda robot: f"{np.mean(evidence.scores(robot, _COMB, _DEV) / evidence.scores(robot, _BEST, _DEV)):.6f}"
-    )
-    return _one(f"one estimator under two names: ratio of dev {text}", HOLDS)
+    def ratio(robot: str) -> str:
+        return f"{np.mean(evidence.scores(robot, _COMB, _DEV) / evidence.scores(robot, _BEST, _DEV)):.6f}"
+
+    return _one(f"one estimator under two names: ratio of dev {_each(evidence, ratio)}", HOLDS)
 
 
 def _less_precise(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
@@ -230,10 +225,9 @@ def _less_precise(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
 
 
 def _depends_on_robot(evidence: Evidence) -> Finding:
-    orders = []
-    for robot in evidence.robots:
-        orders.append(np.argsort([evidence.scores(robot, name, _DEV) for name in (*_OTHERS, _PLAIN)], axis=0))
-    text, p = _often((orders[0] != orders[1]).any(axis=0))
+    names = (*_OTHERS, _PLAIN)
+    one, other = (np.argsort([evidence.scores(robot, name, _DEV) for name in names], axis=0) for robot in evidence.robots)
+    text, p = _often((one != other).any(axis=0))
     return _one(f"their order by dev differs between the robots {text}", PARTLY, p)
 
 
@@ -253,30 +247,25 @@ def _fanuc_better(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
     return f"in {share:.0f} % of the figures; in all {text} (the paper's own n for 2 µm: worse in 3 of 6, one tie)", False, p
 
 
-def _text_figure(quantity: str, digits: int, within: float | None = None) -> Callable[[Evidence], Finding]:
+def _text_figure(
+    quantity: str, digits: int, within: float | None = None, note: str = "(study 0; tube by R11)"
+) -> Callable[[Evidence], Finding]:
     def judge(evidence: Evidence) -> Finding:
         row = evidence.tables["comparison"].set_index("quantity").loc[quantity]
         if np.isnan(row.ours):
             return _one("not studied", PARTLY)
         holds = row.ours <= row.paper if within is None else abs(row.ours - row.paper) <= within
-        return _one(f"{row.ours:.{digits}f} ± {row.mc_std:.{digits}f} (study 0; tube by R11)", HOLDS if holds else FAILS)
+        return _one(f"{row.ours:.{digits}f} ± {row.mc_std:.{digits}f} {note}", HOLDS if holds else FAILS)
 
     return judge
 
 
-def _without_links(evidence: Evidence) -> Finding:
-    row = evidence.tables["comparison"].set_index("quantity").loc["share_compensated_joint_elasticity_only"]
-    holds = abs(row.ours - row.paper) <= 0.5
-    return _one(f"{row.ours:.1f} ± {row.mc_std:.1f} % of averaged models (study 0)", HOLDS if holds else FAILS)
-
-
 def _selection(evidence: Evidence) -> Finding:
+    designs = evidence.tables["designs"]
+    designs = designs[(designs.configurations == evidence.length) & (designs.joint_range == "full_turn")]
+
     def at(robot: str) -> str:
-        designs = evidence.tables["designs"]
-        mine = designs[
-            (designs.robot == robot) & (designs.configurations == evidence.length) & (designs.joint_range == "full_turn")
-        ]
-        rms = mine.set_index("design").rms_um
+        rms = designs[designs.robot == robot].set_index("design").rms_um
         return f"{rms['random'] / rms['I']:.1f}" if {"random", "I"} <= set(rms.index) else "–"
 
     return _one(f"{evidence.length} chosen configurations leave an error smaller by a factor of {_each(evidence, at)}", FAILS)
@@ -344,6 +333,8 @@ def _table2(evidence: Evidence) -> Finding:
     return _one(f"of single data sets {below}; the largest of all data sets together are far larger", PARTLY, p)
 
 
+_with_links = _text_figure("share_compensated_with_link_elasticity", 1, _ROUNDED)
+_without_links = _text_figure("share_compensated_joint_elasticity_only", 1, 0.5, "% of averaged models (study 0)")
 _CLAIMS: tuple[tuple[str, str, Callable[[Evidence], Finding]], ...] = (
     ("abstract", "The two strategies with 3DoF and 6DoF together are best", _both(_two_best)),
     ("abstract, 5", "At least 1.86 times more accurate in dev than 6DoF", _ratio_of_dev),
@@ -366,11 +357,7 @@ _CLAIMS: tuple[tuple[str, str, Callable[[Evidence], Finding]], ...] = (
     ("5", "FANUC is more accurate than KUKA by any metric", _both(_fanuc_better)),
     ("5", "With elastic links below 366 µm for any strategy", _text_figure("residual_deviation_upper_bound", 0)),
     ("5", "Selecting poses has little impact", _selection),
-    (
-        "6.1",
-        "The reduced model compensates 80 % with elastic links",
-        _text_figure("share_compensated_with_link_elasticity", 1, _ROUNDED),
-    ),
+    ("6.1", "The reduced model compensates 80 % with elastic links", _with_links),
     ("6.1", "and 99 % where joints alone are elastic", _without_links),
     ("6.2", "Additional points give more accurate results", _more_points),
     ("6.3", "Combining data sets gives more accurate results", _more_data),

@@ -7,14 +7,10 @@ import numpy as np
 import pandas as pd
 
 from elastocal.study.printed import holm, predict_scatter
-from elastocal.study.tables import MILLI, deviation_ratio, share_compensated
+from elastocal.study.tables import MILLI, deviation_ratio, find_statistics, share_compensated
 
-_TABLE2 = {"deviation_mean": "mean_mm", "deviation_std": "std_mm", "deviation_max": "max_mm"}
-_OF_ONE_SET = {
-    "deviation_mean": lambda frame: frame["mean"],
-    "deviation_std": lambda frame: (frame.mean_square - frame["mean"] ** 2) ** 0.5,
-    "deviation_max": lambda frame: frame.maximum,
-}
+# Value, spread and interpretation of ours.
+_Ours = tuple[float, float, str]
 _TABLE4 = {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}
 
 
@@ -59,10 +55,11 @@ def comparison_table(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
     rows = []
     printed = reference[[*_PrintedFigure._fields]].itertuples(index=False, name=None)
     for figure in map(_PrintedFigure._make, printed):
-        value, spread, interpretation = _RULES[figure.table](figure, ours)
+        text = figure.table == "text"
+        value, spread, interpretation = _TEXT[figure.quantity](ours) if text else _RULES[figure.table](figure, ours)
         z = (value - figure.value) / spread if spread > 0 and np.isfinite(value) else np.nan
         rows.append((*figure, value, spread, z, interpretation, *_scatter(figure, ours)))
-    names = ["table", "robot", "strategy", "quantity", "unit", "paper", "ours", "mc_std", "z", "interpretation"]
+    names = [*_PrintedFigure._fields[:-1], "paper", "ours", "mc_std", "z", "interpretation"]
     table = pd.DataFrame(rows, columns=[*names, "studies_mean", "studies_std", "p_value"])
     return table.assign(p_holm=holm(table.p_value.to_numpy(float)))
 
@@ -70,8 +67,7 @@ def comparison_table(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
 def _scatter(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, float]:
     """Mean, standard deviation and p value of a printed figure where one study, or one data set, stands beside many."""
     if figure.table == "2" and figure.robot in ours.initial:
-        frame = ours.initial[figure.robot]
-        values = MILLI * _OF_ONE_SET[figure.quantity](frame).to_numpy()
+        values = MILLI * find_statistics(ours.initial[figure.robot])[figure.quantity.removeprefix("deviation_")].to_numpy()
         below, above = (values <= figure.value).sum(), (values >= figure.value).sum()
         p_value = min(2 * (min(below, above) + 1) / (len(values) + 1), 1.0)
         return values.mean(), values.std(ddof=1), np.nan if _is_fitted(figure) else p_value
@@ -86,21 +82,20 @@ def _is_fitted(figure: _PrintedFigure) -> bool:
     return (figure.robot, figure.quantity) == ("kuka_extended", "deviation_mean")
 
 
-def _table1_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
+def _table1_figure(figure: _PrintedFigure, ours: OurResults) -> _Ours:
     return _pair(ours.tables["table1"], figure.quantity, robot=figure.robot)[0], 0.0, "R1: an input"
 
 
-def _table2_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
-    column = _TABLE2[figure.quantity]
+def _table2_figure(figure: _PrintedFigure, ours: OurResults) -> _Ours:
     remark = "R11: the tube was chosen for it" if _is_fitted(figure) else "R3"
-    return *_pair(ours.tables["table2"], column, robot=figure.robot), remark
+    return *_pair(ours.tables["table2"], f"{figure.quantity.removeprefix('deviation_')}_mm", robot=figure.robot), remark
 
 
-def _table3_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
+def _table3_figure(figure: _PrintedFigure, ours: OurResults) -> _Ours:
     return *_pair(ours.tables["table3"], figure.quantity, robot=figure.robot), "R7"
 
 
-def _table4_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
+def _table4_figure(figure: _PrintedFigure, ours: OurResults) -> _Ours:
     table, key = ours.tables["table4"], {"strategy": figure.strategy, "robot": figure.robot}
     column = _TABLE4.get(figure.quantity, figure.quantity)
     if "k_sigma" not in column:
@@ -109,11 +104,7 @@ def _table4_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, flo
     return *first, "R7" if first == whole else "R7, R10: joints fixed in the last stage"
 
 
-def _text_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
-    return _TEXT[figure.quantity](ours)
-
-
-def _largest_residual(ours: OurResults) -> tuple[float, float, str]:
+def _largest_residual(ours: OurResults) -> _Ours:
     extended = ours.tables["extended"]
     if extended.empty:
         return np.nan, np.nan, ""
@@ -121,16 +112,16 @@ def _largest_residual(ours: OurResults) -> tuple[float, float, str]:
     return worst.residual_mean_um, worst.residual_mean_um_std_error, "R11: largest of all strategies; the paper prints a bound"
 
 
-def _share_with_links(ours: OurResults) -> tuple[float, float, str]:
+def _share_with_links(ours: OurResults) -> _Ours:
     row = _pair(ours.tables["extended"], "share_compensated_percent", strategy="6DoF")
     return *row, "R11, strategy 6DoF"
 
 
-def _share_without_links(ours: OurResults) -> tuple[float, float, str]:
+def _share_without_links(ours: OurResults) -> _Ours:
     return *share_compensated(ours.metrics, ours.replicates, "kuka", "6DoF", ours.noise_um, ours.length), "kuka, strategy 6DoF"
 
 
-def _smallest_ratio(ours: OurResults) -> tuple[float, float, str]:
+def _smallest_ratio(ours: OurResults) -> _Ours:
     ratios = []
     for _, cells in ours.tables["table4"].groupby("robot", sort=True):
         best = cells.iloc[cells[f"dev_{ours.length}_um"].argmin()]
@@ -140,7 +131,7 @@ def _smallest_ratio(ours: OurResults) -> tuple[float, float, str]:
     return *min(ratios), "R8: the best strategy of each robot, the smaller robot ratio"
 
 
-_RULES = {"1": _table1_figure, "2": _table2_figure, "3": _table3_figure, "4": _table4_figure, "text": _text_figure}
+_RULES = {"1": _table1_figure, "2": _table2_figure, "3": _table3_figure, "4": _table4_figure}
 _TEXT = {
     "residual_deviation_upper_bound": _largest_residual,
     "share_compensated_with_link_elasticity": _share_with_links,

@@ -1,20 +1,16 @@
 """The study's configuration: checked as a whole before anything runs, with the robots and strategies that it names."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, document_path, named_document, parsed
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.identification import first_solvable_length
 from elastocal.study.strategies import check_strategy, strategy_from_document
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
 
 # A measuring point in chain notation.
 _POINT = re.compile(r"\[(\w*[A-Za-z]\w*)\]")
@@ -124,16 +120,14 @@ def _check_cells(config: Mapping[str, Any], source: str) -> None:
     for level in config["noise_um"]:
         if levels.setdefault(f"{level:g}", level) != level:
             raise InputError(source, "noise_um", f"{levels[f'{level:g}']} and {level}", "levels that differ in 6 digits")
-    if tables["classical_strategy"] not in config["strategies"]:
-        raise InputError(
-            source, "tables.classical_strategy", repr(tables["classical_strategy"]), f"one of strategies {config['strategies']}"
-        )
-    if tables["noise_um"] not in config["noise_um"]:
-        raise InputError(source, "tables.noise_um", str(tables["noise_um"]), f"one of noise_um {config['noise_um']}")
-    for index, length in enumerate(config["evaluation"]["lengths"]):
+    lengths = config["evaluation"]["lengths"]
+    for index, length in enumerate(lengths):
         if length > longest:
             raise InputError(source, f"evaluation.lengths[{index}]", str(length), f"up to configurations = {longest}")
-    if tables["length"] not in config["evaluation"]["lengths"]:
-        raise InputError(
-            source, "tables.length", str(tables["length"]), f"one of evaluation.lengths {config['evaluation']['lengths']}"
-        )
+    for key, name, allowed in (
+        ("classical_strategy", "strategies", config["strategies"]),
+        ("noise_um", "noise_um", config["noise_um"]),
+        ("length", "evaluation.lengths", lengths),
+    ):
+        if tables[key] not in allowed:
+            raise InputError(source, f"tables.{key}", repr(tables[key]), f"one of {name} {allowed}")

@@ -4,15 +4,11 @@ In units of one measurement, n configurations with m measurements each cost n (r
 points that needs fewer configurations pays from the cost on at which both are equal: its break-even.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 MICRO = 1e6
 # Costs of a configuration, in measurements, at which curves are given: from none to a robot that is loaded by hand.

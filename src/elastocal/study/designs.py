@@ -4,19 +4,14 @@ Candidates are random configurations with their loads; a design is some of them.
 end-effector error.
 """
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.application.planning.bound import best_value
 from elastocal.application.planning.criteria import CRITERIA, Criterion, criterion, mean_squares
 from elastocal.application.planning.exchange import choose_greedily, exchange_candidates, matrix_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 RANDOM, CONTINUOUS = "random", "bound"
 # Random designs of each size.

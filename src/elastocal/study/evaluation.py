@@ -4,10 +4,8 @@ Two views of the same estimates: the paper's, which averages the stiffness over 
 (equations 12-15), and that of somebody who has one data set.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,10 +19,6 @@ from elastocal.study.metrics import (
     relative_stiffness_error,
     split_models,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
 
 LARGEST_TRUSTED_SPREAD = 0.25
 

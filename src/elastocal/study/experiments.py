@@ -1,5 +1,7 @@
 """Loaded configurations of a robot, as arrays."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,3 +16,7 @@ class Experiments:
 
     joint_angles: np.ndarray
     wrench: np.ndarray
+
+    def first(self, configurations: int) -> Experiments:
+        """The first configurations of each data set."""
+        return Experiments(self.joint_angles[:, :configurations], self.wrench[:, :configurations])

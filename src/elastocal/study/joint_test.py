@@ -9,17 +9,13 @@ how figures depend on one another [2]; of k studies it is no smaller than 1/(k +
 [2] Barnard, G. A., discussion of The spectral analysis of point processes, Journal of the Royal Statistical Society B 25, 1963.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from elastocal.study.printed import LEVEL, Predicted, holm, predict_scatter
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 def joint_table(studies: pd.DataFrame, reference: pd.DataFrame, length: int) -> pd.DataFrame:

@@ -7,8 +7,6 @@ O1 = (s_1 ... s_m)^(1/m) / sqrt(k), O2 = s_m / s_1, O3 = s_m, O4 = s_m^2 / s_1, 
     Robotics and Automation, 2008.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 INDICES = ("O1", "O2", "O3", "O4", "O5")

@@ -12,16 +12,13 @@ Holm's procedure [2].
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from scipy.stats import t as student
 from statsmodels.stats.multitest import multipletests
 
 from elastocal.study.metrics import length_to_reach
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MICRO = 1e6
 # A figure differs from the study where its p value, corrected for all figures, is below this.

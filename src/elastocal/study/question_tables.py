@@ -1,8 +1,8 @@
 """Tables of the research questions beyond the paper's strategies."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from itertools import product
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,9 +12,6 @@ from elastocal.study.budget_tables import MICRO, ratio_of_roots, root_mean
 from elastocal.study.designs import RANDOM
 from elastocal.study.observability import INDICES
 from elastocal.study.tables import find_statistics
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 CHOSEN = "by cross-validation"
 MILLI = 1e3
@@ -29,9 +26,8 @@ def ladder_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """
     rows: list[dict[str, Any]] = []
     for robot, frame in frames.items():
-        for noise, length in sorted(set(zip(frame.noise, frame.length, strict=True))):
-            cell = frame[(frame.noise == noise) & (frame.length == length)]
-            head = {"robot": robot, "noise_um": round(MICRO * noise, 6), "length": length}
+        for (noise, length), cell in frame.groupby(["noise", "length"]):
+            head = {"robot": robot, "noise_um": round(MICRO * float(str(noise)), 6), "length": length}
             steps = [(str(number), some) for number, some in cell.groupby("link_springs")]
             for name, some in [*steps, (CHOSEN, cell[cell.chosen])]:
                 rms, error = root_mean(some.mean_square.to_numpy())
@@ -49,12 +45,9 @@ def designs_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     `frames`: the designs table of each robot. Returns robot, joint_range, design, configurations, rms_um, low_um and high_um: 5
     and 95 % of random designs.
     """
-    parts = []
-    for robot, frame in frames.items():
-        part = frame[["joint_range", "design", "configurations"]].copy()
-        part.insert(0, "robot", robot)
-        parts.append(part.assign(**{f"{name}_um": MICRO * frame[name] for name in ("rms", "low", "high")}))
-    return pd.concat(parts, ignore_index=True)
+    frame = _of_all_robots(frames)
+    errors = (MICRO * frame[["rms", "low", "high"]]).add_suffix("_um")
+    return frame[["robot", "joint_range", "design", "configurations"]].join(errors)
 
 
 def observability_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -65,14 +58,13 @@ def observability_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     means a smaller error.
     """
     rows = []
-    for robot, frame in frames.items():
-        for index in (*INDICES, "bound"):
-            row: dict[str, Any] = {"robot": robot, "index": index}
-            for name, against in (("bound", "bound"), ("error", "mean_square")):
-                found = float(spearmanr(frame[index], frame[against]).statistic)
-                row[f"rank_correlation_with_{name}"] = found
-                row[f"rank_correlation_with_{name}_std_error"] = (1 - found**2) / np.sqrt(len(frame) - 1)
-            rows.append(row)
+    for (robot, frame), index in product(frames.items(), (*INDICES, "bound")):
+        row: dict[str, Any] = {"robot": robot, "index": index}
+        for name, against in (("bound", "bound"), ("error", "mean_square")):
+            found = float(spearmanr(frame[index], frame[against]).statistic)
+            row[f"rank_correlation_with_{name}"] = found
+            row[f"rank_correlation_with_{name}_std_error"] = (1 - found**2) / np.sqrt(len(frame) - 1)
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
@@ -82,17 +74,11 @@ def geometry_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     `frames`: the geometry table of each robot. Returns robot, estimator, rms_um and its parts noise_um and leak_um,
     compliance_noise_percent, compliance_leak_percent, zero_noise_urad, zero_leak_urad.
     """
-    parts = []
-    for robot, frame in frames.items():
-        part = pd.DataFrame({"robot": robot, "estimator": frame.estimator})
-        part["rms_um"] = MICRO * np.hypot(frame.noise, frame.leak)
-        part["noise_um"], part["leak_um"] = MICRO * frame.noise, MICRO * frame.leak
-        for name in ("compliance_noise", "compliance_leak"):
-            part[f"{name}_percent"] = frame[name]
-        for name in ("zero_noise", "zero_leak"):
-            part[f"{name}_urad"] = MICRO * frame[name]
-        parts.append(part)
-    return pd.concat(parts, ignore_index=True)
+    frame = _of_all_robots(frames)
+    part = frame[["robot", "estimator"]].assign(rms_um=MICRO * np.hypot(frame.noise, frame.leak))
+    part = part.join((MICRO * frame[["noise", "leak"]]).add_suffix("_um"))
+    part = part.join(frame[["compliance_noise", "compliance_leak"]].add_suffix("_percent"))
+    return part.join((MICRO * frame[["zero_noise", "zero_leak"]]).add_suffix("_urad"))
 
 
 def weighting_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -100,13 +86,9 @@ def weighting_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 
     `frames`: the weighting table of each robot. Returns robot, orientation_ratio, per_metre_um, equal_um, weighted_um, ratio.
     """
-    parts = []
-    for robot, frame in frames.items():
-        part = pd.DataFrame({"robot": robot, "orientation_ratio": frame.orientation_ratio})
-        for name in ("per_metre", "equal", "weighted"):
-            part[f"{name}_um"] = MICRO * frame[name]
-        parts.append(part.assign(ratio=frame.equal / frame.weighted))
-    return pd.concat(parts, ignore_index=True)
+    frame = _of_all_robots(frames)
+    part = frame[["robot", "orientation_ratio"]].join((MICRO * frame[["per_metre", "equal", "weighted"]]).add_suffix("_um"))
+    return part.assign(ratio=frame.equal / frame.weighted)
 
 
 def places_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -188,16 +170,13 @@ def simulated_designs_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     `frames`: the simulated_designs table of each robot. Returns robot, load, design, configurations, unobservable, rms_um with
     its standard error, at_test_pose_um, and gain: the error of random designs of the size over that of the design.
     """
-    parts = []
-    for robot, frame in frames.items():
-        part = frame[["load", "design", "configurations", "unobservable"]].copy()
-        part.insert(0, "robot", robot)
-        names = {"rms": "rms_um", "std_error": "rms_um_std_error", "there": "at_test_pose_um"}
-        part = part.assign(**{name: MICRO * frame[column] for column, name in names.items()})
-        random = part[part.design == RANDOM].set_index(["load", "configurations"]).rms_um
-        keys = pd.MultiIndex.from_frame(part[["load", "configurations"]])
-        parts.append(part.assign(gain=random.reindex(keys).to_numpy() / part.rms_um))
-    return pd.concat(parts, ignore_index=True)
+    frame = _of_all_robots(frames)
+    names = {"rms": "rms_um", "std_error": "rms_um_std_error", "there": "at_test_pose_um"}
+    errors = MICRO * frame[[*names]].rename(columns=names)
+    part = frame[["robot", "load", "design", "configurations", "unobservable"]].join(errors)
+    size = ["robot", "load", "configurations"]
+    random = part[part.design == RANDOM].set_index(size).rms_um
+    return part.assign(gain=random.reindex(pd.MultiIndex.from_frame(part[size])).to_numpy() / part.rms_um)
 
 
 def stiffness_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -206,10 +185,12 @@ def stiffness_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     `frames`: the stiffness table of each robot. Returns robot, force_N, softest_N_per_um, first_order_percent, loaded_percent,
     by_k_c_percent, bias_percent, k_sigma_percent, offset_rank, rank.
     """
-    parts = []
-    for robot, frame in frames.items():
-        part = pd.DataFrame({"robot": robot, "force_N": frame.force, "softest_N_per_um": frame.softest / MICRO})
-        for name in ("first_order", "loaded", "by_k_c", "bias", "k_sigma"):
-            part[f"{name}_percent"] = frame[name]
-        parts.append(part.assign(offset_rank=frame.offset_rank, rank=frame["rank"]))
-    return pd.concat(parts, ignore_index=True)
+    frame = _of_all_robots(frames)
+    part = pd.DataFrame({"robot": frame.robot, "force_N": frame.force, "softest_N_per_um": frame.softest / MICRO})
+    part = part.join(frame[["first_order", "loaded", "by_k_c", "bias", "k_sigma"]].add_suffix("_percent"))
+    return part.join(frame[["offset_rank", "rank"]])
+
+
+def _of_all_robots(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """The tables of all robots one below the other, with the name of the robot in front."""
+    return pd.concat(frames, names=["robot"]).reset_index("robot").reset_index(drop=True)

@@ -10,17 +10,15 @@ have the bootstrap replicates, whose weights all strategies share.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy.stats import rankdata
 
 from elastocal.study.budget_tables import MICRO, QUANTILE
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 REFERENCE = "rms_um"
 # Scores of strategies that are one estimator agree to rounding.

@@ -1,17 +1,13 @@
 """Tables about many studies: expectations beside them, and what each interpretation of the paper's open points moves."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from elastocal.study.metrics import length_to_reach
 from elastocal.study.printed import LEVEL, MICRO, holm, predict_scatter
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 # Quantities of the expectations table by the columns of scores, with the factor to their units.
 _QUANTITIES = {

@@ -7,6 +7,7 @@ measured by simulation has a column of its Monte Carlo standard error, ``<quanti
 from __future__ import annotations
 
 import re
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,9 @@ def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
 
     Returns robot, c1.. in µrad/(N m).
     """
-    rows = [{"robot": name} | _number_columns("c", MICRO * robot.compliance) for name, robot in robots.items()]
+    rows = []
+    for name, robot in robots.items():
+        rows.append({"robot": name} | {f"c{j}": value for j, value in enumerate((MICRO * robot.compliance).tolist(), 1)})
     return pd.DataFrame(rows)
 
 
@@ -92,22 +95,22 @@ def table4(
     """
     limit = f"{k_sigma_limit_percent:g}_percent"
     rows = []
-    for strategy in strategies:
-        for robot in robots:
-            cell = _by_length(metrics, robot, noise_um, strategy)
-            drawn = _cell(replicates, robot, noise_um, strategy)
-            at = _row_of(cell, length)
-            row: dict[str, str | float] = {"strategy": strategy, "robot": robot}
-            for suffix in ("", "_fixed_joints"):
-                name = f"k_sigma{suffix}"
-                row |= {f"k_sigma_{length}_percent{suffix}": at[name]}
-                row |= {f"k_sigma_{length}_percent{suffix}_std_error": at[f"{name}_std_error"]}
-                reached, error = find_length(cell[name].to_numpy(), _curves(drawn, name), k_sigma_limit_percent)
-                row |= {f"n_k_sigma_{limit}{suffix}": reached, f"n_k_sigma_{limit}{suffix}_std_error": error}
-            row |= {f"dev_{length}_um": MICRO * at.deviation, f"dev_{length}_um_std_error": MICRO * at.deviation_std_error}
-            reached, error = find_length(cell.deviation.to_numpy(), _curves(drawn, "deviation"), deviation_limit_um / MICRO)
-            row |= {f"n_dev_{deviation_limit_um:g}_um": reached, f"n_dev_{deviation_limit_um:g}_um_std_error": error}
-            rows.append(row)
+    # Column of the metrics, its factor, and the limit and names of its score and of the length at which that reaches the limit.
+    figures = [
+        (f"k_sigma{end}", 1.0, k_sigma_limit_percent, f"k_sigma_{length}_percent{end}", f"n_k_sigma_{limit}{end}")
+        for end in ("", "_fixed_joints")
+    ]
+    figures.append(("deviation", MICRO, deviation_limit_um, f"dev_{length}_um", f"n_dev_{deviation_limit_um:g}_um"))
+    for strategy, robot in product(strategies, robots):
+        cell = _by_length(metrics, robot, noise_um, strategy)
+        drawn = _cell(replicates, robot, noise_um, strategy)
+        at = _row_of(cell, length)
+        row: dict[str, str | float] = {"strategy": strategy, "robot": robot}
+        for name, factor, least, score, reached in figures:
+            row |= {score: factor * at[name], f"{score}_std_error": factor * at[f"{name}_std_error"]}
+            found = find_length(cell[name].to_numpy(), _curves(drawn, name), least / factor)
+            row |= dict(zip((reached, f"{reached}_std_error"), found, strict=True))
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
@@ -125,22 +128,12 @@ def extended_table(
     errors; robot where several.
     """
     rows = []
-    for robot in robots:
-        for strategy in strategies:
-            at = _row_of(_by_length(metrics, robot, noise_um, strategy), length)
-            share, error = share_compensated(metrics, replicates, robot, strategy, noise_um, length)
-            rows.append(
-                {
-                    "strategy": strategy,
-                    "initial_mean_mm": MILLI * at.initial_deviation,
-                    "initial_mean_mm_std_error": MILLI * at.initial_deviation_std_error,
-                    "residual_mean_um": MICRO * at.deviation,
-                    "residual_mean_um_std_error": MICRO * at.deviation_std_error,
-                    "share_compensated_percent": share,
-                    "share_compensated_percent_std_error": error,
-                    "robot": robot,
-                }
-            )
+    for robot, strategy in product(robots, strategies):
+        at = _row_of(_by_length(metrics, robot, noise_um, strategy), length)
+        initial = MILLI * at.initial_deviation, MILLI * at.initial_deviation_std_error
+        left = MICRO * at.deviation, MICRO * at.deviation_std_error
+        share = share_compensated(metrics, replicates, robot, strategy, noise_um, length)
+        rows.append((strategy, *initial, *left, *share, robot))
     quantities = ("initial_mean_mm", "residual_mean_um", "share_compensated_percent")
     names = ["strategy", *(name + suffix for name in quantities for suffix in ("", "_std_error")), "robot"]
     return pd.DataFrame(rows, columns=names)
@@ -201,7 +194,8 @@ def per_dataset_table(
         result[f"{name}_um_std_error"] = MICRO * frame[f"{name}_std_error"]
     result["efficiency_std_error"] = 2 * result.efficiency * result.rms_um_std_error / result.rms_um
     relative = [column for column in frame.columns if column.startswith("relative_error_")]
-    return result.join(frame[relative].add_suffix("_percent").rename(columns=_error_last))
+    percent = frame[relative].add_suffix("_percent")
+    return result.join(percent.rename(columns=lambda name: name.replace("_std_error_percent", "_percent_std_error")))
 
 
 def solver_summary(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -329,13 +323,5 @@ def _curves(drawn: pd.DataFrame, name: str) -> np.ndarray:
     return drawn.pivot(index="replicate", columns="length", values=name).to_numpy()
 
 
-def _number_columns(prefix: str, values: Iterable[float]) -> dict[str, float]:
-    return {f"{prefix}{j}": float(value) for j, value in enumerate(values, 1)}
-
-
 def _value_and_error(name: str, replicated: np.ndarray) -> dict[str, float]:
     return {name: float(replicated[0]), f"{name}_std_error": float(np.std(replicated[1:], ddof=1))}
-
-
-def _error_last(column: str) -> str:
-    return column.replace("_std_error_percent", "_percent_std_error")

@@ -4,8 +4,6 @@
     1935.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -8,7 +8,6 @@ from support import OTHER_CHAINS, robot_of
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.steps.columns import to_experiments
 from elastocal.study.steps.design import Design, configuration_first, design_blocks
-from elastocal.study.strategies import Stage, Strategy
 
 
 def test_design_table_names_the_right_set_length_and_joint_pair(kuka, strategies):
@@ -77,22 +76,6 @@ def test_positions_on_the_last_axis_leave_the_design_empty(kuka, strategies):
     (table,) = design_blocks(experiments_of(kuka, sets=3), kuka.chain, strategies["6DoF"], 3, "end_effector")
     for name in ("cov_1_1", "cov_6_6", "condition"):
         assert np.isnan(table[name]).all(), name
-
-
-def test_the_error_of_joints_taken_over_is_part_of_the_covariance_of_later_ones():
-    """Two joints of a planar arm, each from a measurement of its own: Murphy and Topel's two steps written out."""
-    robot = robot_of("Ry(q1) Tx(1.0) [elbow] Ry(q2) Tx(0.5) [hand]")
-    (block,) = experiments_of(robot, sets=1, configurations=3)
-    strategy = Strategy("two steps", (Stage(("elbow",), (0,)), Stage(("hand",), (1,), (0,))))
-    (table,) = design_blocks([block], robot.chain, strategy, 6, "end_effector")
-    elbow, hand = (pinocchio_regressors(robot.chain, block, name) for name in ("elbow", "hand"))
-    for length in (1, 2, 3):
-        first, second = elbow[:length, :, 0].ravel(), hand[:length].reshape(-1, 2)
-        variance = 1 / (first @ first)
-        gain = -(second[:, 1] @ second[:, 0]) / (second[:, 1] @ second[:, 1])
-        expected = [variance, gain * variance, gain**2 * variance + 1 / (second[:, 1] @ second[:, 1])]
-        found = [table[name][length - 1] for name in ("cov_1_1", "cov_2_1", "cov_2_2")]
-        np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_configurations_come_first_and_memory_runs_along_the_data_sets():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from made_study_blocks import (
     CONFIGURATIONS_OF_THE_TEST,
-    OFFSET,
     deflections_of,
     evaluated_in_one_block,
     experiments_of,
@@ -14,7 +13,6 @@ from made_study_blocks import (
     judge,
 )
 
-from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.steps.evaluate import evaluate_strategy
 from elastocal.study.steps.weights import weight_blocks
 
@@ -44,15 +42,6 @@ def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
         assert set(one) == set(other)
         for name in one:
             np.testing.assert_allclose(other[name], one[name], rtol=1e-8, atol=1e-12, err_msg=name)
-
-
-def test_exact_estimates_of_a_target_off_the_flange_have_no_error(kuka):
-    moved = with_target_offset(kuka, OFFSET)
-    table = {"data_set": np.arange(12), "length": np.ones(12)}
-    table |= {f"c{j + 1}": np.full(12, c) for j, c in enumerate(kuka.compliance)}
-    found = evaluated_in_one_block(table, judge(moved), (0,), "compliance", 10, [1])
-    # Roots of rounding.
-    np.testing.assert_allclose(found[0]["deviation"], 0, atol=1e-9)
 
 
 def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
@@ -89,20 +78,6 @@ def test_accuracy_is_of_the_lengths_asked_for_and_of_no_others(kuka):
     accuracy = evaluated_in_one_block(table, judge(kuka), (0,), "compliance", 10, [4, 2])[2]
     assert accuracy["length"].tolist() == [4, 2]
     np.testing.assert_allclose(accuracy["relative_error_3"], [10.0, 50.0], rtol=1e-9)
-
-
-def test_one_compliance_that_is_not_positive_makes_a_length_untrustworthy(kuka):
-    table = make_same_estimates(kuka, (1.0, 1.0), sets=10)
-    table["c5"][4] *= -1.0
-    metrics = evaluated_in_one_block(table, judge(kuka), (0,), "stiffness", 10, [1])[0]
-    np.testing.assert_allclose(metrics["nonpositive_share"], [0.1, 0.0])
-    assert metrics["trustworthy"].tolist() == [False, True]
-
-
-def test_initial_errors_are_the_displacements_of_the_end_effector(kuka):
-    experiments = experiments_of(kuka, 1, CONFIGURATIONS_OF_THE_TEST, purpose="test")
-    block = deflections_of(kuka, experiments)["6DoF"][0]
-    np.testing.assert_allclose(judge(kuka).initial_errors, np.sqrt(block["dx"] ** 2 + block["dy"] ** 2 + block["dz"] ** 2))
 
 
 def test_weights_with_another_number_of_blocks_are_not_used(kuka):

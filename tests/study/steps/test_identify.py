@@ -30,23 +30,21 @@ def test_exact_data_give_the_true_compliances(robot, strategies, name, at):
         np.testing.assert_allclose(found, np.tile(robot.compliance, (5, 1)), rtol=relative)
 
 
-@pytest.mark.parametrize("at", AT)
-@pytest.mark.parametrize("rows", [3, 6])
-def test_exact_data_of_a_target_off_the_flange_give_the_true_compliances(kuka, strategies, rows, at):
+@pytest.mark.parametrize(
+    ("name", "rows", "at"),
+    [
+        *(("6DoF", rows, at) for rows in (3, 6) for at in AT),
+        # One position of the end-effector has measurements enough for joints 4-6, but they meet in one point.
+        *((name, 3, "measuring_point") for name in ("3+6DoF-comb", "4-6DoF-after-3DoF", "5-6DoF-after-4DoF")),
+    ],
+)
+def test_exact_data_of_a_target_off_the_flange_give_the_true_compliances(kuka, strategies, name, rows, at):
     # Interpretations R5 and R6 together: under "end_effector" the wrench stays where it is stated, whatever target is measured.
     moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka)
     deflections = deflections_of(moved, experiments, at=at)
-    table = identified(moved, strategies["6DoF"], experiments, deflections, rows, at, start=1e-6)
-    np.testing.assert_allclose(compliances(table, 4), np.tile(kuka.compliance, (5, 1)), rtol=1e-7)
-
-
-@pytest.mark.parametrize("name", ["6DoF", "3+6DoF-comb", "4-6DoF-after-3DoF", "5-6DoF-after-4DoF"])
-def test_gauss_newton_gets_through_positions_that_are_too_few_to_tell_the_wrist_apart(kuka, strategies, name):
-    # One position of the end-effector has measurements enough for joints 4-6, but they meet in one point.
-    loads, moved = experiments_of(kuka), with_target_offset(kuka, OFFSET)
-    deflections = deflections_of(moved, loads, at="measuring_point")
-    table = identified(moved, strategies[name], loads, deflections, 3, "measuring_point", start=1e-6)
-    np.testing.assert_allclose(compliances(table, 4), np.tile(kuka.compliance, (5, 1)), rtol=1e-6)
+    table = identified(moved, strategies[name], experiments, deflections, rows, at, start=1e-6)
+    tolerance = 1e-7 if name == "6DoF" else 1e-6
+    np.testing.assert_allclose(compliances(table, 4), np.tile(kuka.compliance, (5, 1)), rtol=tolerance)
 
 
 def test_identified_table_names_the_right_set_length_and_joint_pair(kuka, strategies):

@@ -8,6 +8,7 @@ from made_studies import SIZE, USUAL
 from made_study_blocks import deflections_of, experiments_of, judge
 
 from elastocal.mechanics.robot import with_target_offset
+from elastocal.study.experiments import Experiments
 from elastocal.study.metrics import position_errors
 from elastocal.study.steps.columns import to_deflections
 from elastocal.study.steps.in_memory import StudyInMemory
@@ -56,7 +57,17 @@ def test_a_reflector_is_a_target_that_the_point_carries(kuka, point):
     assert found.deflection.shape[0] == 6 and carried.independent_rows == 6
 
 
-@pytest.mark.parametrize(("what", "name"), [(USUAL, "average"), (SIZE, "noise")])
-def test_how_the_paper_is_read_and_how_large_a_study_is_are_frozen(what, name):
+def test_one_estimator_under_two_names_is_worked_out_once(kuka, strategies):
+    found = study_of(kuka).estimates([strategies[name] for name in ("6DoF", "6DoF-after-3DoF", "4-6DoF-after-3DoF")])
+    assert found["6DoF"] is found["6DoF after 3DoF"] and found["6DoF"] is not found["4-6DoF after 3DoF"]
+    (block,) = found["6DoF"]
+    assert block.shape == (4, 5, 6) and np.isfinite(block[:, -1]).all()
+
+
+DRAWN = Experiments(np.zeros((2, 3, 7)), np.ones((2, 3, 6)))
+
+
+@pytest.mark.parametrize(("what", "name"), [(USUAL, "average"), (SIZE, "noise"), (DRAWN, "joint_angles"), (DRAWN, "wrench")])
+def test_how_the_paper_is_read_how_large_a_study_is_and_what_was_drawn_are_frozen(what, name):
     with pytest.raises(FrozenInstanceError):
         setattr(what, name, None)

@@ -1,12 +1,11 @@
 """Further studies in memory: the same scores as the pipeline's steps give from the same data sets."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from made_studies import blocks_of
-from made_study_blocks import OFFSET, PAPER, deflections_of, evaluated_in_one_block, experiments_of, identified, judge
-
-from elastocal.mechanics.robot import with_target_offset
-from elastocal.study.steps.in_memory import Interpretation
+from made_studies import USUAL, blocks_of
+from made_study_blocks import deflections_of, evaluated_in_one_block, experiments_of, identified, judge
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +30,7 @@ def test_studies_differ_and_a_study_does_not_depend_on_how_many_there_are(kuka, 
 @pytest.mark.parametrize("average", ["stiffness", "compliance", "median"])
 def test_scores_are_those_of_the_pipeline_for_the_same_data_sets(kuka, some, average):
     """Study number 0, which is that of the pipeline."""
-    found = blocks_of(kuka, some, Interpretation(PAPER, 6, "end_effector", average, "averaged_model"), studies=[0])
+    found = blocks_of(kuka, some, replace(USUAL, average=average), studies=[0])
     experiments = experiments_of(kuka, sets=4, configurations=5)
     deflections, scores = deflections_of(kuka, experiments, 1e-5), judge(kuka)
     for strategy, block in zip(some, found, strict=True):
@@ -42,33 +41,17 @@ def test_scores_are_those_of_the_pipeline_for_the_same_data_sets(kuka, some, ave
 
 
 def test_lengths_that_do_not_determine_the_compliances_have_no_scores(kuka, some):
-    # Positions of a target off the last axis, so that joint 6 moves it.
-    block = blocks_of(
-        with_target_offset(kuka, OFFSET),
-        some[:1],
-        Interpretation(PAPER, 3, "end_effector", "stiffness", "averaged_model"),
-        studies=[1],
-    )[0]
-    assert np.isnan(block["deviation"][0]) and np.isfinite(block["deviation"][-1])
+    offsets = ((0.1, 0.0, 0.1), (0.1, 0.1, 0.0), (0.1, -0.1, 0.0))
+    for reflectors, determined in ((offsets[:1], False), (offsets, True)):
+        (block,) = blocks_of(kuka, some[:1], replace(USUAL, rows=3, reflectors_m=reflectors), studies=[1])
+        assert np.isfinite(block["deviation"][0]) == determined and np.isfinite(block["deviation"][-1])
 
 
 def test_averages_of_compliances_and_errors_of_single_data_sets_stand_beside_the_scores(kuka, some):
-    usual = blocks_of(kuka, some[:1], studies=[0])[0]
-    plain = blocks_of(kuka, some[:1], Interpretation(PAPER, 6, "end_effector", "compliance", "averaged_model"), studies=[0])[0]
+    (usual,) = blocks_of(kuka, some[:1], studies=[0])
+    (plain,) = blocks_of(kuka, some[:1], replace(USUAL, average="compliance"), studies=[0])
     for name in ("k_sigma", "k_sigma_fixed_joints", "deviation"):
         np.testing.assert_array_equal(usual[f"{name}_mean_compliance"][1:], plain[name][1:])
     # A sign averages out, a norm does not, and a single data set has all of its noise.
     assert (np.abs(usual["deviation_signed"][1:]) < plain["deviation"][1:]).all()
     assert (np.sqrt(usual["mean_square"][1:]) > usual["deviation_mean_compliance"][1:]).all()
-
-
-def test_three_reflectors_determine_what_one_does_not(kuka, some):
-    offsets = ((0.1, 0.0, 0.1), (0.1, 0.1, 0.0), (0.1, -0.1, 0.0))
-    one, three = (
-        blocks_of(
-            kuka, some[:1], Interpretation(PAPER, 3, "end_effector", "stiffness", "averaged_model", some_of), studies=[1]
-        )[0]
-        for some_of in (offsets[:1], offsets)
-    )
-    assert np.isnan(one["deviation"][0]) and np.isfinite(three["deviation"][0])
-    assert three["mean_square"][-1] < one["mean_square"][-1]

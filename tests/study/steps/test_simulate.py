@@ -18,11 +18,6 @@ def test_numbers_of_a_data_set_do_not_depend_on_how_many_there_are_or_how_long_t
         np.testing.assert_array_equal(many[name][shared], values)
 
 
-def test_test_configurations_are_none_of_those_that_identify(kuka):
-    one, other = (joined(experiments_of(kuka, purpose=purpose)) for purpose in ("identification", "test"))
-    assert not np.isin(one["q1"], other["q1"]).any() and not np.isin(one["fx"], other["fx"]).any()
-
-
 @pytest.mark.parametrize(("size", "expected"), [(2, [[0, 1], [2, 3], [4]]), (5, [[0, 1, 2, 3, 4]]), (9, [[0, 1, 2, 3, 4]])])
 def test_blocks_are_full_but_for_the_last_and_hold_each_data_set_once(kuka, monkeypatch, size, expected):
     monkeypatch.setattr(blocks, "SETS_PER_BLOCK", size)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.arm_points import in_sight, places
-from elastocal.study.experiments import Experiments
 from elastocal.study.metrics import error_moment
 
 if TYPE_CHECKING:
@@ -15,6 +14,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from elastocal.mechanics.chain import MeasuringPoint
+    from elastocal.study.experiments import Experiments
     from elastocal.study.steps.in_memory import StudyInMemory
 
 
@@ -27,7 +27,7 @@ def place_columns(study: StudyInMemory, tracker_m: Sequence[float], arm: Mapping
     """
     chain, length, sets = study.robot.chain, study.size.configurations, np.arange(arm["sets"])
     drawn, moment = study.experiments(sets, 2 * length), error_moment(study.judge())
-    first = Experiments(drawn.joint_angles[:, :length], drawn.wrench[:, :length])
+    first = drawn.first(length)
     once = _information(study, first, chain.end_effector)
     angles = first.joint_angles.reshape(-1, chain.coordinates)
     scale, columns = study.size.noise**2, []

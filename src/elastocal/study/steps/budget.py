@@ -13,7 +13,7 @@ from elastocal.study.bounds import squared_error_bounds
 from elastocal.study.identification import prefix_information
 from elastocal.study.metrics import mean_form, mean_square_errors
 from elastocal.study.steps.columns import prefix_index_columns
-from elastocal.study.strategies import Stage, Strategy
+from elastocal.study.strategies import all_at_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -42,8 +42,7 @@ def budget_blocks(study: StudyInMemory, point_sets: Mapping[str, Sequence[str]])
         information = {name: prefix_information(measurements[name].regressor) for name in names}
         for label, points in point_sets.items():
             read = tuple(name + _AGAIN * (name in points[:place]) for place, name in enumerate(points))
-            strategy = Strategy(label, (Stage(read, tuple(range(n))),))
-            squares = mean_square_errors(form, study.estimate(strategy, measurements) - robot.compliance[:, None])
+            squares = mean_square_errors(form, study.estimate(all_at_once(read, n), measurements) - robot.compliance[:, None])
             bounds = squared_error_bounds(sum((information[name] for name in points), np.zeros(())), form[:-1, :-1])
             columns = prefix_index_columns(sets, len(squares))
             yield {

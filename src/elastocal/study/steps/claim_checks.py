@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,8 +33,7 @@ def stiffness_columns(study: StudyInMemory, forces_N: Sequence[float]) -> dict[s
     chain, end = robot.chain, robot.chain.end_effector
     at, rows = loaded_point(chain, end, study.interpretation.wrench_at), []
     for force in forces_N:
-        loading = replace(study.interpretation.loading, force_N=force)
-        loaded = replace(study, interpretation=replace(study.interpretation, loading=loading))
+        loaded = study.under(force_N=force)
         tests = loaded.tests()
         jacobian = jacobians(chain, tests.joint_angles, at)
         plain = robot.compliance * joint_torques(chain, tests.joint_angles, tests.wrench, at)
@@ -51,10 +49,9 @@ def stiffness_columns(study: StudyInMemory, forces_N: Sequence[float]) -> dict[s
         deflection = exact_deflections(chain, drawn.joint_angles, theta, end)
         found = _least_squares(loaded.regressor(drawn), deflection)
         relative = found / robot.compliance
-        unshifted = replace(loaded, interpretation=replace(loaded.interpretation, loading=replace(loading, offset_m=(0, 0, 0))))
         ranks = [
             np.linalg.matrix_rank((one.regressor(one.experiments([0]))[0] * robot.compliance).reshape(-1, robot.joints), 1e-9)
-            for one in (unshifted, loaded)
+            for one in (loaded.under(offset_m=(0, 0, 0)), loaded)
         ]
         rows.append(
             {

@@ -1,16 +1,11 @@
 """Arrays with the axes (data set, configuration, component) to columns of tables and back."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 from elastocal.study.experiments import Experiments
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 # All that `to_deflections` looks at.
 DEFLECTION_COLUMNS = ("configuration", *COMPONENT_NAMES)

@@ -11,13 +11,7 @@ import numpy as np
 
 from elastocal.mechanics.elastostatics import generalized_forces, loaded_point, regressor
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.study.identification import (
-    Measurements,
-    condition_numbers,
-    covariance,
-    estimate_compliance,
-    find_undetermined_prefixes,
-)
+from elastocal.study.identification import Measurements, condition_numbers, covariance, estimate_compliance
 from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_experiments
 from elastocal.study.table_schemas import covariance_columns
 
@@ -66,9 +60,9 @@ def design_blocks(
         silent = np.zeros((rows, *next(iter(regressors.values())).shape[2:]))
         measurements = {name: Measurements(matrix, silent) for name, matrix in regressors.items()}
         triangles = estimate_compliance(strategy, measurements, chain.coordinates)[1]
-        spread, condition = covariance(strategy, measurements, triangles), condition_numbers(strategy, triangles)
-        undetermined = find_undetermined_prefixes(strategy, measurements, condition)
-        spread[undetermined], condition[undetermined] = np.nan, np.nan
+        spread = covariance(strategy, measurements, triangles)
+        condition = condition_numbers(strategy, measurements, triangles)
+        spread[np.isnan(condition)] = np.nan
         columns = prefix_index_columns(sets, len(condition))
         for name, i, j in covariance_columns(chain.coordinates):
             columns[name] = spread[..., i, j].T.ravel()

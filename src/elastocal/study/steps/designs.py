@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,8 +26,7 @@ def design_worths(study: StudyInMemory, candidates: int, sizes: Sequence[int]) -
     """
     found, ranges = [], []
     for joint_range in JOINT_RANGES:
-        loading = replace(study.interpretation.loading, joint_range=joint_range)
-        within = replace(study, interpretation=replace(study.interpretation, loading=loading))
+        within = study.under(joint_range=joint_range)
         drawn = within.experiments([0], candidates, "candidates of designs")
         rows = study.robot.compliance / study.size.noise * within.regressor(drawn)[0, :, : study.interpretation.rows]
         accuracy = study.robot.compliance * within.regressor(within.tests())[0, :, :3]

@@ -5,7 +5,7 @@ They are the same as those of the pipeline's steps: random streams have names, s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,13 +20,14 @@ from elastocal.study.metrics import Judge, make_judge
 from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
 from elastocal.study.steps.blocks import blocks_of_sets
 from elastocal.study.steps.design import Design, configuration_first
+from elastocal.study.strategies import Strategy, drop_forgotten_stages
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from elastocal.mechanics.chain import MeasuringPoint
     from elastocal.study.experiments import Experiments
-    from elastocal.study.strategies import Strategy
+    from elastocal.study.strategies import Stage
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,11 @@ class StudyInMemory:
     seed: int
     interpretation: Interpretation
     size: Size
+
+    def under(self, **loading: Any) -> StudyInMemory:
+        """The same study where the robot is moved and loaded otherwise, by attributes of `Loading`."""
+        changed = replace(self.interpretation.loading, **loading)
+        return replace(self, interpretation=replace(self.interpretation, loading=changed))
 
     def blocks(self, number: int = 0) -> Iterator[np.ndarray]:
         """Numbers of the data sets of a study, block by block, ndarray of int each."""
@@ -154,6 +160,22 @@ class StudyInMemory:
         compliance = estimate_compliance(strategy, measurements, self.robot.joints)[0]
         compliance[: first_solvable_length(strategy, self.interpretation.independent_rows) - 1] = np.nan
         return compliance
+
+    def estimates(self, strategies: Sequence[Strategy], number: int = 0) -> dict[str, list[np.ndarray]]:
+        """Compliances from all data sets of a study, block by block, by the names of strategies.
+
+        `strategies`: those that are one estimator under equation 11 are worked out once and share their arrays. `number`: of
+        the study. Returns (sets, lengths, n) each, as `estimate`.
+        """
+        stages = {strategy.name: drop_forgotten_stages(strategy, self.robot.joints).stages for strategy in strategies}
+        points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
+        found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
+        for sets in self.blocks(number):
+            measurements = self.measure(sets, points)
+            for estimator in dict.fromkeys(stages.values()):
+                compliance = self.estimate(Strategy("", estimator), measurements)
+                found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
+        return {name: found[estimator] for name, estimator in stages.items()}
 
     def _reflectors(
         self, sets: np.ndarray, name: str, repeat: str, drawn: Experiments, regressor: np.ndarray, deflection: np.ndarray

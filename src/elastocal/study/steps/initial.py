@@ -1,15 +1,10 @@
 """How far each robot bends before any calibration (Table 2), data set by data set."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
 from elastocal.study.steps.columns import data_sets, to_deflections
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
 
 
 def initial_blocks(ideal_blocks: Iterable[Mapping[str, np.ndarray]]) -> Iterator[dict[str, np.ndarray]]:

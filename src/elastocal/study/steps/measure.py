@@ -1,17 +1,12 @@
 """Step 2: noise on the ideal deflections."""
 
-from __future__ import annotations
+from collections.abc import Iterable, Iterator
 
-from typing import TYPE_CHECKING
+import numpy as np
 
 from elastocal.mechanics.components import COMPONENT_NAMES
 from elastocal.study.simulation import measurement_noise
 from elastocal.study.steps.columns import block_shape, data_sets
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    import numpy as np
 
 
 def measured_blocks(

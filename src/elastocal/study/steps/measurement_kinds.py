@@ -13,11 +13,11 @@ import numpy as np
 from elastocal.mechanics.elastostatics import joint_torques, loaded_point
 from elastocal.random_streams import draw
 from elastocal.study.experiments import Experiments
-from elastocal.study.identification import Measurements, condition_numbers, estimate_compliance, find_undetermined_prefixes
+from elastocal.study.identification import Measurements, condition_numbers, estimate_compliance
 from elastocal.study.metrics import mean_form, mean_square_errors
 from elastocal.study.steps.columns import prefix_index_columns
 from elastocal.study.steps.design import configuration_first
-from elastocal.study.strategies import Stage, Strategy
+from elastocal.study.strategies import all_at_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -48,13 +48,12 @@ def kind_blocks(
             for name, way in ways.items():
                 found[name + suffix] = replace(study, interpretation=way).measure(sets, (end,), suffix, experiments)[end]
         found |= {f"{ENCODERS}, {1e6 * std:g} µrad": simulate_encoders(study, sets, drawn, std) for std in encoders_rad}
-        strategy = Strategy("", (Stage((end,), tuple(range(n))),))
+        strategy = all_at_once((end,), n)
         for kind, measured in found.items():
             measurements = {end: measured}
             compliance, triangles = estimate_compliance(strategy, measurements, n)
-            undetermined = find_undetermined_prefixes(strategy, measurements, condition_numbers(strategy, triangles))
             squares = mean_square_errors(form, compliance - study.robot.compliance[:, None])
-            squares[undetermined] = np.nan
+            squares[np.isnan(condition_numbers(strategy, measurements, triangles))] = np.nan
             yield {
                 **prefix_index_columns(sets, len(squares)),
                 "kind": kind,

@@ -10,7 +10,7 @@ from elastocal.study.bounds import squared_error_bounds
 from elastocal.study.identification import estimate_compliance, prefix_information
 from elastocal.study.metrics import mean_form, mean_square_errors
 from elastocal.study.observability import observability
-from elastocal.study.strategies import Stage, Strategy
+from elastocal.study.strategies import all_at_once
 
 if TYPE_CHECKING:
     from elastocal.study.steps.in_memory import StudyInMemory
@@ -26,10 +26,9 @@ def observability_columns(study: StudyInMemory) -> dict[str, np.ndarray]:
     robot, size, sets = study.robot, study.size, np.arange(study.size.data_sets)
     point, n, form = robot.chain.end_effector.name, robot.joints, mean_form(study.judge())
     measurements = study.measure(sets, (point,))
-    strategy = Strategy("", (Stage((point,), tuple(range(n))),))
-    error = estimate_compliance(strategy, measurements, n)[0][-1] - robot.compliance[:, None]
+    error = estimate_compliance(all_at_once((point,), n), measurements, n)[0][-1] - robot.compliance[:, None]
     information = prefix_information(measurements[point].regressor)[-1:]
-    scaled = np.moveaxis(information[0], -1, 0) * np.outer(robot.compliance, robot.compliance)
+    scaled = information[0] * np.outer(robot.compliance, robot.compliance)
     return {
         "data_set": sets,
         **observability(scaled, size.configurations),

@@ -11,7 +11,6 @@ import numpy as np
 
 from elastocal.study.evaluation import average
 from elastocal.study.metrics import k_sigma, mean_form, mean_square_errors, signed_deviation
-from elastocal.study.steps.estimates import estimates
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -31,7 +30,7 @@ def repeated_blocks(
     robot, read, tests = study.robot, study.interpretation, np.ones((1, study.size.tests))
     for number in studies:
         judge = study.judge(number)
-        form, found = mean_form(judge), estimates(study, strategies, number)
+        form, found = mean_form(judge), study.estimates(strategies, number)
         for strategy in strategies:
             blocks = [(compliance, np.ones((1, len(compliance)))) for compliance in found[strategy.name]]
             averages = average(blocks, judge, read.average, read.deviation_of, tests)

@@ -10,7 +10,7 @@ Beside D, A and I the test-pose criterion: the accuracy at one pose under the lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,6 @@ from elastocal.application.planning.criteria import CRITERIA, Criterion, criteri
 from elastocal.application.planning.exchange import choose_greedily, exchange_candidates
 from elastocal.random_streams import stream
 from elastocal.study.designs import RANDOM
-from elastocal.study.experiments import Experiments
 from elastocal.study.metrics import make_judge, mean_form, mean_square_errors
 from elastocal.study.uses import iso_9283
 
@@ -88,8 +87,7 @@ def simulated_design_blocks(
 
 def _candidates(study: StudyInMemory, count: int, direction: Sequence[float] | None, uses: Mapping[str, Any]) -> Candidates:
     robot, read = study.robot, study.interpretation
-    loading = read.loading if direction is None else replace(read.loading, direction=tuple(direction))
-    within = replace(study, interpretation=replace(read, loading=loading))
+    within = study if direction is None else study.under(direction=tuple(direction))
     drawn = within.experiments([0], count, "candidates of designs")
     rows = within.regressor(drawn)[0, :, : read.rows]
     size = np.abs(rows).max(axis=(0, 1))
@@ -97,9 +95,7 @@ def _candidates(study: StudyInMemory, count: int, direction: Sequence[float] | N
     tests = study.tests() if observable.all() else within.tests()
     pose = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
     # The first of the five poses is the centre of the cube; a robot that does not reach it has its first test configuration.
-    centre = Experiments(tests.joint_angles[:, :1], tests.wrench[:, :1])
-    if pose is not None:
-        centre = Experiments(pose.joint_angles[:, :1], pose.wrench[:, :1])
+    centre = (pose or tests).first(1)
     forms = [mean_form(make_judge(robot, each, within.deflections(each), read.wrench_at)) for each in (tests, centre)]
     return Candidates(rows, within.deflections(drawn)[0, :, : read.rows], observable, (forms[0], forms[1]))
 

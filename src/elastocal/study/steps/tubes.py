@@ -10,7 +10,7 @@ import numpy as np
 from elastocal.mechanics.links import with_tube
 from elastocal.study.identification import estimate_compliance
 from elastocal.study.metrics import mean_form, mean_square_errors
-from elastocal.study.strategies import Stage, Strategy
+from elastocal.study.strategies import all_at_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -26,7 +26,7 @@ def tube_blocks(study: StudyInMemory, factors: Sequence[float], length: int) -> 
     """
     tube, point = study.robot.links[0].tube, study.robot.chain.end_effector.name
     n, sets = study.robot.joints, np.arange(study.size.data_sets)
-    drawn, strategy = study.experiments(sets), Strategy("", (Stage((point,), tuple(range(n))),))
+    drawn, strategy = study.experiments(sets), all_at_once((point,), n)
     for factor in factors:
         diameter = factor * tube.outer_diameter_m
         other = replace(study, robot=with_tube(study.robot, replace(tube, outer_diameter_m=diameter)))

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.metrics import make_judge, position_errors
-from elastocal.study.steps.estimates import estimates
 from elastocal.study.uses import iso_9283, milling_path
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ def use_blocks(
     cube = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
     path = milling_path(robot, uses["centre_m"], uses["path_m"], uses["cutting_N"])
     judges = [study.judge(), *(use and make_judge(robot, use, study.deflections(use), at) for use in (cube, path))]
-    for strategy, blocks in estimates(study, strategies).items():
+    for strategy, blocks in study.estimates(strategies).items():
         models = np.concatenate([block[:, -1] for block in blocks])
         columns = _scores(*(position_errors(judge, models) if judge else _none(models) for judge in judges))
         yield {"strategy": strategy, "data_set": np.arange(study.size.data_sets), **columns}

@@ -1,16 +1,11 @@
 """Step 4a: the bootstrap weights of one robot, drawn once for all strategies and noise levels."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
 from elastocal.study.steps.blocks import blocks_of_sets
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
 
 DATA_SETS, TESTS = "data sets", "test configurations"
 
