@@ -212,11 +212,12 @@ def prefix_triangles(equations: np.ndarray, start: np.ndarray) -> np.ndarray:
 
     [1] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall, 1974.
     """
-    triangles = [start]
-    for new in equations:
-        below = np.linalg.qr(np.concatenate([triangles[-1], new], axis=1), mode="r")
-        triangles.append(below[:, : start.shape[1]])
-    return np.stack(triangles[1:])
+    triangles = np.empty((len(equations), *start.shape))
+    before = start
+    for triangle, new in zip(triangles, equations, strict=True):
+        triangle[:] = np.asarray(np.linalg.qr(np.concatenate([before, new], axis=1), mode="r"))[:, : start.shape[1]]
+        before = triangle
+    return triangles
 
 
 def prefix_information(regressor: np.ndarray) -> np.ndarray:

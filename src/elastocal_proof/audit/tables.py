@@ -228,7 +228,7 @@ _FORMULAS: Mapping[str, tuple[tuple[str, ...], Mapping[str, str]]] = {
 def by_formulas(run: Audited, name: str) -> _Rows:
     for robot in run.reduced:
         frame = run.table(f"results/{name}/{robot}.parquet").assign(robot=robot)
-        further = {column: frame.eval(formula) for column, formula in _FORMULAS[name][1].items()}
+        further: dict[str, Any] = {column: frame.eval(formula) for column, formula in _FORMULAS[name][1].items()}
         yield from frame.assign(**further).to_dict("records")
 
 
