@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.patches import Rectangle
@@ -54,7 +54,7 @@ def _view(axis: Axes, robot: Robot, cell: Cell, plan: Plan, across: int, up: int
         axis.plot(at[:, across], at[:, up], "os"[number], color=PALETTE[number], ms=3.5, label=name, zorder=2)
     for number, box in enumerate(cell.boxes):
         size = box[:, 1] - box[:, 0]
-        look = {"facecolor": "#f2d7c9", "edgecolor": "#D55E00", "lw": 0.6, "zorder": 0}
+        look: dict[str, Any] = {"facecolor": "#f2d7c9", "edgecolor": "#D55E00", "lw": 0.6, "zorder": 0}
         label = "kept out of" if number == 0 else None
         axis.add_patch(Rectangle((box[across, 0], box[up, 0]), size[across], size[up], label=label, **look))
     if cell.tracker_m is not None:

@@ -214,8 +214,9 @@ def prefix_triangles(equations: np.ndarray, start: np.ndarray) -> np.ndarray:
     """
     triangles = [start]
     for new in equations:
-        below = np.linalg.qr(np.concatenate([triangles[-1], new], axis=1), mode="r")
-        triangles.append(below[:, : start.shape[1]])
+        # An array already, which the annotations of numpy do not say.
+        reduced = np.asarray(np.linalg.qr(np.concatenate([triangles[-1], new], axis=1), mode="r"))
+        triangles.append(reduced[:, : start.shape[1]])
     return np.stack(triangles[1:])
 
 
