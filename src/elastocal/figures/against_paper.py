@@ -1,6 +1,7 @@
 """Figures that hold the study against the paper's printed figures."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -34,7 +35,7 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
         for axis, quantity in zip(line, quantities, strict=True):
             cells = shown[(shown.robot == robot) & (shown.quantity == quantity)]
             rows = [strategies.index(strategy) for strategy in cells.strategy]
-            look = {"color": PALETTE[0], "markersize": 3, "elinewidth": 3, "alpha": 0.6}
+            look: dict[str, Any] = {"color": PALETTE[0], "markersize": 3, "elinewidth": 3, "alpha": 0.6}
             name = "further studies, mean ± 2 standard deviations"
             axis.errorbar(cells.studies_mean, rows, xerr=2 * cells.studies_std, fmt="o", label=name, **look)
             expected = _read_expected(expectations, robot, quantity)

@@ -1,6 +1,7 @@
 """The frames of Denavit-Hartenberg rows on a robot, as a picture."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -43,7 +44,8 @@ def dh_frames_picture(frames: np.ndarray, robot: str, names: Sequence[str]) -> F
     middle = 0.5 * (origins.min(axis=0) + origins.max(axis=0))
     half = 0.5 * span + length
     for name, centre in zip(_AXES, middle, strict=True):
-        axis.set(**{f"{name}lim": (centre - half, centre + half), f"{name}label": f"{name} of the base (m)"})
+        along: dict[str, Any] = {f"{name}lim": (centre - half, centre + half), f"{name}label": f"{name} of the base (m)"}
+        axis.set(**along)
     axis.set_title(f"{robot}: numbered frames where the controller reports zero; joint k turns about z of frame k - 1")
     axis.set_box_aspect((1, 1, 1), zoom=1.1)
     axis.locator_params(nbins=5)

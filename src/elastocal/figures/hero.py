@@ -41,7 +41,7 @@ def arm_with_errors(robot: Robot, table: Mapping[str, np.ndarray], heldout: Mapp
             axis.plot(*project_view(arm).T, color="#dde2e6", lw=1.2, zorder=0)
         draw_arm(axis, links, 11)
         start, tip = project_view(at), project_view(at + _TIMES * off)
-        look = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.005, "zorder": 3}
+        look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.005, "zorder": 3}
         axis.quiver(*start.T, *(tip - start).T, color=color, gid=stage, **look)
         axis.update_datalim(tip)
         error = f"{1e3 * heldout[stage]['rms_m']:.2f} mm"
