@@ -52,7 +52,7 @@ def _draw_arm(axis: Axes, cells: pd.DataFrame, corners: np.ndarray, scale: Norma
         by_place = link.groupby("along_m").agg({"ratio": "mean", "seen_turned_percent": "max"})
         places = np.column_stack([np.interp(by_place.index, way, column) for column in plane.T])
         edge: dict[str, Any] = {"s": 34, "edgecolors": "black", "linewidths": 0.6, "zorder": 2}
-        axis.scatter(*places.T, c=by_place.ratio, cmap=_COLOURS, norm=scale, **edge)
+        axis.scatter(places[:, 0], places[:, 1], c=by_place.ratio, cmap=_COLOURS, norm=scale, **edge)
         # One of a link tells of its neighbours.
         chosen = len(by_place) - 1 if joints == cells.joints.max() else len(by_place) // 2
         words = f"{by_place.ratio.iloc[chosen]:.2f}, seen {by_place.seen_turned_percent.iloc[chosen]:.0f} %"

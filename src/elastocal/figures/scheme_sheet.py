@@ -74,7 +74,7 @@ class Sheet:
             self.take(anchor, leader, 0.2)
         if frame:
             corner, extent = box[:2] + 0.3, size - 0.6
-            rounded = FancyBboxPatch((corner[0], corner[1]), *extent, boxstyle="round,pad=0,rounding_size=0.8")
+            rounded = FancyBboxPatch((corner[0], corner[1]), extent[0], extent[1], boxstyle="round,pad=0,rounding_size=0.8")
             rounded.set(fc="white", ec=frame, lw=1.0, zorder=7, gid=f"{gid}-box")
             self.axes.add_patch(rounded)
         self.text(centre, text, gid=gid)

@@ -115,8 +115,8 @@ def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[s
         column[1].set_xlabel(_LENGTH)
     axes[0, 0].set_ylabel(r"$k_\Sigma$ of the fixed joints (%)")
     axes[1, 0].set_ylabel("dev, equation 15 (µm)")
-    spread = "bands: ± one standard deviation between studies"
-    _legend_below(figure, axes, f"{spread}; one estimator under several names is drawn once")
+    bands = "bands: ± one standard deviation between studies"
+    _legend_below(figure, axes, f"{bands}; one estimator under several names is drawn once")
     return figure
 
 
