@@ -257,16 +257,6 @@ def test_declared_effects_are_not_checked_without_a_list_of_them(cell):
     assert cell.read().declared == ("anything",)
 
 
-def test_a_regression_that_nobody_has_is_refused_and_none_is_looked_for_where_none_is_named(cell):
-    for named in ("auto", "none"):
-        cell.document["remainder"] = named
-        cell.read(regressions=pytest.fail)
-    cell.document["remainder"] = "krigging"
-    with refused(f"{cell.source}: line 15, remainder", "'krigging'", "auto | none | kriging (regression on"):
-        cell.read(regressions=lambda: ["kriging"])
-    assert cell.read().remainder == "krigging"
-
-
 def test_fault_of_the_robot_file_names_that_file(cell):
     cell.arm["chain"] = "Tz(0.4) Rz(q1)"
     with refused((cell.folder / "arm.yaml").as_posix(), "chain", "measuring point"):

@@ -6,17 +6,15 @@ wrong is left for the diagnosis to trace.
 """
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.campaign import (
-    BEST_REMAINDER,
     DEFAULT_HOLDOUT,
     DOCUMENT,
-    NO_REMAINDER,
     Campaign,
     Measurements,
     Target,
@@ -29,18 +27,13 @@ from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, clos
 from elastocal.campaigns.places import is_file, is_file_in
 from elastocal.counting import counted
 from elastocal.errors import InputError
-from elastocal.io.documents import check_document, line_of, read_document, read_schema
+from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import kind_of
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
 
-def read_campaign(
-    folder: str | Path,
-    robots_folder: str | Path,
-    effects: Collection[str] | None = None,
-    regressions: Callable[[], Collection[str]] | None = None,
-) -> Campaign:
+def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collection[str] | None = None) -> Campaign:
     """Read a campaign and check it as a whole.
 
     Parameters
@@ -51,9 +44,6 @@ def read_campaign(
         Holds the robots that a campaign may name.
     effects : iterable of str, optional
         Names that ``declared`` may have; not checked without.
-    regressions : callable, optional
-        Makes the names that ``remainder`` may have; asked only where the campaign names one, as it takes two seconds. Not
-        checked without.
 
     Returns
     -------
@@ -73,7 +63,6 @@ def read_campaign(
     for index, name in enumerate(document.get("declared", ())):
         if effects is not None and name not in set(effects):
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
-    _check_remainder(document, regressions, source)
     _tables(folder)
     table = read_measurements(folder, robot.joints, document["measured"])
     measurements = _measurements(table, robot, targets)
@@ -143,23 +132,18 @@ def read_robot(path: str | Path) -> Robot:
 
 
 def held_out_campaign(
-    campaign: Campaign,
-    folder: str | Path,
-    robots_folder: str | Path,
-    effects: Collection[str] | None = None,
-    regressions: Callable[[], Collection[str]] | None = None,
+    campaign: Campaign, folder: str | Path, robots_folder: str | Path, effects: Collection[str] | None = None
 ) -> Campaign | None:
     """The other campaign that tests this one.
 
-    `folder`: folder of `campaign`. `effects`, `regressions`: as in `read_campaign`. Returns with its own targets and frame; all
-    of its measurements are for the test. None where this campaign holds out its own. Raises `InputError`: a fault of the other
+    `folder`: folder of `campaign`. `effects`: as in `read_campaign`. Returns with its own targets and frame; all of its
+    measurements are for the test. None where this campaign holds out its own. Raises `InputError`: a fault of the other
     campaign, or another chain than this one's.
     """
     if "campaign" not in campaign.holdout:
         return None
     source, key = (Path(folder) / DOCUMENT).as_posix(), "holdout.campaign"
-    there = other_folder(campaign.holdout["campaign"], Path(folder), source)
-    other = read_campaign(there, robots_folder, effects, regressions)
+    other = read_campaign(other_folder(campaign.holdout["campaign"], Path(folder), source), robots_folder, effects)
     if other.robot.chain != campaign.robot.chain:
         allowed = f"a campaign of the same chain, {campaign.robot.name}"
         raise InputError(source, key, f"another chain, of {other.robot.name}", allowed)
@@ -181,15 +165,6 @@ def folds_of(folder: str | Path, robots_folder: str | Path, number: int, of: int
     """
     pairs = measured_poses(read_campaign(folder, robots_folder).measurements)[0]
     return {"poses": pairs[number - 1 :: of].tolist()}
-
-
-def _check_remainder(document: Mapping[str, Any], regressions: Callable[[], Collection[str]] | None, source: str) -> None:
-    """Refuse a regression that the catalogue does not have, as a schema that listed them would."""
-    name = document.get("remainder", BEST_REMAINDER)
-    if regressions is not None and name not in (BEST_REMAINDER, NO_REMAINDER) and name not in regressions():
-        meaning = read_schema("campaign")["properties"]["remainder"]["description"]
-        allowed = " | ".join((BEST_REMAINDER, NO_REMAINDER, *regressions()))
-        raise InputError(source, f"{line_of(source, ['remainder'])}, remainder", repr(name), f"{allowed} ({meaning})")
 
 
 def _check_compliance(

@@ -181,12 +181,12 @@ def check_document(document: Any, schema: str, source: str) -> None:
         path = [*error.absolute_path]
         if error.validator == "additionalProperties":
             path.append(next(name for name in error.instance if name not in error.schema.get("properties", {})))
-        line = line_of(source, path)
+        line = _line_of(source, path)
         raise InputError(source, ", ".join(part for part in (line, key) if part), found, allowed)
     for place, text in _texts(document):
         # White space between the transforms of a chain is free; headers of another table are nobody's names.
         if fault := None if place[:1] == ("columns",) else text_fault(" ".join(text.split()) if place == ("chain",) else text):
-            key, line = _key_of(place), line_of(source, place)
+            key, line = _key_of(place), _line_of(source, place)
             raise InputError(source, ", ".join(part for part in (line, key) if part), *fault)
 
 
@@ -200,7 +200,7 @@ def _texts(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple
         yield from _texts(each, (*path, key))
 
 
-def line_of(source: str, path: Sequence[str | int]) -> str:
+def _line_of(source: str, path: Sequence[str | int]) -> str:
     """Line of the file at which a key stands, or what it should stand in; empty where there is no such file any more."""
     try:
         node = yaml.compose(read_text(source, LARGEST_BYTES), Loader=_Loader)

@@ -9,7 +9,6 @@ from elastocal.campaigns.holdout import split
 from elastocal.campaigns.reading import held_out_campaign, read_campaign, read_descriptions
 from elastocal.effects.catalogue import effects
 from elastocal.io.documents import read_document
-from elastocal.remainder.catalogue import regressions
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,10 +23,10 @@ def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[s
     `folder`, `robots_folder`: as in `reading.read_campaign`. Returns `descriptions`: ``campaign`` and ``robot``, the documents;
     ``held_out`` with the same of the campaign that holds the test, or None. Raises `InputError`.
     """
-    campaign = read_campaign(folder, robots_folder, effects(), regressions)
+    campaign = read_campaign(folder, robots_folder, effects())
     descriptions = _descriptions(folder, robots_folder, campaign)
     training, held_out = split(campaign)
-    other = held_out_campaign(campaign, folder, robots_folder, effects(), regressions)
+    other = held_out_campaign(campaign, folder, robots_folder, effects())
     if other is None:
         return descriptions | {"held_out": None}, training, held_out
     elsewhere = f"{folder}/{campaign.holdout['campaign']}"
@@ -40,7 +39,7 @@ def load_whole_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[
     `folder`, `robots_folder`: as in `reading.read_campaign`. Returns `descriptions`: as by `load_campaign`, but for the
     campaign that holds the test. Raises `InputError`.
     """
-    campaign = read_campaign(folder, robots_folder, effects(), regressions)
+    campaign = read_campaign(folder, robots_folder, effects())
     return _descriptions(folder, robots_folder, campaign), campaign.measurements
 
 

@@ -18,7 +18,6 @@ from elastocal.counting import counted
 from elastocal.effects.catalogue import effects
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import OK, read_corrected_targets
-from elastocal.remainder.catalogue import regressions
 from elastocal.validation.bootstrap_t import drawn_poses, log_ratio_interval
 from elastocal.validation.held_out import Errors
 from elastocal.validation.span import count_configurations
@@ -77,7 +76,7 @@ def measured_errors(folder: str | Path, robots_folder: str | Path, found: Diagno
     folder = Path(folder)
     robot = found.calibrated.robot
     wanted = read_corrected_targets(folder / TARGETS, robot.joints)
-    campaign = read_campaign(folder, robots_folder, effects(), regressions)
+    campaign = read_campaign(folder, robots_folder, effects())
     source, end = folder / DOCUMENT, robot.chain.end_effector.name
     if campaign.robot.chain != robot.chain:
         raise InputError(source, "robot", f"another robot, {campaign.robot.name}", f"that of {found.name}, {robot.name}")
