@@ -1,13 +1,26 @@
 """Every figure beside its target, over every case that belongs to it and no other."""
 
+import re
+
 import pandas as pd
 import pytest
 from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 from scipy.stats import beta
 
 from elastocal_proof.blind.calibration import statements
+from elastocal_proof.blind.cases import HARD, SETTINGS
 from elastocal_proof.blind.coverage import intervals_of
-from elastocal_proof.blind.targets import by_setting, summarized
+from elastocal_proof.blind.limit import COMPARED
+from elastocal_proof.blind.targets import (
+    BY_THE_BEST,
+    OF_ALL_CASES,
+    OVER_THE_BEST,
+    by_setting,
+    of_each_robot,
+    setting_words,
+    summarized,
+    worded,
+)
 
 PAYLOAD = verdict("named", effect("payload"))
 
@@ -163,3 +176,31 @@ def test_settings_tell_false_alarms_effects_and_hidden_effects_apart():
         ("without_covariates", "hidden effect"): 1,
     }
     assert table.loc[("outliers_5_percent", "no effect"), "wrong"] == 1
+
+
+def test_no_setting_is_shown_by_a_name_of_the_configuration():
+    assert [name for name in SETTINGS if re.search(r"_|\d[a-zA-Z]|percent", setting_words(name))] == []
+    shown = worded(summary((truth(), silence(), oracle(1.0))).reset_index()).quantity
+    alarms = [quantity for quantity in shown if quantity.startswith("false alarms, ")]
+    assert alarms == [f"false alarms, {setting_words(name)}" for name in HARD] and "false alarms, 3 kN" in alarms
+
+
+def test_what_a_limit_is_compared_with_has_a_figure_of_all_cases():
+    entries = [
+        (truth(*(("payload",), ("joint_tilt", 2))[: 1 + (group == "pair")], group=group, level=level), silence(), oracle())
+        for group, level in COMPARED
+    ]
+    named = summary(*entries).loc["proof"].index
+    for _, _, words in COMPARED.values():
+        assert {OF_ALL_CASES.get(words, words), words + BY_THE_BEST, words + OVER_THE_BEST} <= set(named)
+
+
+def test_each_robot_of_the_proof_has_its_own_figures():
+    entries = [
+        (truth(("payload",)), PAYLOAD, oracle()),
+        (truth(("payload",), robot="panda"), silence(), oracle()),
+        (truth(("payload",), robot="kuka"), silence(), oracle()),
+    ]
+    alone = of_each_robot(frame(*entries), statements((document, found) for document, found, _ in entries), 1)
+    rates = {name: table.set_index("quantity").rate["detected at 50"] for name, table in alone.items()}
+    assert rates == {"m900ib700": 1.0, "panda": 0.0}

@@ -64,6 +64,11 @@ def test_robots_of_the_proof_and_of_the_tuning_stand_side_by_side_in_one_row():
     assert_nothing_cut_off(figure)
 
 
+def test_settings_are_named_in_words():
+    rates = of_summary(summary_row("false alarms, pose common 15urad", 0.05, 0.02, 0.09, (0.0, 0.06))).axes[0]
+    assert row_labels(rates) == ["false alarms, errors common to a pose,\n15 µrad"]
+
+
 def test_a_target_of_a_single_value_is_centred_on_it():
     (bar,) = of_summary(summary_row("alarms", 0.05, 0.02, 0.09, (0.05, 0.05))).axes[0].patches
     assert bar.get_x() + bar.get_width() / 2 == pytest.approx(5.0) and 0 < bar.get_width() < 2

@@ -30,7 +30,7 @@ def test_targets_are_reached_or_missed_with_their_figures(facts):
     ends = [row[-1] for row in rows.values()]
     # Four hard settings, pairs, stated probabilities and their 95 % sets, and parameters of effects.
     assert rows["95 % intervals of effects' parameters"][-1] == "no case"
-    assert rows["false alarms, force 3kN"][-1] == "no case"
+    assert rows["false alarms, 3 kN"][-1] == "no case"
     without = ends.count("no case")
     assert facts["verdict"].startswith(f"{ends.count('reached')} of {len(ends) - without} figures")
     assert len(facts["missed"]) == ends.count("missed")
@@ -151,7 +151,7 @@ def test_figures_without_a_target_are_worded_as_shares_or_ratios(given, values, 
 def test_hard_settings_have_their_rates_of_detection_and_of_wrong_names(given):
     row = {
         "robots": "proof",
-        "setting": "one_load",
+        "setting": "outliers_1_percent",
         "level": 0.0,
         "cases": 8,
         "low": 0.01,
@@ -163,8 +163,8 @@ def test_hard_settings_have_their_rates_of_detection_and_of_wrong_names(given):
     other = pd.DataFrame([row | {"kind": "effect", "rate": 1.0, "robots": "tuned"}])
     changed = given | {"settings": pd.concat([settings, other])}
     assert blind_facts(changed, "", "quick", 7)["settings"] == [
-        ["one load", "no effect", "8", "12 (1–53)", "–", "12"],
-        ["one load", "effect at 200", "8", "50 (1–53)", "25", "12"],
+        ["1 % outliers", "no effect", "8", "12 (1–53)", "–", "12"],
+        ["1 % outliers", "effect at 200", "8", "50 (1–53)", "25", "12"],
     ]
 
 

@@ -61,8 +61,12 @@ rule score_cases:
 rule draw_blind_targets:
     input:
         summary=rules.score_cases.output.summary,
+        cases=rules.score_cases.output.cases,
+        probabilities=rules.score_cases.output.probabilities,
+        robots=rules.make_cases.input.robots,
         sources=sources("draw_blind_targets.py"),
     output:
+        page="reports/blind/targets.md",
         pdf="reports/blind/figures/targets.pdf",
         png=shown(
             "reports/blind/figures/targets.png", "blind_targets", "Blind proof", shows="Figures against targets", kind="figure"
@@ -71,6 +75,9 @@ rule draw_blind_targets:
         "results/logs/draw_blind_targets.log",
     benchmark:
         "results/timings/draw_blind_targets.tsv"
+    params:
+        size=config["blind"],
+        seed=config["seed"],
     script:
         "../scripts/draw_blind_targets.py"
 
@@ -194,16 +201,19 @@ rule compile_blind_report:
 
 
 rule blind_pictures:
+    """Pictures and the table of docs/, from a finished proof."""
     input:
-        figures=expand("reports/blind/figures/{figure}.png", figure=["targets", "power"]),
+        page=rules.draw_blind_targets.output.page,
+        figures=expand("reports/blind/figures/{figure}.png", figure=["targets", "reliability", "power"]),
     output:
-        figures=expand("docs/blind_{figure}.png", figure=["targets", "power"]),
+        page="docs/blind_tables.md",
+        figures=expand("docs/blind_{figure}.png", figure=["targets", "reliability", "power"]),
     log:
         "results/logs/blind_pictures.log",
     benchmark:
         "results/timings/blind_pictures.tsv"
     shell:
-        "(for one in {input.figures}; do cp $one docs/blind_$(basename $one); done) 2> {log}"
+        "(cp {input.page} {output.page}; for one in {input.figures}; do cp $one docs/blind_$(basename $one); done) 2> {log}"
 
 
 rule blind:

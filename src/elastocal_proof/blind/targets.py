@@ -14,7 +14,7 @@ from elastocal_proof.blind.calibration import calibration_error
 from elastocal_proof.blind.cases import GEAR_GRAVITY, HARD, MOVED, SEVERAL_JOINTS, UNDECLARED
 from elastocal_proof.blind.limit import COMPARED
 from elastocal_proof.blind.rates import rate
-from elastocal_proof.blind.scores import NONE, PROOF, TUNED
+from elastocal_proof.blind.scores import NONE, PROOF, TUNED, leading
 from elastocal_proof.plant.defects import OUTSIDE
 
 if TYPE_CHECKING:
@@ -26,6 +26,22 @@ _RESAMPLES = 2000
 # Held-out errors this near to the oracle's count as its own.
 WITHIN = 1.05
 _SEVERAL_AT_ONCE = 200
+_ALARMS = "false alarms, "
+BY_THE_BEST, OVER_THE_BEST = ", by the best analyst", ", over the best analyst's, on the same cases"
+# Of what is compared with the best analyst on a sample: the figure of all cases, where its words are others.
+OF_ALL_CASES = {
+    "right name alone at 50": "right name alone, exact aliases aside, at 50",
+    "both of two effects at 50 each": "both of two effects, at 50 each",
+    "both of two effects at 200 each": "both of two effects, at 200 each",
+}
+# Of settings whose names are no words.
+_SETTINGS = {
+    "pose_common_15urad": "errors common to a pose, 15 µrad",
+    "force_3kN": "3 kN",
+    "off_line_centres": "centres of mass off the line",
+    **{f"outliers_{share}_percent": f"{share} % outliers" for share in (1, 2, 5)},
+    "outliers_2_percent_far": "2 % outliers, farther off",
+}
 _SETTING_COLUMNS = ["robots", "setting", "kind", "level", *rate([]), "held", "named", "wrong"]
 
 
@@ -67,6 +83,26 @@ _TARGETS: dict[_Key | None, Target] = {
     ("worse", None): _at_most(0.01),
     ("coverage", None): Target("92 to 98 %", 0.92, 0.98),
 }
+
+
+def setting_words(setting: str) -> str:
+    """A setting of the cases as people read it."""
+    return _SETTINGS.get(setting, setting.replace("_", " "))
+
+
+def worded(summary: pd.DataFrame) -> pd.DataFrame:
+    """The summary as people read it: its quantities with their settings in words."""
+    words = {f"{_ALARMS}{name.replace('_', ' ')}": f"{_ALARMS}{setting_words(name)}" for name in HARD}
+    return summary.replace({"quantity": words})
+
+
+def of_each_robot(cases: pd.DataFrame, statements: pd.DataFrame, seed: int) -> dict[str, pd.DataFrame]:
+    """As `summarized`, of each robot of the leading kind by itself, by its name; without intervals of parameters."""
+    mine = cases[cases.robots == leading(cases.robots)]
+    return {
+        str(name): summarized(part, pd.DataFrame(), statements[statements.robot == name], seed)
+        for name, part in mine.groupby("robot")
+    }
 
 
 def summarized(cases: pd.DataFrame, intervals: pd.DataFrame, statements: pd.DataFrame, seed: int) -> pd.DataFrame:
@@ -121,7 +157,7 @@ def _of_cases(cases: pd.DataFrame) -> Iterator[dict[str, Any]]:
     hard = cases[(cases.group == "setting") & (cases.truth == NONE)]
     for setting in HARD:
         part = hard[hard.setting == setting]
-        yield _rated(f"false alarms, {setting.replace('_', ' ')}", part.detected, ("false alarms", "hard"))
+        yield _rated(f"{_ALARMS}{setting.replace('_', ' ')}", part.detected, ("false alarms", "hard"))
     single = cases[cases.group == "single"]
     # What the model absorbs whatever its size is no question of level; a scale of the forces is an alias of the compliances, of
     # which weights that are known to a tenth leave next to nothing.
@@ -159,12 +195,12 @@ def _over_the_limit(cases: pd.DataFrame, seed: int) -> Iterator[dict[str, Any]]:
     sampled = cases[cases.limit_right.notna()]
     for (group, level), (ours, best, words) in COMPARED.items():
         part = sampled[(sampled.group == group) & (sampled.level == level)]
-        yield _rated(f"{words}, by the best analyst", part[best] == 1.0, None)
+        yield _rated(f"{words}{BY_THE_BEST}", part[best] == 1.0, None)
         hits = part[ours].to_numpy(float), part[best].to_numpy(float)
         low, high = _bootstrapped(hits, _ratio_of_sums, stream(seed, "blind", f"{words} over the limit", 0))
         value = float(_ratio_of_sums(*hits)) if len(part) else np.nan
         row = {"hits": None, "cases": len(part), "rate": value, "low": low, "high": high}
-        yield _named(f"{words}, over the best analyst's, on the same cases", row, ("over the limit", None))
+        yield _named(f"{words}{OVER_THE_BEST}", row, ("over the limit", None))
 
 
 def _of_errors(cases: pd.DataFrame, seed: int) -> Iterator[dict[str, Any]]:

@@ -94,7 +94,7 @@ def _error_table(table: pd.DataFrame, words: Mapping[str, str]) -> str:
             shown = f"**{rms}**" if each["rms_mm"] == best else rms
             row[words[each["method"]]] = f"{shown} ({low}–{high}), {most}"
         rows.append(row)
-    return _markdown(rows)
+    return markdown(rows)
 
 
 def _coverage(table: pd.DataFrame, words: Mapping[str, str]) -> str:
@@ -102,7 +102,7 @@ def _coverage(table: pd.DataFrame, words: Mapping[str, str]) -> str:
     for each in table.dropna(subset="covered").to_dict("records"):
         row = rows.setdefault((each["data"], each["split"]), {"data": _words(each["data"]), "split": each["split"]})
         row[words[each["method"]]] = f"{100 * each['covered']:.1f} %"
-    return _markdown(list(rows.values()))
+    return markdown(list(rows.values()))
 
 
 def _published(published: pd.DataFrame, table: pd.DataFrame) -> str:
@@ -113,7 +113,7 @@ def _published(published: pd.DataFrame, table: pd.DataFrame) -> str:
         for each in published.to_dict("records")
         if each["data"] in ours
     ]
-    return _markdown(rows)
+    return markdown(rows)
 
 
 def _mechanisms(table: pd.DataFrame) -> str:
@@ -125,7 +125,7 @@ def _mechanisms(table: pd.DataFrame) -> str:
             row = {"data": _words(name), "mechanism": _words(each["mechanism"])}
             row["probability"] = f"{each['probability']:.2f} ({each['probability_low']:.2f}–{each['probability_high']:.2f})"
             rows.append(row | {"share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"})
-    return _markdown(rows)
+    return markdown(rows)
 
 
 def _costs(costs: pd.DataFrame, words: Mapping[str, str]) -> str:
@@ -133,14 +133,15 @@ def _costs(costs: pd.DataFrame, words: Mapping[str, str]) -> str:
     for each in costs[costs["split"] == RANDOM].to_dict("records"):
         row = rows.setdefault(each["data"], {"data": _words(each["data"])})
         row[words[each["method"]]] = f"{each['seconds_per_fold']:.1f} s, {each['memory_MB']:.0f} MB"
-    return _markdown(list(rows.values()))
+    return markdown(list(rows.values()))
 
 
 def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _markdown(rows: list[dict[str, Any]]) -> str:
+def markdown(rows: list[dict[str, Any]]) -> str:
+    """A table of which each row has its cells by the heads of their columns."""
     return pd.DataFrame(rows).fillna("").to_markdown(index=False, disable_numparse=True) if rows else "None."
 
 

@@ -14,6 +14,7 @@ from elastocal_proof.blind.case_rows import EXACT_ALIASES
 from elastocal_proof.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARED, USUAL_DESIGN
 from elastocal_proof.blind.confusion import CLASS_WITH, CLASS_WITHOUT
 from elastocal_proof.blind.scores import NONE, PROOF, TUNED, leading
+from elastocal_proof.blind.targets import BY_THE_BEST, OF_ALL_CASES, OVER_THE_BEST, setting_words, worded
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping
@@ -37,6 +38,7 @@ _GROUPS = {
 _VERDICTS_OUTSIDE = ("wrong name", "class", "several", "unexplained", "adequate")
 _OUTCOMES_OF_RELATIVES = ("right", "class", "wrong", "other")
 _ABSENT = "–"
+_REACHED = {"True": "reached", "False": "missed"}
 
 
 def blind_facts(tables: Mapping[str, pd.DataFrame], manifest: str, size: str, seed: int) -> dict[str, Any]:
@@ -46,14 +48,13 @@ def blind_facts(tables: Mapping[str, pd.DataFrame], manifest: str, size: str, se
     reports/blind/. `manifest`: contents of the manifest. `size`: of the benchmark. `seed`: of everything that is drawn. Returns
     JSON-serialisable; strings ready to print, lists for tables.
     """
-    cases, summary = tables["cases"], tables["summary"]
+    cases, summary = tables["cases"], worded(tables["summary"])
     robots = leading(cases.robots)
-    aimed = summary[(summary.robots == robots) & summary.target.fillna("").ne("")]
     return {
         "robots": {key: _robots(cases, key) for key in (PROOF, TUNED)},
         "proof": robots == PROOF,
-        "verdict": _verdict(aimed, robots),
-        "missed": [_missed(row) for row in _rows_of(aimed) if str(row.holds) == "False"],
+        "verdict": reached_words(summary),
+        "missed": [_missed(row) for row in _rows_of(_aimed(summary, robots)) if str(row.holds) == "False"],
         "protocol": {
             "cases": grouped(len(cases)),
             "size": size,
@@ -79,6 +80,33 @@ def blind_facts(tables: Mapping[str, pd.DataFrame], manifest: str, size: str, se
     }
 
 
+def target_rows(summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame]) -> list[dict[str, str]]:
+    """Each quantity with a target as a row of words, beside what every robot has alone and what the best analyst finds.
+
+    `summary`: of reports/blind/. `of_each`: of `targets.of_each_robot`, by what the robots are called.
+    """
+    summary = worded(summary)
+    robots = leading(summary.robots)
+    of_all = {row.quantity: row for row in _rows_of(summary[summary.robots == robots])}
+    alone = {name: {row.quantity: row for row in _rows_of(worded(one))} for name, one in of_each.items()}
+    rows = []
+    for row in _rows_of(_aimed(summary, robots)):
+        compared = row.quantity.removesuffix(OVER_THE_BEST)
+        found, limit = of_all.get(OF_ALL_CASES.get(compared, compared), row), of_all.get(f"{compared}{BY_THE_BEST}")
+        cells = {"quantity": found.quantity, "target": row.target, "outcome": _outcome(row)}
+        cells |= {"robots together": _with_interval(found), "cases": _hits(found)}
+        cells |= {name: _value(each[found.quantity]) if found.quantity in each else _ABSENT for name, each in alone.items()}
+        if limit:
+            cells["limit, on a sample"] = f"{_with_interval(limit)}, {_hits(limit)}"
+            cells["found over limit, same sample"] = _with_interval(row)
+        rows.append(cells)
+    return rows
+
+
+def _aimed(summary: pd.DataFrame, robots: str) -> pd.DataFrame:
+    return summary[(summary.robots == robots) & summary.target.fillna("").ne("")]
+
+
 def _rows_of(table: pd.DataFrame) -> Iterator[Any]:
     """Rows of a table; their attributes are its columns."""
     return table.itertuples()
@@ -100,15 +128,25 @@ def _robots(cases: pd.DataFrame, key: str) -> str:
     return listed(names) if names else ""
 
 
-def _verdict(aimed: pd.DataFrame, robots: str) -> str:
-    judged = aimed[aimed.holds.notna()]
+def reached_words(summary: pd.DataFrame) -> str:
+    """How many targets are reached; `summary`: of reports/blind/."""
+    robots = leading(summary.robots)
+    judged = _aimed(summary, robots).dropna(subset="holds")
     held = int((judged.holds.astype(str) == "True").sum())
     where = "the robots of the proof" if robots == PROOF else "robots on which the method was developed, which proves nothing"
     return f"{held} of {counted(len(judged), 'figure')} with a target reach it on {where}."
 
 
 def _missed(row: Any) -> str:
-    return f"{row.quantity}: {_value(row)} ({_interval(row)}), target {row.target}"
+    return f"{row.quantity}: {_with_interval(row)}, target {row.target}"
+
+
+def _with_interval(row: Any) -> str:
+    return f"{_value(row)} ({_interval(row)})"
+
+
+def _outcome(row: Any) -> str:
+    return _REACHED.get(str(row.holds), "no case")
 
 
 def _value(row: Any) -> str:
@@ -134,11 +172,9 @@ def _hits(row: Any) -> str:
 
 
 def _targets(summary: pd.DataFrame, robots: str) -> list[list[str]]:
-    mine = summary[(summary.robots == robots) & summary.target.fillna("").ne("")]
-    reached = {"True": "reached", "False": "missed"}
     return [
-        [row.quantity, _hits(row), _value(row), _interval(row), row.target, reached.get(str(row.holds), "no case")]
-        for row in _rows_of(mine)
+        [row.quantity, _hits(row), _value(row), _interval(row), row.target, _outcome(row)]
+        for row in _rows_of(_aimed(summary, robots))
     ]
 
 
@@ -204,7 +240,7 @@ def _settings(settings: pd.DataFrame, robots: str) -> list[list[str]]:
     mine = settings[settings.robots == robots]
     return [
         [
-            words(row.setting),
+            setting_words(row.setting),
             row.kind + (f" at {row.level:g}" if row.level else ""),
             f"{row.cases}",
             f"{100 * row.rate:.0f} ({100 * row.low:.0f}–{100 * row.high:.0f})",
@@ -221,7 +257,7 @@ def _undetectable(undetectable: pd.DataFrame, robots: str) -> list[list[str]]:
         rows.append(
             [
                 words(row.effect),
-                words(row.setting),
+                setting_words(row.setting),
                 f"{row.level:g}",
                 row.reason,
                 f"{row.hits} of {row.cases}",
