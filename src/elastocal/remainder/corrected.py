@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.campaigns.campaign import BEST_REMAINDER
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import sample_of, state_clusters
@@ -41,12 +42,12 @@ _MOST_TO_CHOOSE = 2_000
 class Plan:
     """How a remainder is to be regressed.
 
-    `regression`: name in `catalogue`; None for that which cross-validation chooses, or none. `blocks`: whether settings and
-    intervals come from blocks of joint space, as for poses far from those fitted; else from random folds. `within_range`:
-    whether nothing is corrected at poses outside the range of those fitted.
+    `regression`: name in `catalogue`; `BEST_REMAINDER` for that which cross-validation chooses, or none. `blocks`: whether
+    settings and intervals come from blocks of joint space, as for poses far from those fitted; else from random folds.
+    `within_range`: whether nothing is corrected at poses outside the range of those fitted.
     """
 
-    regression: str | None
+    regression: str
     blocks: bool
     within_range: bool
     seed: int
@@ -96,7 +97,7 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
 
 def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> Tuned:
     seen, all_of_them = case.observations, regressions()
-    among = [all_of_them[plan.regression]] if plan.regression else list(all_of_them.values())
+    among = list(all_of_them.values()) if plan.regression == BEST_REMAINDER else [all_of_them[plan.regression]]
     parts = _inner_parts(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
     inputs = inputs_of(fitted.model, fitted.estimate, seen, elsewhere)
     return tuned(among, parts, inputs, position_residuals(fitted.model, fitted.estimate, seen), plan.seed)
