@@ -9,7 +9,7 @@ import numpy as np
 from elastocal.counting import plural
 from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.verdict import location_probabilities
+from elastocal.diagnosis.verdict import location_probabilities, locations_of
 from elastocal.diagnosis.words import part_of
 from elastocal.effects import payload
 from elastocal.effects.full_load import lever_m
@@ -58,12 +58,10 @@ def probability_facts(problem: Problem, posterior: Posterior, conclusion: Conclu
     for hypothesis in conclusion.hypotheses:
         if hypothesis.probability < _LEAST_LISTED:
             continue
-        units = posterior.models[hypothesis.model].units if hypothesis.model >= 0 else ()
-        at = {
-            name: dict.fromkeys(problem.units[n].location for n in units if problem.units[n].mechanism == name)
-            for name in hypothesis.mechanisms
+        model = posterior.models[hypothesis.model]
+        where = {
+            name: [location_words(name, at) for at in locations_of(problem, model, name)] for name in hypothesis.mechanisms
         }
-        where = {name: [location_words(name, location) for location in found] for name, found in at.items()}
         sets.append({"mechanisms": list(hypothesis.mechanisms), "probability": hypothesis.probability, "locations": where})
     nothing = next(h.probability for h in conclusion.hypotheses if not h.mechanisms)
     return {

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import NOT_TURNED, Target
 from elastocal.diagnosis import other
+from elastocal.diagnosis.statistics import rows_alike
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import Observations, States
@@ -255,7 +256,7 @@ class Instrument:
         white = whitening(observations, jacobian[..., : self.model.sites.joints], self.noise).apply(every)
         mine = np.flatnonzero(self.declared | self.added)
         declared, added = white[..., np.flatnonzero(self.declared[mine])], white[..., np.flatnonzero(self.added[mine])]
-        rows = self.linearized.products.alike(declared, white[..., len(mine) :], self.columns)
+        rows = rows_alike(self.linearized.products, declared, white[..., len(mine) :], self.columns)
         rows = np.concatenate([rows, added], axis=-1)
         return rows.reshape(len(entries), -1, rows.shape[-1])
 

@@ -85,9 +85,7 @@ def mean_square_left(problem: Problem, model: Model) -> float:
     Returns 1 where the noise accounts for it.
     """
     statistics = problem.statistics
-    place = int(np.argmin(np.abs(statistics.pose_error_rad - model.pose_error_rad)))
-    columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
-    deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in model.units])
+    place, (columns, deviations) = statistics.nearest(model.pose_error_rad), problem.columns_of(model.units, model.scales)
     along = deviations * statistics.along[place, columns]
     inner = deviations[:, None] * statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
     return float((statistics.squares[place] - along @ np.linalg.solve(inner, along)) / statistics.freedom)

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.diagnosis.summed import Sums, nothing_left, null_draws_of, rows_alike
+from elastocal.diagnosis.summed import Sums, nothing_left, null_draws_of
 from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
@@ -56,6 +56,10 @@ class Statistics:
             self.log_likelihood[chosen],
             self.freedom,
         )
+
+    def nearest(self, pose_error_rad: float) -> int:
+        """Place of the size of the pose error that is nearest to one."""
+        return int(np.argmin(np.abs(self.pose_error_rad - pose_error_rad)))
 
 
 @dataclass(frozen=True)
@@ -90,13 +94,15 @@ class Products:
             projected=self.projected[:, -1:],
         )
 
-    def alike(self, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Whitened rows at other states in the parameters of these products.
 
-        `declared` (..., P). `candidates` (..., U): sensitivities to some of the candidates, in units of their plausible sizes.
-        `columns` (U,) of int: which of them. Returns (..., P + U).
-        """
-        return rows_alike(self, declared, candidates, columns)
+def rows_alike(products: Products | Sums, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Whitened rows at other states in the parameters of some products.
+
+    `declared` (..., P). `candidates` (..., U): sensitivities to some of the candidates, in units of their plausible sizes.
+    `columns` (U,) of int: which of them. Returns (..., P + U).
+    """
+    basis = declared @ products.into_basis
+    return np.concatenate([basis, candidates - basis @ products.projected[:, columns]], axis=-1)
 
 
 def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray, joint_rad: np.ndarray) -> Products:

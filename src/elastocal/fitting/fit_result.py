@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Parameter
     from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.fitting.observations import Observations
+    from elastocal.fitting.observations import Observations, States
     from elastocal.fitting.whitening import Scaling, Whitening
 
 
@@ -76,13 +76,15 @@ class Fit:
         """
         for states, seen in parts_of(observations, observations_at_once(observations.rows, len(self.held))):
             some = part_at(observations, states, seen)
-            if self.conditions is None:
-                around = conditions(self.model, self.estimate, some.states)
-            else:
-                around = at_states(self.conditions, states)
-            line = linearize(self.model, self.estimate, some, around)
+            line = linearize(self.model, self.estimate, some, self.conditions_of(some.states, states))
             white = whitening(some, self.jacobian_at(line, seen), self.noise)
             yield seen, line.sensitivities, white.apply(line.sensitivities * np.sqrt(self.weights[seen])[:, None, None])
+
+    def conditions_of(self, states: States, chosen: slice | np.ndarray | None = None) -> Conditions:
+        """Conditions of the states, or of those chosen: as they were kept, or found again where they were too many."""
+        if self.conditions is None:
+            return conditions(self.model, self.estimate, states)
+        return self.conditions if chosen is None else at_states(self.conditions, chosen)
 
     def jacobian_at(self, line: Linearization, seen: slice) -> np.ndarray:
         """Jacobian of some observations with respect to the joints: as kept, or of their `Linearization`, (M', rows, n)."""
