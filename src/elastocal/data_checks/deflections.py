@@ -12,8 +12,9 @@ import numpy as np
 from scipy.constants import g, pound_force
 
 from elastocal.data_checks.placement import rms, robust_sigma, robustly_placed, spread
-from elastocal.fitting.identifiability import solve_identifiable
-from elastocal.fitting.observations import state_clusters
+from elastocal.fitting.identifiability import solve_normal
+from elastocal.fitting.observations import single_observations, state_clusters
+from elastocal.fitting.prediction import measured_in_base
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 
@@ -277,7 +278,8 @@ def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, n
         if kept.sum() < 4 * joints:
             return None
     level = max(rms(residual[kept]), _ROUNDING_M)
-    step, covariance, held = solve_identifiable(expected[kept] / level, deflected.seen[kept] / level, np.ones(joints))
+    left, right = expected[kept] / level, deflected.seen[kept] / level
+    step, covariance, held = solve_normal(left.T @ left, left.T @ right, np.ones(joints))
     # Measurements of one pose have their errors in common: poses count, not measurements.
     deviation = np.sqrt(np.diag(covariance) * max(kept.sum() / (3 * deflected.poses), 1.0))
     well = ~held & (deviation < _WELL_KNOWN * np.abs(step))
@@ -305,9 +307,7 @@ def _linearized(
         position[mask], rotation[mask], at_target = poses_and_jacobians(chain, angles[mask], point)
         jacobian[mask] = at_target[:, :3]
     end = poses_and_jacobians(chain, angles, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
-    session = np.searchsorted(estimate.sessions, measurements.session)
-    into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
-    measured = (into_base @ (measurements.position - estimate.frame_position[session])[..., None])[..., 0]
+    measured, _ = measured_in_base(estimate, single_observations(measurements))
     return measured - position, jacobian, end, rotation, position
 
 

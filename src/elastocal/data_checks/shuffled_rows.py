@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
+from elastocal.campaigns.groups import groups_of
 from elastocal.data_checks.deflections import state_deflections
 from elastocal.data_checks.placement import (
     FAR_BETTER,
@@ -117,8 +118,7 @@ def _moved(measurements: Measurements, shift: _Shift) -> Measurements:
         key = measurements.target[:, None]
     if shift.kind == "pose":
         key = np.column_stack([measurements.target, measurements.load, measurements.repeat])
-    _, group = np.unique(np.column_stack([measurements.session, key]), axis=0, return_inverse=True)
-    group = group.ravel()
+    group = groups_of(np.column_stack([measurements.session, key]))[1]
     source = np.full(len(measurements), -1)
     for number in range(group.max() + 1):
         members = order[group[order] == number]
