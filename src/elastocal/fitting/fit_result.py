@@ -59,6 +59,11 @@ class Fit:
         """As `parameters.parameters`."""
         return parameters(self.model, self.estimate)
 
+    @property
+    def prior_std(self) -> np.ndarray:
+        """Standard deviation of the prior of each of the parameters, infinite where it has none, ndarray (P,)."""
+        return np.array([np.inf if parameter.prior_std is None else parameter.prior_std for _, parameter in self.parameters])
+
     def values_of(self, key: str) -> tuple[np.ndarray, np.ndarray]:
         """Linear parameters (D,) and shapes (F,) of one effect."""
         number = [effect.key for effect in self.model.effects].index(key)
