@@ -26,7 +26,7 @@ from elastocal.diagnosis.statistics import statistics_of
 
 TAU = np.array([0.0, 0.3, 0.9])
 SETTINGS = Settings()
-GRID = Grid(np.array(SETTINGS.scales), scale_weights(SETTINGS.scales, SETTINGS))
+GRID = Grid(np.array(SETTINGS.scales), scale_weights(SETTINGS))
 LOG_POSE = pose_weights(TAU, SETTINGS)
 # Residuals of a little less than the noise, so that its size is at its floor and everything is normal.
 QUIET = 0.5
@@ -274,8 +274,8 @@ def test_the_wrong_sign_costs_and_the_right_one_pays_at_most_a_factor_of_two():
 
 
 def test_weights_of_sizes_are_log_normal_about_the_center_and_sum_to_one():
-    scales = np.array([0.01, 0.1, 1.0])
-    weights = np.exp(scale_weights(scales, replace(SETTINGS, scale_center=0.1, scale_spread=(3.0, 0.7))))
+    settings = replace(SETTINGS, scales=(0.01, 0.1, 1.0), scale_center=0.1, scale_spread=(3.0, 0.7))
+    weights = np.exp(scale_weights(settings))
     assert weights.sum() == pytest.approx(1.0)
     ratio = np.log(10.0)
     assert weights[0] / weights[1] == pytest.approx(np.exp(-0.5 * (ratio / 3.0) ** 2))

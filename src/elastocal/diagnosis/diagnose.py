@@ -280,8 +280,7 @@ def _document(
     warnings: Sequence[str],
 ) -> dict[str, Any]:
     declared, final = steps[1].fitted, steps[-1].fitted
-    listed = [vars(fault) | {"parameters": [vars(value) for value in fault.parameters]} for fault in known]
-    decisive = [fault for fault in listed if fault["decisive"]]
+    decisive = [fault for fault in known if fault.decisive]
     springs = Averaged({}, {})
     entries = [findings.fault_entry(fault) for fault in decisive]
     probabilities: dict[str, Any] | None = None
@@ -289,7 +288,7 @@ def _document(
     misfit: dict[str, float] | None = None
     other_m: float | None = None
     verdict = NAMED if len(decisive) == 1 else SEVERAL
-    remarks = [*warnings, *(f"{fault['name']}: {fault['detail']}" for fault in listed if not fault["decisive"])]
+    remarks = [*warnings, *(f"{fault.name}: {fault.detail}" for fault in known if not fault.decisive)]
     if found:
         problem, conclusion = found.linearized.problem, found.conclusion
         verdict, untestable = conclusion.verdict, found.linearized.untestable

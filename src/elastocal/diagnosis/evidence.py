@@ -83,12 +83,9 @@ class Grid:
             return weights - log_sum_exp(weights, axis=2)[..., None]
 
 
-def scale_weights(scales: Sequence[float] | np.ndarray, settings: Settings) -> np.ndarray:
-    """Logarithms of the prior weights of sizes: log-normal pieces below and above the most likely size.
-
-    `scales` (S,). Returns (S,).
-    """
-    off = np.log(np.asarray(scales) / settings.scale_center)
+def scale_weights(settings: Settings) -> np.ndarray:
+    """Logarithms of the prior weights of the sizes, (S,): log-normal pieces below and above the most likely size."""
+    off = np.log(np.asarray(settings.scales) / settings.scale_center)
     spread = np.where(off < 0, *settings.scale_spread)
     log_weights = -0.5 * (off / spread) ** 2
     return log_weights - log_sum_exp(log_weights)

@@ -19,6 +19,7 @@ from elastocal.fitting.linearization import effect_columns
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.averaging import Averaged
     from elastocal.diagnosis.search import Posterior, Problem
@@ -182,26 +183,23 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
     return [{"name": f"{name} largest_sag", "value": size, "std_error": error, "unit": "m", "prior_std": None, "held": False}]
 
 
-def fault_entry(fault: Mapping[str, Any]) -> dict[str, Any]:
-    """Entry of a decisive fault of the data.
-
-    `fault`: fields of `faults.protocol.Fault`.
-    """
+def fault_entry(fault: Fault) -> dict[str, Any]:
+    """Entry of a decisive fault of the data."""
     return {
-        "name": fault["name"],
+        "name": fault.name,
         "family": "data",
-        "joints": fault["joints"],
-        "detail": fault["detail"],
+        "joints": fault.joints,
+        "detail": fault.detail,
         "members": [],
         "probability": None,
         "locations": [],
-        "parameters": [value | {"std_error": None} for value in fault["parameters"]],
+        "parameters": [vars(value) | {"std_error": None} for value in fault.parameters],
         "p_value": None,
         "heldout_gain": None,
         "adopted": False,
-        "alternatives": list(fault["alternatives"]),
+        "alternatives": list(fault.alternatives),
         "angle_to_nearest_deg": None,
-        "evidence": [float(value) if np.isfinite(value) else None for value in fault["evidence"]],
+        "evidence": [float(value) if np.isfinite(value) else None for value in fault.evidence],
     }
 
 

@@ -252,12 +252,10 @@ class Instrument:
         made = effect_columns(self.laws, around, jacobian, state) * self.sizes
         weighed = np.repeat(entries.weighed, len(observations) // len(entries))
         made[np.ix_(weighed, np.ones(made.shape[1], bool), self.of_load_cell)] = 0.0
-        every = np.concatenate([line.sensitivities[..., self.declared | self.added], made], axis=-1)
-        white = whitening(observations, jacobian[..., : self.model.sites.joints], self.noise).apply(every)
-        mine = np.flatnonzero(self.declared | self.added)
-        declared, added = white[..., np.flatnonzero(self.declared[mine])], white[..., np.flatnonzero(self.added[mine])]
-        rows = rows_alike(self.linearized.products, declared, white[..., len(mine) :], self.columns)
-        rows = np.concatenate([rows, added], axis=-1)
+        parts = line.sensitivities[..., self.declared], made, line.sensitivities[..., self.added]
+        white = whitening(observations, jacobian[..., : self.model.sites.joints], self.noise)
+        declared, made, added = (white.apply(part) for part in parts)
+        rows = np.concatenate([rows_alike(self.linearized.products, declared, made, self.columns), added], axis=-1)
         return rows.reshape(len(entries), -1, rows.shape[-1])
 
     def observations(self, entries: Entries, targets: Sequence[int]) -> Observations:

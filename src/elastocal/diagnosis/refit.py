@@ -97,11 +97,8 @@ def mean_square(fitted: Fit) -> float:
     `fitted`: with the noise that a linear problem promised to leave. Returns 1 where it left that.
     """
     white = fitted.whitened(fitted.residual)
-    squares, priors = (white**2).sum(), [parameter.prior_std for _, parameter in fitted.parameters]
-    values = parameter_values(fitted.model, fitted.estimate)
-    known = np.array([prior is not None for prior in priors], bool)
-    squares += sum((value / prior) ** 2 for value, prior in zip(values[known], np.array(priors)[known], strict=True))
-    return float(squares / (white.size - (~known & ~fitted.held).sum()))
+    squares = (white**2).sum() + ((parameter_values(fitted.model, fitted.estimate) / fitted.prior_std) ** 2).sum()
+    return float(squares / (white.size - (np.isinf(fitted.prior_std) & ~fitted.held).sum()))
 
 
 def remaining_noise(problem: Problem, model: Model, taken: Noise, least: Noise) -> Noise:

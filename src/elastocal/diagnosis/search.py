@@ -66,7 +66,7 @@ class Problem:
     @cached_property
     def grid(self) -> Grid:
         """Sizes of a unit."""
-        return Grid(np.array(self.settings.scales), scale_weights(self.settings.scales, self.settings))
+        return Grid(np.array(self.settings.scales), scale_weights(self.settings))
 
     @property
     def log_pose(self) -> np.ndarray:
