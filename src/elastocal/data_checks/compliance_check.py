@@ -39,8 +39,7 @@ def fitted_compliance_warnings(fitted: Fit) -> list[str]:
     off = np.sqrt((fitted.residual[:, :3] ** 2).sum(axis=1).mean())
     if not model.identifies_compliance or off > IMPLAUSIBLE_M:
         return []
-    mine = [owner == "joint_compliance" for owner, _ in fitted.parameters]
-    deviations = np.sqrt(np.diag(fitted.covariance))[mine]
+    deviations = np.sqrt(np.diag(fitted.covariance))[fitted.places_of("joint_compliance")]
     return compliance_warnings(
         joint_compliances(model, fitted.estimate), deviations, model.nominal_compliance, model.compliance_known
     )

@@ -129,8 +129,7 @@ def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list
     file, a mass is given as its product with that of the joint that it turns most, which measurements tell.
     """
     effect = next(effect for effect in final.model.effects if effect.key == member.key)
-    mine = np.flatnonzero([owner == member.key for owner, _ in final.parameters])
-    values = np.concatenate(final.values_of(member.key))
+    mine, values = final.places_of(member.key), np.concatenate(final.values_of(member.key))
     unknowns: list[Parameter | Shape] = [*effect.parameters, *effect.shapes]
     entries = [
         {
@@ -173,8 +172,7 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
         return []
     jacobian = final.joint_jacobian[:, :3]
     columns = effect_columns([(member, ()) for member in members], final.conditions, jacobian, observations.state)
-    owners = [owner for owner, _ in final.parameters]
-    mine = np.concatenate([np.flatnonzero([owner == member.key for owner in owners]) for member in members])
+    mine = np.concatenate([final.places_of(member.key) for member in members])
     sag = columns @ np.concatenate([final.values_of(member.key)[0] for member in members])
     most = int(np.argmax((sag**2).sum(axis=1)))
     size = float(np.linalg.norm(sag[most]))
@@ -212,8 +210,8 @@ def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: floa
     effects = {effect.key: effect for effect in final.model.effects}
     found = []
     for key in [key for entry in entries for key in entry["members"]]:
-        mine = np.flatnonzero([owner == key for owner, _ in final.parameters])
-        for parameter, value, index in zip(effects[key].parameters, final.values_of(key)[0], mine, strict=False):
+        known = zip(effects[key].parameters, final.values_of(key)[0], final.places_of(key), strict=False)
+        for parameter, value, index in known:
             error = float(np.sqrt(final.covariance[index, index]))
             size = f"{value:.3g} ± {error:.2g} {parameter.unit}"
             if parameter.sign * value < -_SURE * error:

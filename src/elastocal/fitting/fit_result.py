@@ -64,6 +64,10 @@ class Fit:
         """Standard deviation of the prior of each of the parameters, infinite where it has none, ndarray (P,)."""
         return np.array([np.inf if parameter.prior_std is None else parameter.prior_std for _, parameter in self.parameters])
 
+    def places_of(self, owner: str) -> np.ndarray:
+        """Places among the parameters of those that belong to one owner, such as the key of an effect; ndarray of int."""
+        return np.flatnonzero([each == owner for each, _ in self.parameters])
+
     def values_of(self, key: str) -> tuple[np.ndarray, np.ndarray]:
         """Linear parameters (D,) and shapes (F,) of one effect."""
         number = [effect.key for effect in self.model.effects].index(key)
