@@ -154,8 +154,8 @@ def _predicted(problem: Problem, model: Model) -> np.ndarray:
         units = [problem.units[number] for number in model.units]
         place = problem.statistics.nearest(model.pose_error_rad)
         joint = _joint(problem, units, model, slice(place, place + 1))
-        columns = np.concatenate([unit.columns for unit in units])
-        coefficients[columns] = np.repeat(joint.scales, np.diff(joint.starts)) * joint.mean[0]
+        columns, deviations = problem.columns_of(model.units, joint.scales)
+        coefficients[columns] = deviations * joint.mean[0]
     return coefficients
 
 

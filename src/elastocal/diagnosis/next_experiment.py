@@ -81,9 +81,8 @@ def propose(
         return without_poses(joints, best, (), reason)
     problem = evidence.linearized.problem
     numbers = sorted({n for models in kept.values() for model in models for n in model.units})
-    units = [problem.units[n] for n in numbers]
     states = case.observations.states
-    of_load_cell = any(unit.candidate is not None and unit.candidate.family == "load" for unit in units)
+    of_load_cell = any(problem.units[number].of_load_cell for number in numbers)
     reach = new_states.reach_of(states, case.campaign.robot, joint_limits, ladder, of_load_cell)
     lead = kept[best][0]
     factor = float(np.sqrt(max(mean_square_left(problem, lead), 1.0)))

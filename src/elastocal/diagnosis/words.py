@@ -101,8 +101,7 @@ def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
     for location in locations:
         found = _LOCATION.match(location)
         assert found is not None
-        numbers = tuple(map(int, found["numbers"].split(" and "))) if found["numbers"] else ()
-        parsed.append((numbers, found["detail"]))
+        parsed.append((_numbers_in(found["numbers"]), found["detail"]))
     return physical_name(effect) + _where(effect, parsed)
 
 
@@ -115,10 +114,12 @@ def found_words(effect: str, keys: Iterable[str]) -> str:
     for key in keys:
         found = re.match(_ANY_KEY, key)
         assert found is not None
-        locations.append(
-            (tuple(map(int, (found["joints"] or "").split("+"))) if found["joints"] else (), found["detail"] or "")
-        )
+        locations.append((_numbers_in(found["joints"]), found["detail"] or ""))
     return physical_name(effect) + _where(effect, locations)
+
+
+def _numbers_in(text: str | None) -> tuple[int, ...]:
+    return tuple(map(int, re.findall(r"\d+", text or "")))
 
 
 def candidate_words(key: str) -> str:
