@@ -28,10 +28,9 @@ _SURE = 2.0
 
 
 def fitted_compliance_warnings(fitted: Fit) -> list[str]:
-    """`compliance_warnings` of a fit.
+    """`compliance_warnings` of a fit; none where measurements are wrong by centimetres: compliances mean nothing there.
 
-    Returns None where compliances are not identified, nor where measurements are wrong by centimetres: they mean nothing there.
-    That the joints are taken as rigid, where the compliances are not known either.
+    Where they are not identified, nor known, that the joints are taken as rigid.
     """
     model = fitted.model
     if not model.identifies_compliance and not model.compliance_known:

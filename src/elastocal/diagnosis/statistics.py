@@ -48,14 +48,8 @@ class Statistics:
 
     def at(self, chosen: np.ndarray | slice) -> Statistics:
         """The same at some of the sizes of the pose error only; a slice copies nothing."""
-        return Statistics(
-            self.pose_error_rad[chosen],
-            self.gram[chosen],
-            self.along[chosen],
-            self.squares[chosen],
-            self.log_likelihood[chosen],
-            self.freedom,
-        )
+        some = {name: values[chosen] for name, values in vars(self).items() if name != "freedom"}
+        return Statistics(**some, freedom=self.freedom)
 
     def nearest(self, pose_error_rad: float) -> int:
         """Place of the size of the pose error that is nearest to one."""

@@ -76,11 +76,11 @@ def part_of(effect: str) -> str:
     return getattr(effects().get(effect), "PART", "joint")
 
 
-def listed(items: Iterable[str], most: int | None = None, rest: str = "more", last: str = "and") -> str:
+def listed(items: Iterable[str], most: int | None = None, last: str = "and") -> str:
     """Items in a sentence, at most so many of them."""
     items = list(items)
     if most is not None and len(items) > most:
-        items = [*items[:most], f"{len(items) - most} {rest}"]
+        items = [*items[:most], f"{len(items) - most} more"]
     return items[0] if len(items) == 1 else ", ".join(items[:-1]) + f" {last} " + items[-1] if items else "none"
 
 

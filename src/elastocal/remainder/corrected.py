@@ -90,7 +90,7 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
         session = np.searchsorted(estimate.sessions, there.states.session[there.state])
         moved = there.position - (estimate.frame_rotation[session] @ mean[..., None])[..., 0]
         known = replace(fitted, model=model, estimate=estimate)
-        estimate = fit_frames(known, model, replace(there, position=moved), fitted.noise)
+        estimate = fit_frames(known, model, replace(there, position=moved))
     residual = position_residuals(model, estimate, there) - mean
     return Corrected(residual, prediction.std, outside, found.regression, found.setting)
 
@@ -128,9 +128,8 @@ def inputs_of(model: Model, estimate: Estimate, observations: Observations, else
     `estimate`: says where the targets sit. `elsewhere`: whether observations of another campaign are to be predicted: time then
     carries nothing over. Returns without time or temperature where they were not recorded.
     """
-    states, chain, joints = observations.states, model.sites.chain, model.sites.joints
-    coordinates = np.zeros((len(states), chain.coordinates))
-    coordinates[:, :joints] = states.joint_angles
+    states, chain = observations.states, model.sites.chain
+    coordinates = chain.at(states.joint_angles)
     jacobian = np.empty((len(observations), 3, chain.coordinates))
     for number, point in enumerate(target_points(model, estimate)):
         mask = observations.target == number
