@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import g, pound_force
 
+from elastocal.campaigns.groups import groups_of
 from elastocal.data_checks.placement import rms, robust_sigma, robustly_placed, spread
 from elastocal.fitting.identifiability import solve_normal
 from elastocal.fitting.observations import single_observations, state_clusters
@@ -237,8 +238,8 @@ def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDe
     estimate = robustly_placed(campaign, spread(measurements)).estimate
     residual, jacobian, end, _, _ = _linearized(campaign, measurements, estimate)
     keys = np.column_stack([measurements.session, measurements.pose, measurements.load])
-    states, first, state = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    state, targets = state.ravel(), len(campaign.targets)
+    first, state = groups_of(keys)
+    states, targets = keys[first], len(campaign.targets)
     cell = state * targets + measurements.target
     count = np.bincount(cell, minlength=len(states) * targets).reshape(len(states), targets)
     seen = np.zeros((len(states) * targets, 3))
@@ -247,9 +248,9 @@ def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDe
     at_target = np.zeros((len(states) * targets, *jacobian.shape[1:]))
     at_target[cell] = jacobian
     at_target = at_target.reshape(len(states), targets, *jacobian.shape[1:])
-    # np.unique sorts: the unloaded state of a pose, where there is one, is its first.
-    pose_of = np.unique(states[:, :2], axis=0, return_index=True, return_inverse=True)
-    unloaded = pose_of[1][pose_of[2].ravel()]
+    # States are in order: the unloaded one of a pose, where there is one, is its first.
+    first_of_pose, pose = groups_of(states[:, :2])
+    unloaded = first_of_pose[pose]
     both = (count > 0) & (count[unloaded] > 0)
     loaded = measurements.wrench[first].any(axis=1) & (states[unloaded, 2] == 0) & both.any(axis=1)
     if not loaded.any():

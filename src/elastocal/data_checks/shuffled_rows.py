@@ -129,15 +129,14 @@ def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Pla
     starts = [as_written.estimate]
     if campaign.frame == "tracker":
         starts += _by_main_axes(campaign, measurements, as_written)
-    nearest = []
-    for start in starts:
-        beside = placed_by(campaign, measurements, start)
-        nearest.append((_gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))[0], start))
-    _, estimate = min(nearest, key=lambda entry: trimmed_rms(entry[0]))
-    before = None
-    for _ in range(_MATCHING_ROUNDS):
+
+    def nearest(estimate: Estimate) -> tuple[Placement, np.ndarray, np.ndarray]:
         beside = placed_by(campaign, measurements, estimate)
-        _, source = _gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))
+        return beside, *_gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))
+
+    estimate, before = min(starts, key=lambda start: trimmed_rms(nearest(start)[1])), None
+    for _ in range(_MATCHING_ROUNDS):
+        beside, _, source = nearest(estimate)
         if before is not None and (source == before).all():
             break
         before = source
