@@ -51,21 +51,16 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
     likely = _likely(posterior, best)
     equations = {tau: normal_equations(linearized.products, tau)[0] for tau in {model.pose_error_rad for model, _ in likely}}
     kept = _likely_pose_errors(linearized.problem, best, [model.pose_error_rad for model, _ in likely])
-    each = [(model, _moments(linearized, model, equations[model.pose_error_rad], owners, kept)) for model, _ in likely]
-    exact = next(found for model, found in each if model is best)
-    moments: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
-    for (_, probability), (_, found) in zip(likely, each, strict=True):
-        for name, (mean, variance) in found.items():
-            moments.setdefault(name, []).append((probability, mean, variance))
+    each = [(p, _moments(linearized, model, equations[model.pose_error_rad], owners, kept)) for model, p in likely]
+    exact = next(found for (model, _), (_, found) in zip(likely, each, strict=True) if model is best)
     shift: dict[tuple[str, str], float] = {}
     std_error: dict[tuple[str, str], float] = {}
-    for name, entries in moments.items():
-        weight, mean, variance = np.array(entries).T
+    for name, (estimate, _) in exact.items():
+        weight, mean, variance = np.array([(probability, *found[name]) for probability, found in each if name in found]).T
         weight = weight / weight.sum()
         center = weight @ mean
-        if name in exact:
-            shift[name] = float(center - exact[name][0])
-            std_error[name] = float(np.sqrt(weight @ (variance + (mean - center) ** 2)))
+        shift[name] = float(center - estimate)
+        std_error[name] = float(np.sqrt(weight @ (variance + (mean - center) ** 2)))
     return Averaged(shift, std_error)
 
 

@@ -293,14 +293,11 @@ def _document(
     if found:
         problem, conclusion = found.linearized.problem, found.conclusion
         verdict, untestable = conclusion.verdict, found.linearized.untestable
-        probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
+        probabilities = findings.probability_facts(found)
         named = conclusion.best if conclusion.best.named else None
         averages = _averages(declared, found, named)
         springs = _averages(declared, found, None) if named and not found.adopted else averages
-        entries = findings.effect_entries(
-            problem, found.posterior, conclusion, found.alarm, with_effects, averages, case.observations
-        )
-        entries = [entry | {"adopted": found.adopted} for entry in entries]
+        entries = findings.effect_entries(found, with_effects, averages, case.observations)
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
         remarks += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)

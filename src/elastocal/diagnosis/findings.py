@@ -20,10 +20,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from elastocal.data_checks.protocol import Fault
-    from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.averaging import Averaged
-    from elastocal.diagnosis.search import Posterior, Problem
-    from elastocal.diagnosis.verdict import Conclusion
+    from elastocal.diagnosis.diagnose import Evidence
+    from elastocal.diagnosis.search import Problem
     from elastocal.effects.protocol import Candidate, Parameter
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
@@ -49,49 +48,41 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     return " ".join(filter(None, [where, *names])) or ("base" if mechanism == OTHER else "")
 
 
-def probability_facts(problem: Problem, posterior: Posterior, conclusion: Conclusion, alarm: Alarm) -> dict[str, Any]:
+def probability_facts(found: Evidence) -> dict[str, Any]:
     """Probabilities as they stand in verdict.json.
 
     Returns ``nothing``, ``alarm_p_value``, ``mechanisms`` by name, and ``sets`` of mechanisms with the locations of their most
     probable model.
     """
-    sets = []
-    for hypothesis in conclusion.hypotheses:
+    sets, problem, hypotheses = [], found.linearized.problem, found.conclusion.hypotheses
+    for hypothesis in hypotheses:
         if hypothesis.probability < _LEAST_LISTED:
             continue
-        model = posterior.models[hypothesis.model]
+        model = found.posterior.models[hypothesis.model]
         where = {
             name: [location_words(name, at) for at in locations_of(problem, model, name)] for name in hypothesis.mechanisms
         }
         sets.append({"mechanisms": list(hypothesis.mechanisms), "probability": hypothesis.probability, "locations": where})
-    nothing = next(h.probability for h in conclusion.hypotheses if not h.mechanisms)
     return {
-        "nothing": nothing,
-        "alarm_p_value": alarm.p_value,
-        "mechanisms": {name: value for name, value in conclusion.mechanisms.items() if value >= _LEAST_LISTED},
+        "nothing": next(h.probability for h in hypotheses if not h.mechanisms),
+        "alarm_p_value": found.alarm.p_value,
+        "mechanisms": {name: value for name, value in found.conclusion.mechanisms.items() if value >= _LEAST_LISTED},
         "sets": sets,
     }
 
 
-def effect_entries(
-    problem: Problem,
-    posterior: Posterior,
-    conclusion: Conclusion,
-    alarm: Alarm,
-    final: Fit,
-    averages: Averaged,
-    observations: Observations,
-) -> list[dict[str, Any]]:
+def effect_entries(found: Evidence, final: Fit, averages: Averaged, observations: Observations) -> list[dict[str, Any]]:
     """Entries of the effects found, those of the most probable mechanisms first.
 
     `final`: of the most probable model. `averages`: what the other models add to it. `observations`: to which it was fitted.
     """
-    numbers = posterior.models[conclusion.best.model].units if conclusion.best.named else ()
+    problem, conclusion = found.linearized.problem, found.conclusion
+    numbers = found.posterior.models[conclusion.best.model].units if conclusion.best.named else ()
     units = [problem.units[number] for number in numbers]
     entries = []
     for name in sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name]):
         members = [unit.candidate for unit in units if unit.candidate and unit.mechanism == name]
-        where = location_probabilities(problem, posterior, name)
+        where = location_probabilities(problem, found.posterior, name)
         values = [entry for member in members for entry in parameter_entries(member, final, averages)]
         entries.append(
             {
@@ -106,10 +97,11 @@ def effect_entries(
                     if value >= _LEAST_LISTED
                 ],
                 "parameters": sag_entries(name, members, final, observations) + values,
-                "p_value": alarm.p_value,
+                "p_value": found.alarm.p_value,
                 "heldout_gain": None,
                 "alternatives": list(conclusion.alternatives[name]),
                 "angle_to_nearest_deg": _angle_to_nearest(problem, [n for n in numbers if problem.units[n].mechanism == name]),
+                "adopted": found.adopted,
             }
         )
     return entries
