@@ -225,12 +225,7 @@ def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np
 
 
 def held_out_gross_errors(
-    fitted: Fit,
-    there: tuple[Model, Estimate],
-    yardstick: Yardstick,
-    held_out: Case,
-    outside: np.ndarray,
-    settings: Settings,
+    fitted: Fit, there: tuple[Model, Estimate], yardstick: Yardstick, held_out: Case, outside: np.ndarray, settings: Settings
 ) -> Deviations:
     """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that were carried to them.
 

@@ -82,10 +82,7 @@ class Products:
         """Of the declared model alone."""
         kept = np.append(np.arange(self.declared), self.gram.shape[0] - 1)
         return replace(
-            self,
-            gram=self.gram[np.ix_(kept, kept)],
-            pose_rows=self.pose_rows[..., kept],
-            projected=self.projected[:, -1:],
+            self, gram=self.gram[np.ix_(kept, kept)], pose_rows=self.pose_rows[..., kept], projected=self.projected[:, -1:]
         )
 
 

@@ -86,11 +86,5 @@ def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
         limits = np.array([(shape.lowest, shape.highest) for shape in effect.shapes]).reshape(-1, 2)
         shapes.append(np.clip(shape + take(len(shape)), *limits.T))
     return Estimate(
-        estimate.sessions,
-        frame_rotation,
-        frame_position,
-        target_offset,
-        target_rotation,
-        tuple(coefficients),
-        tuple(shapes),
+        estimate.sessions, frame_rotation, frame_position, target_offset, target_rotation, tuple(coefficients), tuple(shapes)
     )
