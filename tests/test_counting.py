@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from elastocal.counting import counted, grouped, plural, spell_count
+from elastocal.counting import counted, first_names, grouped, plural, spell_count
 
 # A count in a message, of what may be one and is not a limit, with its noun written by hand.
 _BY_HAND = re.compile(
@@ -20,6 +20,10 @@ def test_one_thing_is_no_plural_and_thousands_are_grouped():
 def test_small_numbers_are_words_and_a_noun_agrees_without_its_number():
     assert [spell_count(number, "reflector") for number in (1, 3, 4)] == ["one reflector", "three reflectors", "4 reflectors"]
     assert plural("joint", 1) == "joint" and plural("joint", 2) == "joints" and plural("entry", 2, "entries") == "entries"
+
+
+def test_of_many_names_the_first_are_written_and_the_others_counted():
+    assert first_names(["a", "b"], 2) == "a, b" and first_names(["a", "b", "c", "d", "e"], 2) == "a, b and 3 more"
 
 
 def test_messages_of_bad_input_and_of_commands_write_no_plural_by_hand():

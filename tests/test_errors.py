@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from elastocal.errors import LONGEST_MESSAGE, InputError, escaped, fault_of_machine, steering
+from elastocal.errors import LONGEST_MESSAGE, InputError, closest_first, escaped, fault_of_machine, steering
 
 
 def test_the_message_is_place_then_what_was_found_then_what_is_allowed():
@@ -20,6 +20,11 @@ def test_without_a_key_the_whole_file_is_the_place():
 def test_the_message_stays_one_line_whatever_was_found():
     error = InputError("a.csv", "q1\n", "two\r\nlines,\ta tab\n\n", "one\nline")
     assert str(error) == "a.csv: q1: found two lines, a tab; allowed: one line"
+
+
+def test_the_closest_of_the_names_that_are_allowed_comes_first_whatever_its_case():
+    assert closest_first("KUKE", ["abb", "kuka"]) == "'kuka'? (abb, kuka)"
+    assert closest_first("joint", ["abb", "kuka"]) == "abb, kuka"
 
 
 def test_the_parts_can_be_read_one_by_one_as_they_were_given():

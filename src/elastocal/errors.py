@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 import errno
 import unicodedata
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
     from pathlib import Path
 
 
@@ -31,6 +33,19 @@ class InputError(ValueError):
         where += f": {_shortened(printable(key), _LONGEST_KEY)}" if key else ""
         message = f"{where}: found {_shortened(printable(found), _LONGEST_FOUND)}; allowed: "
         super().__init__(message + _shortened(printable(allowed), LONGEST_MESSAGE - len(message)))
+
+
+def closest_first(name: str, known: Collection[str]) -> str:
+    """What is allowed instead of a name: the closest first."""
+    listed = ", ".join(known)
+    return f"{hint} ({listed})" if (hint := closest(name, known)) else listed
+
+
+def closest(name: str, known: Collection[str]) -> str:
+    """The closest of some names as a question, whatever the case of its letters; empty where none is close."""
+    lower = {other.lower(): other for other in known}
+    close = difflib.get_close_matches(str(name).lower(), lower, n=1)
+    return f"{lower[close[0]]!r}?" if close else ""
 
 
 def printable(text: str) -> str:

@@ -5,11 +5,11 @@ import pytest
 from analysed_robots import ROBOTS
 
 from elastocal.campaigns.columns import columns_of
-from elastocal.fitting.case import case_from, noise_from
+from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import effect_columns, linearize
-from elastocal.fitting.noise_estimation import noise_of
+from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.loop.loading import load_campaign
 from elastocal_proof.blind.case_rows import EXACT_ALIASES
 from elastocal_proof.blind.cases import Case, make_case
@@ -45,7 +45,7 @@ def seen(request, tmp_path_factory):
     make_case(made, folder / "blind", folder / "sealed", ROBOTS)
     descriptions, training, _ = load_campaign((folder / "blind" / made.name).as_posix(), ROBOTS.as_posix())
     case = case_from(descriptions, columns_of(training))
-    declared = fit(case.model, case.observations, noise_from(noise_of(case)))
+    declared = fit(case.model, case.observations, estimated_noise(case)[0])
     candidates = [c for c in case.candidates.values() if not c.shapes]
     return declared, case.observations, directions(declared, case.observations, candidates)
 

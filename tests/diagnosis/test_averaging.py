@@ -224,11 +224,11 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
         off[mine], off[others] = coefficients[mine], -values
         return off @ gram @ off + (values**2).sum() / 0.1**2
 
-    whole, beyond = squares_beyond(problem, model, {"a"})
+    whole, beyond = squares_beyond(problem, model, {"a"})[0]
     assert whole == pytest.approx(squares_explained(problem, model)["a"], rel=1e-6)
     assert beyond == pytest.approx(minimize(left, np.zeros(len(others))).fun, rel=1e-6)
     assert 0.0 < beyond < whole
-    assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[1] == pytest.approx(
+    assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[0][1] == pytest.approx(
         squares_explained(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
     )
 

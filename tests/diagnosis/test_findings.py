@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from planted import planted
 
+from elastocal.data_checks.protocol import Fault, Value
 from elastocal.diagnosis.averaging import Averaged
 from elastocal.diagnosis.findings import fault_entry, implausible, location_words, parameter_entries, sag_entries
 from elastocal.diagnosis.hypotheses import OTHER
@@ -167,10 +168,9 @@ def test_more_than_the_rated_payload_is_named(found):
 
 
 def test_a_fault_of_the_data_is_an_entry_without_probability():
-    fault = {"name": "wrong_unit", "joints": [], "detail": "millimetres", "parameters": [{"name": "factor", "value": 1e-3}]}
-    fault |= {"alternatives": ("another frame",), "evidence": (1.0, np.nan)}
-    entry = fault_entry(fault)
+    factor = Value("factor", 1e-3, "m")
+    entry = fault_entry(Fault("wrong_unit", (), "millimetres", (factor,), (1.0, np.nan), (), True, ("another frame",)))
     assert (entry["name"], entry["family"], entry["detail"]) == ("wrong_unit", "data", "millimetres")
-    assert entry["parameters"] == [{"name": "factor", "value": 1e-3, "std_error": None}]
+    assert entry["parameters"] == [{"name": "factor", "value": 1e-3, "unit": "m", "std_error": None}]
     assert entry["probability"] is None and entry["heldout_gain"] is None
     assert entry["alternatives"] == ["another frame"] and entry["evidence"] == [1.0, None]

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis import new_states
 from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.statistics import rows_alike
 
 
 def reached(campaign_states, robot, ladder=None, weights=False):
@@ -41,7 +42,7 @@ def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka):
     entries = new_states.Entries(states.joint_angles, states.wrench, states.approach[:, None], np.zeros(len(states), bool))
     total = made.information(entries, [0, 1]).sum(axis=0)
     rows = line.products.rows
-    every = line.products.alike(rows.declared, rows.candidates.dense()[..., made.columns], made.columns)
+    every = rows_alike(line.products, rows.declared, rows.candidates.dense()[..., made.columns], made.columns)
     expected = np.tensordot(every, every, ((0, 1), (0, 1)))
     # Declared parameters that measurements do not show have their prior, of information one, and only rounding beside it.
     size = np.sqrt(np.diag(expected) + 1e-6)

@@ -7,7 +7,7 @@ import pytest
 from planted import planted
 
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.refit import Selected, fit_with_sizes, mean_square_left, remaining_noise, selected, with_shapes_of
+from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import Model, posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
@@ -36,7 +36,7 @@ def test_priors_arrive_in_the_fit(found):
     best = models.models[0]
     assert [line.problem.units[number].key for number in best.units] == ["offset@3"]
     chosen = selected(line, best)
-    (effect, shapes), *others = chosen.effects
+    (effect, shapes), *others = chosen
     assert not others and shapes.size == 0
     final = fit_with_sizes(declared, campaign.observations, declared.noise, chosen)
     priors = {owner: parameter.prior_std for owner, parameter in final.parameters if "offset@" in owner}
@@ -58,7 +58,7 @@ def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurem
     before = line.problem.grid.root_mean_square(unit)
     sizes = [0.5 * before, before, SETTINGS.scales[-1]]
     assert before < SETTINGS.scales[-1]
-    chosen = [selected(line, replace(best, scales=np.array([size]))).effects[0][0] for size in sizes]
+    chosen = [selected(line, replace(best, scales=np.array([size])))[0][0] for size in sizes]
     deviations = [candidate.parameters[0].prior_std / unit.sizes[0] for candidate in chosen]
     np.testing.assert_allclose(deviations, [0.5 * before, before, before], rtol=1e-12)
 
@@ -66,9 +66,9 @@ def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurem
 def test_a_later_fit_starts_from_the_shapes_that_one_before_has_found(kuka):
     campaign = planted(kuka, {"thermal_growth[time]": [2e-5]}, seed=4)
     candidate = campaign.candidates["thermal_growth[time]"]
-    tried = Selected(((candidate, np.array([candidate.shapes[0].start])),))
+    tried = ((candidate, np.array([candidate.shapes[0].start])),)
     found = fit_with_sizes(campaign.declared, campaign.observations, campaign.declared.noise, tried)
-    ((same, shapes),) = with_shapes_of(tried, found).effects
+    ((same, shapes),) = with_shapes_of(tried, found)
     assert same is candidate and shapes[0] != candidate.shapes[0].start
     assert shapes[0] == found.values_of(candidate.key)[1][0]
 
@@ -89,7 +89,7 @@ def test_a_fit_that_starts_near_another_one_ends_where_it_ends_without(found, wi
     chosen = selected(line, models.models[0])
     expected = fit_with_sizes(declared, campaign.observations, declared.noise, chosen)
     more = tuple((campaign.candidates[key], np.zeros(0)) for key in ("joint_tilt@2", "payload"))
-    others = replace(chosen, effects=(*more, *chosen.effects) if with_it else more)
+    others = (*more, *chosen) if with_it else more
     near = fit_with_sizes(declared, campaign.observations, declared.noise, others)
     for settled in (1e-3, ON_THE_WAY):
         final = fit_with_sizes(declared, campaign.observations, declared.noise, chosen, near, settled=settled)
@@ -104,7 +104,7 @@ def test_the_competitor_and_the_base_are_no_effects_of_the_fit(found):
     _, _, line, _ = found
     other = next(number for number, unit in enumerate(line.problem.units) if unit.candidate is None)
     chosen = selected(line, Model((other,), 0.0, np.array([0.1]), 0.0))
-    assert chosen.effects == ()
+    assert chosen == ()
 
 
 def test_mean_square_left_is_that_of_the_penalised_fit(found):

@@ -7,7 +7,7 @@ import pytest
 from made_problems import made_rows
 from scipy.stats import chi2, kstest
 
-from elastocal.diagnosis.statistics import normal_equations, null_draws, statistics_of
+from elastocal.diagnosis.statistics import normal_equations, null_draws, rows_alike, statistics_of
 from elastocal.diagnosis.summed import rows_at_once, summed, triangle_of
 
 TAU = np.array([0.0, 0.1, 0.7])
@@ -84,7 +84,7 @@ def test_rows_at_other_states_are_in_the_same_parameters():
     rows = in_order(made_rows(6, prior=1e6))
     sums = summed_of(rows)
     chosen = np.array([4, 0, 2])
-    made = sums.alike(rows.declared, rows.candidates[:, chosen], chosen)
+    made = rows_alike(sums, rows.declared, rows.candidates[:, chosen], chosen)
     at = np.append(np.arange(sums.declared), sums.declared + chosen)
     np.testing.assert_allclose(made.T @ made, sums.gram[np.ix_(at, at)], rtol=1e-6, atol=1e-6)
 

@@ -111,8 +111,7 @@ def test_a_mechanism_beside_the_competitor_is_a_class_with_a_related_one():
 def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_other(sizes, mechanisms):
     """Little is what laws are allowed to be off: of squares, that part which the other cannot make, whatever its size."""
     posterior = Posterior((Model((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1))
-    law, law_alone = squares_beyond(PROBLEM, posterior.models[0], {"offset"})
-    unknown, unknown_alone = squares_beyond(PROBLEM, posterior.models[0], {OTHER})
+    (law, law_alone), (unknown, unknown_alone) = squares_beyond(PROBLEM, posterior.models[0], {"offset"})
     small = Settings().law_tolerance ** 2
     assert (unknown_alone < small * law, law_alone < small * unknown) == (OTHER not in mechanisms, "offset" not in mechanisms)
     assert hypotheses_of(PROBLEM, posterior)[0].mechanisms == mechanisms

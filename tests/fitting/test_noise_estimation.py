@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.fitting.case import Case
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.noise import FINEST
-from elastocal.fitting.noise_estimation import estimated_noise, noise_of
+from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.fitting.observations import averaged
 
 
@@ -65,14 +65,6 @@ def test_repeats_come_before_the_residual(fanuc):
     # Within four standard errors of what 192 contrasts tell.
     assert noise.position_m == pytest.approx(30e-6, rel=4 / np.sqrt(2 * 192))
     assert noise.orientation_rad == pytest.approx(15e-6, rel=4 / np.sqrt(2 * 192))
-
-
-def test_noise_is_the_same_after_it_was_written(fanuc):
-    case = case_of(fanuc, errors(1, 70e-6), errors(2, 20e-6))
-    noise, _ = estimated_noise(case)
-    facts = noise_of(case)["noise"]
-    assert facts["joint_rad"] == [0.0] * 6 and facts["source"] == "residual"
-    assert (facts["position_m"], facts["orientation_rad"]) == (noise.position_m, noise.orientation_rad)
 
 
 def peak_bytes(robot, poses):

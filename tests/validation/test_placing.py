@@ -22,7 +22,7 @@ def test_a_session_that_the_fit_has_not_seen_gets_a_frame_of_its_own_and_nothing
     known = states.session != 5
     fitted = fit(model, select_states(seen, known), Noise("declared", 6e-5, 6e-5, np.zeros(6)))
     placed = placed_estimate(fitted, seen)
-    there = fit_frames(fitted, model, select_states(seen, ~known), fitted.noise, own_targets=False)
+    there = fit_frames(fitted, model, select_states(seen, ~known), own_targets=False)
     np.testing.assert_array_equal(there.target_offset, fitted.estimate.target_offset)
     np.testing.assert_array_equal(placed.frame_position[1], there.frame_position[0])
     assert placed.sessions == (2, 5, 7)

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.measurements import closest_first
-from elastocal.errors import InputError
+from elastocal.errors import InputError, closest_first
 from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.robot import Robot, with_rigid_joints
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import math
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -17,7 +16,7 @@ import pyarrow.parquet as pq
 
 from elastocal.campaigns.column_bounds import BOUNDS, find_beyond
 from elastocal.counting import counted
-from elastocal.errors import InputError, steering
+from elastocal.errors import InputError, closest_first, steering
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
 from elastocal.io.texts import LARGEST_NUMBER
@@ -367,10 +366,3 @@ def _write_parquet(path: str, columns: Iterable[Column], table: Mapping[str, Seq
     fields = [pa.field(c.name, pa.type_for_alias(c.type), False, {"unit": c.unit, "meaning": c.meaning}) for c in columns]
     arrays = [pa.array(np.asarray(table[field.name]).tolist(), field.type) for field in fields]
     pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), path, compression="zstd", write_page_checksum=True)
-
-
-def closest_first(name: str, known: Collection[str]) -> str:
-    """What is allowed instead of a name: the closest first."""
-    lower = {other.lower(): other for other in known}
-    close = difflib.get_close_matches(str(name).lower(), lower, n=1)
-    return f"{lower[close[0]]!r}? ({', '.join(known)})" if close else ", ".join(known)

@@ -23,10 +23,10 @@ from elastocal.campaigns.campaign import (
 )
 from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, holdout_from, measured_poses, other_folder
 from elastocal.campaigns.measurement_checks import check_angles, check_measurements
-from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, closest_first, read_measurements, show_cell
+from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, read_measurements, show_cell
 from elastocal.campaigns.places import is_file, is_file_in
 from elastocal.counting import counted
-from elastocal.errors import InputError
+from elastocal.errors import InputError, closest_first
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import kind_of
 from elastocal.mechanics.robot import Robot

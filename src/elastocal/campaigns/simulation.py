@@ -56,8 +56,7 @@ def draw_measurements(robot: Robot, plan: Plan, seed: int, name: str) -> dict[st
     force = plan.force_N * np.array(plan.ladder)[load, None] * direction[pose]
     wrench = wrench_of_offset_force(force, plan.offset_m)
     chain = extended_chain(robot)
-    coordinates = np.zeros((len(pose), chain.coordinates))
-    coordinates[:, : robot.joints] = angles[pose]
+    coordinates = chain.at(angles[pose])
     jacobian = poses_and_jacobians(chain, coordinates, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
     deflected = coordinates + generalized_forces(jacobian, wrench) @ spring_compliance(robot)
     parts = []

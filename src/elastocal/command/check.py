@@ -13,7 +13,7 @@ from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline
 from elastocal.command.printed import print_answer, print_lines
-from elastocal.counting import counted
+from elastocal.counting import counted, first_names
 from elastocal.errors import escaped
 
 # Parameters that are not identifiable and are named; more would be too many to read.
@@ -73,7 +73,7 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 
     noise = facts["noise"]
-    left = f"; not identifiable: {_listed(facts['held'])}" if facts["held"] else ""
+    left = f"; not identifiable: {first_names(facts['held'], _NAMED)}" if facts["held"] else ""
     sessions = f", {facts['sessions']} sessions" if facts["sessions"] > 1 else ""
     robot = f"{facts['campaign']}: {facts['robot']}, {counted(facts['joints'], 'joint')}"
     poses = f"{counted(facts['training']['poses'], 'pose')} to fit and {counted(facts['held_out']['poses'], 'validation pose')}"
@@ -108,8 +108,3 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 _SOURCES = {"repeats": "repeats", "declared": "the campaign's declaration", "residual": "the residual of the declared model"}
-
-
-def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return ", ".join(names[:_NAMED]) + more

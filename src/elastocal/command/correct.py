@@ -11,7 +11,7 @@ from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.printed import print_answer, print_lines
-from elastocal.counting import counted, grouped
+from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -90,9 +90,8 @@ def correct(
         )
     bad = (found.status != OK).nonzero()[0]
     if len(bad) and not partial:
-        rows = ", ".join(f"line {wanted.lines[row]} is {found.status[row]}" for row in bad[:_NAMED])
-        more = f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
-        raise InputError(path, "", rows + more, "poses that the robot reaches within its limits, or --partial")
+        rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in bad], _NAMED)
+        raise InputError(path, "", rows, "poses that the robot reaches within its limits, or --partial")
     good = found.status == OK
     if controller and not good.any():
         raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")

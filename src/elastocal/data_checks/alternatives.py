@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import combinations, permutations, product
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from elastocal.data_checks.placement import (
     FAR_BETTER,
     IMPLAUSIBLE_M,
     IMPLAUSIBLE_RAD,
+    of_each_target,
     placed,
     rms,
     robustly_placed,
@@ -29,7 +31,7 @@ from elastocal.data_checks.placement import (
 from elastocal.data_checks.protocol import Fault, Value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements, Target
     from elastocal.data_checks.placement import Placement
@@ -80,13 +82,13 @@ _EULER = {"XYZ": "Euler angles about the moved x, y, z", "xyz": "angles about th
 class Change:
     """One way in which the file may have to be read otherwise.
 
-    `name`: of the fault that it would be. `detail`: one sentence in plain words. `correct`: ``(campaign, measurements)`` to
-    those read otherwise. `joints`: from 1. `placement`: what it fits; its sentence and its numbers then come from the fit.
+    `name`: of the fault that it would be. `detail`: one sentence in plain words. `correct`: reads a campaign so. `joints`: from
+    1. `placement`: what it fits; its sentence and its numbers then come from the fit.
     """
 
     name: str
     detail: str
-    correct: Callable[[Campaign, Measurements], tuple[Campaign, Measurements]] = field(compare=False)
+    correct: Callable[[Campaign], Campaign] = field(compare=False)
     joints: tuple[int, ...] = ()
     parameters: tuple[Value, ...] = ()
     placement: str = ""
@@ -115,22 +117,21 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
 
     Returns each beside the alternatives that fit as well.
     """
-    some = spread(measurements, _POSES)
-    found = _one_after_the_other(campaign, some)
+    campaign = replace(campaign, measurements=spread(measurements, _POSES))
+    found = _one_after_the_other(campaign)
     if found or campaign.measured == "position":
         return found
-    if slight := _slightly_turned(campaign, some):
+    if slight := _slightly_turned(campaign):
         return slight
     # Where orientations do not go with positions in any way, positions alone may still tell.
-    found = _one_after_the_other(replace(campaign, measured="position"), replace(some, rotation_vector=None))
+    found = _one_after_the_other(_measured(replace(campaign, measured="position"), rotation_vector=None))
     return [replace(fault, detail=f"{fault.detail} (positions alone: orientations do not go with them)") for fault in found]
 
 
-def _one_after_the_other(campaign: Campaign, some: Measurements) -> list[Fault]:
-    campaign = replace(campaign, measurements=some)
+def _one_after_the_other(campaign: Campaign) -> list[Fault]:
     found: list[Fault] = []
     for _ in range(_ROUNDS):
-        new, campaign, some = _mended(campaign, some)
+        new, campaign = _mended(campaign)
         known = {(fault.name, fault.detail) for fault in found}
         new = [fault for fault in new if (fault.name, fault.detail) not in known]
         found += new
@@ -139,10 +140,10 @@ def _one_after_the_other(campaign: Campaign, some: Measurements) -> list[Fault]:
     return found
 
 
-def _slightly_turned(campaign: Campaign, some: Measurements) -> list[Fault]:
+def _slightly_turned(campaign: Campaign) -> list[Fault]:
     """A mount turned by as much as the zero of a joint may be off, but seldom is: for physics to tell, and a warning."""
-    (freed, _) = _with_unknown({"rotation": None})(campaign, some)
-    written, fitted = robustly_placed(campaign, some), robustly_placed(freed, some)
+    freed = _with_unknown({"rotation": None}, campaign)
+    written, fitted = (robustly_placed(each, campaign.measurements) for each in (campaign, freed))
     detail, parameters = _target_fault(campaign.targets, written.estimate, fitted.estimate, np.inf, _NEAR_RAD)
     if not detail or written.turn is None or fitted.turn is None:
         return []
@@ -165,13 +166,13 @@ def placements(campaign: Campaign) -> list[Change]:
     """Changes that fit where the base or the targets are, as far as the campaign says that it knows them."""
     found = []
     if campaign.frame == "base":
-        found.append(Change("wrong_frame", "", lambda c, r: (replace(c, frame="tracker"), r), placement="frame"))
+        found.append(Change("wrong_frame", "", lambda c: replace(c, frame="tracker"), placement="frame"))
     unknown: list[dict[str, None]] = []
     if campaign.measured == "pose" and any(target.rotation is not None for target in campaign.targets):
         unknown.append({"rotation": None})
     if any(target.offset_m is not None for target in campaign.targets):
         unknown.append({"offset_m": None, "rotation": None})
-    found += [Change("wrong_target", "", _with_unknown(parts), placement="targets") for parts in unknown]
+    found += [Change("wrong_target", "", partial(_with_unknown, parts), placement="targets") for parts in unknown]
     if len(_mounts(campaign.measurements)) > len(np.unique(campaign.measurements.target)):
         found.append(Change("mounted_anew", "", _with_a_mount_each_session, placement="mounts"))
     return found
@@ -191,16 +192,17 @@ def pairs(campaign: Campaign) -> list[tuple[Change, ...]]:
     return [*found, *combinations(_single_senses(campaign.robot.joints), 2)]
 
 
-def _mended(campaign: Campaign, measurements: Measurements) -> tuple[list[Fault], Campaign, Measurements]:
-    """Faults of the simplest alternative that mends the measurements, and campaign and measurements as they are then read."""
+def _mended(campaign: Campaign) -> tuple[list[Fault], Campaign]:
+    """Faults of the simplest alternative that mends the measurements, and the campaign as it is then read."""
+    measurements = campaign.measurements
     written = robustly_placed(campaign, measurements)
     # All measurements but a few, or all: a joint may move in a few poses only.
     measures = [measure for measure in (trimmed_rms, rms) if _misfit(written, measurements, measure).implausible]
     if not measures:
-        return [], campaign, measurements
+        return [], campaign
     one, fitted = [(change,) for change in single_changes(campaign)], [(change,) for change in placements(campaign)]
     for stages in ((one, fitted), (pairs(campaign),)):
-        tried = [[_tried(campaign, measurements, changes) for changes in stage] for stage in stages]
+        tried = [[_tried(campaign, changes) for changes in stage] for stage in stages]
         for measure in measures:
             before = _misfit(written, measurements, measure)
             winners = [winner for stage in tried if (winner := _winner(stage, before, measure))]
@@ -211,22 +213,21 @@ def _mended(campaign: Campaign, measurements: Measurements) -> tuple[list[Fault]
             for other in winners[1:]:
                 if other.after.together < winner.after.together / FAR_BETTER:
                     winner = other
-            return winner.faults(written, before, measurements), winner.tried.campaign, winner.tried.measurements
-    return [], campaign, measurements
+            return winner.faults(written, before), winner.tried.campaign
+    return [], campaign
 
 
 @dataclass(frozen=True)
 class _Tried:
     changes: tuple[Change, ...]
     campaign: Campaign
-    measurements: Measurements
     placement: Placement
 
 
-def _tried(campaign: Campaign, measurements: Measurements, changes: tuple[Change, ...]) -> _Tried:
+def _tried(campaign: Campaign, changes: tuple[Change, ...]) -> _Tried:
     for change in changes:
-        campaign, measurements = change.correct(campaign, measurements)
-    return _Tried(changes, campaign, measurements, placed(campaign, measurements))
+        campaign = change.correct(campaign)
+    return _Tried(changes, campaign, placed(campaign, campaign.measurements))
 
 
 @dataclass(frozen=True)
@@ -237,21 +238,21 @@ class _Winner:
     evidence: tuple[float, float]
     alike: tuple[str, ...]
 
-    def faults(self, written: Placement, before: Misfit, measurements: Measurements) -> list[Fault]:
+    def faults(self, written: Placement, before: Misfit) -> list[Fault]:
         """One fault for each change."""
-        found = []
+        found, campaign = [], self.tried.campaign
+        poses = Value("poses compared", float(len(np.unique(campaign.measurements.pose))), "–")
         for change in self.tried.changes:
             detail, parameters, decisive = change.detail, change.parameters, True
             if change.placement == "frame":
                 detail, parameters, decisive = _frame_fault(self.placement.estimate, before, self.after)
             if change.placement == "targets":
                 estimates = written.estimate, self.placement.estimate
-                detail, parameters = _target_fault(self.tried.campaign.targets, *estimates, IMPLAUSIBLE_M, IMPLAUSIBLE_RAD)
+                detail, parameters = _target_fault(campaign.targets, *estimates, IMPLAUSIBLE_M, IMPLAUSIBLE_RAD)
             if change.placement == "mounts":
-                detail, parameters = _mount_fault(self.tried.campaign.targets, self.placement.estimate)
-            parameters = (*parameters, Value("poses compared", float(len(np.unique(measurements.pose))), "–"))
+                detail, parameters = _mount_fault(campaign.targets, self.placement.estimate)
             alike = self.alike if len(self.tried.changes) == 1 else ()
-            found.append(Fault(change.name, change.joints, detail, parameters, self.evidence, (), decisive, alike))
+            found.append(Fault(change.name, change.joints, detail, (*parameters, poses), self.evidence, (), decisive, alike))
         return found
 
 
@@ -259,22 +260,17 @@ def _winner(tried: Sequence[_Tried], before: Misfit, measure: Callable[[np.ndarr
     """The first of the alternatives that fit best, if it convinces."""
     if not tried:
         return None
-    misfits = [_misfit(one.placement, one.measurements, measure) for one in tried]
+    misfits = [_misfit(one.placement, one.campaign.measurements, measure) for one in tried]
     together = np.array([misfit.together for misfit in misfits])
+    positions, orientations = np.array([(misfit.position_m, misfit.orientation_rad) for misfit in misfits]).T
     # One of two faults may concern positions alone, or orientations alone.
-    keys = (
-        together,
-        *(
-            np.array([getattr(misfit, name) for misfit in misfits]) + 1e-3 * together
-            for name in ("position_m", "orientation_rad")
-        ),
-    )
-    for key in keys:
+    for key in (together, positions + 1e-3 * together, orientations + 1e-3 * together):
         alike = np.flatnonzero(key <= max(_ALIKE * key.min(), key.min() + _ALIKE_M))
         best = tried[alike[0]]
-        placement = robustly_placed(best.campaign, best.measurements)
-        after = _misfit(placement, best.measurements, measure)
-        evidence = _evidence(before, after, _extent(placement, best.measurements))
+        measurements = best.campaign.measurements
+        placement = robustly_placed(best.campaign, measurements)
+        after = _misfit(placement, measurements, measure)
+        evidence = _evidence(before, after, _extent(placement, measurements))
         if evidence:
             others = [
                 tried[number].changes[0].detail for number in alike[1 : 1 + _MOST_ALIKE] if len(tried[number].changes) == 1
@@ -292,11 +288,8 @@ def _misfit(placement: Placement, measurements: Measurements, measure: Callable[
 
 def _extent(placement: Placement, measurements: Measurements) -> float:
     """RMS distance of the predicted places of a target from their middle, m."""
-    largest = 0.0
-    for group in np.unique(np.column_stack([measurements.session, measurements.target]), axis=0):
-        points = placement.predicted[(measurements.session == group[0]) & (measurements.target == group[1])]
-        largest = max(largest, rms(np.linalg.norm(points - points.mean(axis=0), axis=1)))
-    return largest
+    each = [placement.predicted[members] for members in of_each_target(measurements)]
+    return max(rms(np.linalg.norm(points - points.mean(axis=0), axis=1)) for points in each)
 
 
 def _evidence(written: Misfit, corrected: Misfit, extent_m: float) -> tuple[float, float] | None:
@@ -322,7 +315,7 @@ def _senses(joints: int) -> list[Change]:
         for sign, word in ((1.0, "added to"), (-1.0, "taken from")):
             detail = f"joint {j + 2} is counted from joint {j + 1}: measurements fit with the angle of joint {j + 1} {word} it"
             matrix = unit + sign * np.outer(unit[j + 1], unit[j])
-            found.append(Change("wrong_sign", detail, _with_angles(matrix), (j + 1, j + 2)))
+            found.append(Change("wrong_sign", detail, partial(_with_angles, matrix), (j + 1, j + 2)))
     return found
 
 
@@ -331,7 +324,7 @@ def _single_senses(joints: int) -> list[Change]:
         Change(
             "wrong_sign",
             f"joint {j + 1} has the wrong sense: measurements fit with its sign turned",
-            _with_angles(np.diag(1.0 - 2.0 * np.eye(joints)[j])),
+            partial(_with_angles, np.diag(1.0 - 2.0 * np.eye(joints)[j])),
             (j + 1,),
         )
         for j in range(joints)
@@ -343,7 +336,7 @@ def _lengths_of_positions() -> list[Change]:
     for unit, metres in _LENGTHS.items():
         detail = f"the positions look like {unit}: measurements fit {metres:g} times the written positions"
         factor = Value("metres for each unit of position written", metres, "m")
-        found.append(Change("wrong_unit", detail, _with_positions(metres * np.eye(3)), (), (factor,)))
+        found.append(Change("wrong_unit", detail, partial(_with_axes, metres * np.eye(3), None), (), (factor,)))
     return found
 
 
@@ -359,36 +352,37 @@ def _lengths_of_targets(campaign: Campaign) -> list[Change]:
         looks = "looks" if len(names) == 1 else "look"
         detail = f"{which} {looks} like {unit}: measurements fit {metres:g} times what is written for {', '.join(names)}"
         factor = Value("metres for each unit of target offset written", metres, "m")
-        found.append(Change("wrong_unit", detail, _with_offsets(names, metres), (), (factor,)))
+        found.append(Change("wrong_unit", detail, partial(_with_offsets, names, metres), (), (factor,)))
     return found
 
 
 def _rotations() -> list[Change]:
     detail = "the rotation vectors fit turned round, as if they took base axes into the target's"
-    found = [Change("wrong_sign", detail, _with_rotations(np.negative))]
+    found = [Change("wrong_sign", detail, partial(_with_rotations, np.negative))]
     for factor, words in _TURNS.items():
-
-        def divided(turned: np.ndarray, factor: float = factor) -> np.ndarray:
-            return turned / factor
-
         detail = f"the rotation vectors look like {words}: measurements fit {1 / factor:.4g} times the written rotation vectors"
         value = Value("radians for each unit of rotation vector written", 1 / factor, "rad")
-        found.append(Change("wrong_unit", detail, _with_rotations(divided), (), (value,)))
+        divided = partial(_with_rotations, partial(_divided_by, factor))
+        found.append(Change("wrong_unit", detail, divided, (), (value,)))
     for letters, words in _EULER.items():
-
-        def vectors(turned: np.ndarray, letters: str = letters) -> np.ndarray:
-            return Rotation.from_euler(letters, turned).as_rotvec()
-
         detail = f"the columns of the rotation vector look like {words}, in rad"
-        found.append(Change("wrong_unit", detail, _with_rotations(vectors)))
+        found.append(Change("wrong_unit", detail, partial(_with_rotations, partial(_from_angles, letters))))
     return found
+
+
+def _divided_by(factor: float, turned: np.ndarray) -> np.ndarray:
+    return turned / factor
+
+
+def _from_angles(letters: str, turned: np.ndarray) -> np.ndarray:
+    return Rotation.from_euler(letters, turned).as_rotvec()
 
 
 def _axes(mirrored_only: bool, oriented: bool) -> list[Change]:
     """Axes exchanged or turned round, those of the fewest changes first; rotation vectors as written, or exchanged as well."""
     if mirrored_only:
         detail = "the measurements are mirrored: two axes are exchanged, or one is turned round, or joints have the wrong sense"
-        return [Change("swapped_axes", detail, _with_positions(np.diag([1.0, 1.0, -1.0])))]
+        return [Change("swapped_axes", detail, partial(_with_axes, np.diag([1.0, 1.0, -1.0]), None))]
     ways = [
         np.array(signs)[:, None] * np.eye(3)[list(order)]
         for order in permutations(range(3))
@@ -398,12 +392,11 @@ def _axes(mirrored_only: bool, oriented: bool) -> list[Change]:
     found = []
     for matrix in ways[1:]:
         detail = f"the axes are exchanged: measurements fit with {_axes_in_words(matrix)}"
-        found.append(Change("swapped_axes", detail, _with_positions(matrix)))
+        found.append(Change("swapped_axes", detail, partial(_with_axes, matrix, None)))
         handed = np.linalg.det(matrix)
         for sign in sorted({1.0, handed}) if oriented else ():
-            turned = _with_positions_and_rotations(matrix, sign * matrix)
             words = f"{detail}, and their rotation vectors likewise{', turned round' if sign * handed > 0 > handed else ''}"
-            found.append(Change("swapped_axes", words, turned))
+            found.append(Change("swapped_axes", words, partial(_with_axes, matrix, sign * matrix)))
     return found
 
 
@@ -418,74 +411,59 @@ def _axes_in_words(matrix: np.ndarray) -> str:
     return ", ".join(written_axes)
 
 
-def _with_angles(matrix: np.ndarray) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
-    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
-        # The sign of a column of the file, which counts from where the controller counts.
-        reported = campaign.robot.reported_angles(measurements.joint_angles)
-        return campaign, replace(measurements, joint_angles=campaign.robot.model_angles(reported @ matrix.T))
-
-    return correct
+# Ways to read a campaign otherwise, by what comes before it.
 
 
-def _with_positions(matrix: np.ndarray) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
-    return _with_positions_and_rotations(matrix, None)
+def _with_angles(matrix: np.ndarray, campaign: Campaign) -> Campaign:
+    # The sign of a column of the file, which counts from where the controller counts.
+    reported = campaign.robot.reported_angles(campaign.measurements.joint_angles)
+    return _measured(campaign, joint_angles=campaign.robot.model_angles(reported @ matrix.T))
 
 
-def _with_positions_and_rotations(
-    matrix: np.ndarray, turning: np.ndarray | None
-) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
-    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
-        vectors = measurements.rotation_vector
-        vectors = vectors if turning is None or vectors is None else vectors @ turning.T
-        return campaign, replace(measurements, position=measurements.position @ matrix.T, rotation_vector=vectors)
-
-    return correct
+def _with_axes(matrix: np.ndarray, turning: np.ndarray | None, campaign: Campaign) -> Campaign:
+    """Positions by a matrix, and rotation vectors, which stay as they are without one of theirs."""
+    vectors = campaign.measurements.rotation_vector
+    vectors = vectors if turning is None or vectors is None else vectors @ turning.T
+    return _measured(campaign, position=campaign.measurements.position @ matrix.T, rotation_vector=vectors)
 
 
-def _with_rotations(
-    function: Callable[[np.ndarray], np.ndarray],
-) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
-    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
-        vectors = measurements.rotation_vector
-        return campaign, replace(measurements, rotation_vector=None if vectors is None else function(vectors))
-
-    return correct
+def _with_rotations(function: Callable[[np.ndarray], np.ndarray], campaign: Campaign) -> Campaign:
+    vectors = campaign.measurements.rotation_vector
+    return _measured(campaign, rotation_vector=None if vectors is None else function(vectors))
 
 
-def _with_unknown(parts: Mapping[str, Any]) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
-    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
-        seen = set(measurements.target.tolist())
-        targets = [replace(t, **parts) if number in seen else t for number, t in enumerate(campaign.targets)]
-        return replace(campaign, targets=tuple(targets)), measurements
-
-    return correct
+def _measured(campaign: Campaign, **columns: Any) -> Campaign:
+    return replace(campaign, measurements=replace(campaign.measurements, **columns))
 
 
-def _with_a_mount_each_session(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
-    mounts = _mounts(measurements)
+def _with_unknown(parts: Mapping[str, Any], campaign: Campaign) -> Campaign:
+    seen = set(campaign.measurements.target.tolist())
+    targets = [replace(t, **parts) if number in seen else t for number, t in enumerate(campaign.targets)]
+    return replace(campaign, targets=tuple(targets))
+
+
+def _with_offsets(names: Collection[str], factor: float, campaign: Campaign) -> Campaign:
+    targets = [
+        replace(target, offset_m=tuple(factor * value for value in target.offset_m))
+        if target.offset_m is not None and target.name in names
+        else target
+        for target in campaign.targets
+    ]
+    return replace(campaign, targets=tuple(targets))
+
+
+def _with_a_mount_each_session(campaign: Campaign) -> Campaign:
+    measurements, mounts = campaign.measurements, _mounts(campaign.measurements)
     named = [(campaign.targets[target], session) for target, session in mounts]
     targets = [replace(t, name=f"{t.name}{_IN_SESSION}{session}", offset_m=None, rotation=None) for t, session in named]
     number = {mount: index for index, mount in enumerate(mounts)}
     each = np.array([number[mount] for mount in zip(measurements.target, measurements.session, strict=True)])
-    return replace(campaign, targets=tuple(targets)), replace(measurements, target=each)
+    return replace(_measured(campaign, target=each), targets=tuple(targets))
 
 
 def _mounts(measurements: Measurements) -> list[tuple[int, int]]:
     """Targets and the sessions in which they are measured."""
     return sorted(set(zip(measurements.target.tolist(), measurements.session.tolist(), strict=True)))
-
-
-def _with_offsets(names: Iterable[str], factor: float) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
-    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
-        targets = [
-            replace(target, offset_m=tuple(factor * value for value in target.offset_m))
-            if target.offset_m is not None and target.name in names
-            else target
-            for target in campaign.targets
-        ]
-        return replace(campaign, targets=tuple(targets)), measurements
-
-    return correct
 
 
 def _frame_fault(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str, tuple[Value, ...], bool]:

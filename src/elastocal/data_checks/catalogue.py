@@ -28,16 +28,8 @@ def fault_modules() -> dict[str, ModuleType]:
     return ordered
 
 
-def known_faults() -> set[str]:
-    """Names of all faults that may be found."""
-    return {name for module in fault_modules().values() for name in module.NAMES}
-
-
 def faults(campaign: Campaign, measurements: Measurements) -> tuple[Fault, ...]:
-    """Every fault that some measurements show.
-
-    Returns a fault is not looked for where another one makes that meaningless: see `faults.protocol`.
-    """
+    """Every fault that some measurements show; none is looked for where another one makes that meaningless: see `protocol`."""
     found: list[Fault] = []
     decisive: set[str] = set()
     for name, module in fault_modules().items():

@@ -10,8 +10,6 @@ from elastocal.data_checks.placement import IMPLAUSIBLE_M
 from elastocal.fitting.displacement import joint_compliances
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from elastocal.fitting.fit_result import Fit
 
 # Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
@@ -28,10 +26,9 @@ _SURE = 2.0
 
 
 def fitted_compliance_warnings(fitted: Fit) -> list[str]:
-    """`compliance_warnings` of a fit.
+    """`compliance_warnings` of a fit; none where measurements are wrong by centimetres: compliances mean nothing there.
 
-    Returns None where compliances are not identified, nor where measurements are wrong by centimetres: they mean nothing there.
-    That the joints are taken as rigid, where the compliances are not known either.
+    Where they are not identified, nor known, that the joints are taken as rigid.
     """
     model = fitted.model
     if not model.identifies_compliance and not model.compliance_known:
@@ -39,26 +36,20 @@ def fitted_compliance_warnings(fitted: Fit) -> list[str]:
     off = np.sqrt((fitted.residual[:, :3] ** 2).sum(axis=1).mean())
     if not model.identifies_compliance or off > IMPLAUSIBLE_M:
         return []
-    mine = [owner == "joint_compliance" for owner, _ in fitted.parameters]
-    deviations = np.sqrt(np.diag(fitted.covariance))[mine]
+    deviations = np.sqrt(np.diag(fitted.covariance))[fitted.places_of("joint_compliance")]
     return compliance_warnings(
         joint_compliances(model, fitted.estimate), deviations, model.nominal_compliance, model.compliance_known
     )
 
 
-def compliance_warnings(
-    compliance: np.ndarray | Sequence[float],
-    std_error: np.ndarray | Sequence[float],
-    nominal: np.ndarray | Sequence[float],
-    known: bool = True,
-) -> list[str]:
+def compliance_warnings(compliance: np.ndarray, std_error: np.ndarray, nominal: np.ndarray, known: bool = True) -> list[str]:
     """Name the identified joint compliances that are negative, or far off nominal either way.
 
     `compliance`, `std_error` (n,): identified, rad/(N m); standard error 0 where a compliance was not identified. `nominal`
     (n,): of the robot file. `known`: whether it states them; else they are usual ones. Returns one sentence with value and
     standard error of each, or none.
     """
-    compliance, std_error, nominal = (1e6 * np.asarray(values, float) for values in (compliance, std_error, nominal))
+    compliance, std_error, nominal = (1e6 * values for values in (compliance, std_error, nominal))
     most, word = (MOST_OFF_NOMINAL, "nominal") if known else (MOST_OFF_USUAL, "usual for such a robot")
     low, high = nominal / most, most * nominal
     beyond = np.maximum(low - compliance, compliance - high)

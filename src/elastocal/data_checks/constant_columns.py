@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.data_checks.placement import IMPLAUSIBLE_M, placed, spread
+from elastocal.data_checks.placement import IMPLAUSIBLE_M, of_each_target, placed, spread
 from elastocal.data_checks.protocol import Fault, Value
 
 if TYPE_CHECKING:
@@ -27,8 +27,7 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     some = spread(measurements)
     predicted = placed(campaign, some).predicted
     found = []
-    for group in np.unique(np.column_stack([some.session, some.target]), axis=0):
-        members = (some.session == group[0]) & (some.target == group[1])
+    for members in of_each_target(some):
         poses = len(np.unique(some.pose[members]))
         if poses < _FEWEST_POSES:
             continue
@@ -37,7 +36,7 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
         needed = _extents(predicted[members])
         still = np.ptp(measured, axis=0) < _SAME_M
         count = Value("poses", float(poses), "–")
-        who = campaign.targets[group[1]].name
+        who = campaign.targets[some.target[members[0]]].name
         if still.any() and needed[still.sum() - 1] > IMPLAUSIBLE_M:
             axes = ", ".join(np.array(list("xyz"))[still])
             verb = "are" if still.sum() > 1 else "is"

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import g, pound_force
 
+from elastocal.campaigns.groups import groups_of
 from elastocal.data_checks.placement import rms, robust_sigma, robustly_placed, spread
-from elastocal.fitting.identifiability import solve_identifiable
-from elastocal.fitting.observations import state_clusters
+from elastocal.fitting.identifiability import solve_normal
+from elastocal.fitting.observations import single_observations, state_clusters
+from elastocal.fitting.prediction import measured_in_base
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 
@@ -236,8 +238,8 @@ def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDe
     estimate = robustly_placed(campaign, spread(measurements)).estimate
     residual, jacobian, end, _, _ = _linearized(campaign, measurements, estimate)
     keys = np.column_stack([measurements.session, measurements.pose, measurements.load])
-    states, first, state = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    state, targets = state.ravel(), len(campaign.targets)
+    first, state = groups_of(keys)
+    states, targets = keys[first], len(campaign.targets)
     cell = state * targets + measurements.target
     count = np.bincount(cell, minlength=len(states) * targets).reshape(len(states), targets)
     seen = np.zeros((len(states) * targets, 3))
@@ -246,9 +248,9 @@ def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDe
     at_target = np.zeros((len(states) * targets, *jacobian.shape[1:]))
     at_target[cell] = jacobian
     at_target = at_target.reshape(len(states), targets, *jacobian.shape[1:])
-    # np.unique sorts: the unloaded state of a pose, where there is one, is its first.
-    pose_of = np.unique(states[:, :2], axis=0, return_index=True, return_inverse=True)
-    unloaded = pose_of[1][pose_of[2].ravel()]
+    # States are in order: the unloaded one of a pose, where there is one, is its first.
+    first_of_pose, pose = groups_of(states[:, :2])
+    unloaded = first_of_pose[pose]
     both = (count > 0) & (count[unloaded] > 0)
     loaded = measurements.wrench[first].any(axis=1) & (states[unloaded, 2] == 0) & both.any(axis=1)
     if not loaded.any():
@@ -277,7 +279,8 @@ def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, n
         if kept.sum() < 4 * joints:
             return None
     level = max(rms(residual[kept]), _ROUNDING_M)
-    step, covariance, held = solve_identifiable(expected[kept] / level, deflected.seen[kept] / level, np.ones(joints))
+    left, right = expected[kept] / level, deflected.seen[kept] / level
+    step, covariance, held = solve_normal(left.T @ left, left.T @ right, np.ones(joints))
     # Measurements of one pose have their errors in common: poses count, not measurements.
     deviation = np.sqrt(np.diag(covariance) * max(kept.sum() / (3 * deflected.poses), 1.0))
     well = ~held & (deviation < _WELL_KNOWN * np.abs(step))
@@ -305,9 +308,7 @@ def _linearized(
         position[mask], rotation[mask], at_target = poses_and_jacobians(chain, angles[mask], point)
         jacobian[mask] = at_target[:, :3]
     end = poses_and_jacobians(chain, angles, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
-    session = np.searchsorted(estimate.sessions, measurements.session)
-    into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
-    measured = (into_base @ (measurements.position - estimate.frame_position[session])[..., None])[..., 0]
+    measured, _ = measured_in_base(estimate, single_observations(measurements))
     return measured - position, jacobian, end, rotation, position
 
 

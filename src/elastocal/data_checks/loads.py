@@ -20,7 +20,7 @@ NAMES, FAMILY, AFTER = ("wrong_sign", "wrong_unit"), "data", ("constant_columns"
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """Sign and unit in which the loads explain the measurements, where they are not those that they must have.
 
-    Returns None where the compliances are not known: no size of a deflection is to be expected then.
+    None where the compliances are not known: no size of a deflection is to be expected then.
     """
     if not campaign.robot.compliance_known:
         return []

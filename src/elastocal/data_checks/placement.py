@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
+from elastocal.campaigns.groups import groups_of
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states, single_observations
 from elastocal.fitting.prediction import measured_in_base
@@ -83,7 +84,7 @@ def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement
         return found
     for step in range(_CORE_STEPS + 1):
         distance, kept = found.distance, np.zeros(len(measurements), bool)
-        for members in _groups(measurements):
+        for members in of_each_target(measurements):
             limit = np.quantile(distance[members], _CORE)
             if step == _CORE_STEPS:
                 limit = max(limit, _APART * robust_sigma(distance[members], 3))
@@ -103,7 +104,7 @@ def spread(measurements: Measurements, poses: int = MANY_POSES) -> Measurements:
     `poses`: at most so many of each target in each session.
     """
     chosen = []
-    for members in _groups(measurements):
+    for members in of_each_target(measurements):
         order = members[np.lexsort((measurements.repeat[members], measurements.load[members], measurements.pose[members]))]
         first = order[np.unique(measurements.pose[order], return_index=True)[1]]
         chosen.append(first[np.unique(np.linspace(0, len(first) - 1, poses).round().astype(int))])
@@ -131,11 +132,9 @@ def robust_sigma(distance: np.ndarray, components: int) -> float:
     return float(np.median(distance) / np.sqrt(chi2.median(components)))
 
 
-def _groups(measurements: Measurements) -> list[np.ndarray]:
+def of_each_target(measurements: Measurements) -> list[np.ndarray]:
     """Indices of the measurements of each target in each session."""
-    pairs = np.column_stack([measurements.session, measurements.target])
-    _, number = np.unique(pairs, axis=0, return_inverse=True)
-    number = number.ravel()
+    number = groups_of(np.column_stack([measurements.session, measurements.target]))[1]
     return [np.flatnonzero(number == group) for group in range(number.max() + 1)]
 
 

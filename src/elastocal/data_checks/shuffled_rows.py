@@ -13,10 +13,12 @@ are matched to deflections as an assignment problem [2].
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
@@ -66,14 +68,6 @@ _ROUNDS_OF_COMPLIANCE = 4
 _CHANCE_LOADS = 1.0 / 3.0
 
 
-@dataclass(frozen=True)
-class _Shift:
-    """Measured columns that belong so many rows of a kind further down."""
-
-    steps: int
-    kind: str
-
-
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """Rows whose measured columns, or whose loads, belong to other rows."""
     return [*_of_positions(campaign, measurements), *_of_loads(campaign, measurements)]
@@ -94,8 +88,8 @@ def _of_positions(campaign: Campaign, measurements: Measurements) -> list[Fault]
 
 def _shifted(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Fault]:
     """All rows fit once the measured columns are moved by one row."""
-    shifts = [_Shift(steps, kind) for kind in ("row", "row of its target", "pose") for steps in (1, -1)]
-    moved = [_moved(measurements, shift) for shift in shifts]
+    shifts = list(product(("row", "row of its target", "pose"), (1, -1)))
+    moved = [_moved(measurements, *shift) for shift in shifts]
     plain = [trimmed_rms(placed(campaign, spread(part)).distance) for part in moved]
     best = int(np.argmin(plain))
     estimate = robustly_placed(campaign, spread(moved[best])).estimate
@@ -104,28 +98,21 @@ def _shifted(campaign: Campaign, measurements: Measurements, as_written: Placeme
     cured = (after > IMPLAUSIBLE_M).mean() < (1 - _CURED) * (before > IMPLAUSIBLE_M).mean()
     if not cured or trimmed_rms(after) > min(trimmed_rms(before), IMPLAUSIBLE_M) or rms(after) > rms(before) / FAR_BETTER:
         return []
-    shift = shifts[best]
-    detail = f"the measured columns fit one {shift.kind} further {'down' if shift.steps > 0 else 'up'}"
-    return [Fault(NAMES[0], (), detail, (Value("shift", float(shift.steps), "–"),), (rms(before), rms(after)), (), True)]
+    kind, steps = shifts[best]
+    detail = f"the measured columns fit one {kind} further {'down' if steps > 0 else 'up'}"
+    return [Fault(NAMES[0], (), detail, (Value("shift", float(steps), "–"),), (rms(before), rms(after)), (), True)]
 
 
-def _moved(measurements: Measurements, shift: _Shift) -> Measurements:
-    """Measurements with the measured columns moved down; those that fall off the end are left out."""
-    order = np.argsort(measurements.row, kind="stable")
-    key = np.zeros((len(measurements), 1), int)
-    if shift.kind == "row of its target":
-        key = measurements.target[:, None]
-    if shift.kind == "pose":
-        key = np.column_stack([measurements.target, measurements.load, measurements.repeat])
-    _, group = np.unique(np.column_stack([measurements.session, key]), axis=0, return_inverse=True)
-    group = group.ravel()
-    source = np.full(len(measurements), -1)
-    for number in range(group.max() + 1):
-        members = order[group[order] == number]
-        if shift.steps > 0:
-            source[members[1:]] = members[:-1]
-        else:
-            source[members[:-1]] = members[1:]
+def _moved(measurements: Measurements, kind: str, steps: int) -> Measurements:
+    """Measurements with the measured columns so many rows of a kind further down; those that fall off an end are left out."""
+    of_target = [measurements.session, measurements.target]
+    alike = {
+        "row": [measurements.session],
+        "row of its target": of_target,
+        "pose": [*of_target, measurements.load, measurements.repeat],
+    }[kind]
+    order, source = np.argsort(measurements.row, kind="stable"), np.empty(len(measurements), int)
+    source[order] = pd.Series(order).groupby([column[order] for column in alike]).shift(steps, fill_value=-1)
     return _with_measured(measurements, np.maximum(source, 0)).select(source >= 0)
 
 
@@ -142,15 +129,14 @@ def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Pla
     starts = [as_written.estimate]
     if campaign.frame == "tracker":
         starts += _by_main_axes(campaign, measurements, as_written)
-    nearest = []
-    for start in starts:
-        beside = placed_by(campaign, measurements, start)
-        nearest.append((_gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))[0], start))
-    _, estimate = min(nearest, key=lambda entry: trimmed_rms(entry[0]))
-    before = None
-    for _ in range(_MATCHING_ROUNDS):
+
+    def nearest(estimate: Estimate) -> tuple[Placement, np.ndarray, np.ndarray]:
         beside = placed_by(campaign, measurements, estimate)
-        _, source = _gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))
+        return beside, *_gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))
+
+    estimate, before = min(starts, key=lambda start: trimmed_rms(nearest(start)[1])), None
+    for _ in range(_MATCHING_ROUNDS):
+        beside, _, source = nearest(estimate)
         if before is not None and (source == before).all():
             break
         before = source

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.diagnosis.evidence import blocks_of, log_likelihood, log_sum_exp
+from elastocal.diagnosis.evidence import condition, log_likelihood, log_sum_exp
 from elastocal.diagnosis.search import REACH
 from elastocal.diagnosis.statistics import null_draws
 from elastocal.diagnosis.summed import Sums
@@ -49,7 +49,9 @@ def alarm_of(problem: Problem, products: Products | Sums, pose_error_rad: float,
     """
     settings, statistics = problem.settings, problem.statistics
     # Of measurements that are summed, the size of the pose error is known to a step of its grid.
-    chosen = _near(statistics.pose_error_rad, pose_error_rad, 0 if isinstance(products, Sums) else REACH)
+    reach, place = 0 if isinstance(products, Sums) else REACH, statistics.nearest(pose_error_rad)
+    # Sizes that draws of the fitted one can make likely: its own, and some to either side.
+    chosen = slice(max(place - reach, 0), place + reach + 1)
     statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
     along, squares = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
     along = np.concatenate([statistics.along[..., None], along], axis=2)
@@ -59,12 +61,6 @@ def alarm_of(problem: Problem, products: Products | Sums, pose_error_rad: float,
     return Alarm(float(p_value), float(found[0]), bool(p_value <= settings.alarm_level))
 
 
-def _near(pose_error_rad: np.ndarray, fitted: float, reach: int) -> slice:
-    """Sizes of the pose error that draws of the fitted one can make likely: its own, and some to either side."""
-    place = int(np.argmin(np.abs(pose_error_rad - fitted)))
-    return slice(max(place - reach, 0), place + reach + 1)
-
-
 def _average_bayes_factors(
     problem: Problem, statistics: Statistics, log_pose: np.ndarray, along: np.ndarray, squares: np.ndarray
 ) -> np.ndarray:
@@ -72,13 +68,12 @@ def _average_bayes_factors(
 
     `along` (T, K, N), `squares` (T, N).
     """
-    grid = problem.grid
-    start = (statistics.log_likelihood + log_pose)[:, None]
+    grid, given_nothing = problem.grid, condition(statistics, np.zeros(0, int), np.zeros(0), log_pose)
+    start = given_nothing.log_occam[:, None]
     nothing = log_sum_exp(start + log_likelihood(squares, statistics.freedom), axis=0)
     tested, log_priors = _alternatives(problem)
-    blocks = blocks_of(statistics.gram, tested, range(len(tested)))
     total = np.full(len(nothing), -np.inf)
-    for members, values, vectors, columns in zip(*vars(blocks).values(), strict=True):
+    for members, values, vectors, columns in given_nothing.blocks_of(tested, range(len(tested))):
         for place, number in enumerate(members):
             turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
             unit = tested[number]

@@ -102,8 +102,7 @@ def members_of(
     hypothesis, odds, columns, means, precisions, roots, signs = [], [], [], [], [], [], []
     for number, (_, models) in enumerate(kept.items()):
         for model in models:
-            mine = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
-            deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in model.units])
+            mine, deviations = problem.columns_of(model.units, model.scales)
             chosen = np.concatenate([np.arange(declared), declared + mine])
             precision = total[np.ix_(chosen, chosen)] + np.diag(np.append(np.zeros(declared), (factor * deviations) ** -2))
             mean = np.zeros(instrument.unknowns)

@@ -51,21 +51,16 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
     likely = _likely(posterior, best)
     equations = {tau: normal_equations(linearized.products, tau)[0] for tau in {model.pose_error_rad for model, _ in likely}}
     kept = _likely_pose_errors(linearized.problem, best, [model.pose_error_rad for model, _ in likely])
-    each = [(model, _moments(linearized, model, equations[model.pose_error_rad], owners, kept)) for model, _ in likely]
-    exact = next(found for model, found in each if model is best)
-    moments: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
-    for (_, probability), (_, found) in zip(likely, each, strict=True):
-        for name, (mean, variance) in found.items():
-            moments.setdefault(name, []).append((probability, mean, variance))
+    each = [(p, _moments(linearized, model, equations[model.pose_error_rad], owners, kept)) for model, p in likely]
+    exact = next(found for (model, _), (_, found) in zip(likely, each, strict=True) if model is best)
     shift: dict[tuple[str, str], float] = {}
     std_error: dict[tuple[str, str], float] = {}
-    for name, entries in moments.items():
-        weight, mean, variance = np.array(entries).T
+    for name, (estimate, _) in exact.items():
+        weight, mean, variance = np.array([(probability, *found[name]) for probability, found in each if name in found]).T
         weight = weight / weight.sum()
         center = weight @ mean
-        if name in exact:
-            shift[name] = float(center - exact[name][0])
-            std_error[name] = float(np.sqrt(weight @ (variance + (mean - center) ** 2)))
+        shift[name] = float(center - estimate)
+        std_error[name] = float(np.sqrt(weight @ (variance + (mean - center) ** 2)))
     return Averaged(shift, std_error)
 
 
@@ -127,23 +122,24 @@ def squares_explained(problem: Problem, model: Model) -> dict[str, float]:
     return found
 
 
-def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) -> tuple[float, float]:
+def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) -> list[tuple[float, float]]:
     """Sum of squares of the displacements that some mechanisms of a model make, and how much of it the others cannot make.
 
     The others may take any size that their priors allow: a Schur complement of the Gram matrix with the priors of the others.
+    Returns both numbers of these mechanisms, and then of the others.
     """
     coefficients, gram = _predicted(problem, model), problem.statistics.gram[0]
+    columns, deviations = problem.columns_of(model.units, model.scales)
     units = [problem.units[number] for number in model.units]
-    deviations = np.repeat(model.scales, [len(unit.columns) for unit in units])
     mine = np.repeat([unit.mechanism in mechanisms for unit in units], [len(unit.columns) for unit in units])
-    columns = np.concatenate([unit.columns for unit in units])
-    ours, rest = columns[mine], columns[~mine]
-    made = gram[:, ours] @ coefficients[ours]
-    whole = float(coefficients[ours] @ made[ours])
-    if not len(rest):
-        return whole, whole
-    inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~mine] ** -2.0)
-    return whole, whole - float(made[rest] @ np.linalg.solve(inner, made[rest]))
+    found = []
+    for inside in (mine, ~mine):
+        ours, rest = columns[inside], columns[~inside]
+        made = gram[:, ours] @ coefficients[ours]
+        whole = float(coefficients[ours] @ made[ours])
+        inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~inside] ** -2.0)
+        found.append((whole, whole - float(made[rest] @ np.linalg.solve(inner, made[rest]))))
+    return found
 
 
 def _predicted(problem: Problem, model: Model) -> np.ndarray:
@@ -151,10 +147,10 @@ def _predicted(problem: Problem, model: Model) -> np.ndarray:
     coefficients = np.zeros(problem.statistics.gram.shape[1])
     if model.units:
         units = [problem.units[number] for number in model.units]
-        place = int(np.argmin(np.abs(problem.statistics.pose_error_rad - model.pose_error_rad)))
+        place = problem.statistics.nearest(model.pose_error_rad)
         joint = _joint(problem, units, model, slice(place, place + 1))
-        columns = np.concatenate([unit.columns for unit in units])
-        coefficients[columns] = np.repeat(joint.scales, np.diff(joint.starts)) * joint.mean[0]
+        columns, deviations = problem.columns_of(model.units, joint.scales)
+        coefficients[columns] = deviations * joint.mean[0]
     return coefficients
 
 
@@ -163,9 +159,7 @@ def _moments(
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Mean and variance of every parameter of one model, by owner and name; declared ones up to a constant in the mean."""
     products, units = linearized.products, [linearized.problem.units[number] for number in model.units]
-    declared = products.declared
-    columns = np.concatenate([np.zeros(0, int), *(unit.columns for unit in units)])
-    deviations = np.repeat(model.scales, [len(unit.columns) for unit in units])
+    declared, (columns, deviations) = products.declared, linearized.problem.columns_of(model.units, model.scales)
     chosen = np.concatenate([np.arange(declared), declared + columns])
     information = equations[np.ix_(chosen, chosen)].copy()
     places = np.arange(declared, len(chosen))
@@ -176,19 +170,13 @@ def _moments(
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)
     variance = ((back @ covariance) * back).sum(axis=1)
     found = dict(zip(owners, zip(back @ mean, variance, strict=True), strict=True))
-    for unit, (value, spread) in zip(units, _coefficients(linearized.problem, units, model, kept), strict=True):
+    coefficients = _joint(linearized.problem, units, model, kept).moments() if units else []
+    for unit, (value, spread) in zip(units, coefficients, strict=True):
         if unit.candidate is None:
             continue
         for index, parameter in enumerate(unit.candidate.parameters):
             found[unit.candidate.key, parameter.name] = unit.sizes[index] * value[index], unit.sizes[index] ** 2 * spread[index]
     return found
-
-
-def _coefficients(
-    problem: Problem, units: Sequence[Unit], model: Model, kept: np.ndarray
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Mean and variance of the coefficients of each unit of a model, averaged over its size and some of the pose error."""
-    return _joint(problem, units, model, kept).moments() if units else []
 
 
 def _joint(problem: Problem, units: Sequence[Unit], model: Model, kept: np.ndarray | slice = slice(None)) -> Joint:

@@ -24,8 +24,8 @@ def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]
     found = scatter_warnings(final.noise, measured, settings.largest_scatter) if measured.source == "repeats" else []
     found += pose_error_warnings(final.noise, settings.largest_pose_error_rad)
     if final.model.identifies_compliance:
-        mine = [owner == "joint_compliance" for owner, _ in final.parameters]
-        compliance, deviation = joint_compliances(final.model, final.estimate), np.sqrt(np.diag(final.covariance))[mine]
+        compliance = joint_compliances(final.model, final.estimate)
+        deviation = np.sqrt(np.diag(final.covariance))[final.places_of("joint_compliance")]
         found += [
             f"the compliance of joint {joint + 1} is negative by {-compliance[joint] / deviation[joint]:.1f} standard errors"
             for joint in np.flatnonzero(compliance < -settings.negative_compliance * deviation)

@@ -21,6 +21,7 @@ from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_l
 from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, SEVERAL, UNEXPLAINED, concluded
 from elastocal.diagnosis.words import hypothesis_words
+from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.tolerances import effective_parameters
@@ -262,7 +263,7 @@ def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> lis
     rest = names[len(alone) :]
     steps = [Step(f"with {rest[0] if len(rest) == 1 else f'{len(rest)} further effects'}", "effect", final)]
     for number in range(len(alone), 0, -1):
-        some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in alone[:number]))
+        some = tuple(entry for entry in chosen if entry[0].effect in alone[:number])
         # Only its errors are shown, which a tenth of a standard error in a parameter hardly moves.
         fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted, settled=ON_THE_WAY)
         steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
@@ -280,8 +281,7 @@ def _document(
     warnings: Sequence[str],
 ) -> dict[str, Any]:
     declared, final = steps[1].fitted, steps[-1].fitted
-    listed = [vars(fault) | {"parameters": [vars(value) for value in fault.parameters]} for fault in known]
-    decisive = [fault for fault in listed if fault["decisive"]]
+    decisive = [fault for fault in known if fault.decisive]
     springs = Averaged({}, {})
     entries = [findings.fault_entry(fault) for fault in decisive]
     probabilities: dict[str, Any] | None = None
@@ -289,18 +289,15 @@ def _document(
     misfit: dict[str, float] | None = None
     other_m: float | None = None
     verdict = NAMED if len(decisive) == 1 else SEVERAL
-    remarks = [*warnings, *(f"{fault['name']}: {fault['detail']}" for fault in listed if not fault["decisive"])]
+    remarks = [*warnings, *(f"{fault.name}: {fault.detail}" for fault in known if not fault.decisive)]
     if found:
         problem, conclusion = found.linearized.problem, found.conclusion
         verdict, untestable = conclusion.verdict, found.linearized.untestable
-        probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
+        probabilities = findings.probability_facts(found)
         named = conclusion.best if conclusion.best.named else None
         averages = _averages(declared, found, named)
         springs = _averages(declared, found, None) if named and not found.adopted else averages
-        entries = findings.effect_entries(
-            problem, found.posterior, conclusion, found.alarm, with_effects, averages, case.observations
-        )
-        entries = [entry | {"adopted": found.adopted} for entry in entries]
+        entries = findings.effect_entries(found, with_effects, averages, case.observations)
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
         remarks += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)
@@ -319,7 +316,7 @@ def _document(
         "verdict": verdict,
         "effects": entries,
         "probabilities": probabilities,
-        "noise": _noise_facts(noise, final.noise),
+        "noise": noise_facts(noise) | {"pose_rad": final.noise.pose_rad, "factor": final.noise.position_m / noise.position_m},
         "misfit": misfit,
         # Root mean square by which positions may be elsewhere by other models than the one that is kept.
         "other_models_m": other_m,
@@ -342,19 +339,6 @@ def _misfit(found: Evidence) -> dict[str, float]:
     return {"before": mean_square_left(problem, found.posterior.nothing), "after": mean_square_left(problem, best)}
 
 
-def _noise_facts(measured: Noise, left: Noise) -> dict[str, Any]:
-    return {
-        "source": measured.source,
-        "position_m": measured.position_m,
-        "orientation_rad": measured.orientation_rad,
-        "joint_rad": measured.joint_rad.tolist(),
-        "degrees_of_freedom": measured.degrees_of_freedom,
-        "pose_rad": left.pose_rad,
-        "usual_m": measured.usual_m,
-        "factor": left.position_m / measured.position_m,
-    }
-
-
 def _averages(declared: Fit, found: Evidence, best: Hypothesis | None) -> Averaged:
     """Averages beside the exact fit of a hypothesis, or of the declared model."""
     model = found.posterior.models[best.model] if best else found.posterior.nothing
@@ -366,7 +350,7 @@ def _compliances(declared: Fit, final: Fit, springs: Averaged) -> dict[str, list
     joints = final.model.sites.joints
     after, deviations = joint_compliances(final.model, final.estimate).copy(), np.zeros(joints)
     if final.model.identifies_compliance:
-        mine = np.flatnonzero([owner == "joint_compliance" for owner, _ in final.parameters])
+        mine = final.places_of("joint_compliance")
         names = [("joint_compliance", final.parameters[index][1].name) for index in mine]
         alone = np.sqrt(np.diag(final.covariance))[mine]
         after += [springs.shift.get(name, 0.0) for name in names]

@@ -29,14 +29,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import lapack, solve_triangular
 from scipy.special import log_ndtr
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.settings import Settings
@@ -83,12 +83,9 @@ class Grid:
             return weights - log_sum_exp(weights, axis=2)[..., None]
 
 
-def scale_weights(scales: Sequence[float] | np.ndarray, settings: Settings) -> np.ndarray:
-    """Logarithms of the prior weights of sizes: log-normal pieces below and above the most likely size.
-
-    `scales` (S,). Returns (S,).
-    """
-    off = np.log(np.asarray(scales) / settings.scale_center)
+def scale_weights(settings: Settings) -> np.ndarray:
+    """Logarithms of the prior weights of the sizes, (S,): log-normal pieces below and above the most likely size."""
+    off = np.log(np.asarray(settings.scales) / settings.scale_center)
     spread = np.where(off < 0, *settings.scale_spread)
     log_weights = -0.5 * (off / spread) ** 2
     return log_weights - log_sum_exp(log_weights)
@@ -113,6 +110,18 @@ def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
     return -0.5 * freedom * np.log(variance) - 0.5 * squares / variance
 
 
+class Block(NamedTuple):
+    """U units of d columns each, decomposed for any size: G_uu = V diag(values) V'.
+
+    `members` (U,) of int: numbers of the units. `values` (T, U, d), `vectors` (T, U, d, d), `columns` (U, d) of int.
+    """
+
+    members: np.ndarray
+    values: np.ndarray
+    vectors: np.ndarray
+    columns: np.ndarray
+
+
 @dataclass(frozen=True)
 class Conditioned:
     """Statistics given that some columns are in the model with given sizes.
@@ -128,14 +137,18 @@ class Conditioned:
     squares: np.ndarray
     log_occam: np.ndarray
 
-    @cached_property
-    def gram(self) -> np.ndarray:
-        """W'MW given these columns, ndarray (T, K, K)."""
-        return self.free - self.cross.transpose(0, 2, 1) @ self.cross if self.cross.shape[1] else self.free
-
-    def blocks_of(self, units: Sequence[Unit], chosen: Sequence[int]) -> Blocks:
-        """As `blocks_of` of the whole matrix, of which only the blocks of these units are made."""
-        return _decomposed(units, chosen, self._part)
+    def blocks_of(self, units: Sequence[Unit], chosen: Sequence[int]) -> list[Block]:
+        """Decompose W'MW given these columns, of which only the blocks of some units are made; for each width of these."""
+        numbers = np.asarray(chosen, int)
+        width = np.array([len(units[number].columns) for number in numbers], int)
+        found = []
+        for size in np.unique(width):
+            members = numbers[width == size]
+            columns = np.array([units[number].columns for number in members])
+            part = self._part(columns)
+            values, vectors = np.linalg.eigh(part) if size > 1 else (part[..., 0], np.ones_like(part))
+            found.append(Block(members, np.clip(values, 0.0, None), vectors, columns))
+        return found
 
     def _part(self, at: np.ndarray) -> np.ndarray:
         part = self.free[:, at[:, :, None], at[:, None, :]]
@@ -168,53 +181,16 @@ def condition(statistics: Statistics, columns: np.ndarray, deviations: np.ndarra
     )
 
 
-@dataclass(frozen=True)
-class Blocks:
-    """Units gathered by their number of columns, decomposed for any size: G_uu = V diag(values) V'.
+def added_evidence(
+    conditioned: Conditioned, units: Sequence[Unit], chosen: Sequence[int], grid: Grid, freedom: int
+) -> np.ndarray:
+    """Log evidence of a model with each of the chosen units added, at every size of that unit.
 
-    `members` (U,) of int: numbers of the units of each block. `values` (T, U, d), `vectors` (T, U, d, d), `columns` (U, d) of
-    int.
-    """
-
-    members: tuple[np.ndarray, ...]
-    values: tuple[np.ndarray, ...]
-    vectors: tuple[np.ndarray, ...]
-    columns: tuple[np.ndarray, ...]
-
-
-def blocks_of(gram: np.ndarray, units: Sequence[Unit], chosen: Sequence[int]) -> Blocks:
-    """Decompose the Gram matrix of each of some units.
-
-    `gram` (T, K, K). `chosen`: which of them.
-    """
-    return _decomposed(units, chosen, lambda at: gram[:, at[:, :, None], at[:, None, :]])
-
-
-def _decomposed(units: Sequence[Unit], chosen: Sequence[int], part_of: Callable[[np.ndarray], np.ndarray]) -> Blocks:
-    numbers = np.asarray(chosen, int)
-    width = np.array([len(units[number].columns) for number in numbers], int)
-    members, values, vectors, columns = [], [], [], []
-    for size in np.unique(width):
-        mine = numbers[width == size]
-        at = np.array([units[number].columns for number in mine])
-        part = part_of(at)
-        found, turned = np.linalg.eigh(part) if size > 1 else (part[..., 0], np.ones_like(part))
-        members.append(mine)
-        values.append(np.clip(found, 0.0, None))
-        vectors.append(turned)
-        columns.append(at)
-    return Blocks(tuple(members), tuple(values), tuple(vectors), tuple(columns))
-
-
-def added_evidence(conditioned: Conditioned, blocks: Blocks, grid: Grid, freedom: int, units: Sequence[Unit]) -> np.ndarray:
-    """Log evidence of a model with each of some units added, at every size of that unit.
-
-    `conditioned`: by what the model has already. `blocks`: of the conditioned Gram matrix. `units`: all of them. Returns (T,
-    number of units, S): -inf for units that are not in the blocks.
+    `conditioned`: by what the model has already. Returns (T, number of units, S): -inf for units that are not chosen.
     """
     found = np.full((len(conditioned.squares), len(units), len(grid.scales)), -np.inf)
     variances = grid.scales**2
-    for members, values, vectors, columns in zip(*vars(blocks).values(), strict=True):
+    for members, values, vectors, columns in conditioned.blocks_of(units, chosen):
         along = conditioned.along[:, columns]
         turned = (vectors.swapaxes(-1, -2) @ along[..., None])[..., 0] ** 2
         widened = 1.0 + values[..., None] * variances

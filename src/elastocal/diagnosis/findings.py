@@ -9,7 +9,7 @@ import numpy as np
 from elastocal.counting import plural
 from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.verdict import location_probabilities
+from elastocal.diagnosis.verdict import location_probabilities, locations_of
 from elastocal.diagnosis.words import part_of
 from elastocal.effects import payload
 from elastocal.effects.full_load import lever_m
@@ -19,10 +19,10 @@ from elastocal.fitting.linearization import effect_columns
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from elastocal.diagnosis.alarm import Alarm
+    from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.averaging import Averaged
-    from elastocal.diagnosis.search import Posterior, Problem
-    from elastocal.diagnosis.verdict import Conclusion
+    from elastocal.diagnosis.diagnose import Evidence
+    from elastocal.diagnosis.search import Problem
     from elastocal.effects.protocol import Candidate, Parameter
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
@@ -48,51 +48,41 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     return " ".join(filter(None, [where, *names])) or ("base" if mechanism == OTHER else "")
 
 
-def probability_facts(problem: Problem, posterior: Posterior, conclusion: Conclusion, alarm: Alarm) -> dict[str, Any]:
+def probability_facts(found: Evidence) -> dict[str, Any]:
     """Probabilities as they stand in verdict.json.
 
     Returns ``nothing``, ``alarm_p_value``, ``mechanisms`` by name, and ``sets`` of mechanisms with the locations of their most
     probable model.
     """
-    sets = []
-    for hypothesis in conclusion.hypotheses:
+    sets, problem, hypotheses = [], found.linearized.problem, found.conclusion.hypotheses
+    for hypothesis in hypotheses:
         if hypothesis.probability < _LEAST_LISTED:
             continue
-        units = posterior.models[hypothesis.model].units if hypothesis.model >= 0 else ()
-        at = {
-            name: dict.fromkeys(problem.units[n].location for n in units if problem.units[n].mechanism == name)
-            for name in hypothesis.mechanisms
+        model = found.posterior.models[hypothesis.model]
+        where = {
+            name: [location_words(name, at) for at in locations_of(problem, model, name)] for name in hypothesis.mechanisms
         }
-        where = {name: [location_words(name, location) for location in found] for name, found in at.items()}
         sets.append({"mechanisms": list(hypothesis.mechanisms), "probability": hypothesis.probability, "locations": where})
-    nothing = next(h.probability for h in conclusion.hypotheses if not h.mechanisms)
     return {
-        "nothing": nothing,
-        "alarm_p_value": alarm.p_value,
-        "mechanisms": {name: value for name, value in conclusion.mechanisms.items() if value >= _LEAST_LISTED},
+        "nothing": next(h.probability for h in hypotheses if not h.mechanisms),
+        "alarm_p_value": found.alarm.p_value,
+        "mechanisms": {name: value for name, value in found.conclusion.mechanisms.items() if value >= _LEAST_LISTED},
         "sets": sets,
     }
 
 
-def effect_entries(
-    problem: Problem,
-    posterior: Posterior,
-    conclusion: Conclusion,
-    alarm: Alarm,
-    final: Fit,
-    averages: Averaged,
-    observations: Observations,
-) -> list[dict[str, Any]]:
+def effect_entries(found: Evidence, final: Fit, averages: Averaged, observations: Observations) -> list[dict[str, Any]]:
     """Entries of the effects found, those of the most probable mechanisms first.
 
     `final`: of the most probable model. `averages`: what the other models add to it. `observations`: to which it was fitted.
     """
-    numbers = posterior.models[conclusion.best.model].units if conclusion.best.named else ()
+    problem, conclusion = found.linearized.problem, found.conclusion
+    numbers = found.posterior.models[conclusion.best.model].units if conclusion.best.named else ()
     units = [problem.units[number] for number in numbers]
     entries = []
     for name in sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name]):
         members = [unit.candidate for unit in units if unit.candidate and unit.mechanism == name]
-        where = location_probabilities(problem, posterior, name)
+        where = location_probabilities(problem, found.posterior, name)
         values = [entry for member in members for entry in parameter_entries(member, final, averages)]
         entries.append(
             {
@@ -107,10 +97,11 @@ def effect_entries(
                     if value >= _LEAST_LISTED
                 ],
                 "parameters": sag_entries(name, members, final, observations) + values,
-                "p_value": alarm.p_value,
+                "p_value": found.alarm.p_value,
                 "heldout_gain": None,
                 "alternatives": list(conclusion.alternatives[name]),
                 "angle_to_nearest_deg": _angle_to_nearest(problem, [n for n in numbers if problem.units[n].mechanism == name]),
+                "adopted": found.adopted,
             }
         )
     return entries
@@ -130,8 +121,7 @@ def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list
     file, a mass is given as its product with that of the joint that it turns most, which measurements tell.
     """
     effect = next(effect for effect in final.model.effects if effect.key == member.key)
-    mine = np.flatnonzero([owner == member.key for owner, _ in final.parameters])
-    values = np.concatenate(final.values_of(member.key))
+    mine, values = final.places_of(member.key), np.concatenate(final.values_of(member.key))
     unknowns: list[Parameter | Shape] = [*effect.parameters, *effect.shapes]
     entries = [
         {
@@ -174,8 +164,7 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
         return []
     jacobian = final.joint_jacobian[:, :3]
     columns = effect_columns([(member, ()) for member in members], final.conditions, jacobian, observations.state)
-    owners = [owner for owner, _ in final.parameters]
-    mine = np.concatenate([np.flatnonzero([owner == member.key for owner in owners]) for member in members])
+    mine = np.concatenate([final.places_of(member.key) for member in members])
     sag = columns @ np.concatenate([final.values_of(member.key)[0] for member in members])
     most = int(np.argmax((sag**2).sum(axis=1)))
     size = float(np.linalg.norm(sag[most]))
@@ -184,26 +173,23 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
     return [{"name": f"{name} largest_sag", "value": size, "std_error": error, "unit": "m", "prior_std": None, "held": False}]
 
 
-def fault_entry(fault: Mapping[str, Any]) -> dict[str, Any]:
-    """Entry of a decisive fault of the data.
-
-    `fault`: fields of `faults.protocol.Fault`.
-    """
+def fault_entry(fault: Fault) -> dict[str, Any]:
+    """Entry of a decisive fault of the data."""
     return {
-        "name": fault["name"],
+        "name": fault.name,
         "family": "data",
-        "joints": fault["joints"],
-        "detail": fault["detail"],
+        "joints": fault.joints,
+        "detail": fault.detail,
         "members": [],
         "probability": None,
         "locations": [],
-        "parameters": [value | {"std_error": None} for value in fault["parameters"]],
+        "parameters": [vars(value) | {"std_error": None} for value in fault.parameters],
         "p_value": None,
         "heldout_gain": None,
         "adopted": False,
-        "alternatives": list(fault["alternatives"]),
+        "alternatives": list(fault.alternatives),
         "angle_to_nearest_deg": None,
-        "evidence": [float(value) if np.isfinite(value) else None for value in fault["evidence"]],
+        "evidence": [float(value) if np.isfinite(value) else None for value in fault.evidence],
     }
 
 
@@ -216,8 +202,8 @@ def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: floa
     effects = {effect.key: effect for effect in final.model.effects}
     found = []
     for key in [key for entry in entries for key in entry["members"]]:
-        mine = np.flatnonzero([owner == key for owner, _ in final.parameters])
-        for parameter, value, index in zip(effects[key].parameters, final.values_of(key)[0], mine, strict=False):
+        known = zip(effects[key].parameters, final.values_of(key)[0], final.places_of(key), strict=False)
+        for parameter, value, index in known:
             error = float(np.sqrt(final.covariance[index, index]))
             size = f"{value:.3g} ± {error:.2g} {parameter.unit}"
             if parameter.sign * value < -_SURE * error:

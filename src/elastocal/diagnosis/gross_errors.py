@@ -24,7 +24,6 @@ from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
 from elastocal.counting import counted
-from elastocal.diagnosis.evidence import scale_weights
 from elastocal.diagnosis.linearize import prior_deviations
 from elastocal.diagnosis.statistics import Products
 from elastocal.fitting.displacement import conditions
@@ -97,7 +96,7 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     some = select_states(single, spread_poses(single, _MOST))
     free = ~fitted.held
     negligible = len(some) < len(single) or not free.any()
-    priors = np.array([np.inf if p.prior_std is None else p.prior_std for _, p in fitted.parameters])[free]
+    priors = fitted.prior_std[free]
     sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
     parts = parts_of(some, observations_at_once(fitted.model.rows, len(free)))
     lines = [_Line.of(fitted.model, fitted.estimate, part_at(some, *edges), noise) for edges in parts]
@@ -226,12 +225,7 @@ def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np
 
 
 def held_out_gross_errors(
-    fitted: Fit,
-    there: tuple[Model, Estimate],
-    yardstick: Yardstick,
-    held_out: Case,
-    outside: np.ndarray,
-    settings: Settings,
+    fitted: Fit, there: tuple[Model, Estimate], yardstick: Yardstick, held_out: Case, outside: np.ndarray, settings: Settings
 ) -> Deviations:
     """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that were carried to them.
 
@@ -266,7 +260,8 @@ def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
         return ~kept
     rows = products.rows
     deviation = prior_deviations([parameter for owner, parameter in about.parameters if owner not in problem.candidates])
-    sizes = np.sqrt(np.exp(scale_weights(settings.scales, settings)) @ np.square(settings.scales))
+    grid = problem.problem.grid
+    sizes = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
     declared = (rows.declared * deviation).reshape(about.residual.size, -1)
     columns = (sizes * rows.candidates.dense()).reshape(about.residual.size, -1)
     covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()

@@ -61,6 +61,11 @@ class Unit:
         return at_shapes(name, self.shapes)
 
     @property
+    def of_load_cell(self) -> bool:
+        """Whether it is an error of what a load cell shows, which a reference weight does not have."""
+        return self.candidate is not None and self.candidate.family == "load"
+
+    @property
     def place(self) -> tuple[str, tuple[int | str, ...], str]:
         """What no two units of a model share: variants at one location exclude each other, laws of `OTHER` do not."""
         return self.mechanism, self.location, self.competitor.name if self.competitor else ""
@@ -125,13 +130,12 @@ def units_of(
     """
     start = 0
     units: list[Unit] = []
-    laws: dict[tuple[str, tuple[int | str, ...]], list[str]] = {}
+    laws: dict[tuple[str, tuple[int | str, ...]], set[str]] = {}
     for candidate, _ in tested:
-        laws.setdefault((candidate.effect, candidate.location), []).append(candidate.key)
+        laws.setdefault((candidate.effect, candidate.location), set()).add(candidate.key)
     shares = _shares_of_shapes(tested)
     for candidate, shapes in tested:
-        keys = laws[candidate.effect, candidate.location]
-        share = 1.0 / len(set(keys)) * shares[candidate.key, tuple(shapes)]
+        share = 1.0 / len(laws[candidate.effect, candidate.location]) * shares[candidate.key, tuple(shapes)]
         columns = np.arange(start, start + len(candidate.parameters))
         values = tuple(float(shape) for shape in shapes)
         sizes = np.array([p.plausible * p.order**-settings.harmonic_decay for p in candidate.parameters])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import BEST_REMAINDER, NO_REMAINDER
+from elastocal.campaigns.campaign import NO_REMAINDER
 from elastocal.campaigns.columns import residual_columns
 from elastocal.counting import counted
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
@@ -122,8 +122,7 @@ def _remainder(diagnosis: Diagnosis, held_out: Case, seed: int) -> dict[str, Any
     if campaign.remainder == NO_REMAINDER or any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
         return None
     # Poses held out at random have neighbours among those fitted; others have not, and nor may those that set the intervals.
-    regression = None if campaign.remainder == BEST_REMAINDER else campaign.remainder
-    plan = Plan(regression, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
+    plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
     draws = stream(seed, campaign.name, "remainder", 0)
     return remainder_facts(plan, diagnosis.declared, diagnosis.final, diagnosis.case, held_out, draws)
 

@@ -24,7 +24,6 @@ from elastocal.diagnosis.summed import (
 )
 from elastocal.effects.conditions import at_states
 from elastocal.errors import InputError
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import part_at, parts_of, select_states, spread_poses
@@ -95,7 +94,7 @@ def linearized(
     `fitted`: of the declared model, or with effects found already, about which the problem is then linear. `shapes`: values of
     the shape of some candidates, by their keys, instead of `shapes_tried`.
     """
-    around, sites = _conditions_of(fitted, observations), fitted.model.sites
+    around, sites = fitted.conditions_of(observations.states), fitted.model.sites
     untestable = {c.key: reason for c in candidates if (reason := lacking(c, fitted.model, observations.states))}
     tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
     tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
@@ -137,13 +136,6 @@ def linearized(
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
     problem = Problem(statistics, shown, prior_of(shown, settings), settings)
     return Linearized(problem, products, untestable, fitted, around, keys, unit_rad)
-
-
-def _conditions_of(fitted: Fit, observations: Observations) -> Conditions:
-    """Conditions of the states of a fit: as it keeps them, or found again where they were too many."""
-    if fitted.conditions is None:
-        return conditions(fitted.model, fitted.estimate, observations.states)
-    return fitted.conditions
 
 
 def prior_deviations(parameters: Sequence[Parameter]) -> np.ndarray:
@@ -236,7 +228,7 @@ class _Source:
         """Rows of some poses all over the campaign."""
         chosen = spread_poses(self.observations, SAMPLE_ROWS // self.observations.rows)
         some, seen = selected(self.fitted, self.observations, chosen)
-        few = replace(self, fitted=some, observations=seen, around=_conditions_of(some, seen))
+        few = replace(self, fitted=some, observations=seen, around=some.conditions_of(seen.states))
         (block,) = few.blocks(few.lines(parts_of(seen, len(seen))))
         return block
 
@@ -274,13 +266,10 @@ def selected(fitted: Fit, observations: Observations, chosen: np.ndarray) -> tup
 
     `chosen` (S,) of bool.
     """
-    some = select_states(observations, chosen)
-    around = fitted.conditions
-    if around is None:
-        around = conditions(fitted.model, fitted.estimate, some.states)
-    elif not chosen.all():
-        around = at_states(around, chosen)
-    seen = chosen[observations.state]
+    if chosen.all():
+        return fitted, observations
+    some, seen = select_states(observations, chosen), chosen[observations.state]
+    around = fitted.conditions_of(some.states, chosen)
     jacobian = None if fitted.joint_jacobian is None else fitted.joint_jacobian[seen]
     kept = replace(
         fitted, conditions=around, weights=fitted.weights[seen], residual=fitted.residual[seen], joint_jacobian=jacobian

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import NOT_TURNED, Target
 from elastocal.diagnosis import other
+from elastocal.diagnosis.statistics import rows_alike
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import Observations, States
@@ -25,7 +26,7 @@ from elastocal.fitting.parameters import parameters
 from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.effects.protocol import Displacing
@@ -251,12 +252,10 @@ class Instrument:
         made = effect_columns(self.laws, around, jacobian, state) * self.sizes
         weighed = np.repeat(entries.weighed, len(observations) // len(entries))
         made[np.ix_(weighed, np.ones(made.shape[1], bool), self.of_load_cell)] = 0.0
-        every = np.concatenate([line.sensitivities[..., self.declared | self.added], made], axis=-1)
-        white = whitening(observations, jacobian[..., : self.model.sites.joints], self.noise).apply(every)
-        mine = np.flatnonzero(self.declared | self.added)
-        declared, added = white[..., np.flatnonzero(self.declared[mine])], white[..., np.flatnonzero(self.added[mine])]
-        rows = self.linearized.products.alike(declared, white[..., len(mine) :], self.columns)
-        rows = np.concatenate([rows, added], axis=-1)
+        parts = line.sensitivities[..., self.declared], made, line.sensitivities[..., self.added]
+        white = whitening(observations, jacobian[..., : self.model.sites.joints], self.noise)
+        declared, made, added = (white.apply(part) for part in parts)
+        rows = np.concatenate([rows_alike(self.linearized.products, declared, made, self.columns), added], axis=-1)
         return rows.reshape(len(entries), -1, rows.shape[-1])
 
     def observations(self, entries: Entries, targets: Sequence[int]) -> Observations:
@@ -285,7 +284,7 @@ class Instrument:
 def instrument_of(
     linearized: Linearized,
     fitted: Fit,
-    numbers: Iterable[int],
+    numbers: Sequence[int],
     noise: Noise,
     states: States,
     reach: Reach,
@@ -305,28 +304,24 @@ def instrument_of(
     added = np.array([owner in new for owner in owners], bool)
     declared = np.array([owner not in linearized.candidates for owner in owners], bool) & ~added
     laws: list[tuple[Displacing, tuple[float, ...]]] = []
-    columns, sizes, cell = [], [], []
-    problem, campaign = linearized.problem, linearized.around
-    for number in numbers:
-        unit = problem.units[number]
+    problem = linearized.problem
+    units = [problem.units[number] for number in numbers]
+    for unit in units:
         if unit.candidate:
             laws.append((unit.candidate, unit.shapes))
         else:
             assert unit.competitor is not None
-            laws.append((other.law_of(unit.competitor, campaign, problem.settings.other_features), unit.shapes))
-        columns.append(unit.columns)
-        sizes.append(unit.sizes)
-        cell.append(np.full(len(unit.columns), unit.candidate is not None and unit.candidate.family == "load"))
-    empty = [np.zeros(0, int)]
+            laws.append((other.law_of(unit.competitor, linearized.around, problem.settings.other_features), unit.shapes))
+    columns, of_load_cell = problem.columns_of(numbers, [unit.of_load_cell for unit in units])
     return Instrument(
         model,
         estimate,
         own,
         linearized,
         laws,
-        np.concatenate(empty + columns),
-        np.concatenate(empty + sizes),
-        np.concatenate([np.zeros(0, bool), *cell]),
+        columns,
+        np.concatenate([np.zeros(0), *(unit.sizes for unit in units)]),
+        of_load_cell.astype(bool),
         declared,
         added,
         noise,

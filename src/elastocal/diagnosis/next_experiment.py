@@ -81,9 +81,8 @@ def propose(
         return without_poses(joints, best, (), reason)
     problem = evidence.linearized.problem
     numbers = sorted({n for models in kept.values() for model in models for n in model.units})
-    units = [problem.units[n] for n in numbers]
     states = case.observations.states
-    of_load_cell = any(unit.candidate is not None and unit.candidate.family == "load" for unit in units)
+    of_load_cell = any(problem.units[number].of_load_cell for number in numbers)
     reach = new_states.reach_of(states, case.campaign.robot, joint_limits, ladder, of_load_cell)
     lead = kept[best][0]
     factor = float(np.sqrt(max(mean_square_left(problem, lead), 1.0)))
@@ -105,7 +104,7 @@ def propose(
     # What is distinguishable from the best holds no more probability than is left open where nothing is ambiguous.
     if np.exp(promise.log_prior[0]) >= settings.credible:
         return without_poses(joints, best, unreachable, NOT_DISTINGUISHABLE)
-    order = _by_worth(members, information, stream)
+    order = _greedy(Criterion.of(members, stream), information, poses)
     entries, information = entries.at(order), information[order]
     totals = np.cumsum(information, axis=0)
     factors = [promise.log_factors(total) for total in totals]
@@ -165,12 +164,7 @@ def _searched(
     exchanges, radii = (_EXCHANGES, _RADII) if share * _SHORT_LIST >= poses else (0, ())
     entries = new_states.drawn(reach, max(int(share * pool), short), stream)
     entries, information = _short_list(criterion, instrument, entries, every, short, stream)
-    chosen: list[int] = []
-    for _ in range(poses):
-        total = information[chosen].sum(axis=0)
-        left = criterion.left(total + information)
-        left[chosen] = np.inf
-        chosen.append(int(np.argmin(left)))
+    chosen = _greedy(criterion, information, poses)
     for _ in range(exchanges):
         before = list(chosen)
         for place in range(poses):
@@ -228,29 +222,25 @@ def _without_idle_targets(
     return entries, information, targets
 
 
-def _by_worth(members: Members, information: np.ndarray, stream: np.random.Generator) -> np.ndarray:
-    """Order of the entries in which each leaves least entropy after those before it."""
-    criterion = Criterion.of(members, stream)
-    order: list[int] = []
-    total = np.zeros(information.shape[1:])
-    for _ in range(len(information)):
-        left = criterion.left(total + information)
-        left[order] = np.inf
-        order.append(int(np.argmin(left)))
-        total = total + information[order[-1]]
-    return np.array(order)
+def _greedy(criterion: Criterion, information: np.ndarray, count: int) -> list[int]:
+    """So many entries, each of which leaves least entropy after those before it."""
+    chosen: list[int] = []
+    for _ in range(count):
+        left = criterion.left(information[chosen].sum(axis=0) + information)
+        left[chosen] = np.inf
+        chosen.append(int(np.argmin(left)))
+    return chosen
 
 
 def _present_separation(linearized: Linearized, found: Model, alternative: Model, factor: float) -> float:
     """What the present measurements separate an effect as large as the one found from a model that is fitted to it."""
     problem = linearized.problem
     statistics = problem.statistics
-    at = int(np.argmin(np.abs(statistics.pose_error_rad - found.pose_error_rad)))
+    at = statistics.nearest(found.pose_error_rad)
     gram, along = statistics.gram[at] / factor**2, statistics.along[at] / factor**2
 
     def of(model: Model) -> tuple[np.ndarray, np.ndarray]:
-        columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
-        deviations = factor * np.repeat(model.scales, [len(problem.units[n].columns) for n in model.units])
+        columns, deviations = problem.columns_of(model.units, factor * model.scales)
         return columns, gram[np.ix_(columns, columns)] + np.diag(deviations**-2)
 
     mine, inner = of(found)

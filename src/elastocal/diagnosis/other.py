@@ -88,7 +88,6 @@ class Law:
     `features`: how many displacements these are.
     """
 
-    competitor: Competitor
     size: float
     parts: tuple[tuple[int, _Waves], ...]
     features: int
@@ -108,11 +107,12 @@ def law_of(competitor: Competitor, campaign: Conditions, features: int) -> Law:
     draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)
     size = JOINT_RAD if location else BASE_M if competitor.motion == SHIFT else BASE_RAD
     count = features if location else _BASE_FEATURES
+    largest_load = np.abs(_load(campaign, location)).max(initial=0.0)
     parts = []
     for coordinate in _coordinates(campaign, competitor):
-        waves = _waves(competitor, campaign, coordinate, draws)
+        waves = _waves(competitor, campaign, coordinate, largest_load, draws)
         parts.append((coordinate, _principal(waves, waves(campaign), count)))
-    return Law(competitor, size, tuple(parts), count * len(parts))
+    return Law(size, tuple(parts), count * len(parts))
 
 
 def _principal(waves: _Waves, seen: np.ndarray, count: int) -> _Waves:
@@ -132,7 +132,9 @@ def _coordinates(around: Conditions, competitor: Competitor) -> list[int]:
     return list(around.sites.base[:3] if competitor.motion == SHIFT else around.sites.base[3:])
 
 
-def _waves(competitor: Competitor, campaign: Conditions, coordinate: int, draws: np.random.Generator) -> _Waves:
+def _waves(
+    competitor: Competitor, campaign: Conditions, coordinate: int, largest_load: float, draws: np.random.Generator
+) -> _Waves:
     """Random functions (S, 2 * drawn) of the inputs of a law without their part that has a name; without an input zero.
 
     Each half has a variance of about one half; the second goes with the load.
@@ -141,13 +143,12 @@ def _waves(competitor: Competitor, campaign: Conditions, coordinate: int, draws:
     drawn = [_drawn(known.shape[1], draws) for _ in range(2)]
     frequency, phase = (np.concatenate(each, axis=-1) for each in zip(*drawn, strict=True))
     size = np.sqrt(1.0 / _DRAWN) if known.shape[1] else 0.0
-    largest = np.abs(_load(campaign, competitor.location)).max(initial=0.0)
     named = _named_part(competitor, campaign, size * np.cos(known @ frequency + phase))
 
     def waves(around: Conditions) -> np.ndarray:
         found = size * np.cos(_inputs(around, competitor, coordinate, campaign) @ frequency + phase) - named(around)
-        if largest > _ROUNDING:
-            found[:, _DRAWN:] *= (_load(around, competitor.location) / largest)[:, None]
+        if largest_load > _ROUNDING:
+            found[:, _DRAWN:] *= (_load(around, competitor.location) / largest_load)[:, None]
         return found
 
     return waves

@@ -10,7 +10,7 @@ often something else beside the law, which fits where poses are and not between 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,36 +27,24 @@ if TYPE_CHECKING:
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 
-
-@dataclass(frozen=True)
-class Selected:
-    """A model as the exact fit wants it.
-
-    `effects` (Candidate, ndarray): found, with normal priors on their parameters, and shape values. Without the competitor,
-    which predicts nothing.
-    """
-
-    effects: tuple[tuple[Candidate, np.ndarray], ...]
+    # Effects with normal priors on their parameters, and values of their shapes.
+    Selected = tuple[tuple[Candidate, np.ndarray], ...]
 
 
 def selected(linearized: Linearized, model: Model) -> Selected:
-    """What a model of the posterior is for the exact fit."""
+    """What a model of the posterior is for the exact fit: without the competitor, which predicts nothing."""
     problem, effects = linearized.problem, []
     for number, scale in zip(model.units, model.scales, strict=True):
         unit = problem.units[number]
         if unit.candidate:
             size = min(scale, problem.grid.root_mean_square(unit))
             effects.append((with_prior(unit.candidate, size * unit.sizes), np.array(unit.shapes, float)))
-    return Selected(tuple(effects))
+    return tuple(effects)
 
 
 def with_shapes_of(chosen: Selected, fitted: Fit) -> Selected:
-    """A selected model with the values of shapes that a fit of it found.
-
-    `fitted`: that has all its effects.
-    """
-    effects = tuple((candidate, fitted.values_of(candidate.key)[1]) for candidate, _ in chosen.effects)
-    return replace(chosen, effects=effects)
+    """A selected model with the values of shapes that a fit of all its effects found."""
+    return tuple((candidate, fitted.values_of(candidate.key)[1]) for candidate, _ in chosen)
 
 
 def fit_with_sizes(
@@ -68,9 +56,9 @@ def fit_with_sizes(
     effects: the search then starts from its values of those that are the same. `**options`: of `fitting.fit`.
     """
     model = declared.model
-    effects = [candidate for candidate, _ in chosen.effects]
+    effects = [candidate for candidate, _ in chosen]
     start = declared.estimate.with_effects(effects)
-    start = replace(start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen.effects)))
+    start = replace(start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen)))
     if near is not None:
         met = {effect.key for effect in near.model.effects}
         values = zip((*model.effects, *effects), start.coefficients, strict=True)
@@ -85,9 +73,7 @@ def mean_square_left(problem: Problem, model: Model) -> float:
     Returns 1 where the noise accounts for it.
     """
     statistics = problem.statistics
-    place = int(np.argmin(np.abs(statistics.pose_error_rad - model.pose_error_rad)))
-    columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
-    deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in model.units])
+    place, (columns, deviations) = statistics.nearest(model.pose_error_rad), problem.columns_of(model.units, model.scales)
     along = deviations * statistics.along[place, columns]
     inner = deviations[:, None] * statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
     return float((statistics.squares[place] - along @ np.linalg.solve(inner, along)) / statistics.freedom)
@@ -99,11 +85,8 @@ def mean_square(fitted: Fit) -> float:
     `fitted`: with the noise that a linear problem promised to leave. Returns 1 where it left that.
     """
     white = fitted.whitened(fitted.residual)
-    squares, priors = (white**2).sum(), [parameter.prior_std for _, parameter in fitted.parameters]
-    values = parameter_values(fitted.model, fitted.estimate)
-    known = np.array([prior is not None for prior in priors], bool)
-    squares += sum((value / prior) ** 2 for value, prior in zip(values[known], np.array(priors)[known], strict=True))
-    return float(squares / (white.size - (~known & ~fitted.held).sum()))
+    squares = (white**2).sum() + ((parameter_values(fitted.model, fitted.estimate) / fitted.prior_std) ** 2).sum()
+    return float(squares / (white.size - (np.isinf(fitted.prior_std) & ~fitted.held).sum()))
 
 
 def remaining_noise(problem: Problem, model: Model, taken: Noise, least: Noise) -> Noise:

@@ -66,12 +66,17 @@ class Problem:
     @cached_property
     def grid(self) -> Grid:
         """Sizes of a unit."""
-        return Grid(np.array(self.settings.scales), scale_weights(self.settings.scales, self.settings))
+        return Grid(np.array(self.settings.scales), scale_weights(self.settings))
 
     @property
     def log_pose(self) -> np.ndarray:
         """Logarithm of the prior weight of each size of the pose error, ndarray (T,)."""
         return pose_weights(self.statistics.pose_error_rad, self.settings)
+
+    def columns_of(self, numbers: Sequence[int], scales: Sequence[float] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Columns of some units of given sizes, (D,), and the prior standard deviation of each, in plausible sizes."""
+        columns = [self.units[number].columns for number in numbers]
+        return np.concatenate([np.zeros(0, int), *columns]), np.repeat(scales, [len(each) for each in columns])
 
 
 @dataclass(frozen=True)
@@ -148,8 +153,7 @@ def likely_pose_errors(statistics: Statistics, units: Sequence[Unit], settings: 
     """
     problem = Problem(statistics, tuple(units), Prior({}, {}), settings)
     conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), problem.log_pose)
-    blocks = conditioned.blocks_of(units, range(len(units)))
-    found = added_evidence(conditioned, blocks, problem.grid, statistics.freedom, units)
+    found = added_evidence(conditioned, units, range(len(units)), problem.grid, statistics.freedom)
     empty = evaluate(statistics, [], problem.grid, problem.log_pose, ())
     likely = _likely(found, log_sum_exp(log_sum_exp(found, axis=0), axis=1), empty)
     likely[0] = True
@@ -192,17 +196,16 @@ class _Searcher:
         if not open_units:
             return
         sizes = self.sizes[model]
-        columns = np.concatenate([np.zeros(0, int), *(units[n].columns for n in model)])
-        deviations = np.repeat(sizes, [len(units[n].columns) for n in model])
-        conditioned = condition(self.statistics, columns, deviations, self.log_pose)
-        blocks = conditioned.blocks_of(units, open_units)
-        by_pose_error = added_evidence(conditioned, blocks, self.grid, self.statistics.freedom, units)
+        conditioned = condition(self.statistics, *self.problem.columns_of(model, sizes), self.log_pose)
+        by_pose_error = added_evidence(conditioned, units, open_units, self.grid, self.statistics.freedom)
         found = log_sum_exp(by_pose_error, axis=0)
         total = log_sum_exp(found, axis=1)
         # What the sizes already in the model are worth as they are, against their average: the same for all extensions.
         alone = log_sum_exp(conditioned.log_occam + log_likelihood(conditioned.squares, self.statistics.freedom))
         if not model:
-            self.keep_likely_pose_errors(by_pose_error, total)
+            # Without the sizes of the pose error that neither "nothing" nor any good single unit makes likely.
+            self.keep_pose_errors(np.flatnonzero(_likely(by_pose_error, total, self.empty)))
+            self.empty = self.evaluated((), self.empty.scales)
         prior, here = self.problem.prior, self.met[model]
         mechanisms = Counter(units[n].mechanism for n in model)
         best, gained = self.grid.scales[found.argmax(axis=1)], (total + (here - alone)).tolist()
@@ -214,11 +217,6 @@ class _Searcher:
                 self.met[key] = odds
                 self.sizes[key] = np.concatenate([sizes[:place], best[number : number + 1], sizes[place:]])
 
-    def keep_likely_pose_errors(self, by_pose_error: np.ndarray, total: np.ndarray) -> None:
-        """Go on without the sizes of the pose error that neither "nothing" nor any good single unit makes likely."""
-        self.keep_pose_errors(np.flatnonzero(_likely(by_pose_error, total, self.empty)))
-        self.empty = self.evaluated((), self.empty.scales)
-
     def keep_pose_errors(self, kept: np.ndarray) -> None:
         """Go on with some of the sizes of the pose error alone; their statistics are copied where there are others."""
         if len(kept) < len(self.log_pose):
@@ -226,15 +224,13 @@ class _Searcher:
 
     def measure(self, model: tuple[int, ...]) -> Model:
         """Meet a model as it is, in full, and what it would be without each of its units."""
-        start = self.sizes.get(model)
-        if start is None:
-            start = np.full(len(model), self.problem.settings.scale_center)
-        found = self.evaluated(model, start)
+        found = self.evaluated(model, self.sizes.get(model, np.full(len(model), self.problem.settings.scale_center)))
         units, prior = self.problem.units, self.problem.prior
         whole, counts = prior.log_odds_of(units[n] for n in model), Counter(units[n].mechanism for n in model)
         odds = found.log_evidence - self.empty.log_evidence + whole
         self.met[model], self.sizes[model] = odds, found.scales
-        self.measured[model] = Model(model, odds, found.scales, self.pose_error(found))
+        pose_error_rad = float(self.statistics.pose_error_rad[np.argmax(found.log_pose)])
+        self.measured[model] = Model(model, odds, found.scales, pose_error_rad)
         if odds == max(self.met.values()):
             self.keep_pose_errors(np.flatnonzero(found.log_pose > _OUT_OF_QUESTION))
         for place, number in enumerate(model):
@@ -245,31 +241,28 @@ class _Searcher:
                 self.sizes[smaller] = np.delete(found.scales, place)
         return self.measured[model]
 
-    def pose_error(self, found: Evaluated) -> float:
-        """Most probable size of the pose error, rad."""
-        return float(self.statistics.pose_error_rad[np.argmax(found.log_pose)])
-
     def start_from_whole_mechanisms(self) -> None:
         """Meet each mechanism at all its locations, with the best variant at each."""
         units = self.problem.units
         for mechanism in dict.fromkeys(unit.mechanism for unit in units if unit.mechanism != OTHER):
-            best: dict[tuple[int | str, ...], tuple[int]] = {}
-            for number, unit in enumerate(units):
-                present = best.get(unit.location)
-                if unit.mechanism == mechanism and (present is None or self.met[(number,)] > self.met[present]):
-                    best[unit.location] = (number,)
-            whole = tuple(sorted(number for (number,) in best.values()))
+            whole = self.best_variants(number for number, unit in enumerate(units) if unit.mechanism == mechanism)
             if 1 < len(whole) <= self.problem.settings.largest_model:
                 self.measure(whole)
 
     def start_from(self, known: Collection[str]) -> None:
         """Meet the model of some candidates, each with the best of its shapes."""
+        units = enumerate(self.problem.units)
+        model = self.best_variants(number for number, unit in units if unit.candidate and unit.candidate.key in known)
+        if model:
+            self.measure(model)
+
+    def best_variants(self, numbers: Iterable[int]) -> tuple[int, ...]:
+        """Of some units the best at each place, rising."""
         best: dict[tuple[str, tuple[int | str, ...], str], tuple[int]] = {}
-        for number, unit in enumerate(self.problem.units):
-            if unit.candidate and unit.candidate.key in known:
-                best[unit.place] = max(best.get(unit.place, (number,)), (number,), key=self.met.__getitem__)
-        if best:
-            self.measure(tuple(sorted(number for (number,) in best.values())))
+        for number in numbers:
+            place = self.problem.units[number].place
+            best[place] = max(best.get(place, (number,)), (number,), key=self.met.__getitem__)
+        return tuple(sorted(number for (number,) in best.values()))
 
     def grow(self) -> None:
         """Extend the best models that have not been, in rounds, until rounds bring nothing better.

@@ -19,12 +19,10 @@ class Settings:
         "probability of an alarm where nothing is missing, exact by simulation; half of a 4 % budget; the rest for the noise",
     )
     alarm_draws: int = _setting(
-        499,
-        "draws of the null distribution; (1 + exceedances) / (1 + draws) is exact (Davison and Hinkley 1997, 4.2)",
+        499, "draws of the null distribution; (1 + exceedances) / (1 + draws) is exact (Davison and Hinkley 1997, 4.2)"
     )
     mechanism_probability: float = _setting(
-        0.02,
-        "prior probability of each mechanism, of which there are some thirty: what it states fits development cases best",
+        0.02, "prior probability of each mechanism, of which there are some thirty: what it states fits development cases best"
     )
     gravity_probability: float = _setting(
         0.5,

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.diagnosis.summed import Sums, nothing_left, null_draws_of, rows_alike
+from elastocal.diagnosis.summed import Sums, nothing_left, null_draws_of
 from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
@@ -48,14 +48,12 @@ class Statistics:
 
     def at(self, chosen: np.ndarray | slice) -> Statistics:
         """The same at some of the sizes of the pose error only; a slice copies nothing."""
-        return Statistics(
-            self.pose_error_rad[chosen],
-            self.gram[chosen],
-            self.along[chosen],
-            self.squares[chosen],
-            self.log_likelihood[chosen],
-            self.freedom,
-        )
+        some = {name: values[chosen] for name, values in vars(self).items() if name != "freedom"}
+        return Statistics(**some, freedom=self.freedom)
+
+    def nearest(self, pose_error_rad: float) -> int:
+        """Place of the size of the pose error that is nearest to one."""
+        return int(np.argmin(np.abs(self.pose_error_rad - pose_error_rad)))
 
 
 @dataclass(frozen=True)
@@ -84,19 +82,18 @@ class Products:
         """Of the declared model alone."""
         kept = np.append(np.arange(self.declared), self.gram.shape[0] - 1)
         return replace(
-            self,
-            gram=self.gram[np.ix_(kept, kept)],
-            pose_rows=self.pose_rows[..., kept],
-            projected=self.projected[:, -1:],
+            self, gram=self.gram[np.ix_(kept, kept)], pose_rows=self.pose_rows[..., kept], projected=self.projected[:, -1:]
         )
 
-    def alike(self, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Whitened rows at other states in the parameters of these products.
 
-        `declared` (..., P). `candidates` (..., U): sensitivities to some of the candidates, in units of their plausible sizes.
-        `columns` (U,) of int: which of them. Returns (..., P + U).
-        """
-        return rows_alike(self, declared, candidates, columns)
+def rows_alike(products: Products | Sums, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Whitened rows at other states in the parameters of some products.
+
+    `declared` (..., P). `candidates` (..., U): sensitivities to some of the candidates, in units of their plausible sizes.
+    `columns` (U,) of int: which of them. Returns (..., P + U).
+    """
+    basis = declared @ products.into_basis
+    return np.concatenate([basis, candidates - basis @ products.projected[:, columns]], axis=-1)
 
 
 def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray, joint_rad: np.ndarray) -> Products:

@@ -8,7 +8,7 @@ of them. What they explain of candidates and residual is taken off the sums, as 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,18 +26,6 @@ SAMPLE_ROWS = 6000
 # Values of whitened columns in a block of declared ones, and observations in a block of candidates, which come in factors.
 _BLOCK_VALUES = 1_500_000
 OBSERVATIONS_AT_ONCE = 500
-
-
-class InBasis(Protocol):
-    """What tells the parameters of products: see `statistics.Products`."""
-
-    @property
-    def into_basis(self) -> np.ndarray:
-        """ndarray (P, P)."""
-
-    @property
-    def projected(self) -> np.ndarray:
-        """ndarray (P, K + 1)."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +93,6 @@ class Sums:
     pose_error_rad: np.ndarray
     totals: np.ndarray
     log_dets: np.ndarray
-    rows: int
     freedom: int
     into_basis: np.ndarray
     projected: np.ndarray
@@ -114,16 +101,6 @@ class Sums:
     def gram(self) -> np.ndarray:
         """Z'Z."""
         return self.totals[0]
-
-    def alike(self, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """As `Products.alike`."""
-        return rows_alike(self, declared, candidates, columns)
-
-
-def rows_alike(products: InBasis, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """See `Products.alike`."""
-    basis = declared @ products.into_basis
-    return np.concatenate([basis, candidates - basis @ products.projected[:, columns]], axis=-1)
 
 
 def rows_at_once(columns: int) -> int:
@@ -188,7 +165,7 @@ def summed(
         rest[:, :-1][:, inside], left[:-1][inside], left[:, :-1][:, inside] = 0.0, 0.0, 0.0
         totals[number] = np.block([[raw[:count, :count], rest], [rest.T, left]])
     freedom = max(round(rows - hat), 1)
-    return Sums(count, np.asarray(pose_error_rad), totals, log_dets, rows, freedom, into_basis, projected)
+    return Sums(count, np.asarray(pose_error_rad), totals, log_dets, freedom, into_basis, projected)
 
 
 class _Sum:

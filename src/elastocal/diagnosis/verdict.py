@@ -158,12 +158,16 @@ def _mechanisms_of(problem: Problem, model: Model, probability: float) -> set[st
     known = names - {OTHER}
     if OTHER not in names or not known or probability <= _TELLING:
         return names
-    by_laws, beyond_unknown = squares_beyond(problem, model, known)
-    by_unknown, beyond_laws = squares_beyond(problem, model, {OTHER})
+    (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(problem, model, known)
     tolerance = problem.settings.law_tolerance**2
     if beyond_laws < tolerance * by_laws:
         return known
     return {OTHER} if beyond_unknown < tolerance * by_unknown else names
+
+
+def locations_of(problem: Problem, model: Model, mechanism: str) -> list[tuple[int | str, ...]]:
+    """Where a mechanism acts in a model, in the order of the units: that of a set differs from one process to the next."""
+    return list(dict.fromkeys(problem.units[n].location for n in model.units if problem.units[n].mechanism == mechanism))
 
 
 def location_probabilities(problem: Problem, posterior: Posterior, mechanism: str) -> dict[tuple[int | str, ...], float]:
@@ -171,8 +175,7 @@ def location_probabilities(problem: Problem, posterior: Posterior, mechanism: st
     total = 0.0
     found: dict[tuple[int | str, ...], float] = {}
     for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
-        # In the order of the units: equally probable ones keep it, and that of a set differs from one process to the next.
-        locations = dict.fromkeys(problem.units[n].location for n in model.units if problem.units[n].mechanism == mechanism)
+        locations = locations_of(problem, model, mechanism)
         total += probability if locations else 0.0
         for location in locations:
             found[location] = found.get(location, 0.0) + float(probability)

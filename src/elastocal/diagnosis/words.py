@@ -76,11 +76,11 @@ def part_of(effect: str) -> str:
     return getattr(effects().get(effect), "PART", "joint")
 
 
-def listed(items: Iterable[str], most: int | None = None, rest: str = "more", last: str = "and") -> str:
+def listed(items: Iterable[str], most: int | None = None, last: str = "and") -> str:
     """Items in a sentence, at most so many of them."""
     items = list(items)
     if most is not None and len(items) > most:
-        items = [*items[:most], f"{len(items) - most} {rest}"]
+        items = [*items[:most], f"{len(items) - most} more"]
     return items[0] if len(items) == 1 else ", ".join(items[:-1]) + f" {last} " + items[-1] if items else "none"
 
 
@@ -101,8 +101,7 @@ def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
     for location in locations:
         found = _LOCATION.match(location)
         assert found is not None
-        numbers = tuple(map(int, found["numbers"].split(" and "))) if found["numbers"] else ()
-        parsed.append((numbers, found["detail"]))
+        parsed.append((_numbers_in(found["numbers"]), found["detail"]))
     return physical_name(effect) + _where(effect, parsed)
 
 
@@ -115,10 +114,12 @@ def found_words(effect: str, keys: Iterable[str]) -> str:
     for key in keys:
         found = re.match(_ANY_KEY, key)
         assert found is not None
-        locations.append(
-            (tuple(map(int, (found["joints"] or "").split("+"))) if found["joints"] else (), found["detail"] or "")
-        )
+        locations.append((_numbers_in(found["joints"]), found["detail"] or ""))
     return physical_name(effect) + _where(effect, locations)
+
+
+def _numbers_in(text: str | None) -> tuple[int, ...]:
+    return tuple(map(int, re.findall(r"\d+", text or "")))
 
 
 def candidate_words(key: str) -> str:

@@ -239,8 +239,7 @@ def conditions_of(
     to; the commanded poses without.
     """
     if coordinates is None:
-        coordinates = np.zeros((len(states), sites.chain.coordinates))
-        coordinates[:, : sites.joints] = states.joint_angles
+        coordinates = sites.chain.at(states.joint_angles)
     return Conditions(
         sites,
         np.asarray(compliance),

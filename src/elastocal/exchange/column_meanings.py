@@ -11,9 +11,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from elastocal.campaigns.measurements import closest_first
 from elastocal.counting import counted
-from elastocal.errors import InputError
+from elastocal.errors import InputError, closest_first
 from elastocal.exchange.column_names import (
     ANGLE,
     EULER,

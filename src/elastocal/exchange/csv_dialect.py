@@ -8,9 +8,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from elastocal.campaigns.measurements import closest_first
 from elastocal.counting import counted
-from elastocal.errors import InputError, steering
+from elastocal.errors import InputError, closest_first, steering
 from elastocal.io.texts import decoded, read_bytes
 
 # In this order: a header that holds a semicolon is not separated by its commas.

@@ -25,9 +25,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from elastocal.campaigns.measurements import closest_first
 from elastocal.counting import counted
-from elastocal.errors import InputError
+from elastocal.errors import InputError, closest_first
 from elastocal.exchange.column_names import read_units, split_unit
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.io.documents import read_document

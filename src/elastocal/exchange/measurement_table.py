@@ -14,8 +14,8 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from elastocal.campaigns.column_bounds import FARTHEST_RAD
-from elastocal.campaigns.measurements import closest_first, file_columns
-from elastocal.errors import InputError, text_fault
+from elastocal.campaigns.measurements import file_columns
+from elastocal.errors import InputError, closest_first, text_fault
 from elastocal.exchange.column_meanings import check_complete, find_columns, find_rotation, find_units
 from elastocal.exchange.column_names import ANGLE, POSITION, UNITS, VECTOR, find_joints, is_name, read_units, recognize_column
 from elastocal.exchange.csv_dialect import read_text_table

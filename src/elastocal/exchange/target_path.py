@@ -12,8 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.column_bounds import FARTHEST_RAD
-from elastocal.campaigns.measurements import closest_first
-from elastocal.errors import InputError
+from elastocal.errors import InputError, closest_first
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.exchange.measurement_cells import CellReader
 from elastocal.mechanics.components import WRENCH

@@ -13,8 +13,7 @@ from itertools import takewhile
 
 import numpy as np
 
-from elastocal.campaigns.measurements import closest_first
-from elastocal.errors import InputError
+from elastocal.errors import InputError, closest_first
 from elastocal.exchange.fixed_transforms import (
     axis_rotation,
     displacement_words,

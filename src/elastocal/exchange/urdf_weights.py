@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from elastocal.counting import first_names
 from elastocal.exchange.robot_text import mass_entries
 from elastocal.exchange.urdf_chain import Carried, UrdfChain, joints_above, parent_joints
 from elastocal.exchange.urdf_reading import Urdf
@@ -20,6 +21,8 @@ RELATIVE_STD = 0.2
 _DECIMALS = 9
 # So many links of a robot never weigh the same.
 _FEWEST_ALIKE = 3
+# Links and joints that a note names.
+_NAMED = 4
 
 
 @dataclass(frozen=True)
@@ -49,9 +52,9 @@ def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD)
         return Weights([], (f"every link weighs {alike.pop():g} kg: placeholders, which are left out",))
     notes = []
     if at_zero:
-        notes.append(f"joints beside the chain are held at zero for what they carry: {_list_names(at_zero)}")
+        notes.append(f"joints beside the chain are held at zero for what they carry: {first_names(sorted(at_zero), _NAMED)}")
     if passive:
-        notes.append(f"behind a passive joint, but weighing as if it did not turn: {_list_names(passive)}")
+        notes.append(f"behind a passive joint, but weighing as if it did not turn: {first_names(sorted(passive), _NAMED)}")
     if not moments:
         notes.append("no masses: the weight of the links is not known")
     return Weights(mass_entries(moments, relative_std), tuple(notes))
@@ -79,8 +82,3 @@ def _find_carrier(urdf: Urdf, link: str, chain: UrdfChain) -> tuple[Carried, lis
         at = joint.parent
     place = chain.links[at]
     return replace(place, transform=place.transform @ transform), by
-
-
-def _list_names(names: set[str]) -> str:
-    most = sorted(names)[:4]
-    return ", ".join(most) + (f" and {len(names) - len(most)} more" if len(names) > len(most) else "")

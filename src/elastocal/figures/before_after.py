@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from elastocal.counting import first_names
 from elastocal.diagnosis.words import in_words
 from elastocal.figures.residuals import MICRO, MILLI
 from elastocal.figures.style import PALETTE, panels, styled
@@ -76,9 +77,7 @@ def _interval(axis: Axes, value: float, low: float, high: float, row: float) -> 
 
 def step_name(name: str, most: int = 3) -> str:
     """Name of a model for people: words, with the ends of long lists left out, in lines that fit beside the bars."""
-    parts = in_words(name).split(", ")
-    rest = f" and {len(parts) - most} more" if len(parts) > most else ""
-    return textwrap.fill(", ".join(parts[:most]) + rest, _LINE)
+    return textwrap.fill(first_names(in_words(name).split(", "), most), _LINE)
 
 
 def _legend(kinds: Collection[str], noise_floor_m: float | None) -> list[Artist]:

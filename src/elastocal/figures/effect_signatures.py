@@ -139,8 +139,7 @@ def _displacement_mm(candidate: Candidate, sites: Sites, compliance: np.ndarray,
     """Displacement of the reflector, ndarray (S, 3)."""
     around = conditions_of(sites, compliance, states, row_span=(0, 1))
     point = replace(sites.chain.end_effector, offset_m=_REFLECTOR_M)
-    commanded = np.zeros((len(states), sites.chain.coordinates))
-    commanded[:, : sites.joints] = states.joint_angles
+    commanded = sites.chain.at(states.joint_angles)
     displaced = commanded.copy()
     sizes = np.array([(parameter.sign or 1) * parameter.plausible for parameter in candidate.parameters])
     displace(displaced, candidate, sizes, [shape.start for shape in candidate.shapes], around)

@@ -67,8 +67,7 @@ def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditio
     Returns (S, C).
     """
     around = with_springs_of(model, estimate, conditions)
-    displaced = np.zeros((len(around.joint_angles), model.sites.chain.coordinates))
-    displaced[:, : model.sites.joints] = around.joint_angles
+    displaced = model.sites.chain.at(around.joint_angles)
     if not model.identifies_compliance:
         displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * model.nominal_compliance
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Parameter
     from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.fitting.observations import Observations
+    from elastocal.fitting.observations import Observations, States
     from elastocal.fitting.whitening import Scaling, Whitening
 
 
@@ -59,6 +59,15 @@ class Fit:
         """As `parameters.parameters`."""
         return parameters(self.model, self.estimate)
 
+    @property
+    def prior_std(self) -> np.ndarray:
+        """Standard deviation of the prior of each of the parameters, infinite where it has none, ndarray (P,)."""
+        return np.array([np.inf if parameter.prior_std is None else parameter.prior_std for _, parameter in self.parameters])
+
+    def places_of(self, owner: str) -> np.ndarray:
+        """Places among the parameters of those that belong to one owner, such as the key of an effect; ndarray of int."""
+        return np.flatnonzero([each == owner for each, _ in self.parameters])
+
     def values_of(self, key: str) -> tuple[np.ndarray, np.ndarray]:
         """Linear parameters (D,) and shapes (F,) of one effect."""
         number = [effect.key for effect in self.model.effects].index(key)
@@ -76,13 +85,15 @@ class Fit:
         """
         for states, seen in parts_of(observations, observations_at_once(observations.rows, len(self.held))):
             some = part_at(observations, states, seen)
-            if self.conditions is None:
-                around = conditions(self.model, self.estimate, some.states)
-            else:
-                around = at_states(self.conditions, states)
-            line = linearize(self.model, self.estimate, some, around)
+            line = linearize(self.model, self.estimate, some, self.conditions_of(some.states, states))
             white = whitening(some, self.jacobian_at(line, seen), self.noise)
             yield seen, line.sensitivities, white.apply(line.sensitivities * np.sqrt(self.weights[seen])[:, None, None])
+
+    def conditions_of(self, states: States, chosen: slice | np.ndarray | None = None) -> Conditions:
+        """Conditions of the states, or of those chosen: as they were kept, or found again where they were too many."""
+        if self.conditions is None:
+            return conditions(self.model, self.estimate, states)
+        return self.conditions if chosen is None else at_states(self.conditions, chosen)
 
     def jacobian_at(self, line: Linearization, seen: slice) -> np.ndarray:
         """Jacobian of some observations with respect to the joints: as kept, or of their `Linearization`, (M', rows, n)."""

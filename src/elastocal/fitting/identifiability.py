@@ -7,31 +7,6 @@ from scipy.linalg.lapack import dpotrf
 _BOUND_TO_SHAPE = 0.5
 
 
-def solve_identifiable(
-    left: np.ndarray,
-    right: np.ndarray,
-    plausible: np.ndarray,
-    frozen: bool | np.ndarray = False,
-    penalty: float | np.ndarray = 0.0,
-    present: float | np.ndarray = 0.0,
-    nonlinear: bool | np.ndarray = False,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Least squares over the parameters that the data identify.
-
-    A parameter whose standard error would exceed its plausible size, first beside those before it and then beside all, keeps
-    its value. Nothing is regularised but what carries a prior, as in generalized ridge regression [1].
-
-    `left` (R, P): whitened sensitivities. `right` (R,): whitened residual. `plausible` (P,): plausible size of each parameter.
-    `frozen` (P,) of bool: parameters not to move. `penalty` (P,): one over the variance of the prior about zero; 0 for none.
-    `present` (P,): values from which the step is taken. `nonlinear` (P,) of bool: as in `identifiable`. Returns `step` (P,):
-    zero where held; `covariance` (P, P); `held` (P,) of bool.
-
-    [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
-    """
-    scaled = left * plausible
-    return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, frozen, penalty, present, nonlinear)
-
-
 def solve_normal(
     gram: np.ndarray,
     along: np.ndarray,
@@ -41,10 +16,17 @@ def solve_normal(
     present: float | np.ndarray = 0.0,
     nonlinear: bool | np.ndarray = False,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As `solve_identifiable`, from products of sensitivities in plausible sizes.
+    """Least squares over the parameters that the data identify, from the normal equations.
 
-    `gram` (P, P), `along` (P,). `plausible`, `frozen`, `penalty`, `present`, `nonlinear`: as in `solve_identifiable`. Returns
-    as in `solve_identifiable`.
+    A parameter whose standard error would exceed its plausible size, first beside those before it and then beside all, keeps
+    its value. Nothing is regularised but what carries a prior, as in generalized ridge regression [1].
+
+    `gram` (P, P): products of whitened sensitivities in plausible sizes with each other. `along` (P,): with the whitened
+    residual. `plausible` (P,): plausible size of each parameter. `frozen` (P,) of bool: parameters not to move. `penalty` (P,):
+    one over the variance of the prior about zero; 0 for none. `present` (P,): values from which the step is taken. `nonlinear`
+    (P,) of bool: as in `identifiable`. Returns `step` (P,): zero where held; `covariance` (P, P); `held` (P,) of bool.
+
+    [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
     gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
     along = along - plausible * np.broadcast_to(penalty * present, len(plausible))

@@ -60,7 +60,7 @@ def evaluated(model: Model, observations: Observations, noise: Noise, estimate: 
     return replace(robustly(model, observations, around, noise, estimate, frozen=True), weights=np.ones(len(observations)))
 
 
-def fit_frames(fitted: Fit, model: Model, observations: Observations, noise: Noise, own_targets: bool = True) -> Estimate:
+def fit_frames(fitted: Fit, model: Model, observations: Observations, own_targets: bool = True) -> Estimate:
     """Fit frames and targets of other observations; everything else stays as it was found.
 
     `model`: the same effects with the targets of these observations. `own_targets`: whether these observations have targets of
@@ -80,4 +80,4 @@ def fit_frames(fitted: Fit, model: Model, observations: Observations, noise: Noi
         start = replace(start, target_rotation=found.target_rotation)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
     around = kept_conditions(model, start, observations)
-    return robustly(model, observations, around, noise, start, frozen).estimate
+    return robustly(model, observations, around, fitted.noise, start, frozen).estimate

@@ -114,12 +114,12 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
         Journal on Scientific Computing 16, 1995.
     [3] Akaike, H., A new look at the statistical model identification, IEEE Transactions on Automatic Control 19, 1974.
     """
-    contrasts, jacobians = _contrasts(model, estimate, measurements)
-    total = sum(part.size for part in contrasts)
+    parts = _contrasts(model, estimate, measurements)
+    total = sum(contrasts.size for contrasts, _ in parts)
     if total < FEWEST:
         return None
     rows, joints = model.rows, model.sites.joints
-    every = np.concatenate([part.reshape(-1, rows) for part in contrasts])
+    every = np.concatenate([contrasts.reshape(-1, rows) for contrasts, _ in parts])
     position = np.sqrt((every[:, :3] ** 2).mean())
     orientation = np.sqrt((every[:, 3:] ** 2).mean()) if rows == 6 else position
     if min(position, orientation) < FINEST:
@@ -129,7 +129,7 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total, usual_m=usual)
     if total < FEWEST_FOR_JOINTS:
         return sensor
-    data = ([_seen(*pair) for pair in zip(contrasts, jacobians, strict=True)],)
+    data = ([_seen(*part) for part in parts],)
     nothing = np.full(joints, np.log(_SMALLEST_RAD))
     both = [np.log(position), np.log(orientation)][: rows // 3]
     start = np.concatenate([both, np.full(joints, np.log(0.3 * position))])
@@ -140,7 +140,7 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
         return sensor
     values = np.exp(fitted.x)
     # Each approach draws a joint once, however many targets are read.
-    per_joint = max(min(total // (joints + 1), sum(len(part) for part in contrasts)), 1)
+    per_joint = max(min(total // (joints + 1), sum(len(contrasts) for contrasts, _ in parts)), 1)
     inflation = np.sqrt(per_joint / chi2.ppf(1 - _UPPER, per_joint))
     sensors = float(values[0]), float(values[rows // 3 - 1])
     return Noise("repeats", *sensors, values[rows // 3 :] * inflation, total, usual_m=usual)
@@ -153,10 +153,10 @@ def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measure
     rad; by the restricted likelihood of `noise_from_repeats`, its maximum over the sensor's part, evenly over the deviation of
     a joint. Zeros where there are too few repeats to say anything: then it is not known.
     """
-    contrasts, jacobians = _contrasts(model, estimate, measurements)
-    if sum(part.size for part in contrasts) < FEWEST:
+    parts = _contrasts(model, estimate, measurements)
+    if sum(contrasts.size for contrasts, _ in parts) < FEWEST:
         return 0.0, 0.0
-    data = [_seen(*pair) for pair in zip(contrasts, jacobians, strict=True)]
+    data = [_seen(*part) for part in parts]
     sensors, joints = model.rows // 3, model.sites.joints
     counts, squares = sum(part.count for part in data), np.sum([part.squares for part in data], axis=0)
     start = 0.5 * np.log(np.maximum(squares / counts, FINEST**2))
@@ -223,10 +223,10 @@ def of_components(spread: np.ndarray, rows: int) -> np.ndarray:
     return whole
 
 
-def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> list[tuple[np.ndarray, np.ndarray]]:
     """Orthonormal contrasts between repeats (G, k * rows) and their Jacobians (G, k, rows, n), for each number k of targets."""
     if not len(measurements) or not np.ptp(measurements.repeat):
-        return [], []
+        return []
     bare, at = replace(model, effects=()), replace(estimate, coefficients=(), shapes=())
     observations, repeated = each_approach(without_outlying_repeats(measurements))
     first = np.flatnonzero(np.diff(repeated, prepend=-1))
@@ -244,7 +244,7 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
     wanted = wanted[np.linspace(0, len(wanted) - 1, int(len(wanted) / share)).astype(int)] if share > 1 else wanted
     chosen = alike & np.isin(repeated, wanted)
     if not chosen.any():
-        return [], []
+        return []
     some = select_states(observations, chosen)
     line = linearize(bare, at, some, conditions(bare, at, some.states))
     usual = _usual(measurements)
@@ -253,8 +253,7 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
     start = np.concatenate([[0], np.cumsum(seen)[:-1]])
     first = np.flatnonzero(np.diff(state, prepend=-1))
     many = np.diff(first, append=len(state))
-    contrasts: dict[int, list[np.ndarray]] = {}
-    jacobians: dict[int, list[np.ndarray]] = {}
+    parts: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
     for repeats, count in np.unique(np.column_stack([many, seen[first]]), axis=0):
         mine = first[(many == repeats) & (seen[first] == count)]
         of_first = start[mine][:, None] + np.arange(count)
@@ -267,9 +266,9 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
             each = of_components(spread[of_first], model.rows)
             found = found / np.repeat(each.reshape(len(mine), -1), repeats - 1, axis=0)
             jacobian = jacobian / each[..., None]
-        contrasts.setdefault(count, []).append(found)
-        jacobians.setdefault(count, []).append(np.repeat(jacobian, repeats - 1, axis=0))
-    return [np.concatenate(parts) for parts in contrasts.values()], [np.concatenate(parts) for parts in jacobians.values()]
+        parts.setdefault(count, []).append((found, np.repeat(jacobian, repeats - 1, axis=0)))
+    pairs = (zip(*part, strict=True) for part in parts.values())
+    return [(np.concatenate(contrasts), np.concatenate(jacobians)) for contrasts, jacobians in pairs]
 
 
 @dataclass(frozen=True)

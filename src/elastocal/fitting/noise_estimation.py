@@ -7,31 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.fitting.case import noise_facts, noise_from
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.noise import FINEST, Noise, chosen_noise
 from elastocal.fitting.registration import registered
 from elastocal.fitting.tolerances import SIZES, most_probable, with_size
 
 if TYPE_CHECKING:
-    from typing import Any
-
     from elastocal.fitting.case import Case
 
 _ASSUMED_M = 1e-4
 
 
 def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
-    """Noise as `noise_of`, and the warnings, as objects."""
-    facts = noise_of(case)
-    return noise_from(facts), facts["warnings"]
-
-
-def noise_of(case: Case) -> dict[str, Any]:
-    """Noise from repeats or as declared; from the residual of the declared model where there is neither.
-
-    Returns ``noise`` and ``warnings``, JSON-serialisable.
-    """
+    """Noise from repeats or as declared, from the residual of the declared model where there is neither; and warnings."""
     start = registered(case.model, case.observations)
     noise, warnings = chosen_noise(case.campaign, case.model, start, case.campaign.measurements)
     if noise is None:
@@ -44,4 +32,4 @@ def noise_of(case: Case) -> dict[str, Any]:
         # What parameters have taken of it is given back.
         wide = fit(model, case.observations, noise, start, settled=ON_THE_WAY)
         noise = noise.scaled(most_probable(wide)[1])
-    return {"noise": noise_facts(noise), "warnings": warnings}
+    return noise, warnings

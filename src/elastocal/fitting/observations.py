@@ -226,14 +226,7 @@ def select_states(observations: Observations, kept: np.ndarray) -> Observations:
 
     `kept` (S,) of bool.
     """
-    states = _states_at(observations.states, kept)
-    mask = kept[observations.state]
-    number = np.cumsum(kept) - 1
-    rotation = None if observations.rotation is None else observations.rotation[mask]
-    spread = None if observations.position_std is None else observations.position_std[mask]
-    return Observations(
-        states, number[observations.state[mask]], observations.target[mask], observations.position[mask], rotation, spread
-    )
+    return _some_of(observations, kept, kept[observations.state], np.cumsum(kept) - 1)
 
 
 def parts_of(observations: Observations, most: int) -> list[tuple[slice, slice]]:
@@ -255,17 +248,18 @@ def part_at(observations: Observations, states: slice, seen: slice) -> Observati
 
     `states`, `seen`: of the states and of the observations.
     """
-    some = _states_at(observations.states, states)
+    return _some_of(observations, states, seen, np.arange(len(observations.states)) - states.start)
+
+
+def _some_of(
+    observations: Observations, states: np.ndarray | slice, seen: np.ndarray | slice, number: np.ndarray
+) -> Observations:
+    """Those seen of some observations, all in some of their states, which are numbered anew: `number` (S,)."""
+    values: dict[str, Any] = {name: None if each is None else each[states] for name, each in vars(observations.states).items()}
     rotation = None if observations.rotation is None else observations.rotation[seen]
     spread = None if observations.position_std is None else observations.position_std[seen]
-    return Observations(
-        some, observations.state[seen] - states.start, observations.target[seen], observations.position[seen], rotation, spread
-    )
-
-
-def _states_at(states: States, chosen: np.ndarray | slice) -> States:
-    values: dict[str, Any] = {name: None if value is None else value[chosen] for name, value in vars(states).items()}
-    return States(**values)
+    target, position = observations.target[seen], observations.position[seen]
+    return Observations(States(**values), number[observations.state[seen]], target, position, rotation, spread)
 
 
 def spread_poses(observations: Observations, most: int) -> np.ndarray:

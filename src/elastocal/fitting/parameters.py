@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.effects.protocol import Parameter
+from elastocal.effects.protocol import Parameter, moved_and_turned
 from elastocal.fitting.model import Estimate
 
 if TYPE_CHECKING:
     from elastocal.fitting.model import Model
 
-_LENGTH = ("dx", "dy", "dz")
-_TURN = ("rx", "ry", "rz")
 # Frames and targets may be anywhere in a workshop.
 _ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
 
@@ -24,13 +22,11 @@ def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
 
     Returns (str, Parameter): what it belongs to ("frame 0", "target A", the key of an effect) and the parameter.
     """
-    found = []
-    shift = [Parameter(name, "m", _ANYWHERE_M) for name in _LENGTH]
-    turn = [Parameter(name, "rad", _ANYWHERE_RAD) for name in _TURN]
+    found, placed = [], moved_and_turned(_ANYWHERE_M, _ANYWHERE_RAD)
     if model.fitted_frames:
-        found += [(f"frame {session}", parameter) for session in estimate.sessions for parameter in (*shift, *turn)]
+        found += [(f"frame {session}", parameter) for session in estimate.sessions for parameter in placed]
     for number, parts in model.fitted_parts:
-        found += [(f"target {model.targets[number].name}", parameter) for parameter in (*shift, *turn)[parts]]
+        found += [(f"target {model.targets[number].name}", parameter) for parameter in placed[parts]]
     for effect in model.effects:
         found += [(effect.key, parameter) for parameter in effect.parameters]
         found += [(effect.key, Parameter(s.name, s.unit, s.highest - s.lowest)) for s in effect.shapes]
@@ -38,9 +34,8 @@ def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
 
 
 def nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
-    """Which of the `parameters` are shapes, ndarray of bool (P,)."""
-    shapes = {(effect.key, shape.name) for effect in model.effects for shape in effect.shapes}
-    return np.array([(owner, parameter.name) in shapes for owner, parameter in parameters(model, estimate)], bool)
+    """Which of the `parameters` are shapes, which alone have limits, ndarray of bool (P,)."""
+    return np.isfinite(limits(model, estimate)).all(axis=1)
 
 
 def limits(model: Model, estimate: Estimate) -> np.ndarray:
@@ -91,11 +86,5 @@ def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
         limits = np.array([(shape.lowest, shape.highest) for shape in effect.shapes]).reshape(-1, 2)
         shapes.append(np.clip(shape + take(len(shape)), *limits.T))
     return Estimate(
-        estimate.sessions,
-        frame_rotation,
-        frame_position,
-        target_offset,
-        target_rotation,
-        tuple(coefficients),
-        tuple(shapes),
+        estimate.sessions, frame_rotation, frame_position, target_offset, target_rotation, tuple(coefficients), tuple(shapes)
     )

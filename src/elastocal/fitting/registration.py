@@ -45,9 +45,8 @@ def nominal_poses(model: Model, observations: Observations) -> tuple[np.ndarray,
     `observations`: M of them. Returns `position` (M, 3): m, base axes; `rotation` (M, 3, 3).
     """
     chain, states = model.sites.chain, observations.states
-    coordinates = np.zeros((len(states), chain.coordinates))
-    coordinates[:, : model.sites.joints] = states.joint_angles
-    position, rotation = poses_of_points(chain, coordinates, [chain.point(target.point) for target in model.targets])
+    points = [chain.point(target.point) for target in model.targets]
+    position, rotation = poses_of_points(chain, chain.at(states.joint_angles), points)
     seen = observations.target, observations.state
     return position[seen], rotation[seen]
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.model import Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 
@@ -38,11 +38,11 @@ _MOST = 2_000
 _ROUNDING = 1e-14
 
 
-def fit_declared(model: Model, observations: Observations, noise: Noise, start: Estimate | None = None) -> Fit:
+def fit_declared(model: Model, observations: Observations, noise: Noise) -> Fit:
     """Fit a declared model, its geometry under priors of the most probable size; without geometry as `least_squares.fit`."""
     if not declared_geometry(model):
-        return fit(model, observations, noise, start)
-    wide = fit(with_size(model, SIZES[-1]), sample_of(observations, _MOST), noise, start, settled=ON_THE_WAY)
+        return fit(model, observations, noise)
+    wide = fit(with_size(model, SIZES[-1]), sample_of(observations, _MOST), noise, settled=ON_THE_WAY)
     return fit(with_size(model, most_probable(wide)[0]), observations, noise, wide.estimate, reweighted=True)
 
 
@@ -77,11 +77,11 @@ def with_prior(candidate: Candidate, deviations: Sequence[float] | np.ndarray) -
     return replace(candidate, parameters=parameters)
 
 
-def most_probable(wide: Fit, least: float = 1.0) -> tuple[float, float]:
+def most_probable(wide: Fit) -> tuple[float, float]:
     """Size of declared geometry, in plausible sizes, and noise over the noise taken that make the measurements most probable.
 
     In closed form from a fit under the widest prior: given frames and targets the geometry is linear, and the principal axes of
-    its covariance in units of the prior are independent. The noise is no less than `least` times the noise taken.
+    its covariance in units of the prior are independent. The noise is no less than the noise taken.
     """
     mine = np.flatnonzero(np.array([parameter.sized for _, parameter in wide.parameters], bool) & ~wide.held)
     prior = np.array([wide.parameters[number][1].prior_std for number in mine], float)
@@ -91,14 +91,14 @@ def most_probable(wide: Fit, least: float = 1.0) -> tuple[float, float]:
     # Squares of the whitened residual were all of it zero, beside frames and targets.
     squares = (wide.whitened(wide.residual) ** 2).sum() + ((seen + 2.0) * shift**2).sum()
     freedom = max(wide.weights.sum() * wide.residual.shape[1] - (~wide.held).sum() + len(mine), 1.0)
-    variance = (least * _FACTORS)[:, None, None] ** 2
+    variance = _FACTORS[:, None, None] ** 2
     wider = ((SIZES / SIZES[-1]) ** 2)[:, None]
     explained = ((shift / left) ** 2 * wider / (variance + seen * wider)).sum(axis=2)
     volume = np.log1p(wider * seen / variance).sum(axis=2)
     variance = variance[..., 0]
     evidence = -0.5 * (freedom * np.log(variance) + (squares - explained) / variance + volume)
     factor, size = np.unravel_index(np.argmax(evidence), evidence.shape)
-    return float(SIZES[size]), float(least * _FACTORS[factor])
+    return float(SIZES[size]), float(_FACTORS[factor])
 
 
 def effective_parameters(fitted: Fit) -> float:
@@ -107,5 +107,4 @@ def effective_parameters(fitted: Fit) -> float:
     Trace of the hat matrix of a ridge regression (Hastie, Tibshirani and Friedman, Elements of Statistical Learning, 3.4.1).
     """
     free = ~fitted.held
-    priors = np.array([np.inf if p.prior_std is None else p.prior_std for _, p in fitted.parameters])
-    return float(free.sum() - (np.diag(fitted.covariance)[free] / priors[free] ** 2).sum())
+    return float(free.sum() - (np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2).sum())

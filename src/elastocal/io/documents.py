@@ -1,6 +1,5 @@
 """YAML documents that users write: read, and checked against a JSON schema that knows every key."""
 
-import difflib
 import json
 import math
 import re
@@ -14,7 +13,7 @@ from typing import Any, ClassVar
 import jsonschema
 import yaml
 
-from elastocal.errors import InputError, text_fault
+from elastocal.errors import InputError, closest, closest_first, text_fault
 from elastocal.io.texts import read_text
 
 # Far above what people write by hand (no schema goes deeper than 7), and read in seconds whatever it holds.
@@ -240,9 +239,7 @@ def _explained(error: Any) -> tuple[str, str, str]:
     if rule == "additionalProperties":
         known = sorted(error.schema.get("properties", {}))
         unknown = next(name for name in error.instance if name not in known)
-        close = difflib.get_close_matches(str(unknown), known, n=1)
-        hint = f"{close[0]!r}?" if close else ""
-        return f"{key}.{unknown}".lstrip("."), "an unknown key", f"{hint} ({', '.join(known)})".strip()
+        return f"{key}.{unknown}".lstrip("."), "an unknown key", f"{closest(unknown, known)} ({', '.join(known)})".strip()
     if rule == "required":
         missing = next(name for name in value if name not in error.instance)
         wanted = error.schema["properties"][missing]
@@ -313,9 +310,8 @@ def named_document(folder: str | Path, kind: str, schema: str, name: str, source
     known = sorted(file.stem for file in Path(folder, kind).glob("*.yaml") if file.is_file())
     # By its name alone: a path would lead out of the folder.
     if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
-        hint = f"{close[0]!r}? ({', '.join(known)})" if close else ", ".join(known)
-        raise InputError(source, kind, repr(name), f"a file of {Path(folder, kind).as_posix()}: {hint}")
+        allowed = f"a file of {Path(folder, kind).as_posix()}: {closest_first(name, known)}"
+        raise InputError(source, kind, repr(name), allowed)
     document = read_document(path)
     check_document(document, schema, path.as_posix())
     return document

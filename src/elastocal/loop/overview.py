@@ -108,7 +108,7 @@ def _identified(declared: Fit) -> dict[str, Any]:
         ],
     }
     if declared.model.identifies_compliance:
-        mine = np.array([owner == "joint_compliance" for owner, _ in declared.parameters])
+        mine = declared.places_of("joint_compliance")
         values = joint_compliances(declared.model, declared.estimate)
         errors = np.sqrt(np.diag(declared.covariance))[mine]
         found["compliance"] = [

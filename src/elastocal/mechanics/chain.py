@@ -82,6 +82,12 @@ class Chain:
         """The last measuring point, where the external wrench is stated."""
         return self.points[-1]
 
+    def at(self, joint_angles: np.ndarray) -> np.ndarray:
+        """Coordinates where the first of them are the joint angles (..., n) and all others zero, ndarray (..., C)."""
+        coordinates = np.zeros((*joint_angles.shape[:-1], self.coordinates))
+        coordinates[..., : joint_angles.shape[-1]] = joint_angles
+        return coordinates
+
     def point(self, name: str) -> MeasuringPoint:
         """The measuring point called `name`; KeyError names those there are."""
         for point in self.points:

@@ -139,8 +139,7 @@ class Sites:
     @cached_property
     def _at_random(self) -> Motion:
         """Motion of the far ends of all links over some poses."""
-        coordinates = np.zeros((16, self.chain.coordinates))
-        coordinates[:, : self.joints] = np.random.default_rng(0).uniform(-np.pi, np.pi, (16, self.joints))
+        coordinates = self.chain.at(np.random.default_rng(0).uniform(-np.pi, np.pi, (16, self.joints)))
         return motion(self.chain, coordinates, [self.far_end(link) for link in range(self.joints + 1)])
 
     @cached_property

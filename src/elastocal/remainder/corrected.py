@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.campaigns.campaign import BEST_REMAINDER
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import sample_of, state_clusters
@@ -41,12 +42,12 @@ _MOST_TO_CHOOSE = 2_000
 class Plan:
     """How a remainder is to be regressed.
 
-    `regression`: name in `catalogue`; None for that which cross-validation chooses, or none. `blocks`: whether settings and
-    intervals come from blocks of joint space, as for poses far from those fitted; else from random folds. `within_range`:
-    whether nothing is corrected at poses outside the range of those fitted.
+    `regression`: name in `catalogue`; `BEST_REMAINDER` for that which cross-validation chooses, or none. `blocks`: whether
+    settings and intervals come from blocks of joint space, as for poses far from those fitted; else from random folds.
+    `within_range`: whether nothing is corrected at poses outside the range of those fitted.
     """
 
-    regression: str | None
+    regression: str
     blocks: bool
     within_range: bool
     seed: int
@@ -89,14 +90,14 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
         session = np.searchsorted(estimate.sessions, there.states.session[there.state])
         moved = there.position - (estimate.frame_rotation[session] @ mean[..., None])[..., 0]
         known = replace(fitted, model=model, estimate=estimate)
-        estimate = fit_frames(known, model, replace(there, position=moved), fitted.noise)
+        estimate = fit_frames(known, model, replace(there, position=moved))
     residual = position_residuals(model, estimate, there) - mean
     return Corrected(residual, prediction.std, outside, found.regression, found.setting)
 
 
 def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> Tuned:
     seen, all_of_them = case.observations, regressions()
-    among = [all_of_them[plan.regression]] if plan.regression else list(all_of_them.values())
+    among = list(all_of_them.values()) if plan.regression == BEST_REMAINDER else [all_of_them[plan.regression]]
     parts = _inner_parts(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
     inputs = inputs_of(fitted.model, fitted.estimate, seen, elsewhere)
     return tuned(among, parts, inputs, position_residuals(fitted.model, fitted.estimate, seen), plan.seed)
@@ -127,9 +128,8 @@ def inputs_of(model: Model, estimate: Estimate, observations: Observations, else
     `estimate`: says where the targets sit. `elsewhere`: whether observations of another campaign are to be predicted: time then
     carries nothing over. Returns without time or temperature where they were not recorded.
     """
-    states, chain, joints = observations.states, model.sites.chain, model.sites.joints
-    coordinates = np.zeros((len(states), chain.coordinates))
-    coordinates[:, :joints] = states.joint_angles
+    states, chain = observations.states, model.sites.chain
+    coordinates = chain.at(states.joint_angles)
     jacobian = np.empty((len(observations), 3, chain.coordinates))
     for number, point in enumerate(target_points(model, estimate)):
         mask = observations.target == number

@@ -38,9 +38,10 @@ def remainder_facts(
     with_it = Errors(np.linalg.norm(found.residual, axis=1), before.cluster)
     limits, reductions = intervals([after, with_it], _REPLICATES, draws)
     squares = [float((errors.distance**2).mean()) for errors in (before, after, with_it)]
+    name, words = (found.regression.NAME, found.regression.WORDS) if found.regression else ("", "")
     facts: dict[str, Any] = {
-        "regression": found.regression.NAME if found.regression else "",
-        "words": found.regression.WORDS if found.regression else "",
+        "regression": name,
+        "words": words,
         "errors": {name: float(value) for name, value in summary(with_it.distance).items()},
         "rms_ci95_m": [float(end) for end in limits[1]["rms_m"]],
         "reduction_ci95": [reductions[1].low, reductions[1].high],

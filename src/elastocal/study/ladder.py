@@ -74,9 +74,7 @@ def spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray:
     `robot`: with links. Returns (sets, configurations, 6, n + 8 L).
     """
     chain, n = extended_chain(robot), robot.joints
-    coordinates = np.zeros((*experiments.joint_angles.shape[:-1], chain.coordinates))
-    coordinates[..., :n] = experiments.joint_angles
-    jacobian = jacobians(chain, coordinates, chain.end_effector)
+    jacobian = jacobians(chain, chain.at(experiments.joint_angles), chain.end_effector)
     torques = generalized_forces(jacobian, experiments.wrench)
     columns = [jacobian[..., :n] * torques[..., None, :n]]
     for number, link in enumerate(robot.links):

@@ -82,8 +82,7 @@ def true_deflections(robot: Robot, experiments: Experiments, point: MeasuringPoi
     deflects a partial point is taken to act (interpretation R6). Returns (sets, configurations, 6): m, rad.
     """
     chain = extended_chain(robot)
-    unloaded = np.zeros((*experiments.joint_angles.shape[:-1], chain.coordinates))
-    unloaded[..., : robot.joints] = experiments.joint_angles
+    unloaded = chain.at(experiments.joint_angles)
     measured = replace(chain.point(point.name), offset_m=point.offset_m)
     jacobian = jacobians(chain, unloaded, loaded_point(chain, measured, wrench_at))
     springs = generalized_forces(jacobian, experiments.wrench) @ spring_compliance(robot)

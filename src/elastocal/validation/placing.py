@@ -27,7 +27,7 @@ def placed(fitted: Fit, case: Case, part: Case) -> tuple[Model, Estimate]:
         return fitted.model, placed_estimate(fitted, part.observations)
     carried = carried_over(fitted, part.model, part.observations.states)
     model = replace(part.model, nominal_compliance=fitted.model.nominal_compliance, effects=carried.model.effects)
-    return model, fit_frames(carried, model, part.observations, fitted.noise)
+    return model, fit_frames(carried, model, part.observations)
 
 
 def same_campaign(case: Case, part: Case) -> bool:
@@ -45,7 +45,7 @@ def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
     unseen = ~np.isin(observations.states.session, found.sessions)
     if not unseen.any():
         return found
-    there = fit_frames(fitted, fitted.model, select_states(observations, unseen), fitted.noise, own_targets=False)
+    there = fit_frames(fitted, fitted.model, select_states(observations, unseen), own_targets=False)
     sessions = (*found.sessions, *there.sessions)
     order = np.argsort(sessions)
     return replace(

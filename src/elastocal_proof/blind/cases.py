@@ -439,24 +439,41 @@ def _first_plausible(
 
         largest = min(KINDS[defect.effect].largest / defect.size for defect in defects)
         try:
-            factor, signal = size_for(yardstick, robot_of_size, 1.0, level, quantity, largest)
+            factor, _ = size_for(yardstick, robot_of_size, 1.0, level, quantity, largest)
         except ValueError:
             continue
         sized = times(factor)
-        shares = [defect.size / KINDS[defect.effect].plausible_on(robot.arm) for defect in sized]
-        if least is None or max(shares) < least[0]:
-            signals = [signal] if len(sized) == 1 else [yardstick.signal(with_defects(robot, [defect])) for defect in sized]
-            sizing = {"non_centrality": level, "of": quantity, "draw": number}
-            least = (
-                max(shares),
-                [
-                    (defect, sizing | {"share_of_plausible": share, "signal": asdict(own)})
-                    for defect, share, own in zip(sized, shares, signals, strict=True)
-                ],
-            )
-        if max(shares) <= _IMPLAUSIBLE:
+        share = max(_share_of_plausible(robot, defect) for defect in sized)
+        if least is None or share < least[0]:
+            least = share, _stated(yardstick, robot, sized, level, quantity, number)
+        if share <= _IMPLAUSIBLE:
             break
     return None if least is None else least[1]
+
+
+def _largest(yardstick: Yardstick, robot: PhysicalRobot, defects: list[Defect], level: float) -> list[_Sized]:
+    """Defects at the largest size that means anything."""
+    for defect in defects:
+        if np.isinf(KINDS[defect.effect].largest):
+            raise ValueError(f"{defect.effect} at {defect.joints}: no size has a non-centrality of {level:g}")
+    sized = [replace(defect, size=KINDS[defect.effect].largest) for defect in defects]
+    return _stated(yardstick, robot, sized, level, "raw", 1)
+
+
+def _stated(
+    yardstick: Yardstick, robot: PhysicalRobot, defects: list[Defect], level: float, quantity: str, draw: int
+) -> list[_Sized]:
+    """Defects with their sizes as in the ground truth, each with its own signal."""
+    found: list[_Sized] = []
+    for defect in defects:
+        sizing = {"non_centrality": level, "of": quantity, "draw": draw}
+        signal = asdict(yardstick.signal(with_defects(robot, [defect])))
+        found.append((defect, sizing | {"share_of_plausible": _share_of_plausible(robot, defect), "signal": signal}))
+    return found
+
+
+def _share_of_plausible(robot: PhysicalRobot, defect: Defect) -> float:
+    return defect.size / KINDS[defect.effect].plausible_on(robot.arm)
 
 
 def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, robots_folder: str | Path) -> str:
@@ -481,20 +498,6 @@ def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, r
     if case.alternative:
         truth["alternative"] = {"effect": case.alternative, "angle_deg": angle_to_alternative(case, robot, design, bad)}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
-
-
-def _largest(yardstick: Yardstick, robot: PhysicalRobot, defects: list[Defect], level: float) -> list[_Sized]:
-    """Defects at the largest size that means anything."""
-    found = []
-    for each in defects:
-        kind = KINDS[each.effect]
-        if np.isinf(kind.largest):
-            raise ValueError(f"{each.effect} at {each.joints}: no size has a non-centrality of {level:g}")
-        defect = replace(each, size=kind.largest)
-        signal = asdict(yardstick.signal(with_defects(robot, [defect])))
-        share = kind.largest / kind.plausible_on(robot.arm)
-        found.append((defect, {"non_centrality": level, "of": "raw", "draw": 1, "share_of_plausible": share, "signal": signal}))
-    return found
 
 
 def _slipped(

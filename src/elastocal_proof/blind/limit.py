@@ -144,5 +144,5 @@ def _hypotheses(case: Case, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
     kinds, locations = np.array(signals.kinds), np.arange(len(signals.kinds) * _DRAWS).reshape(-1, _DRAWS)
     chosen = np.array(list(combinations(range(len(kinds)), len(case.effects))))
     sets = np.sort(kinds[chosen], axis=1)
-    chosen = chosen[[len(set(names)) == len(names) for names in sets]]
-    return np.sort(kinds[chosen], axis=1), locations[chosen].reshape(len(chosen), -1)
+    distinct = [len(set(names)) == len(names) for names in sets]
+    return sets[distinct], locations[chosen[distinct]].reshape(sum(distinct), -1)

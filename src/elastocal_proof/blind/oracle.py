@@ -7,7 +7,6 @@ by time or by temperature): of these it takes the one that the residual of the d
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,10 +15,10 @@ from scipy.stats import chi2
 from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.judge import heldout_errors
 from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.refit import fit_with_sizes
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, noise_from
-from elastocal.fitting.least_squares import fit
 from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.whole import cases_in
 from elastocal.validation.fitted_range import outside_poses
@@ -102,14 +101,13 @@ def _with_effects(
             variants *= len(alternatives)
             chosen += max(alternatives, key=lambda members: sum(factor for factor, _, _ in members))
     members = tuple(candidate for _, candidate, _ in chosen)
-    start = declared.estimate.with_effects(members)
-    start = replace(start, shapes=(*declared.estimate.shapes, *(np.array(shapes, float) for _, _, shapes in chosen)))
-    return fit(declared.model.with_effects(members), case.observations, declared.noise, start), members, variants
+    effects_at = tuple((candidate, np.array(shapes, float)) for _, candidate, shapes in chosen)
+    return fit_with_sizes(declared, case.observations, declared.noise, effects_at), members, variants
 
 
 def _wald(fitted: Fit, members: Sequence[Candidate]) -> float:
     """Of all coefficients at once, given the shapes."""
-    places = [np.split(_parameters_of(fitted, member.key), [len(member.parameters)]) for member in members]
+    places = [np.split(fitted.places_of(member.key), [len(member.parameters)]) for member in members]
     linear, shapes = (np.concatenate([place[part] for place in places] or [np.empty(0)]) for part in (0, 1))
     free = np.flatnonzero(~fitted.held)
     tested, kept = np.isin(free, linear), ~np.isin(free, shapes)
@@ -119,10 +117,6 @@ def _wald(fitted: Fit, members: Sequence[Candidate]) -> float:
     information = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
     covariance = np.linalg.inv(information[np.ix_(kept, kept)])[np.ix_(tested[kept], tested[kept])]
     return float(chi2.sf(values @ np.linalg.solve(covariance, values), tested.sum() + (~kept).sum()))
-
-
-def _parameters_of(fitted: Fit, key: str) -> np.ndarray:
-    return np.flatnonzero([owner == key for owner, _ in fitted.parameters])
 
 
 def _outcome(members: Iterable[Candidate], p_value: float, heldout: Mapping[str, Any]) -> dict[str, Any]:
