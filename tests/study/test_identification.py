@@ -206,8 +206,11 @@ def test_prefixes_that_are_too_short_are_not_a_number(robots, strategies):
 
 def test_condition_tells_a_prefix_that_has_measurements_enough_but_not_the_right_ones(robots, strategies):
     # One position of the end-effector cannot tell three joints that meet in a wrist apart.
-    found = identify(strategies["4-6DoF-after-3DoF"], data_of("kuka", 3, robots).measurements(), 6).condition
+    strategy, measurements = strategies["4-6DoF-after-3DoF"], data_of("kuka", 3, robots).measurements()
+    found = identify(strategy, measurements, 6).condition
     assert np.isnan(found[0]).all() and (found[1:] < 1e5).all()
+    # Nor are its compliances rounding over rounding where no condition is asked for.
+    assert np.isnan(estimate_compliance(strategy, measurements, 6)[0][0, 3:]).all()
 
 
 systems = st.tuples(st.integers(1, 5), st.integers(0, 2), st.integers(1, 4), st.integers(1, 7), st.integers(0, 2**32 - 1))

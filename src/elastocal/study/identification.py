@@ -243,6 +243,7 @@ def _stacked(matrices: np.ndarray) -> np.ndarray:
 
 
 def _without_singular(triangles: np.ndarray) -> np.ndarray:
-    """Not a number for triangles with a zero on the diagonal, at which linear algebra would stop for all of them."""
-    singular = (np.diagonal(triangles, axis1=-2, axis2=-1) == 0).any(axis=-1)
+    """Not a number for triangles that determine nothing: a condition is at least the largest of the diagonal over its least."""
+    pivots = np.abs(np.diagonal(triangles, axis1=-2, axis2=-1))
+    singular = pivots.max(axis=-1) >= LARGEST_CONDITION * pivots.min(axis=-1)
     return np.where(singular[..., None, None], np.nan, triangles)
