@@ -96,6 +96,11 @@ def worded(summary: pd.DataFrame) -> pd.DataFrame:
     return summary.replace({"quantity": words})
 
 
+def with_target(summary: pd.DataFrame) -> pd.DataFrame:
+    """The figures that have a target, of a summary as it is made or as it is read."""
+    return summary[summary.target.fillna("").ne("")]
+
+
 def of_each_robot(cases: pd.DataFrame, statements: pd.DataFrame, seed: int) -> dict[str, pd.DataFrame]:
     """As `summarized`, of each robot of the leading kind by itself, by its name; without intervals of parameters."""
     mine = cases[cases.robots == leading(cases.robots)]

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from elastocal.figures.style import PALETTE, note, panels, styled
 from elastocal_proof.blind.scores import PROOF, TUNED, leading
-from elastocal_proof.blind.targets import worded
+from elastocal_proof.blind.targets import with_target, worded
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -39,7 +39,7 @@ def rates_and_targets(summary: pd.DataFrame) -> Figure:
 
     `summary`: of reports/blind/summary.csv.
     """
-    aimed = worded(summary[summary.target.notna() & (summary.target != "")])
+    aimed = worded(with_target(summary))
     ratio = aimed.quantity.str.contains("over the oracle")
     names = [list(dict.fromkeys(part.quantity)) for part in (aimed[~ratio], aimed[ratio])]
     # Shares of what the best analyst finds may exceed all of it.

@@ -14,7 +14,7 @@ from elastocal_proof.blind.case_rows import EXACT_ALIASES
 from elastocal_proof.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARED, USUAL_DESIGN
 from elastocal_proof.blind.confusion import CLASS_WITH, CLASS_WITHOUT
 from elastocal_proof.blind.scores import NONE, PROOF, TUNED, leading
-from elastocal_proof.blind.targets import BY_THE_BEST, OF_ALL_CASES, OVER_THE_BEST, setting_words, worded
+from elastocal_proof.blind.targets import BY_THE_BEST, OF_ALL_CASES, OVER_THE_BEST, setting_words, with_target, worded
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping
@@ -104,7 +104,7 @@ def target_rows(summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame]) -> l
 
 
 def _aimed(summary: pd.DataFrame, robots: str) -> pd.DataFrame:
-    return summary[(summary.robots == robots) & summary.target.fillna("").ne("")]
+    return with_target(summary[summary.robots == robots])
 
 
 def _rows_of(table: pd.DataFrame) -> Iterator[Any]:
