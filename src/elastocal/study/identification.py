@@ -117,8 +117,7 @@ def estimate_compliance(
         start = np.zeros((sets, pivots, pivots + len(stage.fixed) + 1)) if prior is None else prior.triangle(stage)
         triangle = prefix_triangles(_equations(stage, measurements), start)
         known = triangle[..., pivots:-1] @ compliance[..., list(stage.fixed), None]
-        solved = np.linalg.solve(_without_singular(triangle[..., :pivots]), triangle[..., -1:] - known)
-        compliance[..., list(stage.identified)] = solved[..., 0]
+        compliance[..., list(stage.identified)] = _solve(triangle[..., :pivots], triangle[..., -1:] - known)[..., 0]
         triangles.append(triangle)
     return np.moveaxis(compliance, -1, 1), triangles
 
@@ -157,7 +156,7 @@ def covariance(strategy: Strategy, measurements: Mapping[str, Measurements], tri
     inverses: list[np.ndarray] = []
     for stage, triangle in zip(stages, triangles[-len(stages) :], strict=True):
         pivots, size = list(stage.identified), len(stage.identified)
-        inverse = np.linalg.inv(_without_singular(triangle[..., :size]))
+        inverse = _solve(triangle[..., :size], np.broadcast_to(np.eye(size), (*triangle.shape[:2], size, size)))
         back = inverse @ triangle[..., size:-1]
         for gain in gains:
             gain[..., pivots, :] = -back @ gain[..., list(stage.fixed), :]
@@ -208,16 +207,26 @@ def prefix_triangles(equations: np.ndarray, start: np.ndarray) -> np.ndarray:
     pivots, Q^T times them.
 
     Sequential accumulation [1]: the factor of k configurations on top of the rows of the next one is again reduced to a
-    triangle.
+    triangle, by Householder reflections of all data sets at once. numpy's stacked QR calls LAPACK for each small matrix and
+    takes twice as long.
 
     [1] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall, 1974.
     """
-    triangles = np.empty((len(equations), *start.shape))
-    before = start
-    for triangle, new in zip(triangles, equations, strict=True):
-        triangle[:] = np.asarray(np.linalg.qr(np.concatenate([before, new], axis=1), mode="r"))[:, : start.shape[1]]
-        before = triangle
-    return triangles
+    triangle = np.moveaxis(start, 0, -1).copy()
+    found = np.empty((len(equations), *triangle.shape))
+    for prefix, new in zip(found, np.moveaxis(equations, 1, -1), strict=True):
+        rows = new.copy()
+        for pivot in range(len(triangle)):
+            head, below = triangle[pivot, pivot], rows[:, pivot]
+            norm = np.sqrt(head**2 + (below**2).sum(axis=0))
+            first = head + np.copysign(norm, head)
+            # A column of zeros is left as it is.
+            scale = np.where(norm > 0.0, norm * np.abs(first), 1.0)
+            along = (first * triangle[pivot, pivot:] + np.einsum("rs,rcs->cs", below, rows[:, pivot:])) / scale
+            triangle[pivot, pivot:] -= first * along
+            rows[:, pivot + 1 :] -= below[:, None] * along[1:]
+        prefix[:] = triangle
+    return np.ascontiguousarray(np.moveaxis(found, -1, 1))
 
 
 def prefix_information(regressor: np.ndarray) -> np.ndarray:
@@ -225,25 +234,31 @@ def prefix_information(regressor: np.ndarray) -> np.ndarray:
 
     `regressor` (rows, n, configurations, sets). Returns (configurations, sets, n, n).
     """
-    rows = _stacked(regressor)
+    rows = np.ascontiguousarray(np.moveaxis(regressor, (2, 3), (0, 1)))
     return np.cumsum(np.swapaxes(rows, -1, -2) @ rows, axis=0)
 
 
 def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> np.ndarray:
     """Equations of a stage, stacked; columns: joints identified, joints fixed, measured deflection."""
     order, points = [*stage.identified, *stage.fixed], [measurements[name] for name in stage.points]
-    return _stacked(
-        np.concatenate([np.concatenate([each.regressor[:, order], each.deflection[:, None]], axis=1) for each in points])
-    )
+    rows, _, *shape = points[0].regressor.shape
+    equations = np.empty((*shape, len(points), rows, len(order) + 1))
+    for place, point in enumerate(points):
+        equations[..., place, :, :-1] = np.moveaxis(point.regressor[:, order], (2, 3), (0, 1))
+        equations[..., place, :, -1] = np.moveaxis(point.deflection, 0, -1)
+    return equations.reshape(*shape, len(points) * rows, len(order) + 1)
 
 
-def _stacked(matrices: np.ndarray) -> np.ndarray:
-    """(rows, columns, configurations, sets) to contiguous (configurations, sets, rows, columns)."""
-    return np.ascontiguousarray(np.moveaxis(matrices, (2, 3), (0, 1)))
+def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Back substitution for all triangles at once; numpy's solve and inverse would decompose each again.
 
-
-def _without_singular(triangles: np.ndarray) -> np.ndarray:
-    """Not a number for triangles that determine nothing: a condition is at least the largest of the diagonal over its least."""
-    pivots = np.abs(np.diagonal(triangles, axis1=-2, axis2=-1))
-    singular = pivots.max(axis=-1) >= LARGEST_CONDITION * pivots.min(axis=-1)
-    return np.where(singular[..., None, None], np.nan, triangles)
+    Not a number where a triangle determines nothing: its condition is at least the largest of the diagonal over its least.
+    """
+    pivots = np.diagonal(triangles, axis1=-2, axis2=-1).copy()
+    sizes = np.abs(pivots)
+    pivots[sizes.max(axis=-1) >= LARGEST_CONDITION * sizes.min(axis=-1)] = np.nan
+    solution = np.empty(right.shape)
+    for row in reversed(range(pivots.shape[-1])):
+        later = np.einsum("...i,...ij->...j", triangles[..., row, row + 1 :], solution[..., row + 1 :, :])
+        solution[..., row, :] = (right[..., row, :] - later) / pivots[..., row, None]
+    return solution
