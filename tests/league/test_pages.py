@@ -1,5 +1,7 @@
 """The page of the league has every figure in words that a stranger knows."""
 
+from dataclasses import replace
+
 import pandas as pd
 import pytest
 from made_leagues import made_results
@@ -25,10 +27,16 @@ FIGURE = {"rms_mm": 0.5, "what": "RMS", "source": "somebody", "why": "fitted pos
 PUBLISHED = pd.DataFrame([{"data": name} | FIGURE for name in ("one", "three")])
 
 
+ROBOTS = {"A robot": ["one"], "Another": ["two"]}
+
+
+def written(table):
+    return league_page(table, COSTS, MECHANISMS, PUBLISHED, METHODS, {"four": "folder/four.csv"})
+
+
 @pytest.fixture(scope="module")
 def page():
-    table = league_table(made_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1)
-    return league_page(table, COSTS, MECHANISMS, PUBLISHED, METHODS, {"four": "folder/four.csv"})
+    return written(league_table(made_results(), ROBOTS, "geometry", 1))
 
 
 def test_each_split_has_a_table_in_which_the_best_is_bold(page):
@@ -49,13 +57,24 @@ def test_improbable_mechanisms_and_figures_of_other_data_are_left_out(page):
 
 
 def test_each_wall_of_numbers_is_a_sentence_and_a_folded_table(page):
-    table = league_table(made_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1)
+    table = league_table(made_results(), ROBOTS, "geometry", 1)
     random = table[table["split"] == "random"]
     best = [METHODS[part.loc[part["rms_mm"].idxmin(), "method"]].words for _, part in random.groupby("data")]
     section = page.split("## Random poses held out\n\n")[1]
     assert section.startswith(f"Smallest RMS error of {len(best)} data sets: ")
     assert all(f"{name} {best.count(name)}" in section.splitlines()[0] for name in best)
     assert page.count("<details><summary>") == page.count("\n\n</details>") == 6
+
+
+def test_the_page_says_first_how_often_a_diagnosis_leads_and_how_surely(page):
+    results = made_results()
+    assert "has the smallest RMS error in 6 of 6 rows, in 6 with 95 % confidence" in page
+    assert "; another has it in 0, in 0 with that confidence." in page
+    # The same entries under two names: one of them is smallest, and neither is ahead for certain.
+    twins = [replace(each, method="half") for each in results if each.method == "geometry"]
+    table = league_table([each for each in results if each.method == "geometry"] + twins, ROBOTS, "geometry", 1)
+    assert "has the smallest RMS error in 0 of 6 rows, in 0 with" in written(table)
+    assert "; another has it in 6, in 0 with that confidence." in written(table)
 
 
 def test_only_methods_with_intervals_have_a_coverage(page):

@@ -9,6 +9,7 @@ import pandas as pd
 
 from elastocal.counting import counted
 from elastocal_proof.league.folds import BLOCKS, RANDOM, SESSION
+from elastocal_proof.league.methods import DIAGNOSIS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -44,6 +45,7 @@ def league_page(
     """
     words = {name: method.words or name for name, method in methods.items()}
     parts = [f"Left out: {_words(name)}, as {file} is missing." for name, file in missing.items()]
+    parts.append(_lead(table, {name for name, method in methods.items() if method.physics == DIAGNOSIS}))
     for split, title in _TITLES.items():
         mine = table[table["split"] == split]
         if len(mine):
@@ -58,6 +60,20 @@ def league_page(
 def folded(title: str, table: str) -> str:
     """A table that a reader opens, under a title, as the Markdown of GitHub and of MyST."""
     return f"<details><summary>{title}</summary>\n\n{table}\n\n</details>"
+
+
+def _lead(table: pd.DataFrame, ours: set[str]) -> str:
+    """In how many rows of all tables the best method rests on a diagnosis, and in how many it does not."""
+    ahead: dict[bool, list[bool]] = {True: [], False: []}
+    for _, part in table.groupby(["split", "data"]):
+        diagnosed = part["method"].isin(ours).to_numpy()
+        wins = bool(diagnosed[part["rms_mm"].argmin()])
+        ahead[wins].append(bool((part["ratio_to_best_low"][diagnosed != wins] > 1.0).all()))
+    won, lost = ahead[True], ahead[False]
+    return (
+        f"A method that diagnoses has the smallest RMS error in {len(won)} of {len(won) + len(lost)} rows, in {sum(won)} with"
+        f" 95 % confidence against each other method; another has it in {len(lost)}, in {sum(lost)} with that confidence."
+    )
 
 
 def _winners(table: pd.DataFrame, words: Mapping[str, str]) -> str:
