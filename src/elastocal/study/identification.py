@@ -234,8 +234,7 @@ def prefix_information(regressor: np.ndarray) -> np.ndarray:
 
     `regressor` (rows, n, configurations, sets). Returns (configurations, sets, n, n).
     """
-    rows = np.ascontiguousarray(np.moveaxis(regressor, (2, 3), (0, 1)))
-    return np.cumsum(np.swapaxes(rows, -1, -2) @ rows, axis=0)
+    return np.cumsum(np.einsum("rics,rjcs->csij", regressor, regressor), axis=0)
 
 
 def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> np.ndarray:
