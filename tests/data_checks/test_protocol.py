@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from elastocal.data_checks.catalogue import fault_modules
-from elastocal.data_checks.protocol import Fault, Value
+from elastocal.data_checks.protocol import Fault, Value, data_at_fault
+from elastocal.diagnosis.findings import fault_entry
 
 FAULT = Fault("wrong_sign", (2,), "joint 2 fits counted the other way round", (Value("x", 0.5, "m"),), (0.3, 1e-4), (), True)
 
@@ -29,3 +30,9 @@ def test_every_module_names_its_faults_its_family_and_the_modules_before_it(name
 
 def test_what_the_faults_have_in_common_is_no_fault_of_its_own():
     assert not {"deflections", "placement", "protocol"} & set(fault_modules())
+
+
+def test_a_verdict_with_a_fault_beside_effects_finds_the_data_at_fault_and_one_without_does_not():
+    effect = {"family": "gravity"}
+    assert data_at_fault({"effects": [effect, fault_entry(FAULT)]})
+    assert not data_at_fault({"effects": [effect]}) and not data_at_fault({"effects": []})

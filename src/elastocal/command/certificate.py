@@ -12,6 +12,7 @@ from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import iso_date, print_answer, printed
 from elastocal.command.quantities import LARGEST_SEED, length_m
+from elastocal.data_checks.protocol import data_at_fault
 from elastocal.errors import InputError
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
@@ -78,7 +79,7 @@ def certificate(
     used = None
     if use is not None:
         used = use_at(found.calibrated, found.case.observations.states, read_target_path(use, found.calibrated.robot.joints))
-    if any(effect["family"] == "data" for effect in found.verdict["effects"]):
+    if data_at_fault(found.verdict):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
     wanted = Wanted(limit, risk, number, day, seed, stated)
     with console.status("working"):

@@ -10,7 +10,16 @@ Nothing else knows the faults by name: a new module is new faults. Where it is a
 trace that was right, a miss only leaves it to what comes after.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+# Family of faults of the data among the effects of a verdict.
+DATA = "data"
 
 
 @dataclass(frozen=True)
@@ -44,3 +53,8 @@ class Fault:
     rows: tuple[int, ...]
     decisive: bool
     alternatives: tuple[str, ...] = ()
+
+
+def data_at_fault(verdict: Mapping[str, Any]) -> bool:
+    """Whether the document of a diagnosis or verdict finds a fault of the data, after which it says nothing of the robot."""
+    return any(effect["family"] == DATA for effect in verdict["effects"])

@@ -10,6 +10,7 @@ import numpy as np
 from elastocal.campaigns.campaign import NO_REMAINDER
 from elastocal.campaigns.columns import residual_columns
 from elastocal.counting import counted
+from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import noise_from
@@ -99,7 +100,7 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
     its poses lie outside the range of the fitted ones, (P,)."""
     final, measurements = diagnosis.final, held_out.campaign.measurements
     poses = outside_poses(final, diagnosis.case, held_out)
-    if any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
+    if data_at_fault(diagnosis.document):
         return Deviations.none(len(measurements), held_out.model.rows), held_out, poses
     part, settings = held_out, Settings()
     errors = Deviations.none(len(measurements), held_out.model.rows)
@@ -119,7 +120,7 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
 def _remainder(diagnosis: Diagnosis, held_out: Case, seed: int) -> dict[str, Any] | None:
     """What a regression on the remainder of the final model adds on held-out poses, where the campaign asks for one."""
     campaign = diagnosis.case.campaign
-    if campaign.remainder == NO_REMAINDER or any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
+    if campaign.remainder == NO_REMAINDER or data_at_fault(diagnosis.document):
         return None
     # Poses held out at random have neighbours among those fitted; others have not, and nor may those that set the intervals.
     plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from elastocal.application.certificate.error_budget import effect_costs
 from elastocal.application.scope import calibrate_on_case, campaign_accuracy, campaign_poses, judge_by_held_out, set_form
 from elastocal.campaigns.columns import columns_of
+from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
@@ -62,7 +63,7 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
     accuracy, costs = None, dict[str, float]()
-    if not any(effect["family"] == "data" for effect in verdict.document["effects"]):
+    if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out)
         accuracy = campaign_accuracy(found, case.observations.states).document()
         costs = effect_costs(found, *campaign_poses(found, case.observations.states))

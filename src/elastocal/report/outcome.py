@@ -7,6 +7,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from elastocal.data_checks.protocol import data_at_fault
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -27,7 +29,7 @@ def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
             lines.append(f"{_REPORTS[path]}: {path}")
         if match := _CAMPAIGN.fullmatch(path):
             verdict = json.loads(Path(workplace, path).with_name("verdict.json").read_text(encoding="utf-8"))
-            of_use = verdict["verdict"] in _OF_USE and all(effect["family"] != "data" for effect in verdict["effects"])
+            of_use = verdict["verdict"] in _OF_USE and not data_at_fault(verdict)
             stated = headline(verdict)
             errors = [f"  {headline_sentence(stated)}"] if stated else []
             lines += [f"{'✓' if of_use else '!'} {match[1]}: {sentences(verdict)[0]}", *errors, f"  report: {path}"]
