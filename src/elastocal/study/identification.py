@@ -240,12 +240,8 @@ def prefix_information(regressor: np.ndarray) -> np.ndarray:
 def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> np.ndarray:
     """Equations of a stage, stacked; columns: joints identified, joints fixed, measured deflection."""
     order, points = [*stage.identified, *stage.fixed], [measurements[name] for name in stage.points]
-    rows, _, *shape = points[0].regressor.shape
-    equations = np.empty((*shape, len(points), rows, len(order) + 1))
-    for place, point in enumerate(points):
-        equations[..., place, :, :-1] = np.moveaxis(point.regressor[:, order], (2, 3), (0, 1))
-        equations[..., place, :, -1] = np.moveaxis(point.deflection, 0, -1)
-    return equations.reshape(*shape, len(points) * rows, len(order) + 1)
+    systems = [np.concatenate([each.regressor[:, order], each.deflection[:, None]], axis=1) for each in points]
+    return np.ascontiguousarray(np.moveaxis(np.concatenate(systems), (2, 3), (0, 1)))
 
 
 def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
