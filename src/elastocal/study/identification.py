@@ -241,7 +241,7 @@ def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> np.nda
     """Equations of a stage, stacked; columns: joints identified, joints fixed, measured deflection."""
     order, points = [*stage.identified, *stage.fixed], [measurements[name] for name in stage.points]
     systems = [np.concatenate([each.regressor[:, order], each.deflection[:, None]], axis=1) for each in points]
-    return np.ascontiguousarray(np.moveaxis(np.concatenate(systems), (2, 3), (0, 1)))
+    return np.moveaxis(np.concatenate(systems), (2, 3), (0, 1))
 
 
 def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
