@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.protocol import at_shapes
 
@@ -213,7 +214,7 @@ def verdict_document(
     remainder=None,
 ):
     """Contents of verdict.json."""
-    known, faulty = noise != "residual", any(effect["family"] == "data" for effect in effects)
+    known, faulty = noise != "residual", data_at_fault({"effects": effects})
     adopted = any(effect["adopted"] for effect in effects)
     errors = {"mean_m": 1.1e-4, "rms_m": 1.2e-4, "p95_m": 2.0e-4, "max_m": 3.0e-4}
     after = {name: (0.7 if adopted else 1.0) * value for name, value in errors.items()}

@@ -25,8 +25,6 @@ MECHANISMS = pd.DataFrame(
 )
 FIGURE = {"rms_mm": 0.5, "what": "RMS", "source": "somebody", "why": "fitted poses"}
 PUBLISHED = pd.DataFrame([{"data": name} | FIGURE for name in ("one", "three")])
-
-
 ROBOTS = {"A robot": ["one"], "Another": ["two"]}
 
 

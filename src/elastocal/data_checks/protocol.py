@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 # Family of faults of the data among the effects of a verdict.
-DATA = "data"
+OF_DATA = "data"
 
 
 @dataclass(frozen=True)
@@ -57,4 +57,4 @@ class Fault:
 
 def data_at_fault(verdict: Mapping[str, Any]) -> bool:
     """Whether the document of a diagnosis or verdict finds a fault of the data, after which it says nothing of the robot."""
-    return any(effect["family"] == DATA for effect in verdict["effects"])
+    return any(effect["family"] == OF_DATA for effect in verdict["effects"])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.counting import plural
-from elastocal.data_checks.protocol import DATA
+from elastocal.data_checks.protocol import OF_DATA
 from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities, locations_of
@@ -178,7 +178,7 @@ def fault_entry(fault: Fault) -> dict[str, Any]:
     """Entry of a decisive fault of the data."""
     return {
         "name": fault.name,
-        "family": DATA,
+        "family": OF_DATA,
         "joints": fault.joints,
         "detail": fault.detail,
         "members": [],

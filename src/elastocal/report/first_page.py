@@ -8,6 +8,7 @@ import numpy as np
 
 from elastocal.application.accuracy import BASE
 from elastocal.counting import counted
+from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.words import (
     NOTHING,
@@ -51,7 +52,6 @@ TITLES = {
     "not_testable": "these measurements can test no mechanism",
 }
 AT_FAULT = "the data are at fault"
-OF_DATA = "data"
 # Hypotheses below this stand together as "something else", and so do those beyond the first few.
 LEAST_SHOWN, _MOST_SHOWN = 0.01, 4
 # From this probability on a location is stated without its alternatives, and a cause is real.
@@ -73,7 +73,7 @@ def headline(verdict: Mapping[str, Any]) -> dict[str, str] | None:
 
     None where the data are at fault; ``noise`` is empty where it is not known.
     """
-    if any(effect["family"] == OF_DATA for effect in verdict["effects"]):
+    if data_at_fault(verdict):
         return None
     errors, floor = verdict["heldout"], verdict["heldout"]["noise_floor_rms_m"]
     return {
@@ -229,7 +229,7 @@ def probability_sentence(probabilities: Mapping[str, Any]) -> str:
 def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any]]) -> list[str]:
     """What follows from the verdict for whoever runs the robot, list of str."""
     kind, found, heldout = verdict["verdict"], verdict["effects"], verdict["heldout"]
-    if any(effect["family"] == OF_DATA for effect in found):
+    if data_at_fault(verdict):
         return ["Correct the data as stated, in the file or where they are exported, and diagnose again.", *_transforms(found)]
     if verdict["kept"] == "frames":
         return [

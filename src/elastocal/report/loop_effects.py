@@ -6,10 +6,11 @@ import re
 from typing import TYPE_CHECKING
 
 from elastocal.counting import counted, grouped, plural
+from elastocal.data_checks.protocol import OF_DATA
 from elastocal.diagnosis.words import alternative_words, listed, parameter_words, physical_name
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
-from elastocal.report.first_page import LEAST_SHOWN, MOST_NAMES, OF_DATA, cost_words, location_words
+from elastocal.report.first_page import LEAST_SHOWN, MOST_NAMES, cost_words, location_words
 from elastocal.report.loop_parameters import MOSTLY_PRIOR
 from elastocal.report.wording import as_sentence, capital, length, members_words, probability_words, scaled, words
 

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
+from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.words import in_words
 from elastocal.report.first_page import (
     AT_FAULT,
-    OF_DATA,
     TITLES,
     cause_rows,
     headline,
@@ -53,7 +53,7 @@ def loop_facts(
     next_experiment.csv. `table`, `parameters` (N,): columns of the residuals and of the parameters of the final model.
     `descriptions`: contents of campaign.json. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
-    faulty = any(effect["family"] == OF_DATA for effect in verdict["effects"])
+    faulty = data_at_fault(verdict)
     # Probabilities are then those from before the measurements.
     searched = {entry["name"] for effect in verdict["effects"] for entry in effect["parameters"] if entry.get("shape")}
     untested = verdict["verdict"] == "not_testable"
