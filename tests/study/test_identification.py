@@ -219,15 +219,15 @@ systems = st.tuples(st.integers(1, 5), st.integers(0, 2), st.integers(1, 4), st.
 @given(systems)
 def test_triangles_carry_the_normal_equations_of_every_prefix(shape):
     pivots, more, configurations, rows, seed = shape
-    system = np.random.default_rng(seed).standard_normal((configurations, 2, rows, pivots + more))
-    triangles = prefix_triangles(system, np.zeros((2, pivots, pivots + more)))
+    system = np.random.default_rng(seed).standard_normal((configurations, rows, pivots + more, 2))
+    triangles = prefix_triangles(system.copy(), np.zeros((pivots, pivots + more, 2)))
     for k, s in np.ndindex(configurations, 2):
-        stacked = system[: k + 1, s].reshape(-1, pivots + more)
-        triangle = triangles[k, s, :, :pivots]
+        stacked = system[: k + 1, ..., s].reshape(-1, pivots + more)
+        triangle = triangles[k, :, :pivots, s]
         if len(stacked) >= pivots:
             np.testing.assert_array_equal(np.tril(triangle, -1), 0)
             expected = stacked[:, :pivots].T @ stacked
-            np.testing.assert_allclose(triangle.T @ triangles[k, s], expected, rtol=0, atol=1e-12 * rows * configurations)
+            np.testing.assert_allclose(triangle.T @ triangles[k, ..., s], expected, rtol=0, atol=1e-12 * rows * configurations)
 
 
 def test_prefix_information_is_the_sum_over_the_first_configurations():

@@ -4,10 +4,10 @@ The least-squares problem of the first k configurations, for every k, is solved 
 configuration after the other and all data sets at once. It gives the solution of the normal equations of equation 11 without
 forming them, so that prefixes of one or two configurations keep their digits.
 
-Matrices of all prefixes and data sets are stacked as (configurations, sets, rows, columns).
+Equations and triangles have the data sets on their last axis, so that one step of the algebra runs over all of them.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -43,11 +43,11 @@ class Prior:
     std: np.ndarray
 
     def triangle(self, stage: Stage) -> np.ndarray:
-        """The equations c / std = nominal / std of the joints that a stage identifies, (sets, pivots, columns)."""
+        """The equations c / std = nominal / std of the joints that a stage identifies, (pivots, columns, sets)."""
         mine, pivots = list(stage.identified), len(stage.identified)
-        found = np.zeros((self.nominal.shape[1], pivots, pivots + len(stage.fixed) + 1))
-        found[:, range(pivots), range(pivots)] = 1.0 / self.std[mine].T
-        found[..., -1] = (self.nominal[mine] / self.std[mine]).T
+        found = np.zeros((pivots, pivots + len(stage.fixed) + 1, self.nominal.shape[1]))
+        found[range(pivots), range(pivots)] = 1.0 / self.std[mine]
+        found[:, -1] = self.nominal[mine] / self.std[mine]
         return found
 
 
@@ -104,22 +104,23 @@ def estimate_compliance(
 
     `strategy`, `measurements`, `joints`: as in `identify`. `prior`: what is known beforehand, as further measurements of each
     stage (ridge regression towards it [1]). Returns `compliance` (configurations, n, sets): rad/(N m); meaningless where a
-    prefix is too short, see `first_solvable_length`; `triangles` (configurations, sets, pivots, columns): triangular factor of
+    prefix is too short, see `first_solvable_length`; `triangles` (configurations, pivots, columns, sets): triangular factor of
     each stage; columns: joints identified, joints fixed, right-hand side.
 
     [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
     *_, configurations, sets = next(iter(measurements.values())).regressor.shape
-    compliance = np.full((configurations, sets, joints), np.nan)
+    compliance = np.full((configurations, joints, sets), np.nan)
     triangles = []
     for stage in strategy.stages:
         pivots = len(stage.identified)
-        start = np.zeros((sets, pivots, pivots + len(stage.fixed) + 1)) if prior is None else prior.triangle(stage)
+        start = np.zeros((pivots, pivots + len(stage.fixed) + 1, sets)) if prior is None else prior.triangle(stage)
         triangle = prefix_triangles(_equations(stage, measurements), start)
-        known = triangle[..., pivots:-1] @ compliance[..., list(stage.fixed), None]
-        compliance[..., list(stage.identified)] = _solve(triangle[..., :pivots], triangle[..., -1:] - known)[..., 0]
+        known = np.einsum("kpfs,kfs->kps", triangle[:, :, pivots:-1], compliance[:, list(stage.fixed)])
+        right = triangle[:, :, -1] - known
+        compliance[:, list(stage.identified)] = _solve(triangle[:, :, :pivots], right[:, :, None])[:, :, 0]
         triangles.append(triangle)
-    return np.moveaxis(compliance, -1, 1), triangles
+    return compliance, triangles
 
 
 def covariance(strategy: Strategy, measurements: Mapping[str, Measurements], triangles: Sequence[np.ndarray]) -> np.ndarray:
@@ -156,8 +157,9 @@ def covariance(strategy: Strategy, measurements: Mapping[str, Measurements], tri
     inverses: list[np.ndarray] = []
     for stage, triangle in zip(stages, triangles[-len(stages) :], strict=True):
         pivots, size = list(stage.identified), len(stage.identified)
-        inverse = _solve(triangle[..., :size], np.broadcast_to(np.eye(size), (*triangle.shape[:2], size, size)))
-        back = inverse @ triangle[..., size:-1]
+        unit = np.broadcast_to(np.eye(size)[..., None], triangle[:, :, :size].shape)
+        inverse = _matrices(_solve(triangle[:, :, :size], unit))
+        back = inverse @ _matrices(triangle[:, :, size:-1])
         for gain in gains:
             gain[..., pivots, :] = -back @ gain[..., list(stage.fixed), :]
         gains.append(np.zeros((*inverse.shape[:2], joints, size)))
@@ -189,7 +191,7 @@ def condition_numbers(
     """
     largest: np.ndarray = np.ones(())
     for stage, triangle in zip(strategy.stages, triangles, strict=True):
-        matrices = triangle[..., : len(stage.identified)]
+        matrices = _matrices(triangle[:, :, : len(stage.identified)])
         eigenvalues = np.linalg.eigvalsh(np.swapaxes(matrices, -1, -2) @ matrices)
         with np.errstate(divide="ignore"):
             largest = np.maximum(largest, np.sqrt(eigenvalues[..., -1] / np.maximum(eigenvalues[..., 0], 0.0)))
@@ -199,12 +201,12 @@ def condition_numbers(
     return condition
 
 
-def prefix_triangles(equations: np.ndarray, start: np.ndarray) -> np.ndarray:
+def prefix_triangles(equations: Iterable[np.ndarray], start: np.ndarray) -> np.ndarray:
     """Triangular factor of the equations of the first k configurations, for every k.
 
-    `equations` (configurations, sets, rows, columns): unknowns first, right-hand side last. `start` (sets, pivots, columns):
-    the triangle before any of them. Returns (configurations, sets, pivots, columns): rows of R and, in the columns that are no
-    pivots, Q^T times them.
+    `equations`: of one configuration after the other, (rows, columns, sets) each, overwritten: unknowns first, right-hand side
+    last. `start` (pivots, columns, sets): the triangle before any of them. Returns (configurations, pivots, columns, sets): the
+    rows of R and, in the columns that are no pivots, Q^T times them.
 
     Sequential accumulation [1]: the factor of k configurations on top of the rows of the next one is again reduced to a
     triangle, by Householder reflections of all data sets at once. numpy's stacked QR calls LAPACK for each small matrix and
@@ -212,21 +214,20 @@ def prefix_triangles(equations: np.ndarray, start: np.ndarray) -> np.ndarray:
 
     [1] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall, 1974.
     """
-    triangle = np.moveaxis(start, 0, -1).copy()
-    found = np.empty((len(equations), *triangle.shape))
-    for prefix, new in zip(found, np.moveaxis(equations, 1, -1), strict=True):
-        rows = new.copy()
+    triangle, found = start.copy(), []
+    for rows in equations:
         for pivot in range(len(triangle)):
             head, below = triangle[pivot, pivot], rows[:, pivot]
-            norm = np.sqrt(head**2 + (below**2).sum(axis=0))
+            products = np.einsum("rs,rcs->cs", below, rows[:, pivot:])
+            norm = np.sqrt(head**2 + products[0])
             first = head + np.copysign(norm, head)
             # A column of zeros is left as it is.
             scale = np.where(norm > 0.0, norm * np.abs(first), 1.0)
-            along = (first * triangle[pivot, pivot:] + np.einsum("rs,rcs->cs", below, rows[:, pivot:])) / scale
+            along = (first * triangle[pivot, pivot:] + products) / scale
             triangle[pivot, pivot:] -= first * along
             rows[:, pivot + 1 :] -= below[:, None] * along[1:]
-        prefix[:] = triangle
-    return np.ascontiguousarray(np.moveaxis(found, -1, 1))
+        found.append(triangle.copy())
+    return np.array(found)
 
 
 def prefix_information(regressor: np.ndarray) -> np.ndarray:
@@ -237,23 +238,33 @@ def prefix_information(regressor: np.ndarray) -> np.ndarray:
     return np.cumsum(np.einsum("rics,rjcs->csij", regressor, regressor), axis=0)
 
 
-def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> np.ndarray:
-    """Equations of a stage, stacked; columns: joints identified, joints fixed, measured deflection."""
+def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> Iterator[np.ndarray]:
+    """Equations of a stage, configuration by configuration; columns: joints identified, joints fixed, measured deflection."""
     order, points = [*stage.identified, *stage.fixed], [measurements[name] for name in stage.points]
-    systems = [np.concatenate([each.regressor[:, order], each.deflection[:, None]], axis=1) for each in points]
-    return np.moveaxis(np.concatenate(systems), (2, 3), (0, 1))
+    for configuration in range(points[0].regressor.shape[2]):
+        systems = [
+            np.concatenate([each.regressor[:, order, configuration], each.deflection[:, None, configuration]], axis=1)
+            for each in points
+        ]
+        yield np.concatenate(systems)
 
 
 def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Back substitution for all triangles at once; numpy's solve and inverse would decompose each again.
 
-    Not a number where a triangle determines nothing: its condition is at least the largest of the diagonal over its least.
+    `triangles` (configurations, pivots, pivots, sets). `right` (configurations, pivots, columns, sets). Returns as `right`: not
+    a number where a triangle determines nothing: its condition is at least the largest of the diagonal over its least.
     """
-    pivots = np.diagonal(triangles, axis1=-2, axis2=-1).copy()
+    pivots = np.einsum("kpps->kps", triangles).copy()
     sizes = np.abs(pivots)
-    pivots[sizes.max(axis=-1) >= LARGEST_CONDITION * sizes.min(axis=-1)] = np.nan
+    np.moveaxis(pivots, 1, -1)[sizes.max(axis=1) >= LARGEST_CONDITION * sizes.min(axis=1)] = np.nan
     solution = np.empty(right.shape)
-    for row in reversed(range(pivots.shape[-1])):
-        later = np.einsum("...i,...ij->...j", triangles[..., row, row + 1 :], solution[..., row + 1 :, :])
-        solution[..., row, :] = (right[..., row, :] - later) / pivots[..., row, None]
+    for row in reversed(range(pivots.shape[1])):
+        later = np.einsum("kps,kpcs->kcs", triangles[:, row, row + 1 :], solution[:, row + 1 :])
+        solution[:, row] = (right[:, row] - later) / pivots[:, row, None]
     return solution
+
+
+def _matrices(stacked: np.ndarray) -> np.ndarray:
+    """From (configurations, rows, columns, sets) to (configurations, sets, rows, columns), as numpy multiplies matrices."""
+    return np.ascontiguousarray(np.moveaxis(stacked, -1, 1))
