@@ -116,8 +116,7 @@ def estimate_compliance(
         pivots = len(stage.identified)
         start = np.zeros((pivots, pivots + len(stage.fixed) + 1, sets)) if prior is None else prior.triangle(stage)
         triangle = prefix_triangles(_equations(stage, measurements), start)
-        known = np.einsum("kpfs,kfs->kps", triangle[:, :, pivots:-1], compliance[:, list(stage.fixed)])
-        right = triangle[:, :, -1] - known
+        right = triangle[:, :, -1] - np.einsum("kpfs,kfs->kps", triangle[:, :, pivots:-1], compliance[:, list(stage.fixed)])
         compliance[:, list(stage.identified)] = _solve(triangle[:, :, :pivots], right[:, :, None])[:, :, 0]
         triangles.append(triangle)
     return compliance, triangles
@@ -242,11 +241,9 @@ def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> Iterat
     """Equations of a stage, configuration by configuration; columns: joints identified, joints fixed, measured deflection."""
     order, points = [*stage.identified, *stage.fixed], [measurements[name] for name in stage.points]
     for configuration in range(points[0].regressor.shape[2]):
-        systems = [
-            np.concatenate([each.regressor[:, order, configuration], each.deflection[:, None, configuration]], axis=1)
-            for each in points
-        ]
-        yield np.concatenate(systems)
+        matrix = np.concatenate([each.regressor[:, order, configuration] for each in points])
+        measured = np.concatenate([each.deflection[:, None, configuration] for each in points])
+        yield np.concatenate([matrix, measured], axis=1)
 
 
 def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -255,9 +252,10 @@ def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
     `triangles` (configurations, pivots, pivots, sets). `right` (configurations, pivots, columns, sets). Returns as `right`: not
     a number where a triangle determines nothing: its condition is at least the largest of the diagonal over its least.
     """
-    pivots = np.einsum("kpps->kps", triangles).copy()
-    sizes = np.abs(pivots)
-    np.moveaxis(pivots, 1, -1)[sizes.max(axis=1) >= LARGEST_CONDITION * sizes.min(axis=1)] = np.nan
+    diagonal = np.einsum("kpps->kps", triangles)
+    sizes = np.abs(diagonal)
+    determined = sizes.max(axis=1, keepdims=True) < LARGEST_CONDITION * sizes.min(axis=1, keepdims=True)
+    pivots = np.where(determined, diagonal, np.nan)
     solution = np.empty(right.shape)
     for row in reversed(range(pivots.shape[1])):
         later = np.einsum("kps,kpcs->kcs", triangles[:, row, row + 1 :], solution[:, row + 1 :])
