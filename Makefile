@@ -1,14 +1,18 @@
-# make paper: the whole study from nothing.  make test: the tests.  See README.md.
+# make paper: the paper's tables and figures from nothing, two campaigns.  make study: the rest of the study.  make test: the tests.
 PYTHON ?= python3
 BIN = .venv/bin
 CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper audit test test-slurm fuzz soak mutants lint bench pictures site crate supply dist installed lock clean
+.PHONY: paper study audit test test-slurm fuzz soak mutants lint bench pictures site crate supply dist installed lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
+
+# Extended questions, repeated studies, designs and claims, with the report of the study.
+study: .venv/ready
+	$(BIN)/snakemake -j$(CORES) study
 
 # Samples of every file worked out again, by pinocchio among others, which nothing else of a run needs.
 audit: .venv/ready-for-audit

@@ -26,7 +26,7 @@ def test_campaigns_of_the_repository_pass(config, config_folder):
 
 def of_one_campaign(config, name="mine"):
     nobody = config["league"] | {"data": {"all": {}}}
-    return config | {"loop": config["loop"] | {"campaigns": [name], "measured": []}, "league": nobody}
+    return config | {"loop": config["loop"] | {"main": [name], "campaigns": [], "measured": []}, "league": nobody}
 
 
 def test_a_data_set_of_two_leagues_is_named_once(config):

@@ -7,6 +7,8 @@ import pandas as pd
 import pytest
 from made_study_tables import comparison, facts, metrics, per_dataset
 
+from elastocal.report.answers import beside_rows
+
 
 def test_facts_can_be_written_as_json():
     assert json.loads(json.dumps(facts(), allow_nan=False)) == facts()
@@ -108,3 +110,11 @@ def test_elastic_links_and_solvers_are_worded():
     (solver,) = found["solvers"]
     assert [*solver.values()] == ["kuka", "6DoF", "2DoF+6DoF", "2e-03", "0e+00", "2e-04"]
     assert facts(extended=pd.DataFrame(columns=["robot", "strategy"]))["extended"] == []
+
+
+def test_a_printed_figure_stands_beside_ours_and_its_difference_in_standard_deviations():
+    columns = ["table", "robot", "strategy", "quantity", "paper", "ours", "mc_std", "z"]
+    rows = [("4", "kuka", "6DoF", "dev_20", 8.386, 9.03, 1.15, 0.56), ("1", "kuka", np.nan, "c1", 0.54, np.nan, 0.0, np.nan)]
+    scored, without = beside_rows(pd.DataFrame(rows, columns=columns), {"kuka": "KUKA"})
+    assert scored["ours"] == "9.0 ± 1.1" and scored["differs"] == "+0.6" and scored["robot"] == "KUKA"
+    assert (without["ours"], without["differs"], without["strategy"]) == ("not studied", "", "")

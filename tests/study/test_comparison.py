@@ -8,7 +8,8 @@ import pytest
 from made_metrics import metrics_of, replicates_of
 from made_studies import studies_of
 
-from elastocal.study.comparison import OurResults, comparison_table
+from elastocal.study.comparison import OurResults, beside_paper
+from elastocal.study.printed import comparison_table
 from elastocal.study.tables import table4
 
 PRINTED = ["table", "robot", "strategy", "quantity", "unit", "value"]
@@ -25,10 +26,14 @@ def ours(metrics, replicates):
         "table4": staged,
         "extended": empty,
     }
-    # Of single data sets with deviations of 0.90, 0.91 ... 1.10 mm.
+    return OurResults(tables, metrics, replicates, 200.0, 20)
+
+
+def judged(beside):
+    """Among further studies, and single data sets with deviations of 0.90, 0.91 ... 1.10 mm."""
     initial = pd.DataFrame({"mean": np.linspace(0.9e-3, 1.1e-3, 21), "maximum": np.linspace(3e-3, 4e-3, 21)})
     initial["mean_square"] = 2 * initial["mean"] ** 2
-    return OurResults(tables, metrics, replicates, 200.0, 20, studies_of(), {"arm": initial, "kuka_extended": initial})
+    return comparison_table(beside, studies_of(), {"arm": initial, "kuka_extended": initial}, 20)
 
 
 def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference():
@@ -44,7 +49,7 @@ def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference(
         ],
         columns=["table", "robot", "strategy", "quantity", "unit", "value"],
     )
-    table = comparison_table(reference, ours(metrics_of("A", 40.0), replicates_of("A", 40.0)))
+    table = judged(beside_paper(reference, ours(metrics_of("A", 40.0), replicates_of("A", 40.0))))
     assert (
         table[["table", "robot", "strategy", "quantity", "unit", "paper"]].to_numpy().tolist() == reference.to_numpy().tolist()
     )
@@ -59,7 +64,7 @@ def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference(
 
 
 def compare(results, *printed):
-    return comparison_table(pd.DataFrame([printed], columns=PRINTED), results).iloc[0]
+    return judged(beside_paper(pd.DataFrame([printed], columns=PRINTED), results)).iloc[0]
 
 
 @pytest.fixture

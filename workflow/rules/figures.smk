@@ -190,7 +190,7 @@ rule draw_accuracy:
 
 rule draw_scores:
     input:
-        comparison=rules.compare_with_paper.output.table,
+        comparison=rules.compare_with_studies.output.table,
         expectations=rules.tabulate_expectations.output.table,
         sources=sources("draw_scores.py"),
     output:

@@ -4,120 +4,47 @@ Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Write
 reports/loop/{campaign}/report.pdf and report.html, and, of the study too, the pictures of the README.
 """
 
+# Each of LOOP_FIGURES, with its caption and what `snakemake --report` says that it shows.
+SHOWN = {
+    "before_after": "Errors before and after",
+    "arrows": "Residuals in space",
+    "residuals": "Residuals before and after",
+    "candidates": "Candidates",
+    "confounding": "What the poses confuse",
+}
 
-rule draw_residuals:
+
+rule draw_campaign:
     input:
         descriptions=rules.read_campaign.output.descriptions,
         residuals=rules.judge_campaign.output.residuals,
-        sources=sources("draw_residuals.py"),
-    output:
-        pdf="reports/loop/{campaign}/figures/residuals.pdf",
-        png=shown(
-            "reports/loop/{campaign}/figures/residuals.png",
-            "loop_residuals",
-            "Campaigns",
-            campaign="{campaign}",
-            shows="Residuals before and after",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_residuals/{campaign}.log",
-    benchmark:
-        "results/timings/draw_residuals/{campaign}.tsv"
-    script:
-        "../scripts/draw_residuals.py"
-
-
-rule draw_arrows:
-    input:
-        descriptions=rules.read_campaign.output.descriptions,
-        residuals=rules.judge_campaign.output.residuals,
-        sources=sources("draw_arrows.py"),
-    output:
-        pdf="reports/loop/{campaign}/figures/arrows.pdf",
-        png=shown(
-            "reports/loop/{campaign}/figures/arrows.png",
-            "loop_arrows",
-            "Campaigns",
-            campaign="{campaign}",
-            shows="Residuals in space",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_arrows/{campaign}.log",
-    benchmark:
-        "results/timings/draw_arrows/{campaign}.tsv"
-    script:
-        "../scripts/draw_arrows.py"
-
-
-rule draw_candidates:
-    input:
-        diagnosis=rules.diagnose_campaign.output.diagnosis,
-        candidates=rules.diagnose_campaign.output.candidates,
-        sources=sources("draw_candidates.py"),
-    output:
-        pdf="reports/loop/{campaign}/figures/candidates.pdf",
-        png=shown(
-            "reports/loop/{campaign}/figures/candidates.png",
-            "loop_candidates",
-            "Campaigns",
-            campaign="{campaign}",
-            shows="Candidates",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_candidates/{campaign}.log",
-    benchmark:
-        "results/timings/draw_candidates/{campaign}.tsv"
-    script:
-        "../scripts/draw_candidates.py"
-
-
-rule draw_confounding:
-    input:
-        candidates=rules.diagnose_campaign.output.candidates,
-        confounding=rules.diagnose_campaign.output.confounding,
-        sources=sources("draw_confounding.py"),
-    output:
-        pdf="reports/loop/{campaign}/figures/confounding.pdf",
-        png=shown(
-            "reports/loop/{campaign}/figures/confounding.png",
-            "loop_confounding",
-            "Campaigns",
-            campaign="{campaign}",
-            shows="What the poses confuse",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_confounding/{campaign}.log",
-    benchmark:
-        "results/timings/draw_confounding/{campaign}.tsv"
-    script:
-        "../scripts/draw_confounding.py"
-
-
-rule draw_before_after:
-    input:
         verdict=rules.judge_campaign.output.verdict,
         before_after=rules.judge_campaign.output.before_after,
-        sources=sources("draw_before_after.py"),
+        diagnosis=rules.diagnose_campaign.output.diagnosis,
+        candidates=rules.diagnose_campaign.output.candidates,
+        confounding=rules.diagnose_campaign.output.confounding,
+        sources=sources("draw_campaign.py"),
     output:
-        pdf="reports/loop/{campaign}/figures/before_after.pdf",
-        png=shown(
-            "reports/loop/{campaign}/figures/before_after.png",
-            "loop_before_after",
-            "Campaigns",
-            campaign="{campaign}",
-            shows="Errors before and after",
-            kind="figure",
-        ),
+        pdf=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=LOOP_FIGURES),
+        png=[
+            shown(
+                f"reports/loop/{{campaign}}/figures/{figure}.png",
+                f"loop_{figure}",
+                "Campaigns",
+                campaign="{campaign}",
+                shows=SHOWN[figure],
+                kind="figure",
+            )
+            for figure in LOOP_FIGURES
+        ],
     log:
-        "results/logs/draw_before_after/{campaign}.log",
+        "results/logs/draw_campaign/{campaign}.log",
     benchmark:
-        "results/timings/draw_before_after/{campaign}.tsv"
+        "results/timings/draw_campaign/{campaign}.tsv"
+    params:
+        figures=LOOP_FIGURES,
     script:
-        "../scripts/draw_before_after.py"
+        "../scripts/draw_campaign.py"
 
 
 rule compile_loop_report:
@@ -131,7 +58,7 @@ rule compile_loop_report:
         candidates=rules.diagnose_campaign.output.candidates,
         steps=rules.diagnose_campaign.output.steps,
         descriptions=rules.read_campaign.output.descriptions,
-        figures=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=LOOP_FIGURES),
+        figures=rules.draw_campaign.output.pdf,
         pages=[placed(PACKAGES / "elastocal/report" / name) for name in ("loop.typ", "sheet.typ", "loop.html", "loop.js")],
         sources=sources("compile_loop_report.py"),
     output:

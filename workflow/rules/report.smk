@@ -1,7 +1,7 @@
-"""The report: numbers for its text, then its pages.
+"""The reports: the paper's tables and figures, and the study's: numbers for its text, then its pages.
 
-Needs reports/tables/ and reports/figures/. Writes reports/answers.json and reports/study.pdf; of the documentation,
-docs/study_tables.md.
+Needs reports/tables/ and reports/figures/. Writes reports/paper.pdf, reports/answers.json and reports/study.pdf; of the
+documentation, docs/study_tables.md.
 """
 
 # What the text of the report says of loads and places.
@@ -14,11 +14,38 @@ STATED = {
 }
 
 
+rule compile_paper:
+    input:
+        beside=rules.compare_with_paper.output.table,
+        figures=expand("reports/figures/{figure}.pdf", figure=PAPER_FIGURES),
+        citation=placed(ROOT / "CITATION.cff"),
+        pages=placed(PACKAGES / "elastocal" / "report" / "paper.typ"),
+        sources=sources("compile_paper.py"),
+    output:
+        report=shown(
+            "reports/paper.pdf", "paper", "Tables and figures of the paper", shows="The paper, regenerated", kind="report"
+        ),
+    log:
+        "results/logs/compile_paper.log",
+    benchmark:
+        "results/timings/compile_paper.tsv"
+    params:
+        names=TITLES,
+        stated={
+            "figures": PAPER_FIGURES,
+            "classical": NAMES[CLASSICAL],
+            **{key: str(config["tables"][key]) for key in ("noise_um", "length")},
+            **{key: str(config[key]) for key in ("data_sets", "configurations", "test_configurations")},
+        },
+    script:
+        "../scripts/compile_paper.py"
+
+
 rule judge_claims:
     input:
         studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
         expected=cells("expected", REDUCED, NOISE, CLASSICAL),
-        comparison=rules.compare_with_paper.output.table,
+        comparison=rules.compare_with_studies.output.table,
         solvers=rules.tabulate_solvers.output.table,
         starts=rules.tabulate_decisions.output.starts,
         stiffness=rules.tabulate_decisions.output.stiffness,
@@ -43,7 +70,7 @@ rule judge_claims:
 
 rule state_answers:
     input:
-        comparison=rules.compare_with_paper.output.table,
+        comparison=rules.compare_with_studies.output.table,
         expectations=rules.tabulate_expectations.output.table,
         ladder=rules.tabulate_ladder.output.table,
         budget=rules.tabulate_budget.output.budget,

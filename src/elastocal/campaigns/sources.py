@@ -37,8 +37,9 @@ def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str 
 
 
 def named_campaigns(config: Mapping[str, Any]) -> list[str]:
-    """Campaigns that a configuration names, each once: simulated, measured and of the league."""
-    return list(dict.fromkeys((*config["loop"]["campaigns"], *config["loop"]["measured"], *named_league(config))))
+    """Campaigns that a configuration names, each once: simulated, measured, of the default run and of the league."""
+    looped = (name for key in ("campaigns", "measured", "main") for name in config["loop"][key])
+    return list(dict.fromkeys((*looped, *named_league(config))))
 
 
 def named_league(config: Mapping[str, Any]) -> list[str]:

@@ -87,6 +87,27 @@ def answers(tables: Mapping[str, pd.DataFrame], titles: Mapping[str, str], cells
     }
 
 
+def beside_rows(beside: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[str, str]]:
+    """Each figure that the paper prints beside ours, in words.
+
+    `beside`: by `comparison.beside_paper`. `titles`: names of the robots by their keys. Of ours stands the Monte Carlo standard
+    deviation of a study of this size behind ±; `differs` says by how many of these the two differ.
+    """
+    return [_beside_row(row, titles) for row in beside.itertuples()]
+
+
+def _beside_row(row: Any, titles: Mapping[str, str]) -> dict[str, str]:
+    return {
+        "table": row.table,
+        "robot": titles.get(row.robot, ""),
+        "strategy": row.strategy if isinstance(row.strategy, str) else "",
+        "quantity": column_head(row.quantity),
+        "paper": f"{row.paper:g}",
+        "ours": "not studied" if np.isnan(row.ours) else word_value(row.ours, row.mc_std),
+        "differs": "" if np.isnan(row.z) else f"{row.z:+.1f}",
+    }
+
+
 def _count(judged: pd.DataFrame) -> dict[str, str]:
     return {"cells": str(len(judged)), "differ": str(int((judged.p_holm < LEVEL).sum()))}
 

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
 _CAMPAIGN = re.compile(r"reports/loop/([^/]+)/report\.pdf")
 # Verdicts after which the robot is corrected; after the others its report says what to do.
 _OF_USE = ("adequate", "named", "class", "several")
-_REPORTS = {"reports/study.pdf": "the study", "reports/blind/blind.pdf": "the blind proof"}
+_REPORTS = {
+    "reports/paper.pdf": "the paper, regenerated",
+    "reports/study.pdf": "the study",
+    "reports/blind/blind.pdf": "the blind proof",
+}
 
 
 def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:

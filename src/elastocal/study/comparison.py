@@ -1,4 +1,4 @@
-"""The paper's printed figures beside ours, each with the Monte Carlo spread of a study of this size."""
+"""The paper's printed figures beside ours, each with the Monte Carlo spread of a study of this size; `printed` judges them."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -6,11 +6,12 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from elastocal.study.printed import holm, predict_scatter
-from elastocal.study.tables import MILLI, deviation_ratio, find_statistics, share_compensated
+from elastocal.study.tables import deviation_ratio, share_compensated
 
 # Value, spread and interpretation of ours.
 _Ours = tuple[float, float, str]
+# Robot and quantity that the study has a parameter for, chosen to meet it.
+FITTED = ("kuka_extended", "deviation_mean")
 _TABLE4 = {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}
 
 
@@ -19,8 +20,7 @@ class OurResults:
     """Everything that a printed figure may be compared with.
 
     `tables`: table1 .. table4 and extended. `metrics`, `replicates`: long; of all robots and strategies. `length`: noise level
-    and data set length of the tables. `studies`: robot and the columns of `table_schemas.repeated`: further studies of the same
-    size. `initial`: the initial table of each robot.
+    and data set length of the tables.
     """
 
     tables: dict[str, pd.DataFrame]
@@ -28,8 +28,6 @@ class OurResults:
     replicates: pd.DataFrame
     noise_um: float
     length: int
-    studies: pd.DataFrame
-    initial: dict[str, pd.DataFrame]
 
 
 class _PrintedFigure(NamedTuple):
@@ -43,14 +41,13 @@ class _PrintedFigure(NamedTuple):
     value: float
 
 
-def comparison_table(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
+def beside_paper(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
     """One row for each figure that the paper prints.
 
     `reference`: table, robot, strategy, quantity, unit, value as printed; empty strings where a figure belongs to none. Returns
     table, robot, strategy, quantity, unit, paper, ours, mc_std, z, interpretation: `mc_std` is the standard deviation between
     studies of this size, by bootstrap over data sets and test configurations; z = (ours - paper) / mc_std, empty where one is
-    missing. studies_mean, studies_std, p_value, p_holm: of further studies for Tables 3 and 4, of single data sets for Table 2,
-    see `printed`; without a p value where the study was fitted to the figure. What the study does not cover is empty.
+    missing. What the study does not cover is empty.
     """
     rows = []
     printed = reference[[*_PrintedFigure._fields]].itertuples(index=False, name=None)
@@ -58,28 +55,8 @@ def comparison_table(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
         text = figure.table == "text"
         value, spread, interpretation = _TEXT[figure.quantity](ours) if text else _RULES[figure.table](figure, ours)
         z = (value - figure.value) / spread if spread > 0 and np.isfinite(value) else np.nan
-        rows.append((*figure, value, spread, z, interpretation, *_scatter(figure, ours)))
-    names = [*_PrintedFigure._fields[:-1], "paper", "ours", "mc_std", "z", "interpretation"]
-    table = pd.DataFrame(rows, columns=[*names, "studies_mean", "studies_std", "p_value"])
-    return table.assign(p_holm=holm(table.p_value.to_numpy(float)))
-
-
-def _scatter(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, float]:
-    """Mean, standard deviation and p value of a printed figure where one study, or one data set, stands beside many."""
-    if figure.table == "2" and figure.robot in ours.initial:
-        values = MILLI * find_statistics(ours.initial[figure.robot])[figure.quantity.removeprefix("deviation_")].to_numpy()
-        below, above = (values <= figure.value).sum(), (values >= figure.value).sum()
-        p_value = min(2 * (min(below, above) + 1) / (len(values) + 1), 1.0)
-        return values.mean(), values.std(ddof=1), np.nan if _is_fitted(figure) else p_value
-    found = None
-    if figure.table in ("3", "4"):
-        found = predict_scatter(ours.studies, figure.robot, figure.strategy, figure.quantity, ours.length)
-    return (found.mean, found.std, found.p_value(figure.value)) if found else (np.nan, np.nan, np.nan)
-
-
-def _is_fitted(figure: _PrintedFigure) -> bool:
-    """Whether the study has a parameter that was chosen for this figure."""
-    return (figure.robot, figure.quantity) == ("kuka_extended", "deviation_mean")
+        rows.append((*figure, value, spread, z, interpretation))
+    return pd.DataFrame(rows, columns=[*_PrintedFigure._fields[:-1], "paper", "ours", "mc_std", "z", "interpretation"])
 
 
 def _table1_figure(figure: _PrintedFigure, ours: OurResults) -> _Ours:
@@ -87,7 +64,7 @@ def _table1_figure(figure: _PrintedFigure, ours: OurResults) -> _Ours:
 
 
 def _table2_figure(figure: _PrintedFigure, ours: OurResults) -> _Ours:
-    remark = "R11: the tube was chosen for it" if _is_fitted(figure) else "R3"
+    remark = "R11: the tube was chosen for it" if (figure.robot, figure.quantity) == FITTED else "R3"
     return *_pair(ours.tables["table2"], f"{figure.quantity.removeprefix('deviation_')}_mm", robot=figure.robot), remark
 
 

@@ -11,14 +11,18 @@ Holm's procedure [2].
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 from statsmodels.stats.multitest import multipletests
 
+from elastocal.study.comparison import FITTED
 from elastocal.study.metrics import length_to_reach
+from elastocal.study.tables import MILLI, find_statistics
 
 MICRO = 1e6
 # A figure differs from the study where its p value, corrected for all figures, is below this.
@@ -93,6 +97,36 @@ def predict_scatter(
     limit = float(quantity.split("_")[-2]) / _scale(column)
     curves = rows.pivot(index="study", columns="length", values=column).to_numpy()
     return Predicted(np.log(length_to_reach(curves, limit)), True, digit) if len(curves) > 1 else None
+
+
+def comparison_table(
+    beside: pd.DataFrame, studies: pd.DataFrame, initial: Mapping[str, pd.DataFrame], length: int
+) -> pd.DataFrame:
+    """The printed figures judged by further studies.
+
+    `beside`: by `comparison.beside_paper`. `studies`: as in `predict_scatter`. `initial`: the initial table of each robot.
+    `length`: of Table 3. Returns `beside` with studies_mean, studies_std, p_value and p_holm: of further studies for Tables 3
+    and 4, of single data sets for Table 2; without a p value where the study was fitted to the figure.
+    """
+    scattered = [_scatter(figure, studies, initial, length) for figure in beside.itertuples()]
+    found = pd.DataFrame(scattered, beside.index, ["studies_mean", "studies_std", "p_value"], float)
+    return beside.join(found.assign(p_holm=holm(found.p_value.to_numpy())))
+
+
+def _scatter(
+    figure: Any, studies: pd.DataFrame, initial: Mapping[str, pd.DataFrame], length: int
+) -> tuple[float, float, float]:
+    """Mean, standard deviation and p value of a printed figure where one study, or one data set, stands beside many."""
+    if figure.table == "2" and figure.robot in initial:
+        values = MILLI * find_statistics(initial[figure.robot])[figure.quantity.removeprefix("deviation_")].to_numpy()
+        below, above = (values <= figure.paper).sum(), (values >= figure.paper).sum()
+        p_value = min(2 * (min(below, above) + 1) / (len(values) + 1), 1.0)
+        fitted = (figure.robot, figure.quantity) == FITTED
+        return values.mean(), values.std(ddof=1), np.nan if fitted else p_value
+    found = None
+    if figure.table in ("3", "4"):
+        found = predict_scatter(studies, figure.robot, figure.strategy, figure.quantity, length)
+    return (found.mean, found.std, found.p_value(figure.paper)) if found else (np.nan, np.nan, np.nan)
 
 
 def holm(p_values: np.ndarray) -> np.ndarray:
