@@ -36,12 +36,12 @@ def test_it_is_read_in_minutes():
     assert len(README.split()) <= MOST_WORDS
 
 
-def test_the_first_screen_has_the_claim_a_picture_the_figures_and_two_commands():
+def test_the_first_screen_has_the_claim_a_picture_the_figures_and_three_commands():
     first = README.partition("\n## ")[0].splitlines()
     assert len(first) <= FIRST_SCREEN
     assert sum("![" in line for line in first) == 1
     commands = [line.split("#")[0].strip() for line in first if line.startswith("    ")]
-    assert commands == ["make paper", ".venv/bin/elastocal demo"]
+    assert commands == ["make paper", "make study", ".venv/bin/elastocal demo"]
     screen = "\n".join(first)
     for words in ("uncorrected | corrected | noise floor", "false alarms", "right cause", "measured UR10"):
         assert words in screen
