@@ -4,7 +4,6 @@ import numpy as np
 from support import PinocchioPoint, without_tool
 
 from elastocal.study.simulation import Loading
-from elastocal.study.steps.design import design_blocks
 from elastocal.study.steps.evaluate import evaluate_strategy, judge_from
 from elastocal.study.steps.identify import identified_blocks, paired_blocks
 from elastocal.study.steps.measure import measured_blocks
@@ -40,8 +39,7 @@ def deflections_of(robot, experiments, noise=0.0, at="end_effector", key="kuka")
 
 def identified(robot, strategy, experiments, deflections, rows=6, at="end_effector", start=None):
     needed = {name: deflections[name] for name in strategy.points}
-    designs = design_blocks(experiments, robot.chain, strategy, rows, at)
-    blocks = identified_blocks(paired_blocks(experiments, needed), designs, robot.chain, strategy, rows, at, start)
+    blocks = identified_blocks(paired_blocks(experiments, needed), robot.chain, strategy, rows, at, start)
     return joined(list(blocks))
 
 

@@ -14,11 +14,13 @@ from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.identification import (
     Measurements,
     Prior,
+    condition_numbers,
     estimate_compliance,
     first_solvable_length,
     identify,
     prefix_information,
     prefix_triangles,
+    undetermined,
 )
 from elastocal.study.simulation import true_deflections
 from elastocal.study.strategies import Stage, Strategy
@@ -248,3 +250,16 @@ def test_a_strong_prior_gives_its_values_and_a_weak_one_those_of_least_squares(d
     np.testing.assert_allclose(strong, np.broadcast_to(nominal, strong.shape), rtol=1e-3)
     plain = estimate_compliance(strategy, data.measurements(), 6)[0]
     np.testing.assert_allclose(weak[3:], plain[3:], rtol=1e-6)
+
+
+def test_undetermined_are_the_prefixes_whose_condition_is_not_a_number():
+    rng = np.random.default_rng(5)
+    strategy, sets = Strategy("A", (Stage(("A",), (0, 1, 2)),)), 200
+    # The third column is the first but for parts from 1e-4 to 1e-9, on either side of the largest condition.
+    regressor = rng.standard_normal((6, 3, 2, sets))
+    regressor[:, 2] = regressor[:, 0] + np.logspace(-9, -4, sets) * regressor[:, 2]
+    measurements = {"A": Measurements(regressor, np.zeros((6, 2, sets)))}
+    triangles = estimate_compliance(strategy, measurements, 3)[1]
+    unknown = np.isnan(condition_numbers(strategy, measurements, triangles))
+    assert 0 < unknown.sum() < unknown.size
+    np.testing.assert_array_equal(undetermined(strategy, 6, triangles), unknown)

@@ -50,7 +50,6 @@ rule identify:
     input:
         experiments="data/simulated/{robot}/experiments.parquet",
         measured=rules.measure.output.measured,
-        design=rules.judge_design.output.design,
         weights=rules.draw_weights.output.weights,
         test_experiments="data/simulated/{robot}/test/experiments.parquet",
         test_ideal="data/simulated/{robot}/test/ideal.parquet",

@@ -11,7 +11,7 @@ from elastocal.study.steps.evaluate import evaluate_strategy, judge_from
 from elastocal.study.steps.identify import identified_blocks, paired_blocks
 from elastocal.study.steps.weights import DATA_SETS, TESTS
 from elastocal.study.strategies import drop_forgotten_stages, strategy_from_document
-from elastocal.study.table_schemas import DEFLECTIONS, REPLICATES, WEIGHTS, accuracy, design, experiments, identified, metrics
+from elastocal.study.table_schemas import DEFLECTIONS, REPLICATES, WEIGHTS, accuracy, experiments, identified, metrics
 
 
 def identify(job: Job) -> None:
@@ -23,9 +23,8 @@ def identify(job: Job) -> None:
         read_blocks(job.input.experiments, experiments(n)),
         {name: read_blocks(job.input.measured, DEFLECTIONS, DEFLECTION_COLUMNS, point=name) for name in strategy.points},
     )
-    designs = read_blocks(job.input.design, design(n), ["condition"])
     solvable = drop_forgotten_stages(strategy, n) if settings.start is None else strategy
-    solved = identified_blocks(blocks, designs, chain, solvable, settings.rows, settings.wrench_at, settings.start)
+    solved = identified_blocks(blocks, chain, solvable, settings.rows, settings.wrench_at, settings.start)
     write_table(job.output.identified, identified(n), solved, origin)
 
     judge = judge_from(

@@ -190,14 +190,34 @@ def condition_numbers(
     """
     largest: np.ndarray = np.ones(())
     for stage, triangle in zip(strategy.stages, triangles, strict=True):
-        matrices = _matrices(triangle[:, :, : len(stage.identified)])
-        eigenvalues = np.linalg.eigvalsh(np.swapaxes(matrices, -1, -2) @ matrices)
-        with np.errstate(divide="ignore"):
-            largest = np.maximum(largest, np.sqrt(eigenvalues[..., -1] / np.maximum(eigenvalues[..., 0], 0.0)))
+        largest = np.maximum(largest, _condition(_matrices(triangle[:, :, : len(stage.identified)])))
     rows = next(iter(measurements.values())).regressor.shape[0]
     condition = np.where(largest < LARGEST_CONDITION, largest, np.nan)
     condition[: first_solvable_length(strategy, rows) - 1] = np.nan
     return condition
+
+
+def undetermined(strategy: Strategy, rows: int, triangles: Iterable[np.ndarray]) -> np.ndarray:
+    """Prefixes whose `condition_numbers` are not a number, (configurations, sets) of bool.
+
+    Almost all have a condition far below the largest that is allowed, which an upper bound from determinant and Frobenius norm
+    shows [1]; only the others are decomposed.
+
+    [1] Guggenheimer, H. W., Edelman, A. S. and Johnson, C. R., A simple estimate of the condition number of a linear system,
+        College Mathematics Journal 26, 1995.
+    """
+    found: np.ndarray = np.zeros((), bool)
+    for stage, triangle in zip(strategy.stages, triangles, strict=True):
+        size = len(stage.identified)
+        square = triangle[:, :, :size]
+        determinant = np.abs(np.einsum("kpps->kps", square).prod(axis=1))
+        norm = np.sqrt(np.einsum("kpqs,kpqs->ks", square, square) / size)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            doubtful = ~(2.0 * norm**size / determinant < LARGEST_CONDITION)
+        doubtful[doubtful] = ~(_condition(np.moveaxis(square, -1, 1)[doubtful]) < LARGEST_CONDITION)
+        found = found | doubtful
+    found[: first_solvable_length(strategy, rows) - 1] = True
+    return found
 
 
 def prefix_triangles(equations: Iterable[np.ndarray], start: np.ndarray) -> np.ndarray:
@@ -261,6 +281,13 @@ def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
         later = np.einsum("kps,kpcs->kcs", triangles[:, row, row + 1 :], solution[:, row + 1 :])
         solution[:, row] = (right[:, row] - later) / pivots[:, row, None]
     return solution
+
+
+def _condition(matrices: np.ndarray) -> np.ndarray:
+    """2-norm condition numbers of matrices (..., n, n)."""
+    eigenvalues = np.linalg.eigvalsh(np.swapaxes(matrices, -1, -2) @ matrices)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sqrt(eigenvalues[..., -1] / np.maximum(eigenvalues[..., 0], 0.0))
 
 
 def _matrices(stacked: np.ndarray) -> np.ndarray:

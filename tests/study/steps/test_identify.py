@@ -14,8 +14,7 @@ from made_study_blocks import (
 
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.steps.columns import to_deflections
-from elastocal.study.steps.design import design_blocks
-from elastocal.study.steps.identify import identified_blocks, paired_blocks
+from elastocal.study.steps.identify import paired_blocks
 
 
 @pytest.mark.parametrize("at", AT)
@@ -70,14 +69,13 @@ def test_estimates_of_every_prefix_are_numpy_least_squares_of_its_measurements(k
 
 
 @pytest.mark.parametrize("start", [None, 1e-6])
-def test_nothing_is_identified_where_the_design_is_empty_and_everything_elsewhere(kuka, strategies, start):
-    experiments = experiments_of(kuka, sets=2)
-    deflections = deflections_of(kuka, experiments)
-    (design,) = design_blocks(experiments, kuka.chain, strategies["6DoF"], 6, "end_effector")
-    empty = np.array([True, False, False, False, True, False, True, False])
-    design["condition"] = np.where(empty, np.nan, design["condition"])
-    blocks = paired_blocks(experiments, {"6DoF": deflections["6DoF"]})
-    (table,) = identified_blocks(blocks, [design], kuka.chain, strategies["6DoF"], 6, "end_effector", start)
+def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_after(kuka, strategies, start):
+    (experiments,) = experiments_of(kuka, sets=2)
+    # No load in the first configuration of one data set and the first two of the other.
+    empty = np.array([True, False, False, False, True, True, False, False])
+    for name in ("fx", "fy", "fz", "mx", "my", "mz"):
+        experiments[name] = np.where(empty, 0.0, experiments[name])
+    table = identified(kuka, strategies["6DoF"], [experiments], deflections_of(kuka, [experiments]), start=start)
     for joint in range(1, 7):
         np.testing.assert_array_equal(np.isnan(table[f"c{joint}"]), empty)
 
@@ -98,10 +96,3 @@ def test_tables_with_another_number_of_blocks_are_not_paired():
     for experiments, seen in ((one, {"A": two}), (two, {"A": two, "B": one})):
         with pytest.raises(ValueError, match="zip"):
             list(paired_blocks(experiments, seen))
-
-
-def test_designs_with_another_number_of_blocks_are_not_used(kuka, strategies):
-    experiments = experiments_of(kuka, sets=1)
-    blocks = paired_blocks(experiments, {"6DoF": deflections_of(kuka, experiments)["6DoF"]})
-    with pytest.raises(ValueError, match="zip"):
-        list(identified_blocks(blocks, [], kuka.chain, strategies["6DoF"], 6, "end_effector"))

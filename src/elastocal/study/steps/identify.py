@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.gauss_newton import identify_exactly
-from elastocal.study.identification import Measurements, estimate_compliance
+from elastocal.study.identification import Measurements, estimate_compliance, undetermined
 from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_deflections, to_experiments
 from elastocal.study.steps.design import Design, configuration_first
 
@@ -31,29 +31,26 @@ def paired_blocks(
 
 def identified_blocks(
     blocks: Iterable[tuple[Mapping[str, np.ndarray], Mapping[str, Mapping[str, np.ndarray]]]],
-    designs: Iterable[Mapping[str, np.ndarray]],
     chain: Chain,
     strategy: Strategy,
     rows: int,
     wrench_at: str,
     start: float | None = None,
 ) -> Iterator[dict[str, np.ndarray]]:
-    """Compliances in blocks; not a number where the design says that a prefix does not determine them.
+    """Compliances in blocks; not a number where a prefix does not determine them.
 
     `blocks` (dict, dict of str to dict): blocks of the experiments table and, for each measuring point, of the deflections
-    table. `designs`: blocks of the design table of the strategy, for the same data sets. `rows`: 6 where poses are measured, 3
-    where positions are. `wrench_at`: interpretation R6. `start`: given, compliances come from Gauss-Newton on the exact
-    kinematics, started there (rad/(N m)); else from equation 11. Yields columns of one block of the identified table.
+    table. `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: interpretation R6. `start`: given,
+    compliances come from Gauss-Newton on the exact kinematics, started there (rad/(N m)); else from equation 11. Yields columns
+    of one block of the identified table.
     """
-    for (experiments, deflections), design in zip(blocks, designs, strict=True):
+    for experiments, deflections in blocks:
         sets = data_sets(experiments)
         situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
-        condition = design["condition"].reshape(len(sets), -1).T
-        if start is None:
-            compliance = estimate_compliance(strategy, situation.measurements, chain.coordinates)[0]
-        else:
-            compliance = situation.solve_exactly(start, range(1, len(condition) + 1))
-        np.moveaxis(compliance, 1, -1)[np.isnan(condition)] = np.nan
+        compliance, triangles = estimate_compliance(strategy, situation.measurements, chain.coordinates)
+        if start is not None:
+            compliance = situation.solve_exactly(start, range(1, len(compliance) + 1))
+        np.moveaxis(compliance, 1, -1)[undetermined(strategy, rows, triangles)] = np.nan
         columns = prefix_index_columns(sets, len(compliance))
         yield columns | {f"c{j + 1}": compliance[:, j].T.ravel() for j in range(chain.coordinates)}
 
