@@ -89,47 +89,47 @@ supply: .venv/ready .venv-supply/ready
 
 # New pins. The index is the caller's own; none is written into the lock files.
 lock:
-	uv pip compile --group install --universal --python-version 3.11 --generate-hashes --no-header -o requirements-install.lock
-	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-header -o requirements.lock
+	uv pip compile --group install --universal --python-version 3.11 --generate-hashes --no-header -o requirements/install.lock
+	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-header -o requirements/run.lock
 	uv pip compile pyproject.toml --extra build --extra audit --universal --python-version 3.11 --generate-hashes --no-header \
-	    -c requirements.lock -o requirements-audit.lock
+	    -c requirements/run.lock -o requirements/audit.lock
 	uv pip compile pyproject.toml --extra build --extra cluster --universal --python-version 3.11 --generate-hashes --no-header \
-	    -c requirements.lock -o requirements-cluster.lock
+	    -c requirements/run.lock -o requirements/cluster.lock
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --generate-hashes --no-header \
-	    -c requirements-audit.lock -c requirements-cluster.lock -o requirements-test.lock
-	uv pip compile --group crate --universal --python-version 3.11 --generate-hashes --no-header -o requirements-crate.lock
-	uv pip compile --group supply --universal --python-version 3.11 --generate-hashes --no-header -o requirements-supply.lock
+	    -c requirements/audit.lock -c requirements/cluster.lock -o requirements/test.lock
+	uv pip compile --group crate --universal --python-version 3.11 --generate-hashes --no-header -o requirements/crate.lock
+	uv pip compile --group supply --universal --python-version 3.11 --generate-hashes --no-header -o requirements/supply.lock
 
 clean:
 	rm -rf .venv .venv-crate .venv-supply .snakemake data/simulated results/[a-z]* reports/[a-z]* site ro-crate-metadata.json sbom.cdx.json
 
 # A file of its own: the interpreter in the environment is a link to an old one, which make would take for out of date for ever.
-.venv/made: requirements-install.lock
+.venv/made: requirements/install.lock
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install -q --require-hashes -r requirements-install.lock
+	$(BIN)/python -m pip install -q --require-hashes -r requirements/install.lock
 	touch $@
 
-.venv/ready: requirements.lock pyproject.toml | .venv/made
-	$(INSTALL) --no-deps --require-hashes -r requirements.lock
+.venv/ready: requirements/run.lock pyproject.toml | .venv/made
+	$(INSTALL) --no-deps --require-hashes -r requirements/run.lock
 	$(INSTALL) --no-deps --no-build-isolation -e .
 	touch $@
 
 # What the audit needs besides.
-.venv/ready-for-audit: requirements-audit.lock .venv/ready
-	$(INSTALL) --no-deps --require-hashes -r requirements-audit.lock
+.venv/ready-for-audit: requirements/audit.lock .venv/ready
+	$(INSTALL) --no-deps --require-hashes -r requirements/audit.lock
 	touch $@
 
 # What a run on a cluster needs besides: docs/cluster.md.
-.venv/ready-for-cluster: requirements-cluster.lock .venv/ready
-	$(INSTALL) --no-deps --require-hashes -r requirements-cluster.lock
+.venv/ready-for-cluster: requirements/cluster.lock .venv/ready
+	$(INSTALL) --no-deps --require-hashes -r requirements/cluster.lock
 	touch $@
 
-.venv/ready-for-tests: requirements-test.lock .venv/ready
-	$(INSTALL) --no-deps --require-hashes -r requirements-test.lock
+.venv/ready-for-tests: requirements/test.lock .venv/ready
+	$(INSTALL) --no-deps --require-hashes -r requirements/test.lock
 	touch $@
 
 # Tools of their own: the validator of crates, and what looks at the environment from outside.
-.venv-%/ready: requirements-%.lock | .venv/made
+.venv-%/ready: requirements/%.lock | .venv/made
 	$(PYTHON) -m venv .venv-$*
-	$(BIN)/uv pip install -q --system-certs --python .venv-$*/bin/python --no-deps --require-hashes -r requirements-$*.lock
+	$(BIN)/uv pip install -q --system-certs --python .venv-$*/bin/python --no-deps --require-hashes -r requirements/$*.lock
 	touch $@

@@ -20,7 +20,7 @@ import pickle, time
 with open(f"{jobs}/{{time.time_ns()}}-{script}", "wb") as file:
     pickle.dump(snakemake, file)
 """
-SOURCES = ("Snakefile", "CITATION.cff", "paper.bib", "config.yaml", "config", "workflow", "profiles", "src")
+SOURCES = ("Snakefile", "CITATION.cff", "paper", "config.yaml", "config", "workflow", "profiles", "src")
 
 
 def copy_study(folder: Path) -> Path:

@@ -28,8 +28,9 @@ NOWHERE = {"certificate": ["--compare", "nowhere"], "correct": [], "export": []}
 
 
 def edited_pins(checkout):
-    (checkout / "requirements.lock").write_text("numpy==2.0\n", encoding="utf-8")
-    return "requirements.lock none", "requirements.lock "
+    (checkout / "requirements").mkdir(exist_ok=True)
+    (checkout / "requirements/run.lock").write_text("numpy==2.0\n", encoding="utf-8")
+    return "requirements/run.lock none", "requirements/run.lock "
 
 
 def another_numpy(_):
@@ -51,5 +52,5 @@ def test_results_of_another_environment_are_refused_by_every_command_unless_that
     for command, words in WANTED.items():
         result = elastocal(command, "made", *words, *NOWHERE[command], "--accept-environment")
         assert "nowhere" in str(result.exception) or result.exit_code == 0
-    (in_checkout / "requirements.lock").unlink(missing_ok=True)
+    (in_checkout / "requirements/run.lock").unlink(missing_ok=True)
     record_jobs("made", campaign_files("made", ROBOTS))

@@ -12,14 +12,14 @@ from snakemake_starts import started
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = (
     "Snakefile",
-    "requirements.lock",
+    "requirements",
     "config.yaml",
     "config",
     "workflow",
     "profiles",
     "src",
     "README.md",
-    "paper.bib",
+    "paper",
     "CITATION.cff",
 )
 ROBOTS = ("kuka", "kuka_extended")

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-RECIPE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+RECIPE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
 COPIED = {name for line in re.findall(r"^COPY (.*) \S+$", RECIPE, re.MULTILINE) for name in line.split()}
 
 
@@ -19,7 +19,7 @@ def test_it_installs_by_digest_and_names_no_index():
 
 
 def test_an_engine_is_handed_what_is_copied_and_nothing_else():
-    rules = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    rules = (ROOT / "docker" / "Dockerfile.dockerignore").read_text(encoding="utf-8").splitlines()
     assert "*" in rules and {rule[1:] for rule in rules if rule.startswith("!")} == COPIED
 
 

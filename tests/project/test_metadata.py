@@ -42,7 +42,7 @@ def test_authors_are_the_developers_everywhere(project, citation, codemeta):
     assert project["authors"] == [{"name": AUTHORS}]
     assert citation["authors"] == [{"name": AUTHORS}]
     assert [author["name"] for author in codemeta["author"]] == [AUTHORS]
-    assert f"name: {AUTHORS}" in text("paper.md")
+    assert f"name: {AUTHORS}" in text("paper/paper.md")
 
 
 def test_the_licence_is_the_same_everywhere(project, citation, codemeta):
@@ -79,7 +79,7 @@ FEWEST_WORDS, MOST_WORDS = 750, 1750
 
 
 def test_the_paper_has_the_sections_and_the_length_that_the_journal_asks_for():
-    _, front, body = text("paper.md").split("---\n", 2)
+    _, front, body = text("paper/paper.md").split("---\n", 2)
     assert {"title", "tags", "authors", "affiliations", "date", "bibliography"} <= set(yaml.safe_load(front))
     assert tuple(re.findall(r"^# (.*)$", body, re.MULTILINE)) == SECTIONS
     assert FEWEST_WORDS <= len(re.sub(r"<!--.*?-->", "", body, flags=re.DOTALL).split()) <= MOST_WORDS
@@ -87,15 +87,15 @@ def test_the_paper_has_the_sections_and_the_length_that_the_journal_asks_for():
 
 def test_papers_cite_what_their_bibliography_has():
     """That of the software, and that of the study, whose labels of figures and tables look like references."""
-    cited = set(re.findall(r"@([\w:-]+)", text("paper.md").split("---\n", 2)[2]))
+    cited = set(re.findall(r"@([\w:-]+)", text("paper/paper.md").split("---\n", 2)[2]))
     study = text("src/elastocal/report/study.typ")
     labels = set(re.findall(r"<(\w+)>", study)) | set(re.findall(r'tag: "(\w+)"', study))
     cited |= set(re.findall(r"(?<!\w)@(\w+)", study)) - labels
-    assert cited == set(re.findall(r"^@\w+\{([\w:-]+),$", text("paper.bib"), re.MULTILINE))
+    assert cited == set(re.findall(r"^@\w+\{([\w:-]+),$", text("paper/paper.bib"), re.MULTILINE))
 
 
 def test_every_figure_of_the_paper_is_one_of_a_page():
-    found = re.findall(r"<!-- (README\.md|docs/\w+\.md): (.*?) -->", text("paper.md"))
+    found = re.findall(r"<!-- (README\.md|docs/\w+\.md): (.*?) -->", text("paper/paper.md"))
     assert len(found) >= 4
     for page, words in found:
         assert words in text(page), (page, words)

@@ -17,7 +17,7 @@ import elastocal
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "Snakefile", "config.yaml", "config", "profiles", "src", "workflow")
-SOURCES += ("paper.bib", "CITATION.cff")
+SOURCES += ("paper", "CITATION.cff")
 # Of the checkout alone: it checks, rehearses and explains.
 LEFT_OUT = (
     "workflow/lint.py",
@@ -78,7 +78,7 @@ def files_of(folder):
 def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline(wheel):
     packages = {name.removeprefix("src/") for name in files_of("src") if ".egg-info/" not in name}
     pipeline = (
-        {"Snakefile", "config.yaml", "paper.bib", "CITATION.cff"}
+        {"Snakefile", "config.yaml", "paper/paper.bib", "CITATION.cff"}
         | files_of("config")
         | files_of("profiles")
         | files_of("workflow")

@@ -12,7 +12,7 @@ from elastocal.report.typesetting import compile_document
 
 FIGURES = ["fig2", "fig3", "fig4", "fig5a", "fig5c", "table2_samples", "bias_and_accuracy", "accuracy_of_one_data_set"]
 FIGURES += ["scores_against_paper", "ladder", "budget", "designs", "arm_map", "metrics", "studies", "costs"]
-BIBLIOGRAPHY = Path(__file__).resolve().parents[2] / "paper.bib"
+BIBLIOGRAPHY = Path(__file__).resolve().parents[2] / "paper" / "paper.bib"
 EVERY = facts() | question_facts()
 HEAD = {
     "table1": ["robot", "c1"],

@@ -119,7 +119,7 @@ def test_a_new_commit_of_unchanged_sources_reruns_nothing(finished):
 
 
 def test_an_edited_list_of_pins_reruns_every_job(finished, every_job):
-    finished.append("requirements.lock", "# edited\n")
+    finished.append("requirements/run.lock", "# edited\n")
     assert finished.planned() == every_job
 
 

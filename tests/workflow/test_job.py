@@ -95,7 +95,7 @@ def test_a_job_that_ended_well_leaves_a_record_of_what_it_read_and_wrote_when_an
     record = json.loads(Path("results/records/results/b.csv.json").read_text(encoding="utf-8"))
     digest = hashlib.sha256(b"1\n").hexdigest()
     assert record["inputs"] == {INPUT: digest} and record["outputs"] == [OUTPUT] and record["files"] == {OUTPUT: digest}
-    assert record["environment"]["numpy"] == np.__version__ and "requirements.lock" in record["environment"]
+    assert record["environment"]["numpy"] == np.__version__ and "requirements/run.lock" in record["environment"]
     assert (record["rule"], record["wildcards"], record["origin"]) == ("copy", {"robot": "kuka"}, job.config["origin"])
     assert record["started"] <= record["ended"] and record["ended"].endswith("+00:00")
 

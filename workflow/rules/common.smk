@@ -79,7 +79,7 @@ RESOLVED = {
 }
 # Scripts find it in the configuration, an edit of which reruns nothing by itself: a new commit makes no figure anew.
 ORIGIN = Origin(
-    commit_of(ROOT, ["Snakefile", "config.yaml", "config", "profiles", "src", "workflow", "requirements.lock"]),
+    commit_of(ROOT, ["Snakefile", "config.yaml", "config", "profiles", "src", "workflow", "requirements/run.lock"]),
     configuration_sha256(RESOLVED),
     config["seed"],
 )

@@ -145,7 +145,7 @@ rule compile_report:
         table4=rules.tabulate_strategies.output.table,
         interpretations=f"{CONFIG}/paper/interpretations.csv",
         figures=expand("reports/figures/{figure}.pdf", figure=FIGURES),
-        bibliography=placed(ROOT / "paper.bib"),
+        bibliography=placed(ROOT / "paper" / "paper.bib"),
         pages=placed(PACKAGES / "elastocal" / "report" / "study.typ"),
         sources=sources("compile_report.py"),
     output:

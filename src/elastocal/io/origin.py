@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 # Of what a run on one machine has installed; a wheel comes without.
-_LOCK = "requirements.lock"
+_LOCK = "requirements/run.lock"
 # What numbers may depend on wherever there is no such list.
 _LIBRARIES = ("numpy", "pandas", "pyarrow", "scipy")
 
