@@ -132,7 +132,7 @@ def test_another_library_reruns_every_job(finished, every_job):
 
 def test_pins_of_tests_clusters_and_crates_rerun_nothing(finished):
     for name in ("test", "cluster", "crate", "install"):
-        finished.path(f"requirements-{name}.lock").write_text("# edited\n", encoding="utf-8")
+        finished.path(f"requirements/{name}.lock").write_text("# edited\n", encoding="utf-8")
     assert finished.planned() == set()
 
 
