@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 ALLOWED = {
-    "Specify a conda environment or container for each rule.": "one pinned environment serves every rule: requirements/run.lock",
+    "Specify a conda environment or container for each rule.": "one pinned environment serves all: requirements/run.lock",
 }
 
 if __name__ == "__main__":

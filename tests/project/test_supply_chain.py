@@ -54,7 +54,9 @@ def test_what_a_run_imports_is_installed_and_the_audit_alone_needs_its_extra():
 
 @pytest.mark.parametrize("name", ["run", "cluster"])
 def test_the_pins_of_a_run_and_of_the_container_have_nothing_of_tests_and_audit(name):
-    pinned = set(re.findall(r"^([a-z0-9-]+)==", (ROOT / "requirements" / f"{name}.lock").read_text(encoding="utf-8"), re.MULTILINE))
+    pinned = set(
+        re.findall(r"^([a-z0-9-]+)==", (ROOT / "requirements" / f"{name}.lock").read_text(encoding="utf-8"), re.MULTILINE)
+    )
     extras = PROJECT["optional-dependencies"]
     assert pinned >= names(PROJECT["dependencies"])
     assert pinned & (names(extras["audit"]) | {"cvxpy", "pytest", "yourdfpy"}) == set()

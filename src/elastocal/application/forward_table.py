@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial.transform import Rotation
-from scipy.stats import qmc
 
 from elastocal.application.accuracy import root_mean_square
 from elastocal.application.calibrated import forward, nominal_forward
@@ -31,6 +30,8 @@ def forward_table(calibrated: CalibratedRobot, rows: int, operating: OperatingCo
 
     [1] Owen, A. B., Scrambling Sobol' and Niederreiter-Xing points, Journal of Complexity 14, 1998.
     """
+    from scipy.stats import qmc
+
     low, high = calibrated.robot.joint_limits.T
     points = qmc.Sobol(len(low), rng=np.random.default_rng(seed)).random_base2(int(np.ceil(np.log2(max(rows, 2)))))
     return _tabulate(calibrated, calibrated.robot.reported_angles(low + points * (high - low)), operating)

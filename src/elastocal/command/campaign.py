@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
 from typer import Option
 
 from elastocal.command.pipeline import pipeline, workplace
@@ -33,6 +32,8 @@ def diagnosed_campaign(folder: Path, accept_environment: bool = False) -> Diagno
     was, now = found.origin["environment"], environment(pipeline())
     other = [name for name in sorted(was | now) if was.get(name) != now.get(name)]
     if other:
+        from rich.console import Console
+
         there, here = (", ".join(f"{name} {each.get(name, 'none')[:12]}" for name in other) for each in (was, now))
         allowed = f"those of now, {here}: elastocal diagnose {folder}; or --accept-environment"
         error = InputError(folder, "", f"results by {there}", allowed)

@@ -5,14 +5,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import iso_date, print_answer, printed
 from elastocal.command.quantities import LARGEST_SEED, length_m
-from elastocal.data_checks.protocol import data_at_fault
 from elastocal.errors import InputError
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
@@ -51,8 +49,11 @@ def certificate(
     """
     from datetime import date as calendar
 
+    from rich.console import Console
+
     from elastocal.application.certificate.use import use_at
     from elastocal.campaigns.reading import read_descriptions
+    from elastocal.data_checks.protocol import data_at_fault
     from elastocal.exchange.target_path import read_target_path
     from elastocal.figures.certificate import budget_bars, workspace_map
     from elastocal.figures.style import save_all

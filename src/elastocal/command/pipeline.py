@@ -1,6 +1,5 @@
 """Where the pipeline is that the command runs, with its robots, and where its results are."""
 
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from elastocal.errors import InputError
@@ -34,6 +33,8 @@ def _checkout() -> Path | None:
 
 def _installed() -> Path | None:
     """What the wheel of this package brought, wherever the installer has put it."""
+    from importlib.metadata import PackageNotFoundError, distribution
+
     try:
         files = distribution("elastocal").files or []
     except PackageNotFoundError:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from rich.console import Console
 from typer import Argument, Option
 
 from elastocal.command.printed import print_answer
@@ -87,6 +86,8 @@ def plan(**words: Any) -> None:
     The chosen poses and loads determine the robot's parameters best, among those that the arm, the cell and the tracker allow.
     plan.pdf is the sheet to take to the cell.
     """
+    from rich.console import Console
+
     from elastocal.application.planning.sheet import sheet
     from elastocal.campaigns.measurements import CSV
 

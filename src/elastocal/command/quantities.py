@@ -1,12 +1,17 @@
 """Options that state quantities: lengths and angles with their unit, and lists of numbers."""
 
+from __future__ import annotations
+
 import math
 import re
-from collections.abc import Mapping
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import numpy as np
 
 _METRES = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _RADIANS = {"deg": math.radians(1.0), "°": math.radians(1.0), "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6}
@@ -46,6 +51,8 @@ def _quantity(option: str, text: str, units: Mapping[str, float], bounds: tuple[
 
 def numbers(option: str, text: str, count: int, largest: float = _FARTHEST_PLACE_M) -> np.ndarray:
     """So many numbers separated by commas, metres, each of at most a size; anything else is refused."""
+    import numpy as np
+
     try:
         found = np.array([float(part) for part in text.split(",")])
     except ValueError:

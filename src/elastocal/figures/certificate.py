@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from scipy.stats import binned_statistic_2d
 
 from elastocal.figures.style import PALETTE, panels, styled
 
@@ -73,6 +72,8 @@ def _edges(errors: WorkspaceErrors) -> tuple[np.ndarray, np.ndarray, list[np.nda
 
 
 def _statistic(errors: WorkspaceErrors, values: np.ndarray, how: Any) -> np.ndarray:
+    from scipy.stats import binned_statistic_2d
+
     radius, height, edges = _edges(errors)
     return np.asarray(binned_statistic_2d(radius, height, values, how, bins=edges).statistic)
 

@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student
-from statsmodels.stats.multitest import multipletests
+from scipy.special import stdtr
 
 from elastocal.study.comparison import FITTED
 from elastocal.study.metrics import length_to_reach
@@ -57,10 +56,12 @@ class Predicted:
     def p_value(self, printed: float) -> float:
         """Two-sided, of a further study that lies so far out."""
         standard, _ = self._standardize(printed)
-        return float(2 * student.sf(abs(standard), len(self.values) - 1))
+        return float(2 * stdtr(len(self.values) - 1, -abs(standard)))
 
     def log_density(self, printed: float) -> float:
         """Log predictive density of the printed figure; of lengths, of their logarithm."""
+        from scipy.stats import t as student
+
         standard, scale = self._standardize(printed)
         return float(student.logpdf(standard, len(self.values) - 1) - np.log(scale))
 
@@ -131,6 +132,8 @@ def _scatter(
 
 def holm(p_values: np.ndarray) -> np.ndarray:
     """p values corrected for their number, ndarray (N,); not a number where there is none."""
+    from statsmodels.stats.multitest import multipletests
+
     found, there = np.full(len(p_values), np.nan), ~np.isnan(p_values)
     if there.any():
         found[there] = multipletests(p_values[there], method="holm")[1]

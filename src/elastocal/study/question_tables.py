@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import spearmanr
 
 from elastocal.study.budget_tables import MICRO, ratio_of_roots, root_mean
 from elastocal.study.designs import RANDOM
@@ -57,6 +56,8 @@ def observability_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     and rank_correlation_with_error, each with its standard error by a normal approximation; -1 where a larger index always
     means a smaller error.
     """
+    from scipy.stats import spearmanr
+
     rows = []
     for (robot, frame), index in product(frames.items(), (*INDICES, "bound")):
         row: dict[str, Any] = {"robot": robot, "index": index}

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import rankdata
 
 from elastocal.study.budget_tables import MICRO, QUANTILE
 
@@ -77,6 +76,8 @@ def ranks_table(found: Mapping[str, Mapping[str, Mapping[str, Score]]], classica
     `found`: `scores` of each robot. `classical`: name of a strategy. Returns robot, metric, strategy, value, value_std_error,
     ratio with its 95 % interval (ratio_low, ratio_high), rank from 1; one estimator under two names has one rank.
     """
+    from scipy.stats import rankdata
+
     rows = []
     for robot, by_metric in found.items():
         for metric, by_strategy in by_metric.items():

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import norm
-from statsmodels.stats.multitest import multipletests
+from scipy.special import ndtr
 
 from elastocal.application.accuracy import remove_rigid_motion
 from elastocal.application.calibrated import forward, pose_sensitivities, square_root
@@ -81,6 +80,8 @@ def compare_campaigns(
 
 def _changes(before: CalibratedRobot, after: CalibratedRobot) -> tuple[Change, ...]:
     """Differences of the parameters of both, where both leave the same ones at their values."""
+    from statsmodels.stats.multitest import multipletests
+
     found = [_values(each) for each in (before, after)]
     kept = [{key for key, (_, error, _) in values.items() if error > 0.0} for values in found]
     if kept[0] != kept[1] or not kept[0]:
@@ -88,7 +89,7 @@ def _changes(before: CalibratedRobot, after: CalibratedRobot) -> tuple[Change, .
     keys = [key for key in found[1] if key in kept[1]]
     old, new = (np.array([values[key][:2] for key in keys]) for values in found)
     errors = np.hypot(old[:, 1], new[:, 1])
-    raw = 2.0 * norm.sf(np.abs(new[:, 0] - old[:, 0]) / errors)
+    raw = 2.0 * ndtr(-np.abs(new[:, 0] - old[:, 0]) / errors)
     adjusted = multipletests(raw, method="holm")[1]
     changes = [
         Change(

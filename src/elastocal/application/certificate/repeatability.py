@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from scipy.stats import chi
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from elastocal.campaigns.groups import groups_of
 
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
 _DEVIATIONS = 3.0
 # What it asks for (section 7.2.1): so many poses, each approached so often.
 ISO_POSES, ISO_CYCLES = 5, 30
-# Mean and standard deviation of the length of a vector of three standard normal components.
-_MEAN, _STD = float(chi.mean(3)), float(chi.std(3))
+# Mean and standard deviation of the length of a vector of three standard normal components, which is of Maxwell's distribution.
+_MEAN, _STD = float(np.sqrt(8.0 / np.pi)), float(np.sqrt(3.0 - 8.0 / np.pi))
 _CONFIDENCE = 0.975
 
 
@@ -107,5 +106,5 @@ def _pool(distance: np.ndarray, pose: np.ndarray) -> tuple[float, tuple[float, f
     left = np.log(figure(total - sums, squares.sum() - squares, many - count))
     poses = len(count)
     error = np.sqrt((poses - 1.0) / poses * ((left - left.mean()) ** 2).sum())
-    reach = student.ppf(_CONFIDENCE, poses - 1) * error
+    reach = stdtrit(poses - 1, _CONFIDENCE) * error
     return value, (float(value * np.exp(-reach)), float(value * np.exp(reach)))

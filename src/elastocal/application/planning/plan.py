@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import qmc
 
 from elastocal.application.planning.bound import best_value, efficiency
 from elastocal.application.planning.cell import find_allowed
@@ -95,6 +94,8 @@ def find_allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int
     `count`: of candidates; fewer where the cell allows fewer. `seed`: of Halton's sequence, scrambled, and of the directions of
     the loads. Raises `InputError` where the cell allows none.
     """
+    from scipy.stats import qmc
+
     robot = survey.robot
     low, high = robot.joint_limits.T
     shares = qmc.Halton(robot.joints, seed=seed).random(_DRAWS * count)

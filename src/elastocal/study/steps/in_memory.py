@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regressor
 from elastocal.mechanics.kinematics import jacobians, poses
@@ -181,6 +180,8 @@ class StudyInMemory:
         self, sets: np.ndarray, name: str, repeat: str, drawn: Experiments, regressor: np.ndarray, deflection: np.ndarray
     ) -> Measurements:
         """Positions of the reflectors at a point, whose pose they move with as a rigid body."""
+        from scipy.spatial.transform import Rotation
+
         turned = poses(self.robot.chain, drawn.joint_angles, self._point(name))[1]
         loaded = Rotation.from_rotvec(deflection[..., 3:].reshape(-1, 3)).as_matrix().reshape(turned.shape)
         matrices, measured = [], []
