@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from made_urdf import joint, link, written
 
-from elastocal.exchange import URDF_MASS_STD, gravity_in_base, weights_of
+from elastocal.exchange import URDF_MASS_STD
 from elastocal.exchange.urdf_chain import chain_between
 from elastocal.exchange.urdf_reading import read_urdf
+from elastocal.exchange.urdf_weights import gravity_in_base, weights_of
 
 
 def weights(tmp_path, *parts, base="base", tip="hand", **more):
