@@ -1,5 +1,6 @@
 """Where the pipeline and its results are: in a checkout, beside an installed package, nowhere."""
 
+from importlib import metadata
 from importlib.metadata import PackageNotFoundError, PathDistribution
 
 import pytest
@@ -22,7 +23,7 @@ def made(tmp_path):
 def installed(tmp_path, monkeypatch):
     """The package in a folder of no checkout, with the record of a wheel; the folder of its pipeline."""
     monkeypatch.setattr(module, "__file__", str(tmp_path / "lib" / "elastocal" / "command" / "pipeline.py"))
-    monkeypatch.setattr(module, "distribution", lambda name: PathDistribution(tmp_path / "lib" / f"{name}-1.dist-info"))
+    monkeypatch.setattr(metadata, "distribution", lambda name: PathDistribution(tmp_path / "lib" / f"{name}-1.dist-info"))
     (tmp_path / "lib" / "elastocal-1.dist-info").mkdir(parents=True)
     record = "elastocal/__init__.py,,\n../share/elastocal/Snakefile,,\n"
     (tmp_path / "lib" / "elastocal-1.dist-info" / "RECORD").write_text(record)
@@ -72,6 +73,6 @@ def test_a_package_without_a_pipeline_is_refused_in_one_line(installed, monkeypa
     def not_installed(name):
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr(module, "distribution", not_installed)
+    monkeypatch.setattr(metadata, "distribution", not_installed)
     with pytest.raises(InputError, match="no Snakefile here or above"):
         pipeline()

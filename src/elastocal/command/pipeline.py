@@ -33,11 +33,11 @@ def _checkout() -> Path | None:
 
 def _installed() -> Path | None:
     """What the wheel of this package brought, wherever the installer has put it."""
-    from importlib.metadata import PackageNotFoundError, distribution
+    from importlib import metadata
 
     try:
-        files = distribution("elastocal").files or []
-    except PackageNotFoundError:
+        files = metadata.distribution("elastocal").files or []
+    except metadata.PackageNotFoundError:
         return None
     found = [Path(str(file.locate())).resolve() for file in files if file.as_posix().endswith(_INSTALLED)]
     return next((file.parent for file in found if file.is_file()), None)
