@@ -41,6 +41,8 @@ def placed(file):
 
 
 CONFIG = placed(ROOT / "config")
+# Measured data that come with the project.
+BOX = placed(ROOT / "data" / "measured")
 
 
 def shown(file, caption, category, **labels):

@@ -9,7 +9,7 @@ def missing_data(names):
     """A file that is missing of each data set of which one is."""
     sources = {name: SOURCES[name] for name in names if SOURCES[name]["source"] == "public"}
     files = {
-        name: find_missing(source["files"], importer(source["importer"], name).FILES, "data/public")
+        name: find_missing(source["files"], importer(source["importer"], name).FILES, "data/public", BOX)
         for name, source in sources.items()
     }
     return {name: file for name, file in files.items() if file}

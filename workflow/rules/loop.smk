@@ -55,6 +55,7 @@ rule import_campaign:
     params:
         source=lambda wildcards: SOURCES[wildcards.campaign],
         kept="data/public",
+        box=BOX,
     script:
         "../scripts/import_campaign.py"
 

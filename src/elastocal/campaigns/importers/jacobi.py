@@ -5,6 +5,7 @@ position of the reflector, which the nominal chain and a tool along its last axi
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,13 @@ def _file(robot: str, poses: str) -> PublicFile:
 
 
 FILES = {f"jacobi_{name}": _file(*name.split("_")) for name in _SHA256}
+# The header and every seventh row of the grid: ten poses make a line of it, so these are spread over all of it.
+FILES["jacobi_ur5_every_seventh"] = replace(
+    FILES["jacobi_ur5_grid"],
+    sha256="86a7cea6d5678239b26e27d3e7cf549a9439b69274381c6e081e27f30ce4f740",
+    local="jacobi_ur5/3D_UR5_uncalibrated_grid_every_seventh.csv",
+    excerpt=True,
+)
 TARGET = "SMR"
 # Robots of the source by their number of joints.
 _ROBOT_OF_JOINTS = {6: "ur5", 7: "wam"}
