@@ -65,23 +65,23 @@ def test_what_is_said_of_each_pose_needs_no_drawn_robots(fanuc):
 
 @pytest.mark.parametrize("unknown_base", [False, True])
 def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unknown_base):
-    """Of 300 robots; 92 to 98 % are within two and a half standard errors."""
+    """Of 150 robots; 90 to 100 % are within nearly three standard errors."""
     calibrated = set_scope(made_calibrated(fanuc, *USUAL), unknown_base)
     angles = calibrated.robot.reported_angles(STATES.joint_angles)
     stated = predict_errors(calibrated, angles, NEUTRAL).accuracy("")
     position, _ = forward(calibrated, angles)
     draws, root = np.random.default_rng(3), np.linalg.cholesky(calibrated.covariance)
     rms, worst = [], []
-    for _ in range(300):
+    for _ in range(150):
         step = root @ draws.standard_normal(len(root))
         other = replace(calibrated, estimate=stepped(calibrated.model, calibrated.estimate, step))
         off = forward(other, angles)[0] - position
         distance = np.linalg.norm(remove_rigid_motion(off, position) if unknown_base else off, axis=1)
         rms.append(np.sqrt((distance**2).mean()))
         worst.append(distance.max())
-    assert np.sqrt(np.mean(np.square(rms))) == pytest.approx(stated.rms_m, rel=0.05)
-    assert np.mean(np.array(rms) < stated.rms_bound_m) == pytest.approx(0.95, abs=0.03)
-    assert np.mean(np.array(worst) < stated.worst_bound_m) == pytest.approx(0.95, abs=0.03)
+    assert np.sqrt(np.mean(np.square(rms))) == pytest.approx(stated.rms_m, rel=0.08)
+    assert np.mean(np.array(rms) < stated.rms_bound_m) == pytest.approx(0.95, abs=0.05)
+    assert np.mean(np.array(worst) < stated.worst_bound_m) == pytest.approx(0.95, abs=0.05)
 
 
 def test_joints_and_poses_add_what_each_has_of_its_own(turned):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_cells import DOCUMENT, POSES, Cell
 from support import refused
@@ -35,6 +35,7 @@ def test_split_parts_no_pose_of_any_session(cell):
     assert sorted(row for part in split(campaign) for row in part.row) == campaign.measurements.row.tolist()
 
 
+@settings(max_examples=8)
 @given(st.randoms(use_true_random=False))
 def test_split_is_the_same_whatever_the_order_of_the_rows(tmp_path_factory, random):
     cell = Cell(tmp_path_factory.mktemp("campaign"))

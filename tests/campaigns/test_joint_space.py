@@ -41,10 +41,10 @@ def test_a_joint_that_hardly_moves_parts_nothing():
 
 @pytest.mark.parametrize(("poses", "joints"), [(6, 6), (21, 6), (40, 7)])
 def test_one_pose_in_twenty_drawn_like_the_others_is_beyond_their_range(poses, joints):
-    """4,000 draws: a rate of 5 % is seen as 4 to 6 %, three standard errors, and one of 7 % is not."""
+    """1,500 draws: a rate of 5 % is seen as 3.3 to 6.7 %, three standard errors, and one of 8 % is not."""
     rng = np.random.default_rng(4)
-    flagged = [beyond_range(rng.uniform(-1, 1, (poses, joints)), rng.uniform(-1, 1, (1, joints)))[0] for _ in range(4000)]
-    assert 0.035 < np.mean(flagged) < 0.06
+    flagged = [beyond_range(rng.uniform(-1, 1, (poses, joints)), rng.uniform(-1, 1, (1, joints)))[0] for _ in range(1500)]
+    assert 0.033 < np.mean(flagged) < 0.067
 
 
 def test_a_joint_far_beyond_is_told_whichever_it_is():
@@ -128,8 +128,8 @@ def test_poses_along_a_path_are_configurations_no_wider_than_twice_what_one_pose
     assert found.max() + 1 == pytest.approx(1.0 / SAME_POSE_RAD, rel=0.2)
 
 
-def test_a_million_poses_of_a_slow_path_are_sorted_without_all_their_pairs():
-    """Of neighbours alone there are 2e10 pairs, more than any memory has."""
-    path = np.linspace(0.0, 1.0, 1_000_000)[:, None] * [1.0, -0.5]
+def test_many_poses_of_a_slow_path_are_sorted_without_all_their_pairs():
+    """Of neighbours alone there are 4e8 pairs, 6 GB."""
+    path = np.linspace(0.0, 1.0, 150_000)[:, None] * [1.0, -0.5]
     found = configurations(path, np.arange(len(path)))
     assert found.max() + 1 == pytest.approx(1.0 / SAME_POSE_RAD, abs=2)

@@ -79,7 +79,7 @@ def test_the_inverse_covariance_is_that_of_the_sum_and_of_its_part():
     assert not part[3].any() and not part[:, 4].any()
 
 
-@pytest.mark.parametrize("shift", [20 * NOISE_M, 1e-2, 1.0, 1e2])
+@pytest.mark.parametrize("shift", [20 * NOISE_M, 1e2])
 def test_a_bad_row_is_named_and_changes_no_verdict(cases, clean, shift):
     found = diagnose(damaged(cases[0], {BAD: shift}), SETTINGS, 1)
     (entry,) = found.document["gross_errors"]

@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from open_alternatives import ELASTIC, LADDER, SETTINGS, diagnosed, keys_like, limits, pieces
 from planted import planted, two_loads_a_pose
 from scipy.stats import binom
@@ -20,6 +21,7 @@ from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import stepped
 
 
+@pytest.mark.slow
 def test_resolved_as_often_as_promised_by_the_whole_engine(ambiguous, proposal, kuka):
     """Exact kinematics, a new fit and a new posterior for 50 experiments.
 

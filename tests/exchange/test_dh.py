@@ -76,7 +76,7 @@ tables = st.lists(st.tuples(angle, length, length, angle, st.sampled_from("RPF")
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(rows=tables, modified=st.booleans())
 def test_any_table_is_where_its_notation_puts_it_and_weighs_there(tmp_path_factory, rows, modified):
     header = "theta_offset,d,a,alpha,type,lower,upper,mass_kg,cx,cy,cz"

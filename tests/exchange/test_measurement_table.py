@@ -54,7 +54,7 @@ def test_ten_times_as_many_poses_take_about_ten_times_as_long_to_number(tmp_path
         rows = "".join(f"{number * 0.1:.1f},1,2,3\n" for number in range(poses))
         assert table(tmp_path, "q1,x,y,z\n" + rows, PLAIN).table["pose"][-1] == poses
 
-    assert growth(lambda: read(3_000), lambda: read(30_000)) < 20
+    assert growth(lambda: read(1_000), lambda: read(10_000)) < 20
 
 
 def test_labels_of_poses_are_numbered_and_numbers_stay(tmp_path):

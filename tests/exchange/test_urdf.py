@@ -129,7 +129,7 @@ def test_millimetres_are_refused(tmp_path):
         robot_from_urdf(path, "a", "b")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(parts=segments)
 def test_any_chain_is_where_pinocchio_has_it_and_weighs_as_much(tmp_path_factory, parts):
     """Each link also carries a bolted part at its side."""

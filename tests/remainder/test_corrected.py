@@ -21,7 +21,7 @@ PLAN = Plan("gaussian_process", blocks=False, within_range=False, seed=1)
 
 @pytest.fixture(scope="module")
 def made(kuka, config_folder, tmp_path_factory):
-    case, held_out = smoothly_wrong_cases(tmp_path_factory.mktemp("corrected"), kuka, config_folder / "robots", poses=150)
+    case, held_out = smoothly_wrong_cases(tmp_path_factory.mktemp("corrected"), kuka, config_folder / "robots", poses=90)
     return case, held_out, fit(case.model, case.observations, NOISE)
 
 

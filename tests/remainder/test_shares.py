@@ -13,7 +13,7 @@ NOISE = Noise("declared", 2e-5, 2e-5, np.zeros(6))
 
 
 def test_shares_add_up_and_the_reduction_is_that_of_the_errors(kuka, config_folder, tmp_path):
-    case, held_out = smoothly_wrong_cases(tmp_path, kuka, config_folder / "robots", poses=100)
+    case, held_out = smoothly_wrong_cases(tmp_path, kuka, config_folder / "robots", poses=60)
     declared = fit(case.model, case.observations, NOISE)
     plan = Plan("gaussian_process", blocks=False, within_range=True, seed=1)
     facts = remainder_facts(plan, declared, declared, case, held_out, np.random.default_rng(1))

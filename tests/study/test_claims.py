@@ -119,10 +119,10 @@ def test_six_dof_needs_more_than_fifty_configurations_for_two_micrometres(table)
     assert found.verdict == FAILS and "kuka 86" in found.ours and found.p == pytest.approx(1 / 9)
 
 
-def test_fanuc_is_better_in_all_figures_only_where_it_is():
-    better = claim(claims_table(evidence()).set_index("claim"), "FANUC is more accurate")
+def test_fanuc_is_better_in_all_figures_only_where_it_is(table):
     worse = claim(claims_table(evidence(studies=studies(1.2))).set_index("claim"), "FANUC is more accurate")
-    assert "in 100 % of the figures" in better.ours and "in 0 % of the figures" in worse.ours
+    assert "in 100 % of the figures" in claim(table, "FANUC is more accurate").ours
+    assert "in 0 % of the figures" in worse.ours
 
 
 def test_what_the_tables_say_is_quoted(table):

@@ -44,12 +44,12 @@ def test_variances_are_those_without_the_measurements_of_the_pose(fanuc):
 
 
 def test_poses_drawn_alike_are_seldom_outside_and_larger_loads_always(fanuc):
-    """Of 180 poses beside 14, 5 % by their angles and 1 in 15 by the variance: 20 expected, 37 four standard errors away.
+    """Of 72 poses beside 14, 5 % by their angles and 1 in 15 by the variance: 8 expected, 19 four standard errors away.
 
-    Three times as many are seen with a power of 0.99.
+    Three times as many are seen with a power of 0.85.
     """
     alike = loaded = count = 0
-    for seed in range(20):
+    for seed in range(8):
         fitted, own, other = fitted_part(fanuc, seed, 14, 9)
         own_variance, variance = predictive_variances(fitted, own, fitted.model, fitted.estimate, other)
         outside = outside_fitted_range(own.states, other.states, own_variance, variance)
@@ -59,7 +59,7 @@ def test_poses_drawn_alike_are_seldom_outside_and_larger_loads_always(fanuc):
         outside = outside_fitted_range(own.states, other.states, own_variance, variance)
         loaded += outside[other.states.load == 1].sum()
         count += 9
-    assert 4 <= alike <= 37
+    assert 1 <= alike <= 19
     # No range of angles tells a load ten times as large.
     assert loaded > 0.9 * count
 

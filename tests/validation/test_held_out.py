@@ -144,6 +144,7 @@ def test_few_poses_have_intervals_of_student(poses):
 
 # Of 400 campaigns: 95 %, less the two points that docs/held_out_intervals.md shows missing, less two standard errors.
 # A share of 0.87, as the percentile bootstrap has for 9 poses, fails with probability 0.98, and always does with this seed.
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "poses"), [("common", 9), ("common", 24), ("uneven", 18)])
 def test_nine_to_some_dozens_of_poses_have_intervals_that_hold(kind, poses):
     truth, hits = true_figures(kind), []

@@ -132,11 +132,9 @@ def _scatter(
 
 def holm(p_values: np.ndarray) -> np.ndarray:
     """p values corrected for their number, ndarray (N,); not a number where there is none."""
-    from statsmodels.stats.multitest import multipletests
-
-    found, there = np.full(len(p_values), np.nan), ~np.isnan(p_values)
-    if there.any():
-        found[there] = multipletests(p_values[there], method="holm")[1]
+    order = np.argsort(p_values)[: np.count_nonzero(~np.isnan(p_values))]
+    found = np.full(len(p_values), np.nan)
+    found[order] = np.minimum(np.maximum.accumulate(p_values[order] * np.arange(len(order), 0, -1)), 1.0)
     return found
 
 

@@ -32,6 +32,7 @@ def calibrated(fanuc):
     return made_calibrated(fanuc, *USUAL)
 
 
+@pytest.mark.slow
 def test_a_robot_that_did_not_change_seldom_seems_changed(calibrated):
     """At 5 % in 80 pairs; 10 or more have a probability of 0.7 % there, and of 0.99 at a rate of 20 %.
 

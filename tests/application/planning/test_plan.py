@@ -29,7 +29,7 @@ def survey():
 
 @pytest.fixture(scope="module")
 def some(survey):
-    return made_candidates(survey, 600)
+    return made_candidates(survey, 300)
 
 
 @pytest.mark.parametrize("kind", ["D", "A", "I"])
@@ -74,7 +74,7 @@ def test_too_few_poses_are_refused_with_how_many_it_takes(survey, some):
     with pytest.raises(InputError, match="at least"):
         choose_plan(survey, some, 2, 5, "D", 1)
     with pytest.raises(InputError, match="more candidates"):
-        choose_plan(survey, some, 598, 5, "D", 1)
+        choose_plan(survey, some, 298, 5, "D", 1)
 
 
 def test_targets_that_no_joint_moves_are_refused(survey, some):
