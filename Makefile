@@ -5,7 +5,7 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper audit test test-slurm fuzz soak mutants lint bench pictures site crate supply dist installed lock clean
+.PHONY: paper audit test test-slow test-slurm fuzz soak mutants lint bench pictures site crate supply dist installed lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
@@ -16,6 +16,11 @@ audit: .venv/ready-for-audit
 
 test: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+
+# Blind rehearsals, planted errors, closed loop, browsers, site: all, or the tenth of a commit: make test-slow SLOW="part --part c0ffee"
+SLOW ?= all
+test-slow: .venv/ready-for-tests
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder -m slow --slow $(SLOW)
 
 # The profile for Slurm on a Slurm of this machine, which the tests start and stop; asks for root.
 test-slurm: .venv/ready-for-tests

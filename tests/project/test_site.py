@@ -16,6 +16,7 @@ from durations import HUNG_S
 from elastocal.command.diagnose import diagnose
 from elastocal.effects.catalogue import effects
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site" / "html"
 CHROMIUM = shutil.which("chromium")
