@@ -16,14 +16,16 @@ from durations import HUNG_S
 from elastocal.command.diagnose import diagnose
 from elastocal.effects.catalogue import effects
 
-pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site" / "html"
 CHROMIUM = shutil.which("chromium")
 PAGES = ("index.html", "docs/tutorial.html", "docs/study.html", "reference/gallery.html", "reference/files/campaign.html")
 BACKGROUND = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
 
-pytestmark = pytest.mark.skipif(not (SITE / "index.html").is_file(), reason="no site: `make site` builds it")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (SITE / "index.html").is_file(), reason="no site: `make site` builds it"),
+]
 
 
 class Links(HTMLParser):
