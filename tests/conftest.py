@@ -1,5 +1,6 @@
 """Fixtures: the robots and strategies of the repository's own config."""
 
+import shutil
 from pathlib import Path
 
 import hypothesis
@@ -92,12 +93,18 @@ def config(config_folder):
     return read_document(config_folder.parent / "config.yaml")
 
 
-@pytest.fixture(scope="module")
-def checkout(tmp_path_factory):
-    """A checkout with the diagnosed campaign ``made`` in it."""
+@pytest.fixture(scope="session")
+def made_checkout(tmp_path_factory):
+    """A checkout with the diagnosed campaign ``made`` in it, to be read."""
     # Imports the whole loop, which few tests need.
     from certified import certified_checkout
 
-    top = tmp_path_factory.mktemp("checkout")
+    top = tmp_path_factory.mktemp("made")
     certified_checkout(top)
     return top
+
+
+@pytest.fixture(scope="module")
+def checkout(made_checkout, tmp_path_factory):
+    """A copy, to be changed by the tests of a file."""
+    return shutil.copytree(made_checkout, tmp_path_factory.mktemp("checkout") / "top", symlinks=True)
