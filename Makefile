@@ -14,17 +14,18 @@ paper: .venv/ready
 audit: .venv/ready-for-audit
 	$(BIN)/snakemake -j$(CORES) audit
 
+# Of the slow tests none: blind proof, planted errors, closed loop, demonstration, tutorial, store, Slurm, wheel and site are in
+# test-slow. CI adds the tenth of a commit: make test SLOW="part --part c0ffee"
+SLOW ?= none
 test: .venv/ready-for-tests
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder --slow $(SLOW)
 
-# Blind rehearsals, planted errors, closed loop, browsers, site: all, or the tenth of a commit: make test-slow SLOW="part --part c0ffee"
-SLOW ?= all
-test-slow: .venv/ready-for-tests
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder -m slow --slow $(SLOW)
+test-slow:
+	$(MAKE) test SLOW="all -m slow"
 
 # The profile for Slurm on a Slurm of this machine, which the tests start and stop; asks for root.
 test-slurm: .venv/ready-for-tests
-	OMP_NUM_THREADS=1 ELASTOCAL_SLURM=1 $(BIN)/python -m pytest -q -rs tests/workflow/test_slurm.py
+	OMP_NUM_THREADS=1 ELASTOCAL_SLURM=1 $(BIN)/python -m pytest -q -rs --slow all tests/workflow/test_slurm.py
 
 # The tests of tests/fuzz with 90 times as many inputs, and others each time: 5 minutes.
 fuzz: .venv/ready-for-tests

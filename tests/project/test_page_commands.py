@@ -184,8 +184,8 @@ def way_of(text):
         return "not ours"
     if re.fullmatch(r"make [\w./-]+", text):
         return "make"
-    # `make test` runs all of them.
-    if (found := re.fullmatch(r"python -m pytest (tests/\S+)", text)) and (ROOT / found[1]).exists():
+    # `make test` and `make test-slow` run all of them.
+    if (found := re.fullmatch(r"python -m pytest (tests/\S+?)( --slow all)?", text)) and (ROOT / found[1]).exists():
         return "script"
     if text.startswith("snakemake "):
         return "dry run"
