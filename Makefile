@@ -5,7 +5,7 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper study audit test test-slurm fuzz soak mutants lint bench pictures site crate supply dist installed lock clean
+.PHONY: paper study audit test test-slow test-slurm fuzz soak mutants lint bench pictures site crate supply dist installed lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
@@ -18,12 +18,18 @@ study: .venv/ready
 audit: .venv/ready-for-audit
 	$(BIN)/snakemake -j$(CORES) audit
 
+# Of the slow tests none: blind proof, planted errors, closed loop, demonstration, tutorial, store, Slurm, wheel and site are in
+# test-slow. CI adds the tenth of a commit: make test SLOW="part --part c0ffee"
+SLOW ?= none
 test: .venv/ready-for-tests
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder --slow $(SLOW)
+
+test-slow:
+	$(MAKE) test SLOW="all -m slow"
 
 # The profile for Slurm on a Slurm of this machine, which the tests start and stop; asks for root.
 test-slurm: .venv/ready-for-tests
-	OMP_NUM_THREADS=1 ELASTOCAL_SLURM=1 $(BIN)/python -m pytest -q -rs tests/workflow/test_slurm.py
+	OMP_NUM_THREADS=1 ELASTOCAL_SLURM=1 $(BIN)/python -m pytest -q -rs --slow all tests/workflow/test_slurm.py
 
 # The tests of tests/fuzz with 90 times as many inputs, and others each time: 5 minutes.
 fuzz: .venv/ready-for-tests

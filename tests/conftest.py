@@ -1,5 +1,6 @@
 """Fixtures: the robots and strategies of the repository's own config."""
 
+import shutil
 from pathlib import Path
 
 import hypothesis
@@ -22,9 +23,23 @@ hypothesis.settings.register_profile(
 hypothesis.settings.load_profile("repeatable")
 
 
-def pytest_collection_modifyitems(items):
-    """Files of minutes first, so that no worker is left alone with one at the end."""
-    items.sort(key=lambda item: item.path.parent.name != "workflow")
+def pytest_addoption(parser):
+    parser.addoption("--slow", choices=["none", "all", "part"], default="none", help="run slow tests: none, all, or a tenth")
+    parser.addoption("--part", default="0", help="hexadecimal number, as of a commit, that chooses the tenth of the slow tests")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Files of minutes first, so that no worker is left alone with one at the end; slow tests where they are asked for.
+
+    A file's tests, which share what they make, stay together: each tenth has every tenth of the slow files.
+    """
+    slow = sorted({item.path for item in items if item.get_closest_marker("slow")})
+    asked, part = config.getoption("slow"), int(config.getoption("part")[:8], 16) % 10
+    chosen = {"none": [], "all": slow, "part": slow[part::10]}[asked]
+    left_out = [item for item in items if item.path not in chosen and item.get_closest_marker("slow")]
+    config.hook.pytest_deselected(items=left_out)
+    kept = [item for item in items if item.path in chosen or not item.get_closest_marker("slow")]
+    items[:] = sorted(kept, key=lambda item: item.path.parent.name != "workflow")
 
 
 def load_robot(key):
@@ -78,12 +93,18 @@ def config(config_folder):
     return read_document(config_folder.parent / "config.yaml")
 
 
-@pytest.fixture(scope="module")
-def checkout(tmp_path_factory):
-    """A checkout with the diagnosed campaign ``made`` in it."""
+@pytest.fixture(scope="session")
+def made_checkout(tmp_path_factory):
+    """A checkout with the diagnosed campaign ``made`` in it, to be read."""
     # Imports the whole loop, which few tests need.
     from certified import certified_checkout
 
-    top = tmp_path_factory.mktemp("checkout")
+    top = tmp_path_factory.mktemp("made")
     certified_checkout(top)
     return top
+
+
+@pytest.fixture(scope="module")
+def checkout(made_checkout, tmp_path_factory):
+    """A copy, to be changed by the tests of a file."""
+    return shutil.copytree(made_checkout, tmp_path_factory.mktemp("checkout") / "top", symlinks=True)

@@ -41,34 +41,24 @@ GLOSSARY = {
 IDENTIFIERS = r"\w*_(said|told)\w*|(said|told|unsaid|saying) \|?= .*|(said|told|unsaid|saying)([\[(]|\.\w|: \w+\[).*"
 
 
-def lines():
-    for name in SEARCHED:
-        top = REPOSITORY / name
-        for path in sorted(top.rglob("*")) if top.is_dir() else [top]:
-            if path.is_file() and path.suffix in KINDS:
-                for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-                    yield f"{path.relative_to(REPOSITORY)}:{number}", line
-
-
 @pytest.fixture(scope="module")
-def text():
-    # The name of a random stream cannot change without changing its numbers.
-    return "\n".join(f"{where}: {line}" for where, line in lines() if "stream(" not in line)
+def texts():
+    """Each file's text by its name."""
+    paths = [path for name in SEARCHED for path in (sorted((REPOSITORY / name).rglob("*")) or [REPOSITORY / name])]
+    return {path: path.read_text(encoding="utf-8") for path in paths if path.is_file() and path.suffix in KINDS}
 
 
-def found_in(text, words):
-    """Lines of the text that have one of the words."""
-    found = re.finditer(rf"(?<![A-Za-z])(?:{words})(?![A-Za-z])", text)
-    starts = sorted({text.rfind("\n", 0, each.start()) + 1 for each in found})
-    return [text[start:].partition("\n")[0][:140] for start in starts]
+def found(pattern, texts):
+    """Lines in which it stands; the name of a random stream cannot change without changing its numbers."""
+    pattern = re.compile(rf"(?<![A-Za-z])(?:{pattern})(?![A-Za-z])")
+    lines = [(path, line) for path, text in texts.items() if pattern.search(text) for line in text.splitlines()]
+    return [f"{path}: {line.strip()[:100]}" for path, line in lines if pattern.search(line) and "stream(" not in line]
 
 
 @pytest.mark.parametrize("banned", GLOSSARY)
-def test_no_word_of_the_private_dialect_comes_back(banned, text):
-    found = found_in(text, banned)
-    assert not found, f"say {GLOSSARY[banned]!r}:\n" + "\n".join(found[:20])
+def test_no_word_of_the_private_dialect_comes_back(banned, texts):
+    assert found(banned, texts) == [], f"say {GLOSSARY[banned]!r}"
 
 
-def test_no_variable_is_named_after_the_act_of_saying(text):
-    found = found_in(text, IDENTIFIERS)
-    assert not found, "say what it is, such as 'verdict', 'stated', 'outcome', 'declared':\n" + "\n".join(found[:20])
+def test_no_variable_is_named_after_the_act_of_saying(texts):
+    assert found(IDENTIFIERS, texts) == [], "say what it is, such as 'verdict', 'stated', 'outcome', 'declared'"

@@ -70,6 +70,7 @@ def test_no_robot_of_the_proof_is_among_the_defaults():
     assert len(chosen["robots"]) * chosen["each"] == 300
 
 
+@pytest.mark.slow
 def test_a_campaign_that_a_reader_takes_is_diagnosed_and_its_rows_go_to_a_file_and_back(tmp_path):
     seed = draw_seeds(KUKA, 1, 1)[0]
     found = compare_verdicts(KUKA, ROBOTS, seed)

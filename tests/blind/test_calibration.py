@@ -99,6 +99,7 @@ def test_calibrated_statements_have_the_error_of_chance_and_overconfident_ones_m
     assert expected_calibration_error(bold, correct) > 0.08
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_error_holds_a_miscalibration_that_is_known():
     """Stated 0.9 and true in 0.8: an error of 0.1, which 100 samples of 400 cases hold in at least 88; the power to see a
     nominal 80 % interval instead is over 95 %."""

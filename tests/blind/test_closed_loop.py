@@ -23,6 +23,8 @@ from elastocal_proof.blind.closed_loop import (
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.blind.rehearsal import hidden_robot
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def table():

@@ -14,6 +14,8 @@ from elastocal.loop.loading import load_campaign
 from elastocal_proof.blind.case_rows import EXACT_ALIASES
 from elastocal_proof.blind.cases import Case, make_case
 
+pytestmark = pytest.mark.slow
+
 _SINE, _ROUNDING = 1e-6, 1e-7
 # Weight acts on the arm as it is bent: of a non-centrality of 200 a share of this, squared, leaves a thousandth.
 _BENT = 2e-3

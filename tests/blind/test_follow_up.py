@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 
+import pytest
 from made_folders import made_folder, made_table
 
 from elastocal_proof.blind.follow_up import ARMS, POSES, diagnosed_anew, diagnosed_until_named, folder_name, followed_up
@@ -65,6 +66,7 @@ def test_each_case_of_a_block_is_diagnosed_anew_in_each_arm(tmp_path):
     assert diagnosed_anew((tmp_path / "nothing").as_posix(), diagnose) == []
 
 
+@pytest.mark.slow
 def test_proposing_and_diagnosing_anew_open_no_sealed_file_and_know_no_plant(kuka, config_folder, tmp_path):
     table = made_table(kuka, "case_1", offset_of_joint_3=6e-4)
     folder = made_folder(tmp_path / "blind" / "case_1", kuka, "case_1", table=table)

@@ -11,6 +11,8 @@ from elastocal_proof.blind.cases import Counts, cases_of, design_of, specimen_of
 from elastocal_proof.blind.limit import limit, log_bayes_factors, signals_of
 from elastocal_proof.plant.defects import KINDS
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = "config/robots"
 SOME = ("force_bias", "joint_tilt", "setup_step", "tracker_scale")
 

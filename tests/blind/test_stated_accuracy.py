@@ -33,6 +33,7 @@ def test_shares_are_of_the_cases_that_a_question_concerns_with_exact_intervals()
     assert share(found, "rms below its 95 % bound", "tracker")["hits"] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", FRAMES)
 def test_the_truth_on_the_plant_is_near_what_is_stated_whether_the_base_is_known_or_not(frame):
     rows = stated_accuracy(ROBOTS / "kuka.yaml", ROBOTS, "link_elasticity", 1827404023, frame)

@@ -45,6 +45,7 @@ def test_designs_differ_in_points_loads_and_reach_of_the_joints():
     np.testing.assert_allclose(schedule_of(arm, narrow, 1).angle.mean(axis=0), (low + high) / 2, atol=0.1 * (high - low).max())
 
 
+@pytest.mark.slow
 def test_the_angle_is_that_to_all_that_the_alternative_can_make():
     """A stiffness that depends on the angle by a phase of its own: of two phases all others are made."""
     case = next(

@@ -76,7 +76,7 @@ def fill(folder, seed):
     sheet.assign(done="x").to_csv(folder / "measurements.csv", index=False)
 
 
-@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True, phases=[Phase.generate])
+@settings(max_examples=3, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True, phases=[Phase.generate])
 @given(calls())
 def test_every_plan_is_a_sheet_that_is_checked_once_it_is_filled(call):
     name, words = call

@@ -35,7 +35,7 @@ def test_rows_fill_one_after_another():
     assert fill_rows([4, 4, 2], 10, gap=0) == [[0, 1, 2]]
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(st.lists(st.floats(0.1, 12), min_size=1, max_size=12), st.floats(0, 3))
 def test_no_row_is_too_wide_and_none_has_room_for_the_next(widths, gap):
     rows = fill_rows(widths, 10.0, gap)

@@ -39,6 +39,10 @@ SMALL = {
     # The loop has tests of its own.
     "loop": {"proposed_states": 2, "campaigns": [], "measured": []},
 }
+# What most tests need of it: the paper's tables and figures of one robot.
+ROBOT, LEVEL = "kuka", "200"
+PAPER = "paper"
+TINY = {"robots": [ROBOT], "strategies": ["6DoF", "4-6DoF-after-3DoF"], "noise_um": [200], "data_sets": 20}
 _JOB = re.compile(r"^(?:local)?rule (\w+):\n(.*?)(?=^\[|^\S|\Z)", re.MULTILINE | re.DOTALL)
 
 
@@ -49,8 +53,8 @@ class Study:
         self.folder = Path(folder)
 
     @classmethod
-    def of_sources(cls, folder):
-        """The repository's sources alone, set to the small study."""
+    def of_sources(cls, folder, changes=None):
+        """The repository's sources alone, set to the small study with `changes`."""
         study = cls(folder)
         study.folder.mkdir(parents=True)
         for name in SOURCES:
@@ -61,7 +65,7 @@ class Study:
                 shutil.copy2(source, study.folder / name)
         if not study.path("README.md").exists():
             study.path("README.md").write_text("# Stand-in\n", encoding="utf-8")
-        study.configure(SMALL)
+        study.configure(SMALL | (changes or {}))
         return study
 
     @classmethod

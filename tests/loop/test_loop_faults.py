@@ -8,6 +8,7 @@ from analysed_robots import ROBOTS
 from loop_scripts import run_loop
 from made_folders import made_folder, made_table
 from scipy.spatial.transform import Rotation
+from selected import slow_but
 
 from elastocal.errors import InputError
 from elastocal.loop.whole import diagnosed
@@ -83,7 +84,10 @@ def check(verdict, name, words):
     assert not [warning for warning in verdict["warnings"] if "times the noise" in warning]
 
 
-@pytest.mark.parametrize("fault", [fault for fault in FAULTS if fault not in REPORTED])
+FAST = ("loads turned", "kilonewtons", "tracker's frame, poses", "z turned", "rows shuffled", "positions constant")
+
+
+@pytest.mark.parametrize("fault", slow_but(FAST, [fault for fault in FAULTS if fault not in REPORTED]))
 def test_a_decisive_fault_ends_in_a_verdict_that_names_it(fault, kuka, tmp_path):
     change, settings, name, words = FAULTS[fault]
     verdict = verdict_of(folder_of(tmp_path / "made", kuka, change, settings))
@@ -99,12 +103,13 @@ def reported(folder, out):
     return json.loads((out / "verdict.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("fault", REPORTED)
+@pytest.mark.parametrize("fault", slow_but(["nonsense"], REPORTED))
 def test_a_decisive_fault_ends_in_a_verdict_and_in_a_report(fault, kuka, tmp_path):
     change, settings, name, words = FAULTS[fault]
     check(reported(folder_of(tmp_path / "made", kuka, change, settings), tmp_path / "out"), name, words)
 
 
+@pytest.mark.slow
 def test_data_that_are_right_end_in_a_verdict_and_in_a_report(kuka, tmp_path):
     verdict = reported(made_folder(tmp_path / "made", kuka), tmp_path / "out")
     assert verdict["probabilities"] is not None and not any(effect["family"] == "data" for effect in verdict["effects"])
@@ -135,6 +140,7 @@ def test_a_target_offset_in_millimetres_is_named(kuka, tmp_path):
         assert all(words in effect["detail"] for effect in faults)
 
 
+@pytest.mark.slow
 def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, tmp_path):
     """Unloaded, each target once in a pose, beside a noise of a decimetre: there is no fault, and nothing shows."""
     table = made_table(kuka, "made")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 from made_folders import PLAN, made_folder, made_table
+from selected import slow_but
 from small_data import service_arm_folder
 
 from elastocal.diagnosis.diagnose import diagnose
@@ -82,7 +83,7 @@ def verdict_of(path, robot, kind):
     return diagnosed(folder_of(path, robot, kind), ROBOTS, 1)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slow_but(["adequate", "several"], KINDS))
 def test_verdict_is(kind, kuka, tmp_path):
     verdict = verdict_of(tmp_path, kuka, kind)
     json.dumps(verdict, allow_nan=False)
@@ -104,6 +105,7 @@ def test_verdict_is(kind, kuka, tmp_path):
         assert heldout["after"] == heldout["before"]
 
 
+@pytest.mark.slow
 def test_the_verdict_is_the_same_for_one_seed(kuka, tmp_path):
     folder = folder_of(tmp_path, kuka, "adequate")
     one, again, other = (diagnosed(folder, ROBOTS, seed) for seed in (7, 7, 9))
@@ -156,6 +158,7 @@ def test_diagnosing_process_opens_no_sealed_file(kuka, tmp_path):
     assert not [path for path in opened if "sealed" in path]
 
 
+@pytest.mark.slow
 def test_a_calibration_by_few_poses_is_no_worse_than_none(tmp_path):
     """Without priors these end at 1.12 times the error of frames alone."""
     ratios = []
@@ -178,6 +181,7 @@ def test_a_lost_beam_changes_nothing_in_what_is_stated_of_the_accuracy(kuka, tmp
     assert stated[1]["accuracy"]["rms_m"] == pytest.approx(stated[0]["accuracy"]["rms_m"], rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "stated"), [("adequate", ["a contradiction"]), ("unexplained", [])])
 def test_what_contradicts_an_adequate_model_is_stated_of_no_other(kind, stated, kuka, tmp_path, monkeypatch):
     """Where an alarm was raised it is the residual that is unexplained, and the report says that."""

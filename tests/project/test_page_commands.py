@@ -184,8 +184,8 @@ def way_of(text):
         return "not ours"
     if re.fullmatch(r"make [\w./-]+", text):
         return "make"
-    # `make test` runs all of them.
-    if (found := re.fullmatch(r"python -m pytest (tests/\S+)", text)) and (ROOT / found[1]).exists():
+    # `make test` and `make test-slow` run all of them.
+    if (found := re.fullmatch(r"python -m pytest (tests/\S+?)( --slow all)?", text)) and (ROOT / found[1]).exists():
         return "script"
     if text.startswith("snakemake "):
         return "dry run"
@@ -250,6 +250,14 @@ def dry_runs():
     return [sorted(plain), *own]
 
 
+def test_targets_are_rules():
+    """Without a plan, which takes seconds."""
+    rules = [path.read_text(encoding="utf-8") for path in (ROOT / "Snakefile", *(ROOT / "workflow" / "rules").glob("*.smk"))]
+    known = {rule for text in rules for rule in re.findall(r"^rule (\w+):", text, re.MULTILINE)}
+    assert {word for word in dry_runs()[0] if re.fullmatch(r"[a-z_]+", word)} - known == set()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("words", dry_runs(), ids=" ".join)
 def test_snakemake_knows_its_targets(words, tmp_path):
     """A dry run: what the targets cost is minutes to hours, and others test what their jobs do."""
@@ -257,6 +265,7 @@ def test_snakemake_knows_its_targets(words, tmp_path):
     assert ran.returncode == 0, ran.stdout + ran.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", STORIES)
 def test_a_how_to_page_works_from_top_to_bottom(page, tmp_path):
     Study.of_links(tmp_path)

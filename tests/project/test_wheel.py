@@ -75,6 +75,7 @@ def files_of(folder):
     return {path.relative_to(ROOT).as_posix() for path in found if not {"__pycache__"} & set(path.parts)}
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline(wheel):
     packages = {name.removeprefix("src/") for name in files_of("src") if ".egg-info/" not in name}
     pipeline = (
@@ -90,6 +91,7 @@ def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline(wheel):
     assert held == packages | pipeline
 
 
+@pytest.mark.slow
 def test_the_wheel_says_whose_it_is_and_which(wheel):
     with zipfile.ZipFile(wheel) as archive:
         (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
@@ -106,6 +108,7 @@ def test_the_version_stands_in_one_place():
     assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "elastocal.__version__"}
 
 
+@pytest.mark.slow
 def test_a_campaign_is_begun_and_checked_where_there_is_no_checkout(run, tmp_path):
     begun = run("elastocal", "init", "cell", "--robot", ROOT / "config" / "robots" / "ur5.yaml")
     assert begun.returncode == 0, begun.stderr
@@ -116,6 +119,7 @@ def test_a_campaign_is_begun_and_checked_where_there_is_no_checkout(run, tmp_pat
     assert len(checked.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_the_installed_pipeline_reads_a_campaign_in_the_working_directory(installed, run, tmp_path, kuka):
     """A robot of config/robots; the first step runs, and what the others read is looked for: a diagnosis takes too long."""
     made_folder(tmp_path / "cell", kuka)

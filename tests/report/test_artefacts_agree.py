@@ -42,6 +42,7 @@ def test_artefacts_of_every_verdict_agree(campaign, kuka, pictures, tmp_path, mo
     assert_agree(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not DIAGNOSED, reason="no campaign is diagnosed in this checkout")
 @pytest.mark.parametrize("report", DIAGNOSED, ids=lambda path: path.parent.name)
 def test_artefacts_of_the_campaigns_in_this_checkout_agree(report):

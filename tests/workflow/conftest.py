@@ -1,11 +1,11 @@
-"""A small study and a small proof, run once for all workers, and a folder of its own for each test that changes something."""
+"""A small study, made once for all workers, and a folder of its own for each test that changes something."""
 
 import fcntl
 import os
 import shutil
 
 import pytest
-from study_folder import Study
+from study_folder import PAPER, TINY, Study
 
 
 def made_once(factory, name, changes, *arguments):
@@ -20,16 +20,27 @@ def made_once(factory, name, changes, *arguments):
         done = study.folder.with_suffix(".done")
         if not done.exists():
             shutil.rmtree(study.folder, ignore_errors=True)
-            Study.of_sources(study.folder).configure(changes)
-            study.run(*arguments)
+            Study.of_sources(study.folder, changes).run(*arguments)
             done.touch()
     return study
 
 
 @pytest.fixture(scope="session")
+def paper(tmp_path_factory):
+    """Tables and figures of the paper for one robot, finished."""
+    return made_once(tmp_path_factory, "paper", TINY, PAPER)
+
+
+@pytest.fixture
+def finished_paper(paper, tmp_path):
+    """A copy, to be changed."""
+    return paper.copied_to(tmp_path / "study")
+
+
+@pytest.fixture(scope="session")
 def small_study(tmp_path_factory):
-    """The finished small study."""
-    return made_once(tmp_path_factory, "small", {})
+    """The whole study of two robots, finished: for slow tests."""
+    return made_once(tmp_path_factory, "small", {}, PAPER, "study")
 
 
 @pytest.fixture(scope="session")
@@ -46,5 +57,5 @@ def finished(small_study, tmp_path):
 
 @pytest.fixture
 def unstarted(tmp_path):
-    """The sources of the small study and nothing else, to be changed."""
-    return Study.of_sources(tmp_path / "study")
+    """The sources and nothing else, to be changed."""
+    return Study.of_sources(tmp_path / "study", TINY)

@@ -1,7 +1,14 @@
-"""README's way from a URDF to a corrected robot is the script that CI runs."""
+"""README's way from a URDF to a corrected robot is the script that a slow test runs, and the demonstration goes it by itself."""
 
+import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
+
+import pytest
+from study_folder import Study
 
 from elastocal.command.main import app
 
@@ -41,3 +48,31 @@ def test_options_of_the_readme_are_those_of_the_script():
         used[named(words)] |= {word for word in words if word.startswith("--")}
     for words in commands(readme):
         assert {word for word in words if word.startswith("--")} <= used[named(words)], words
+
+
+WAYS = {
+    "demo": ("elastocal", "demo", "campaigns/demo", "--no-open"),
+    "kr16": ("workflow/examples/afternoon.sh", "campaigns/kr16"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("campaign", WAYS)
+def test_the_whole_way_ends_with_a_certificate(campaign, tmp_path):
+    Study.of_links(tmp_path)
+    binaries = Path(sys.executable).parent
+    (tmp_path / ".venv").symlink_to(binaries.parent)
+    environment = os.environ | {"PATH": f"{binaries}:{os.environ['PATH']}", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(WAYS[campaign], cwd=tmp_path, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    reports = tmp_path / "reports" / "loop" / campaign
+    assert all((reports / name).stat().st_size for name in ("report.pdf", "certificate.pdf"))
+    assert json.loads((reports / "verdict.json").read_text(encoding="utf-8"))["effects"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path(os.environ.get("ELASTOCAL_DATA", "nowhere")).is_dir(), reason="no measured data: ELASTOCAL_DATA")
+def test_a_campaign_of_other_people_and_a_sample_of_the_league(tmp_path):
+    study = Study.of_links(tmp_path)
+    study.run("reports/loop/fanuc_cpa/report.pdf", "league_small", "--config", "league={folds: 2}")
+    assert study.path("reports/league/small/league.csv").stat().st_size

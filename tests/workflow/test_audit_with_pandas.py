@@ -17,12 +17,12 @@ def run(folder, text):
     return subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, check=False)
 
 
-def test_three_numbers_of_table_4_follow_from_raw_data(small_study):
-    done = run(small_study.folder, code())
+def test_three_numbers_of_table_4_follow_from_raw_data(paper):
+    done = run(paper.folder, code())
     assert done.returncode == 0, done.stderr
     assert "import elastocal" not in code() and len([line for line in code().splitlines() if line.strip()]) <= 20
 
 
-def test_another_number_is_noticed(small_study):
+def test_another_number_is_noticed(paper):
     changed = code().replace("k_sigma_20_percent, rtol", "dev_20_um, rtol")
-    assert changed != code() and run(small_study.folder, changed).returncode != 0
+    assert changed != code() and run(paper.folder, changed).returncode != 0

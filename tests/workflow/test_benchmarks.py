@@ -10,6 +10,7 @@ import pytest
 from durations import HUNG_S
 from study_folder import REPOSITORY
 
+pytestmark = pytest.mark.slow
 BENCHMARKS = REPOSITORY / "benchmarks"
 RUN = runpy.run_path(str(BENCHMARKS / "run.py"))
 

@@ -2,6 +2,7 @@
 
 import pytest
 
+pytestmark = pytest.mark.slow
 BLIND = ("blind", "--config", "blind=smoke")
 # All that an analyst does: none of these may have a truth among its inputs.
 ANALYSIS = {"diagnose_cases", "propose_follow_ups", "diagnose_follow_ups"}

@@ -1,32 +1,37 @@
-"""Results in another folder than the sources, as in a container: `snakemake --snakefile ELSEWHERE/Snakefile`."""
+"""Results in another folder than the sources, as in a container, and jobs on a cluster: every target lays out its jobs."""
+
+import re
 
 from snakemake_starts import started
 
 TARGETS = (
-    "study",
     "paper",
+    "study",
     "extended_study",
     "loop",
     "measured",
+    "league",
     "blind",
     "closed_loop",
     "bad_rows",
     "planning",
     "audit",
-    "crate",
 )
 
 
-def test_every_target_finds_its_sources_and_its_configuration(unstarted, tmp_path):
+def test_every_target_finds_its_sources_and_its_jobs_can_be_grouped(unstarted, tmp_path):
+    """The profile for Slurm lays out groups, which needs no Slurm: no group waits for jobs that wait for it."""
     place = tmp_path / "results of mine"
     place.mkdir()
-    command = unstarted.command("-n", "--quiet", "--snakefile", str(unstarted.path("Snakefile")), "--", *TARGETS)
-    done = started(**command | {"cwd": place})
+    where = "--snakefile", str(unstarted.path("Snakefile")), "--profile", str(unstarted.path("profiles/slurm"))
+    done = started(**unstarted.command("-n", "-p", *where, "--", *TARGETS, "crate") | {"cwd": place})
     assert done.returncode == 0, done.stderr[-3000:]
+    laid_out = set(re.findall(r"^(\w+) +\d+$", done.stdout, re.MULTILINE))
+    assert {"seal_cases", "compile_report", "tabulate_league", "summarize_closed_loop", "write_crate"} <= laid_out
 
 
-def test_the_paper_is_its_tables_and_figures_alone(unstarted):
-    rules = {job[0] for job in unstarted.planned("paper")}
+def test_the_paper_is_its_tables_and_figures_alone(paper):
+    rules = {job[0] for job in paper.planned("paper", "--forceall")}
     assert {"typeset_table", "tabulate_strategies", "draw_noise_impact", "draw_deviations", "draw_scheme"} <= rules
-    beyond = {"repeat_studies", "compare_point_sets", "judge_claims", "compile_report", "diagnose_campaign", "simulate_designs"}
+    beyond = {"repeat_studies", "compare_point_sets", "judge_claims", "diagnose_campaign", "simulate_designs"}
     assert not rules & beyond

@@ -17,6 +17,7 @@ from durations import HUNG_S
 from foreign_robots import SEVEN, SIX, foreign_urdf, mesh
 from study_folder import REPOSITORY, Study
 
+pytestmark = pytest.mark.slow
 # What docs/closed_loop.md holds the corrected robot to, of what noise and repeatability leave.
 OVER_FLOOR = 1.2
 TARGETS = {"A": "0.06,0,0.02", "B": "-0.05,0.05,0", "C": "-0.03,-0.06,0.04"}

@@ -20,11 +20,7 @@ stages:
   - {points: [5DoF], joints: [1, 2, 3, 4, 5]}
   - {points: [6DoF], joints: [6], held: [1, 2, 3, 4, 5]}
 """
-TWO_AND_SIX = """\
-name: 2+6DoF comb
-stages:
-  - {points: [2DoF, 6DoF], joints: [1, 2, 3, 4, 5, 6]}
-"""
+pytestmark = pytest.mark.slow
 TABLE4, PER_DATA_SET = "reports/tables/table4.csv", "reports/tables/per_dataset.csv"
 
 
@@ -41,7 +37,7 @@ def test_another_robot_strategy_and_noise_level_make_a_study_of_their_own(unstar
     add(unstarted, "config/robots/ur10.yaml", UR10)
     add(unstarted, "config/strategies/6DoF-after-5DoF.yaml", SIX_AFTER_FIVE)
     unstarted.configure({"robots": ["ur10"], "strategies": ["6DoF", "6DoF-after-5DoF"], "noise_um": [12.5, 200]})
-    unstarted.run()
+    unstarted.run("paper", "study")
     assert set(table(unstarted, "reports/tables/table1.csv").robot) == {"ur10"}
     table4 = table(unstarted, TABLE4)
     assert set(zip(table4.robot, table4.strategy, strict=True)) == {("ur10", "6DoF"), ("ur10", "6DoF after 5DoF")}
@@ -51,24 +47,6 @@ def test_another_robot_strategy_and_noise_level_make_a_study_of_their_own(unstar
     }
     assert unstarted.path("results/identified/ur10/12.5um/6DoF-after-5DoF.parquet").exists()
     assert unstarted.path("reports/study.pdf").exists()
-
-
-def test_an_added_robot_runs_no_job_of_the_others(finished):
-    add(finished, "config/robots/ur10.yaml", UR10)
-    finished.configure({"robots": ["kuka", "kuka_extended", "ur10"]})
-    data = {"draw_experiments", "simulate", "measure"}
-    grid = data | {"judge_design", "identify", "bound", "summarize_initial", "compare_solvers"}
-    planned = {job for job in finished.planned() if job[0] in grid}
-    assert {job[0] for job in planned} == grid
-    assert {job[1] for job in planned} == {"ur10"}
-
-
-def test_an_added_strategy_runs_no_job_of_the_others(finished):
-    add(finished, "config/strategies/2+6DoF-comb.yaml", TWO_AND_SIX)
-    finished.configure({"strategies": ["6DoF", "4-6DoF-after-3DoF", "3+6DoF-comb", "2+6DoF-comb"]})
-    planned = finished.planned()
-    assert {job[-1] for job in planned if job[0] in ("judge_design", "identify")} == {"2+6DoF-comb"}
-    assert {job[0] for job in planned}.isdisjoint({"draw_experiments", "simulate", "measure", "summarize_initial"})
 
 
 # Beside each switch, the first step whose results it changes: the steps before it have nothing to do.
@@ -89,28 +67,19 @@ SWITCHES = {
 STEPS = ["draw_experiments", "simulate", "measure", "identify", "tabulate_strategies"]
 
 
-@pytest.fixture(scope="module")
-def tiny_study(small_study, tmp_path_factory):
-    """The small study with fewer cells, finished as far as Table 4."""
-    study = small_study.copied_to(tmp_path_factory.mktemp("tiny") / "study")
-    study.configure({"robots": ["kuka"], "strategies": ["6DoF", "3+6DoF-comb"], "noise_um": [200]})
-    study.run(TABLE4)
-    return study
-
-
 @pytest.mark.parametrize("switch", SWITCHES)
-def test_a_switch_runs_and_changes_the_results(switch, tiny_study, tmp_path):
+def test_a_switch_runs_and_changes_the_results(switch, paper, tmp_path):
     """Where the wrench acts is a question of partial points alone."""
     changes, first = SWITCHES[switch]
-    study = tiny_study.copied_to(tmp_path / "study")
+    study = paper.copied_to(tmp_path / "study")
     study.configure(changes)
     ran = study.run(TABLE4).stderr
     for step in STEPS:
         assert bool(re.search(rf": {step}\b", ran)) == (STEPS.index(step) >= STEPS.index(first)), step
-    before, after = table(tiny_study, TABLE4), table(study, TABLE4)
+    before, after = table(paper, TABLE4), table(study, TABLE4)
     assert list(before.columns) == list(after.columns)
     assert (before.strategy == after.strategy).all()
     measure = "dev_20_um" if "deviation" in switch else "k_sigma_20_percent"
     assert np.isfinite(after[measure]).all()
     changed = set(before.strategy[before[measure] != after[measure]])
-    assert changed == ({"3+6DoF comb"} if "wrench_at" in switch else {"6DoF", "3+6DoF comb"})
+    assert changed == ({"4-6DoF after 3DoF"} if "wrench_at" in switch else {"6DoF", "4-6DoF after 3DoF"})

@@ -12,10 +12,13 @@ from durations import HUNG_S
 from slurm_on_one_machine import NODES, ended_jobs, missing, slurm_on_one_machine
 from study_folder import REPOSITORY, Study
 
-pytestmark = pytest.mark.skipif(
-    os.environ.get("ELASTOCAL_SLURM") != "1" or bool(missing()),
-    reason=f"no Slurm: {missing() or 'ELASTOCAL_SLURM=1 starts one'}",
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        os.environ.get("ELASTOCAL_SLURM") != "1" or bool(missing()),
+        reason=f"no Slurm: {missing() or 'ELASTOCAL_SLURM=1 starts one'}",
+    ),
+]
 # Without a database of accounts squeue is what knows of jobs; a cluster of one machine answers at once.
 ONE_MACHINE = (
     *("--slurm-no-account", "--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2"),

@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "faults"))
 
 from soak import contents, ended_by_itself, files_made, killed, killed_for_sure, part_of_the_study
 
+pytestmark = pytest.mark.slow
 MEASURED = ("data/simulated/kuka/200um/measured.parquet", "data/simulated/kuka/0um/measured.parquet")
 
 

@@ -11,6 +11,7 @@ import pytest
 from durations import HUNG_S
 from moto.server import ThreadedMotoServer
 
+pytestmark = pytest.mark.slow
 BUCKET, FOLDER, BLIND = "results", "of/study/", "of/blind/"
 STORE = ("store", "--config", f"store=s3://{BUCKET}/{FOLDER.rstrip('/')}")
 # Python imports this before all else: nothing finds the plugin.
