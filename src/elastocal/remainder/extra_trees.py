@@ -5,16 +5,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sklearn.ensemble import ExtraTreesRegressor
+import numpy as np
 
 from elastocal.remainder.protocol import Prediction
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    import numpy as np
+    from sklearn.tree import ExtraTreeRegressor
 
     from elastocal.remainder.protocol import Inputs, Predictor, Setting
 
@@ -26,12 +27,13 @@ SETTINGS: Sequence[Setting] = tuple(
 )
 
 
-class _Predictor:
-    def __init__(self, trees: ExtraTreesRegressor) -> None:
-        self._trees = trees
+@dataclass(frozen=True)
+class _Forest:
+    trees: list[ExtraTreeRegressor]
 
     def __call__(self, inputs: Inputs) -> Prediction:
-        return Prediction(self._trees.predict(inputs.columns))
+        columns = inputs.columns.astype(np.float32)
+        return Prediction(np.mean([tree.predict(columns, check_input=False) for tree in self.trees], axis=0))
 
 
 def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
@@ -39,5 +41,13 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
 
     `inputs`, `residual`, `settings`, `seed`: as in `protocol.Regression`.
     """
+    # Most of what needs the catalogue grows no tree.
+    from sklearn.tree import ExtraTreeRegressor
+
+    columns, target = inputs.columns.astype(np.float32), np.ascontiguousarray(residual)
     for setting in settings:
-        yield _Predictor(ExtraTreesRegressor(_TREES, random_state=seed, **setting).fit(inputs.columns, residual))
+        # One by one: a forest would look at the same inputs again for each of its trees.
+        draws = np.random.RandomState(seed)
+        seeds = [draws.randint(np.iinfo(np.int32).max) for _ in range(_TREES)]
+        grown = [ExtraTreeRegressor(random_state=each, **setting) for each in seeds]
+        yield _Forest([tree.fit(columns, target, check_input=False) for tree in grown])

@@ -2,21 +2,17 @@
 
 Its variance far from all of them is that of the residuals themselves, so that what it has not seen it calls unknown [1].
 
-[1] Rasmussen, C. E. and Williams, C. K. I., Gaussian Processes for Machine Learning, chapters 2 and 5, MIT Press, 2006.
+[1] Rasmussen, C. E. and Williams, C. K. I., Gaussian Processes for Machine Learning, chapters 2, 4 and 5, MIT Press, 2006.
 """
 
 from __future__ import annotations
 
-import warnings
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.feature_selection import VarianceThreshold
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import StandardScaler
+from scipy.linalg import blas, lapack
+from scipy.optimize import Bounds, minimize
 
 from elastocal.remainder.protocol import Prediction
 
@@ -33,24 +29,47 @@ SETTINGS: Sequence[Setting] = ({},)
 _MOST_FOR_HYPERPARAMETERS = 300
 # Of so many the covariance matrix takes 1.2 GB; of more, so many are drawn.
 _MOST = 12_000
-# In standard deviations of each input: from wiggles between neighbours to one trend across all poses.
-_LENGTHS = (0.05, 100.0)
+# Variance of the process, lengths in standard deviations of each input, from wiggles between neighbours to one trend across all
+# poses, and variance of the noise: where the search starts, and its bounds.
+_VARIANCE, _LENGTH, _NOISE = (1.0, 1e-3, 1e3), (1.0, 0.05, 100.0), (0.5, 1e-4, 10.0)
+# Of the variances: added to the diagonal, so that rounding leaves it positive definite.
+_JITTER = 1e-10
 # An input that differs by less than this over all poses says nothing: rad, N, m, s, degC.
 _STILL = 1e-10
-# At once, when a prediction asks for its covariances with all poses.
-_PREDICTED_AT_ONCE = 2_000
+# Rows of a covariance matrix that are made at once.
+_AT_ONCE = 2_000
 
 
-class _Predictor:
-    def __init__(self, scaling: Pipeline, process: GaussianProcessRegressor) -> None:
-        self._scaling, self._process = scaling, process
+@dataclass(frozen=True)
+class _Process:
+    """A process with the observations that it was fitted to.
+
+    `logarithms`: of variance, lengths and noise. `taken`, `middle`, `spread`: inputs that count, their means and standard
+    deviations. `scaled` (N, k): inputs over their lengths. `mean`, `size` (3,): of the residuals. `lower` (N, N): Cholesky
+    factor of the covariance. `along` (N, 3): inverse of the covariance times residuals of mean 0 and size 1.
+    """
+
+    logarithms: np.ndarray
+    taken: np.ndarray
+    middle: np.ndarray
+    spread: np.ndarray
+    scaled: np.ndarray
+    mean: np.ndarray
+    size: np.ndarray
+    lower: np.ndarray
+    along: np.ndarray
 
     def __call__(self, inputs: Inputs) -> Prediction:
-        scaled = self._scaling.transform(inputs.columns)
-        parts = [scaled[start : start + _PREDICTED_AT_ONCE] for start in range(0, len(scaled), _PREDICTED_AT_ONCE)]
-        found = [self._process.predict(part, return_std=True) for part in parts]
-        mean, std = (np.concatenate(values) for values in zip(*found, strict=True))
-        return Prediction(mean, std)
+        variance, lengths, noise = _parted(self.logarithms)
+        scaled = (inputs.columns[:, self.taken] - self.middle) / self.spread / lengths
+        mean, left = np.empty((len(scaled), 3)), np.empty(len(scaled))
+        for first in range(0, len(scaled), _AT_ONCE):
+            some = slice(first, first + _AT_ONCE)
+            across = variance * _matern(scaled[some], self.scaled)[0]
+            mean[some] = across @ self.along
+            explained = blas.dtrsm(1.0, self.lower, across.T, lower=1, overwrite_b=1)
+            left[some] = variance + noise - (explained**2).sum(axis=0)
+        return Prediction(mean * self.size + self.mean, np.sqrt(np.maximum(left, 0.0))[:, None] * self.size)
 
 
 def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
@@ -58,16 +77,84 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
 
     `inputs`, `residual`, `settings`, `seed`: as in `protocol.Regression`. Yields with standard deviations.
     """
-    draws = np.random.default_rng(seed)
-    scaling = make_pipeline(VarianceThreshold(_STILL**2), StandardScaler()).fit(inputs.columns)
-    scaled = scaling.transform(inputs.columns)
-    kernel = ConstantKernel(1.0, (1e-3, 1e3)) * Matern(np.ones(scaled.shape[1]), _LENGTHS, nu=2.5)
-    kernel += WhiteKernel(0.5, (1e-4, 10.0))
+    draws, columns = np.random.default_rng(seed), inputs.columns
+    taken = np.flatnonzero(columns.std(axis=0) > _STILL)
+    middle, spread = columns[:, taken].mean(axis=0), columns[:, taken].std(axis=0)
+    scaled = (columns[:, taken] - middle) / spread
     few, many = (np.sort(draws.permutation(len(scaled))[:most]) for most in (_MOST_FOR_HYPERPARAMETERS, _MOST))
+    ranges = np.log([_VARIANCE, *[_LENGTH] * len(taken), _NOISE])
     for _ in settings:
-        with warnings.catch_warnings():
-            # A length at its bound is an input without influence, not a failure.
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            found = GaussianProcessRegressor(kernel, normalize_y=True).fit(scaled[few], residual[few]).kernel_
-        process = GaussianProcessRegressor(found, optimizer=None, normalize_y=True).fit(scaled[many], residual[many])
-        yield _Predictor(scaling, process)
+        of_few = _standardized(residual[few])[0]
+        # A length at its bound is an input without influence, not a failure.
+        start, limits = ranges[:, 0], Bounds(*ranges[:, 1:].T)
+        found = minimize(_surprise, start, args=(scaled[few], of_few), method="L-BFGS-B", jac=True, bounds=limits).x
+        variance, lengths, noise = _parted(found)
+        places, (standard, mean, size) = scaled[many] / lengths, _standardized(residual[many])
+        covariance = np.empty((len(many),) * 2, order="F")
+        for first in range(0, len(many), _AT_ONCE):
+            covariance[:, first : first + _AT_ONCE] = variance * _matern(places, places[first : first + _AT_ONCE])[0]
+        np.einsum("ii->i", covariance)[:] += noise + _JITTER
+        lower = lapack.dpotrf(covariance, lower=1, overwrite_a=1)[0]
+        along = lapack.dpotrs(lower, standard, lower=1)[0]
+        yield _Process(found, taken, middle, spread, places, mean, size, lower, along)
+
+
+def _standardized(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    mean, size = residual.mean(axis=0), residual.std(axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    return (residual - mean) / size, mean, size
+
+
+def _parted(logarithms: np.ndarray) -> tuple[float, np.ndarray, float]:
+    """Variance, lengths and variance of the noise."""
+    values = np.exp(logarithms)
+    return float(values[0]), values[1:-1], float(values[-1])
+
+
+def _matern(some: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Matérn's correlation of order 5/2, and the slope by which it falls with half of a squared distance: ndarray (N, M)."""
+    square = some @ others.T
+    square *= -2.0
+    square += (some**2).sum(axis=1)[:, None]
+    square += (others**2).sum(axis=1)
+    square *= 5.0
+    np.maximum(square, 0.0, out=square)
+    root = np.sqrt(square)
+    falling = np.exp(-root)
+    root += 1.0
+    root *= falling
+    square *= falling
+    square /= 3.0
+    square += root
+    root *= 5.0 / 3.0
+    return square, root
+
+
+def _surprise(logarithms: np.ndarray, inputs: np.ndarray, standard: np.ndarray) -> tuple[float, np.ndarray]:
+    """Minus the logarithm of the marginal likelihood of all axes, and its gradient: equations 5.8 and 5.9 of [1].
+
+    A length moves the covariance by a product of the slope and squared differences of one input, whose sum over all pairs is a
+    product of matrices.
+
+    `inputs` (N, k). `standard` (N, 3): residuals of mean 0 and size 1.
+    """
+    variance, lengths, noise = _parted(logarithms)
+    (count, axes), scaled = standard.shape, inputs / lengths
+    correlation, slope = _matern(scaled, scaled)
+    covariance = variance * correlation
+    covariance[np.diag_indices(count)] = variance + noise + _JITTER
+    lower, failed = lapack.dpotrf(covariance.T, lower=1, overwrite_a=1)
+    if failed:
+        return np.inf, np.zeros(len(logarithms))
+    along = lapack.dpotrs(lower, standard, lower=1)[0]
+    value = 0.5 * (standard * along).sum() + axes * (np.log(np.diag(lower)).sum() + 0.5 * count * np.log(2.0 * np.pi))
+    inverse = lapack.dpotri(lower, lower=1, overwrite_c=1)[0]
+    # LAPACK leaves the other triangle as it was.
+    inverse = np.tril(inverse)
+    inverse += np.tril(inverse, -1).T
+    inverse *= -axes
+    inverse += along @ along.T
+    of_noise, of_variance = noise * np.trace(inverse), variance * np.vdot(inverse.T, correlation)
+    slope *= inverse
+    of_lengths = 2.0 * variance * (slope.sum(axis=1) @ scaled**2 - (scaled * (slope @ scaled)).sum(axis=0))
+    return float(value), -0.5 * np.array([of_variance, *of_lengths, of_noise])
