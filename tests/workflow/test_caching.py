@@ -19,7 +19,7 @@ SCRIPTS = sorted(
     if path.read_text(encoding="utf-8").splitlines()[-1].startswith("run(")
 )
 DATA = {"draw_experiments", "simulate", "measure"}
-GRID = DATA | {"judge_design", "identify"}
+GRID = DATA | {"identify"}
 STAGED = "4-6DoF-after-3DoF"
 
 
@@ -73,7 +73,7 @@ EDITS = {
     "library": (_another_numpy, None, {"typeset_table"}, set()),
     "points of a strategy": (
         lambda study: study.replace(f"config/strategies/{STAGED}.yaml", "points: [3DoF]", "points: [2DoF, 3DoF]"),
-        {("judge_design", ROBOT, STAGED), ("identify", ROBOT, LEVEL, STAGED)},
+        {("identify", ROBOT, LEVEL, STAGED)},
         {"tabulate_strategies", "typeset_table"},
         {"tabulate_initial", "tabulate_compliances", "draw_scheme"},
     ),
