@@ -1,5 +1,5 @@
-"""The diagnosing engine: a fit against one dense least-squares problem of its size, a case of the blind proof, growth with rows,
-and campaigns of thousands and a million measurements.
+"""The diagnosing engine: a fit against one dense least-squares problem of its size, a case of the blind proof, growth with
+rows, and campaigns of thousands and a million measurements.
 
 A case and a large campaign are diagnosed and judged by a process of their own, from folder to verdict, which notes its peak
 memory at the end (Linux).
@@ -59,7 +59,7 @@ print(json.dumps({"seconds": seconds, "peak_gb": peak, "measurements": len(train
 
 @dataclass(frozen=True)
 class Setting:
-    """Numbers of measurements of a fit, repetitions, cases, rows of UR10 Series A (None: all), of two campaigns and of a large one."""
+    """Measurements of a fit, repetitions, cases, rows of UR10 Series A (None: all), of two campaigns and of a large one."""
 
     fitted: int
     repetitions: int
