@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import gamma
+from scipy.special import gammaincinv
 
 from elastocal.application.calibrated import forward, pose_sensitivities, square_root
 from elastocal.mechanics.kinematics import jacobians
@@ -300,7 +300,7 @@ def quantile_of_length(covariance: np.ndarray) -> np.ndarray:
     variance = 2.0 * (covariance**2).sum(axis=(1, 2))
     safe = np.where(mean > 0.0, mean, 1.0)
     shape = np.where(mean > 0.0, safe**2 / np.where(variance > 0.0, variance, 1.0), 1.5)
-    return np.sqrt(gamma.ppf(CONFIDENCE, shape) * mean / shape)
+    return np.sqrt(gammaincinv(shape, CONFIDENCE) * mean / shape)
 
 
 def root_mean_square(displacement: np.ndarray) -> float:

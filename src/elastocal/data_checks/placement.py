@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from elastocal.campaigns.groups import groups_of
 from elastocal.fitting.model import declared_model
@@ -129,7 +129,7 @@ def robust_sigma(distance: np.ndarray, components: int) -> float:
     [1] Hampel, F. R., The influence curve and its role in robust estimation, Journal of the American Statistical Association
         69, 1974.
     """
-    return float(np.median(distance) / np.sqrt(chi2.median(components)))
+    return float(np.median(distance) / np.sqrt(2 * gammaincinv(components / 2, 0.5)))
 
 
 def of_each_target(measurements: Measurements) -> list[np.ndarray]:
