@@ -33,7 +33,7 @@ def test_an_angle_is_read_with_its_unit_and_refused_without():
 
 
 def test_numbers_are_counted():
-    assert numbers("--tracker", "1,2.5,-3", 3).tolist() == [1.0, 2.5, -3.0]
+    assert numbers("--tracker", "1,2.5,-3", 3) == [1.0, 2.5, -3.0]
     for text in ("1,2", "1,2,x", "1,2,nan", "1,2,inf", "1,2,1e300"):
         with refused("--tracker", "", "3 numbers"):
             numbers("--tracker", text, 3)

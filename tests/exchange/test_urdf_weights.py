@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from made_urdf import joint, link, written
 
+from elastocal.exchange.mass_deviations import OF_URDF
 from elastocal.exchange.urdf_chain import chain_between
 from elastocal.exchange.urdf_reading import read_urdf
-from elastocal.exchange.urdf_weights import RELATIVE_STD, gravity_in_base, weights_of
+from elastocal.exchange.urdf_weights import gravity_in_base, weights_of
 
 
 def weights(tmp_path, *parts, base="base", tip="hand", **more):
@@ -32,7 +33,7 @@ def test_what_is_bolted_on_weighs_with_the_link_that_carries_it(tmp_path):
         "link": 1,
         "mass_kg": 3.0,
         "centre_m": pytest.approx([(2 * 0.1 + 1) / 3, 0, 0.1]),
-        "relative_std": RELATIVE_STD,
+        "relative_std": OF_URDF,
     }
     assert found.notes == ()
 

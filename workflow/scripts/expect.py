@@ -2,7 +2,8 @@
 
 from job import Job, run
 
-from elastocal.io.data_frames import read_frame
+import numpy as np
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, read_table, write_table
 from elastocal.mechanics.robot import with_target_offset
@@ -26,7 +27,7 @@ def expect(job: Job) -> None:
     noise_free = None
     if job.input.get("noise_free"):
         averaged = [f"compliance_{j + 1}" for j in range(n)]
-        noise_free = read_frame(job.input.noise_free, metrics(n), averaged)[averaged].to_numpy()
+        noise_free = np.stack([*read_table(job.input.noise_free, metrics(n), averaged).values()], axis=1)
     scores = expected_scores(
         read_blocks(job.input.design, design(n)),
         noise_free,

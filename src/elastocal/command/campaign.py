@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
 from typer import Option
 
 from elastocal.command.pipeline import pipeline, workplace
@@ -38,5 +37,7 @@ def diagnosed_campaign(folder: Path, accept_environment: bool = False) -> Diagno
         error = InputError(folder, "", f"results by {there}", allowed)
         if not accept_environment:
             raise error
+        from rich.console import Console
+
         print_lines([f"warning: {error}"], Console(stderr=True))
     return found

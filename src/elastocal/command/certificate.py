@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
@@ -50,6 +49,8 @@ def certificate(
     is predicted to pass or fail; --measured states what was measured.
     """
     from datetime import date as calendar
+
+    from rich.console import Console
 
     from elastocal.application.certificate.use import use_at
     from elastocal.campaigns.reading import read_descriptions

@@ -1,20 +1,24 @@
 """`elastocal check`: what a campaign can show, before it is diagnosed."""
 
+from __future__ import annotations
+
 import json
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline
 from elastocal.command.printed import print_answer, print_lines
 from elastocal.counting import counted, first_names
 from elastocal.errors import escaped
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rich.console import Console
 
 # Parameters that are not identifiable and are named; more would be too many to read.
 _NAMED = 8
@@ -28,6 +32,8 @@ def check(
 
     The exit code is 1 where the data are at fault and cannot be diagnosed.
     """
+    from rich.console import Console
+
     from elastocal.loop.overview import overview
 
     facts = overview(folder, pipeline() / "config" / "robots")
@@ -41,6 +47,8 @@ def check(
 
 def show(facts: Mapping[str, Any], folder: Path, console: Console) -> None:
     """Print what `overview` found: the answer, its table, what asks for attention and what comes next."""
+    from rich.table import Table
+
     print_answer(facts["diagnosable"], answer(facts), [], "", console)
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)

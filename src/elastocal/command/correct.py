@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
-from rich.progress import Progress
 from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
@@ -52,6 +50,8 @@ def correct(
     unknown, in the robot's own frame after its best placement over the campaign's poses.
     """
     import numpy as np
+    from rich.console import Console
+    from rich.progress import Progress
 
     from elastocal.application.accuracy import accuracy_sentence, before_m, millimetres, predict_errors
     from elastocal.application.calibrated import OperatingConditions, assumptions

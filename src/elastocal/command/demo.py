@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline, workplace
@@ -41,6 +40,7 @@ def demo(
     there is one. Nothing but this package is needed.
     """
     import numpy as np
+    from rich.console import Console
 
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_descriptions, read_robot

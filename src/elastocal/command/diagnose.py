@@ -1,21 +1,24 @@
 """`elastocal diagnose`: the Snakemake target of a campaign, with its progress, verdict and report."""
 
+from __future__ import annotations
+
 import re
-import subprocess
 import sys
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from typer import Argument, Option
 
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import print_lines
 from elastocal.command.quantities import MOST_JOBS
 from elastocal.errors import InputError, steering
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rich.console import Console
 
 # What `snakemake_logger_plugin_elastocal` writes when a job starts.
 _JOB = re.compile(r"(\d+) of (\d+): (.+)")
@@ -33,6 +36,10 @@ def diagnose(
 
     The report compares the error before and after on held-out poses. It is the Snakemake target `diagnose` of this campaign.
     """
+    import subprocess
+
+    from rich.console import Console
+
     campaign = str(folder.resolve())
     # Braces are wildcards to Snakemake, the others mapping and comment of YAML.
     if mark := next((mark for mark in ("{", "}", ": ", " #") if mark in campaign), steering(campaign)):
@@ -55,6 +62,8 @@ def follow(lines: Iterable[str], console: Console) -> bool:
 
     Returns whether there was nothing to do, where Snakemake prints no outcome.
     """
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
     current = False
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f} of {task.total:.0f}")
     with Progress(*columns, TimeElapsedColumn(), console=console, transient=True, disable=not console.is_terminal) as progress:

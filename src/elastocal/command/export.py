@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
 from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
@@ -54,6 +53,7 @@ def export(
 
     import numpy as np
     import yaml
+    from rich.console import Console
 
     from elastocal.application.accuracy import accuracy_sentence
     from elastocal.application.calibrated import OperatingConditions

@@ -1,7 +1,7 @@
 """`elastocal import`: what people have, to the files that elastocal reads; robots here, measurements in `import_csv`."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 from typer import Argument, Option
@@ -10,11 +10,7 @@ from elastocal.command.import_csv import csv
 from elastocal.command.printed import example
 from elastocal.command.quantities import LARGEST_RELATIVE_STD
 from elastocal.errors import printable
-from elastocal.exchange import dh as exchange_dh
-from elastocal.exchange import urdf_weights
-from elastocal.exchange.dh_table import DhOptions
-from elastocal.exchange.robot_text import Imported, refuse_existing, summary, write_robot
-from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.exchange.mass_deviations import OF_TABLE, OF_URDF
 
 importing = typer.Typer(name="import", no_args_is_help=True)
 _Output = Annotated[Path, Option("--output", "-o", help="The robot file to write.")]
@@ -41,13 +37,16 @@ def urdf(
         Literal["deg", "rad"] | None,
         Option(help="Unit of the limits of joints that turn; asked for where they look like degrees."),
     ] = None,
-    mass_std: _MassStd = urdf_weights.RELATIVE_STD,
+    mass_std: _MassStd = OF_URDF,
     force: _Force = False,
 ) -> None:
     """Make a robot file of the chain between two links of a URDF.
 
     It has the lengths, the joint limits and the masses of that chain.
     """
+    from elastocal.exchange.robot_text import refuse_existing
+    from elastocal.exchange.urdf import robot_from_urdf
+
     refuse_existing(output, force)
     _write(robot_from_urdf(file, base, tip, point or (), mass_std, limits), output)
 
@@ -62,7 +61,7 @@ def dh(
     decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of a CSV table; a comma has to be stated.")] = None,
     ignore: Annotated[list[str] | None, Option(help="Column to leave out; as often as needed.")] = None,
     name: Annotated[str | None, Option(help="Maker and model. Default: the name of the file.")] = None,
-    mass_std: _MassStd = exchange_dh.RELATIVE_STD,
+    mass_std: _MassStd = OF_TABLE,
     force: _Force = False,
 ) -> None:
     """Make a robot file of a Denavit-Hartenberg table.
@@ -77,15 +76,21 @@ def dh(
 
     2, 0, 0, -0.425, 0, R
     """
+    from elastocal.exchange.dh import robot_from_dh
+    from elastocal.exchange.dh_table import DhOptions
+    from elastocal.exchange.robot_text import refuse_existing
+
     refuse_existing(output, force)
     options = DhOptions(angles, lengths, decimal, tuple(ignore or ()))
-    _write(exchange_dh.robot_from_dh(file, modified, options, name, mass_std), output)
+    _write(robot_from_dh(file, modified, options, name, mass_std), output)
 
 
 importing.command(epilog=example("elastocal import csv tracker.csv --folder campaigns/cell --target SMR1"))(csv)
 
 
-def _write(result: Imported, output: Path) -> None:
-    """Write the robot file, and print what was read."""
+def _write(result: Any, output: Path) -> None:
+    """Write the robot file of `robot_text.Imported`, and print what was read."""
+    from elastocal.exchange.robot_text import summary, write_robot
+
     write_robot(result, output)
     typer.echo("\n".join(map(printable, [*summary(result), f"written: {output.as_posix()}"])))

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Annotated
 
-from rich.console import Console
 from typer import Argument, Option
 
 from elastocal.command.printed import print_answer
@@ -18,6 +17,8 @@ def init(
 
     campaign.yaml explains every key; measurements.csv has its header alone. No file that exists is replaced.
     """
+    from rich.console import Console
+
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV, PARQUET
     from elastocal.campaigns.reading import read_robot

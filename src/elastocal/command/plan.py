@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from rich.console import Console
 from typer import Argument, Option
 
 from elastocal.command.printed import print_answer
@@ -87,6 +86,8 @@ def plan(**words: Any) -> None:
     The chosen poses and loads determine the robot's parameters best, among those that the arm, the cell and the tracker allow.
     plan.pdf is the sheet to take to the cell.
     """
+    from rich.console import Console
+
     from elastocal.application.planning.sheet import sheet
     from elastocal.campaigns.measurements import CSV
 
@@ -114,6 +115,8 @@ plan.__signature__ = inspect.signature(_Options, eval_str=True)  # type: ignore[
 
 def _read_task(options: _Options) -> _Task:
     """The task that the options state; the first that is wrong is refused by its name."""
+    import numpy as np
+
     from elastocal.application.inverse_kinematics import reach_m
     from elastocal.application.planning.cell import RADIUS_SHARE, Cell
     from elastocal.application.planning.criteria import CRITERIA
@@ -129,12 +132,12 @@ def _read_task(options: _Options) -> _Task:
     targets = _read_targets(options.target or [arm.chain.end_effector.name], arm.chain)
     noise = _read_noise(options.noise, options.orientation_noise, sensor, measured)
     survey = Survey(arm, targets, not options.base_known, measured, loads.shares, *noise)
-    boxes = tuple(numbers("--box", text, 6).reshape(3, 2) for text in options.box or ())
+    boxes = tuple(np.reshape(numbers("--box", text, 6), (3, 2)) for text in options.box or ())
     for corner in boxes:
         if (corner[:, 0] >= corner[:, 1]).any():
             allowed = "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max"
             raise InputError("--box", "", str(corner.ravel().tolist()), allowed)
-    tracker = None if options.tracker is None else numbers("--tracker", options.tracker, 3)
+    tracker = None if options.tracker is None else np.array(numbers("--tracker", options.tracker, 3))
     accuracy = None if options.accuracy is None else length_m("--accuracy", options.accuracy)
     return _Task(survey, Cell(boxes, tracker, RADIUS_SHARE * reach_m(arm)), loads, sensor, accuracy)
 
@@ -244,7 +247,7 @@ def _read_targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
             raise InputError("--target", "", *fault)
         if name in found:
             raise InputError("--target", "", f"{name!r} twice", f"a name for each target, such as A:{point} and B:{point}")
-        at = tuple(numbers("--target", offset, 3, FARTHEST_TARGET_M).tolist()) if equals else None
+        at = tuple(numbers("--target", offset, 3, FARTHEST_TARGET_M)) if equals else None
         found[name] = Target(name, point, at)
     return tuple(found.values())
 

@@ -4,8 +4,6 @@ import math
 import re
 from collections.abc import Mapping
 
-import numpy as np
-
 from elastocal.errors import InputError
 
 _METRES = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
@@ -44,13 +42,13 @@ def _quantity(option: str, text: str, units: Mapping[str, float], bounds: tuple[
     return value
 
 
-def numbers(option: str, text: str, count: int, largest: float = _FARTHEST_PLACE_M) -> np.ndarray:
+def numbers(option: str, text: str, count: int, largest: float = _FARTHEST_PLACE_M) -> list[float]:
     """So many numbers separated by commas, metres, each of at most a size; anything else is refused."""
     try:
-        found = np.array([float(part) for part in text.split(",")])
+        found = [float(part) for part in text.split(",")]
     except ValueError:
-        found = np.zeros(0)
+        found = []
     # Not a number is no more than anything either.
-    if len(found) != count or not (np.abs(found) <= largest).all():
+    if len(found) != count or not all(abs(number) <= largest for number in found):
         raise InputError(option, "", repr(text), f"{count} numbers separated by commas, each up to {largest:g} m")
     return found

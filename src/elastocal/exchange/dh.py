@@ -25,14 +25,13 @@ import numpy as np
 from elastocal.errors import InputError
 from elastocal.exchange.dh_table import AS_STATED, FIXED, PRISMATIC, REVOLUTE, DhOptions, DhRow, read_dh_table
 from elastocal.exchange.fixed_transforms import displacement_words, elementary, shift_word, turn_word
+from elastocal.exchange.mass_deviations import OF_TABLE
 from elastocal.exchange.robot_text import Imported, check_imported, mass_entries
 from elastocal.exchange.ros_kinematics import KINEMATICS, robot_from_kinematics
 from elastocal.exchange.urdf_chain import point_name
 from elastocal.io.documents import read_document
 from elastocal.mechanics.usual_values import UNLIMITED_DEG
 
-# A table with masses is a maker's or was identified; a tenth is what such masses are known to at best.
-RELATIVE_STD = 0.1
 END = "flange"
 _DECIMALS = 9
 # Calibrated tables have lengths along nearly parallel axes, by hundreds of metres, that cancel.
@@ -47,7 +46,7 @@ def robot_from_dh(
     modified: bool = False,
     options: DhOptions = AS_STATED,
     name: str | None = None,
-    relative_std: float = RELATIVE_STD,
+    relative_std: float = OF_TABLE,
 ) -> Imported:
     """The robot of a Denavit-Hartenberg table, or of a YAML file of `ros_kinematics`.
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.exchange.dh_table import MOST_TURNS
+from elastocal.exchange.mass_deviations import OF_URDF
 from elastocal.exchange.robot_text import Imported, check_imported
 from elastocal.exchange.urdf_chain import chain_between
 from elastocal.exchange.urdf_reading import Joint, Urdf, read_urdf
-from elastocal.exchange.urdf_weights import RELATIVE_STD, gravity_in_base, weights_of
+from elastocal.exchange.urdf_weights import gravity_in_base, weights_of
 from elastocal.mechanics.usual_values import UNLIMITED_DEG
 
 # Limits to a billionth of a degree, or to a nanometre.
@@ -28,7 +29,7 @@ def robot_from_urdf(
     base: str,
     tip: str,
     points: Sequence[str] = (),
-    relative_std: float = RELATIVE_STD,
+    relative_std: float = OF_URDF,
     limits_in: str | None = None,
 ) -> Imported:
     """The robot between two links of a URDF.

@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 
 from elastocal.counting import first_names
+from elastocal.exchange.mass_deviations import OF_URDF
 from elastocal.exchange.robot_text import mass_entries
 from elastocal.exchange.urdf_chain import Carried, UrdfChain, joints_above, parent_joints
 from elastocal.exchange.urdf_reading import Urdf
 from elastocal.mechanics.robot import STANDARD_GRAVITY
 
-# A URDF does not say where its masses come from: of a drawing without cables, grease and covers, or guessed. Where dynamic
-# parameters of robots were identified, masses and centres of such models were off by a tenth to a third.
-RELATIVE_STD = 0.2
 # Of gravity, m/s².
 _DECIMALS = 9
 # So many links of a robot never weigh the same.
@@ -33,7 +31,7 @@ class Weights:
     notes: tuple[str, ...]
 
 
-def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD) -> Weights:
+def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = OF_URDF) -> Weights:
     """Masses and centres of what each joint carries; `relative_std` is how well they are known."""
     moments: dict[int, np.ndarray] = {}
     at_zero, passive = set(), set()
