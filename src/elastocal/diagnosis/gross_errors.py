@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import lapack, solve_triangular
-from scipy.stats import chi2
-from scipy.stats import f as f_distribution
+from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
 from elastocal.diagnosis.linearize import prior_deviations
@@ -114,7 +113,7 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
         volume = np.concatenate([line.log_volume(pose_rad) for line in lines]).mean()
         rows = fitted.model.rows
         # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
-        spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(chi2.median(rows)), 1.0))
+        spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0))
         best = min(best, (spread, Yardstick(replace(noise, pose_rad=pose_rad), covariance)), key=lambda each: each[0])
     return best[1]
 
@@ -199,7 +198,9 @@ def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: S
     """
     ordered = np.sort(np.where(kept, distance, np.inf))
     usual = ordered[(np.array(_SCALE_QUANTILES) * (len(ordered) - 1)).astype(int)]
-    scale = np.max(usual[np.isfinite(usual)] / np.sqrt(chi2.ppf(_SCALE_QUANTILES, rows))[np.isfinite(usual)], initial=1.0)
+    scale = np.max(
+        usual[np.isfinite(usual)] / np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))[np.isfinite(usual)], initial=1.0
+    )
     inside = distance <= scale * _limit(len(distance), rows, settings)
     if inside.mean() < 1.0 - settings.gross_error_share:
         return distance / scale, np.zeros(len(distance), bool)
@@ -214,7 +215,7 @@ def _limit(count: int, rows: int, settings: Settings, freedom: float = np.inf) -
     ``freedom`` is that of the scale: infinite where it is known.
     """
     level = settings.gross_error_level / count
-    return float(np.sqrt(chi2.isf(level, rows) if np.isinf(freedom) else rows * f_distribution.isf(level, rows, freedom)))
+    return float(np.sqrt(chdtri(rows, level) if np.isinf(freedom) else rows * fdtri(rows, freedom, 1.0 - level)))
 
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
@@ -241,7 +242,7 @@ def held_out_gross_errors(
     distance, gross = beyond_chance(distance, model.rows, every, settings)
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
-        least = max(least, float(np.median(distance[outside])) / np.sqrt(chi2.median(model.rows)))
+        least = max(least, float(np.median(distance[outside])) / np.sqrt(2 * gammaincinv(model.rows / 2, 0.5)))
     far = distance > least * _limit(len(distance), model.rows, settings)
     return Deviations(residual, distance, gross & (far | ~outside))
 

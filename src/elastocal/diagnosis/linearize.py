@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from elastocal.counting import counted
 from elastocal.diagnosis import other
@@ -151,7 +151,7 @@ def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Sett
 
     Returns (number of units,) of int: place among the sizes; their number where even the largest is too small to be seen.
     """
-    critical = chi2.isf(settings.alarm_level / max(len(units), 1), 1)
+    critical = chdtri(1, settings.alarm_level / max(len(units), 1))
     grams = (statistics.gram[0][np.ix_(unit.columns, unit.columns)] for unit in units)
     largest = np.array([np.linalg.eigvalsh(gram)[-1] for gram in grams])
     return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
