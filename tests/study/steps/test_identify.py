@@ -82,24 +82,6 @@ def test_nothing_is_identified_where_the_design_is_empty_and_everything_elsewher
         np.testing.assert_array_equal(np.isnan(table[f"c{joint}"]), empty)
 
 
-def test_the_deflections_of_each_point_stand_beside_the_experiments_of_their_block():
-    experiments = [{"data_set": np.array([n])} for n in (0, 1)]
-    deflections = {name: [{"dx": np.array([10.0 * n + k])} for n in (0, 1)] for k, name in enumerate(("A", "B"))}
-    found = list(paired_blocks(experiments, deflections))
-    assert [block["data_set"][0] for block, _ in found] == [0, 1]
-    assert [{name: part["dx"][0] for name, part in seen.items()} for _, seen in found] == [
-        {"A": 0.0, "B": 1.0},
-        {"A": 10.0, "B": 11.0},
-    ]
-
-
-def test_tables_with_another_number_of_blocks_are_not_paired():
-    one, two = [{}], [{}, {}]
-    for experiments, seen in ((one, {"A": two}), (two, {"A": two, "B": one})):
-        with pytest.raises(ValueError, match="zip"):
-            list(paired_blocks(experiments, seen))
-
-
 def test_designs_with_another_number_of_blocks_are_not_used(kuka, strategies):
     experiments = experiments_of(kuka, sets=1)
     blocks = paired_blocks(experiments, {"6DoF": deflections_of(kuka, experiments)["6DoF"]})
