@@ -156,29 +156,12 @@ def test_file_that_is_no_table_is_refused(cell, text, key, words):
         read_campaign(cell.folder, cell.robots)
 
 
-def test_parquet_that_cannot_be_read_is_refused(cell):
-    cell.write()
-    (cell.folder / "measurements.csv").rename(cell.folder / "measurements.parquet")
-    with refused((cell.folder / "measurements.parquet").as_posix(), "", "no readable Parquet file"):
-        read_campaign(cell.folder, cell.robots)
-
-
 def test_a_column_that_parquet_has_twice_is_refused_with_the_file_named(cell):
     cell.write("parquet")
     path = cell.folder / "measurements.parquet"
     table = pq.read_table(path)
     pq.write_table(table.append_column("x", table["x"]), path)
     with refused(path.as_posix(), "header", "column 'x' twice", "each column once"):
-        read_campaign(cell.folder, cell.robots)
-
-
-def test_parquet_whose_text_is_no_utf8_is_refused(cell):
-    cell.write("parquet")
-    names = pa.array([b"\xd8"] * len(cell.table["pose"]), pa.binary())
-    broken = pa.Array.from_buffers(pa.string(), len(names), names.buffers())
-    path = cell.folder / "measurements.parquet"
-    pq.write_table(pa.table(cell.table | {"target": broken}), path)
-    with refused(path.as_posix(), "", "no readable Parquet file"):
         read_campaign(cell.folder, cell.robots)
 
 

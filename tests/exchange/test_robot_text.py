@@ -35,13 +35,6 @@ def test_the_head_says_where_it_came_from_and_what_it_lacks(result):
     assert keys == ["name", "joint_names", "chain", "joint_limits_deg", "masses"]
 
 
-def test_the_name_of_a_file_cannot_leave_the_comment(tmp_path):
-    path = tmp_path / "a\nname: other\n.urdf"
-    path.write_text("")
-    text = robot_text(check_imported(DOCUMENT, path, "by hand", ()))
-    assert yaml.safe_load(text) == DOCUMENT
-
-
 def test_what_was_read_is_told_in_a_few_lines(result):
     told = summary(result)
     assert told[0] == result.origin and "by hand" in told[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from elastocal.study.costs import break_even_table, configurations_needed, cost_table, find_needed_by_set
+from elastocal.study.costs import break_even_table, configurations_needed, cost_table
 
 POINT_SETS = {"one": ["A"], "two": ["A", "B"], "useless": ["A", "A"]}
 LENGTHS = np.arange(1, 101)
@@ -56,9 +56,3 @@ def test_the_cheapest_set_changes_at_its_break_even(weights):
         cheapest[0.0] == "one" and cheapest.iloc[-1] == "two" and table.groupby("configuration_cost").cheapest.sum().eq(1).all()
     )
     assert table[table.points == "one"].ratio.eq(1.0).all()
-
-
-def test_a_set_that_was_not_measured_is_left_out(weights):
-    some = frame()
-    found = find_needed_by_set(some[some.points != "two"], POINT_SETS, 60.0, weights["arm"])
-    assert set(found) == {"one", "useless"} and found["one"].shape == (21,)

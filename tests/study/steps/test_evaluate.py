@@ -3,7 +3,6 @@
 from itertools import pairwise
 
 import numpy as np
-import pytest
 from made_study_blocks import (
     CONFIGURATIONS_OF_THE_TEST,
     deflections_of,
@@ -62,25 +61,3 @@ def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
     assert metrics["trustworthy"].all() and not metrics["nonpositive_share"].any()
     assert replicates["replicate"].tolist() == np.repeat(range(1, 11), 2).tolist()
     np.testing.assert_allclose(replicates["k_sigma"], np.tile([-300.0, -120.0], 10), rtol=1e-12)
-
-
-def test_a_quarter_too_large_leaves_about_a_quarter_of_the_deflection_and_twice_as_large_all_of_it(kuka):
-    scores = judge(kuka)
-    metrics, _, accuracy = evaluated_in_one_block(make_same_estimates(kuka, (2.0, 1.25)), scores, (0,), "stiffness", 10, [1, 2])
-    # The deflection is linear in the compliances to second order in turns of some milliradians.
-    np.testing.assert_allclose(metrics["deviation"] / metrics["initial_deviation"], [1.0, 0.25], rtol=0.01)
-    np.testing.assert_allclose(accuracy["mean"], metrics["deviation"], rtol=1e-9)
-    np.testing.assert_allclose(accuracy["max"] / scores.initial_errors.max(), [1.0, 0.25], rtol=0.02)
-
-
-def test_accuracy_is_of_the_lengths_asked_for_and_of_no_others(kuka):
-    table = make_same_estimates(kuka, (2.0, 1.5, 1.25, 1.1))
-    accuracy = evaluated_in_one_block(table, judge(kuka), (0,), "compliance", 10, [4, 2])[2]
-    assert accuracy["length"].tolist() == [4, 2]
-    np.testing.assert_allclose(accuracy["relative_error_3"], [10.0, 50.0], rtol=1e-9)
-
-
-def test_weights_with_another_number_of_blocks_are_not_used(kuka):
-    *counts, tests = weight_blocks("kuka", 1, 12, CONFIGURATIONS_OF_THE_TEST, 10)
-    with pytest.raises(ValueError, match="zip"):
-        evaluate_strategy([], counts, tests, judge(kuka), (0,), "stiffness", "averaged_model", [1])

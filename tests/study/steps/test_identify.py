@@ -14,7 +14,6 @@ from made_study_blocks import (
 
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.steps.columns import to_deflections
-from elastocal.study.steps.identify import paired_blocks
 
 
 @pytest.mark.parametrize("at", AT)
@@ -78,21 +77,3 @@ def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_af
     table = identified(kuka, strategies["6DoF"], [experiments], deflections_of(kuka, [experiments]), start=start)
     for joint in range(1, 7):
         np.testing.assert_array_equal(np.isnan(table[f"c{joint}"]), empty)
-
-
-def test_the_deflections_of_each_point_stand_beside_the_experiments_of_their_block():
-    experiments = [{"data_set": np.array([n])} for n in (0, 1)]
-    deflections = {name: [{"dx": np.array([10.0 * n + k])} for n in (0, 1)] for k, name in enumerate(("A", "B"))}
-    found = list(paired_blocks(experiments, deflections))
-    assert [block["data_set"][0] for block, _ in found] == [0, 1]
-    assert [{name: part["dx"][0] for name, part in seen.items()} for _, seen in found] == [
-        {"A": 0.0, "B": 1.0},
-        {"A": 10.0, "B": 11.0},
-    ]
-
-
-def test_tables_with_another_number_of_blocks_are_not_paired():
-    one, two = [{}], [{}, {}]
-    for experiments, seen in ((one, {"A": two}), (two, {"A": two, "B": one})):
-        with pytest.raises(ValueError, match="zip"):
-            list(paired_blocks(experiments, seen))
