@@ -308,16 +308,3 @@ def test_the_import_closure_is_what_a_script_loads(script, small_study, loaded):
     scripts = small_study.path("workflow/scripts")
     found = closure(scripts / script, small_study.path("src"))
     assert [file.relative_to(small_study.folder).as_posix() for file in found] == loaded[script]
-
-
-def test_the_identification_job_starts_without_what_it_does_not_need(finished):
-    finished.append(
-        "workflow/scripts/identify.py",
-        "\nimport sys as _sys\n\nwith open('loaded.txt', 'w') as _file:\n    print(*_sys.modules, file=_file)\n",
-    )
-    forced = "-j1", "--force", "results/identified/kuka/200um/4-6DoF-after-3DoF.parquet"
-    # By a process of its own: those that are forked have other people's modules from the start.
-    subprocess.run(**finished.command(*forced), check=True, capture_output=True, timeout=HUNG_S)
-    names = {name.split(".")[0] for name in finished.path("loaded.txt").read_text(encoding="utf-8").split()}
-    assert {"numpy", "pyarrow", "elastocal"} <= names
-    assert not names & {"scipy", "matplotlib", "jsonschema", "yaml"}
