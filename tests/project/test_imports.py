@@ -54,3 +54,18 @@ def test_help_is_given_without_anything_that_computes():
     found = loaded(_HELP.format(commands=commands))
     assert "elastocal.command.main" in found
     assert not found & (_OF_STUDY - {"typer"} | {"numpy", "pyarrow", "scipy"})
+
+
+def test_a_table_is_written_and_read_without_pandas(tmp_path):
+    """PyArrow would import it for the first array, and where it turns one into numpy's."""
+    found = loaded(f"""
+import numpy as np
+from elastocal.io.storage import Column, TableSchema, read_table, write_table
+kinds = {{"int32": [1, 2], "float64": [0.5, 2.0], "float32": [0.5, 2.0], "bool": [True, False], "string": ["µ", "b"]}}
+schema = TableSchema("made", tuple(Column(name, name, "", "made") for name in kinds))
+write_table({str(tmp_path / "made.parquet")!r}, schema, [kinds], {{"robot": "kuka"}})
+read = read_table({str(tmp_path / "made.parquet")!r}, schema)
+assert {{name: values.tolist() for name, values in read.items()}} == kinds
+""")
+    assert "elastocal.io.storage" in found
+    assert not found & _OF_STUDY
