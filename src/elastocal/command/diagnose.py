@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -36,8 +37,6 @@ def diagnose(
 
     The report compares the error before and after on held-out poses. It is the Snakemake target `diagnose` of this campaign.
     """
-    import subprocess
-
     from rich.console import Console
 
     campaign = str(folder.resolve())
