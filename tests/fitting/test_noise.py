@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import optimize
 from scipy.optimize import brentq, check_grad
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
@@ -197,13 +198,13 @@ def test_declared_noise_is_checked_against_repeats_which_are_used(fanuc, factor,
 @pytest.mark.parametrize("rows", [3, 6])
 def test_derivatives_of_the_likelihood_agree_with_differences(fanuc, rows, monkeypatch):
     seen = {}
-    real = noise_module.minimize
+    real = optimize.minimize
 
     def spy(function, start, data, *rest, **options):
         seen.update(function=function, start=start, data=data)
         return real(function, start, data, *rest, **options)
 
-    monkeypatch.setattr(noise_module, "minimize", spy)
+    monkeypatch.setattr(optimize, "minimize", spy)
     noise_from_repeats(*drawn(fanuc, 2, poses=8, joint_rad=2e-5, rows=rows))
     at = seen["start"] + np.random.default_rng(3).normal(0, 0.2, len(seen["start"]))
     slope = seen["function"](at, *seen["data"])[1]
