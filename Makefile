@@ -114,6 +114,7 @@ clean:
 .venv/ready: requirements.lock pyproject.toml | .venv/made
 	$(INSTALL) --no-deps --require-hashes -r requirements.lock
 	$(INSTALL) --no-deps --no-build-isolation -e .
+	$(BIN)/python -m compileall -q src
 	touch $@
 
 # What the audit needs besides.

@@ -82,7 +82,7 @@ ELSEWHERE = {
         '("-m", "zipfile", "-e", "reports/sources.zip", ".")',
     ),
     "python workflow/check_crate.py": ("tests/workflow/test_crate.py", 'REPOSITORY / "workflow" / "check_crate.py"'),
-    "snakemake --report report.html": ("tests/workflow/test_snakemake_report.py", 'snakemake("--report", str(path))'),
+    "snakemake --report report.html": ("tests/workflow/test_snakemake_report.py", '"--report", str(path))'),
     # Minutes of measurement: CI runs them in a small setting.
     **{
         f"python benchmarks/{script}{options}": ("tests/workflow/test_benchmarks.py", f'ended("{script}", ')

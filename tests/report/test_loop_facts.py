@@ -1,6 +1,7 @@
 """What the report of a campaign states fits together, is said in words that people know, and compiles, whatever the verdict."""
 
 import json
+import shutil
 from importlib import resources
 
 import pytest
@@ -86,9 +87,10 @@ def test_a_fault_of_the_data_is_no_effect():
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory):
     """One in the place of each."""
-    path = tmp_path_factory.mktemp("figures") / "before_after.pdf"
-    save(before_after(step_rows(), 5e-5), str(path), str(path.with_suffix(".png")))
-    return 5 * [str(path)]
+    folder = tmp_path_factory.mktemp("figures")
+    names = [str(folder / f"{name}.pdf") for name in ("before_after", "arrows", "residuals", "candidates", "confounding")]
+    save(before_after(step_rows(), 5e-5), names[0], str(folder / "before_after.png"))
+    return [names[0], *(shutil.copy(names[0], name) for name in names[1:])]
 
 
 @pytest.fixture
