@@ -41,6 +41,7 @@ def test_pages_and_document_are_written_beside_the_report(issued):
     assert document["conformity"]["decision"] in result.output
 
 
+@pytest.mark.slow
 def test_a_joint_that_slipped_between_two_campaigns_is_seen(run, checkout, tmp_path):
     certified_checkout(checkout, "later", 2e-3)
     result = run(checkout / "later", "--tolerance", "0.5mm", "--compare", checkout / "made", "--output", tmp_path / "out")
@@ -124,6 +125,7 @@ def test_a_prediction_that_fails_exits_with_1(run, checkout, tmp_path):
     assert result.exit_code == 1 and result.output.startswith("! fail") and "Nobody has measured" in result.output
 
 
+@pytest.mark.slow
 def test_a_stated_use_is_what_is_judged_and_denies_a_pass_where_it_lies_beyond_what_was_fitted(
     run, checkout, corrected, tmp_path
 ):

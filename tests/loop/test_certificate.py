@@ -1,7 +1,5 @@
 """Contents of a certificate: those of the report where both state them, and what is wanted of it."""
 
-import hashlib
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -44,15 +42,6 @@ def test_a_certificate_passes_below_and_fails_above_what_is_predicted(found, che
         assert certificate(checkout / "made", ROBOTS, diagnosed, wanted)[0]["conformity"]["decision"] == decision
 
 
-def test_it_states_what_it_is_of(found, checkout, diagnosed):
-    document = found[0]
-    assert (document["serial"], document["date"], document["campaign"]) == ("SN 7", "2026-11-23", "made")
-    assert document["files"]["campaign.yaml"] == hashlib.sha256((checkout / "made" / "campaign.yaml").read_bytes()).hexdigest()
-    assert document["origin"] == diagnosed.origin and document["origin"]["commit"] == "c0ffee"
-    assert set(document["versions"]) == {"elastocal", "numpy", "scipy", "python"}
-    json.dumps(document, allow_nan=False)
-
-
 def test_the_worst_pose_is_the_one_of_the_largest_predicted_error(found):
     document = found[0]
     # The largest of many random errors is larger than what any one pose is expected to have.
@@ -72,8 +61,3 @@ def test_a_campaign_compared_with_itself_has_not_changed(found):
     comparison = found[0]["comparison"]
     assert comparison["campaign"] == "made" and comparison["rms_m"] == 0.0 and comparison["p_value"] == 1.0
     assert comparison["changes"][0]["before"] == comparison["changes"][0]["after"]
-
-
-def test_the_same_seed_gives_the_same_certificate(found, checkout, diagnosed):
-    again, _ = certificate(checkout / "made", ROBOTS, diagnosed, WANTED, diagnosed)
-    assert again == found[0]
