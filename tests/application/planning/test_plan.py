@@ -32,7 +32,7 @@ def some(survey):
     return made_candidates(survey, 300)
 
 
-@pytest.mark.parametrize("kind", ["D", "A", "I"])
+@pytest.mark.parametrize("kind", ["D", pytest.param("A", marks=pytest.mark.slow), "I"])
 def test_a_plan_is_better_than_random_designs(survey, some, kind):
     plan = choose_plan(survey, some, 16, 5, kind, 1)
     assert plan.accuracy_m[-1] < np.quantile(plan.random_m[:, -1], 0.5)
