@@ -1,7 +1,5 @@
 """The use of a robot: wanted poses are corrected, and those beyond what was fitted or out of reach are named."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from made_calibrated import USUAL, made_calibrated
@@ -31,13 +29,3 @@ def test_poses_within_what_was_fitted_are_corrected_and_not_beyond(kuka, calibra
     used = use_at(calibrated, states, path_at(calibrated, angles, np.zeros(6)))
     assert not used.outside.any()
     assert np.abs(kuka.model_angles(used.reported_angles) - angles).max() < 0.02
-
-
-@pytest.mark.parametrize("fault", ["a load beyond", "out of reach"])
-def test_a_load_beyond_and_a_pose_out_of_reach_lie_outside(kuka, calibrated, fault):
-    states = planted(kuka, {}, seed=1, poses=20).observations.states
-    wrench = np.array([0.0, 0.0, -1e5, 0.0, 0.0, 0.0]) if fault == "a load beyond" else np.zeros(6)
-    wanted = path_at(calibrated, states.joint_angles[:2], wrench)
-    if fault == "out of reach":
-        wanted = replace(wanted, position=wanted.position + 50.0)
-    assert use_at(calibrated, states, wanted).outside.all()
