@@ -40,7 +40,7 @@ _JITTER = 1e-10
 # An input that differs by less than this over all poses says nothing: rad, N, m, s, degC.
 _STILL = 1e-10
 # Rows of a covariance matrix that are made at once.
-_AT_ONCE = 2_000
+_AT_ONCE = 500
 
 
 @dataclass(frozen=True)
