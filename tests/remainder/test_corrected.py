@@ -11,7 +11,9 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.prediction import target_points
 from elastocal.mechanics.kinematics import poses
-from elastocal.remainder.corrected import Plan, corrected, inputs_of
+from elastocal.remainder import corrected as judged
+from elastocal.remainder.corrected import Plan, inputs_of
+from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_errors
 from elastocal.validation.placing import placed
 
@@ -23,6 +25,10 @@ PLAN = Plan("gaussian_process", blocks=False, within_range=False, seed=1)
 def made(kuka, config_folder, tmp_path_factory):
     case, held_out = smoothly_wrong_cases(tmp_path_factory.mktemp("corrected"), kuka, config_folder / "robots", poses=90)
     return case, held_out, fit(case.model, case.observations, NOISE)
+
+
+def corrected(plan, fitted, case, held_out):
+    return judged.corrected(plan, fitted, case, held_out, outside_poses(fitted, case, held_out))
 
 
 def rms(values):

@@ -15,8 +15,9 @@ NOISE = Noise("declared", 2e-5, 2e-5, np.zeros(6))
 def test_shares_add_up_and_the_reduction_is_that_of_the_errors(kuka, config_folder, tmp_path):
     case, held_out = smoothly_wrong_cases(tmp_path, kuka, config_folder / "robots", poses=60)
     declared = fit(case.model, case.observations, NOISE)
+    inside = np.zeros(held_out.observations.cluster.max() + 1, bool)
     plan = Plan("gaussian_process", blocks=False, within_range=True, seed=1)
-    facts = remainder_facts(plan, declared, declared, case, held_out, np.random.default_rng(1))
+    facts = remainder_facts(plan, declared, declared, case, held_out, inside, np.random.default_rng(1))
     assert facts["physics"] == 0.0
     assert facts["regression_share"] + facts["left"] == pytest.approx(1.0)
     assert facts["regression_share"] > 0.5
@@ -25,4 +26,4 @@ def test_shares_add_up_and_the_reduction_is_that_of_the_errors(kuka, config_fold
     assert 0.85 < facts["covered"] <= 1.0 and facts["half_width_m"]["within"] > 3e-5
     assert facts["rms_ci95_m"][0] < facts["errors"]["rms_m"] < facts["rms_ci95_m"][1]
     trees = Plan("extra_trees", blocks=False, within_range=True, seed=1)
-    assert remainder_facts(trees, declared, declared, case, held_out, np.random.default_rng(1))["covered"] is None
+    assert remainder_facts(trees, declared, declared, case, held_out, inside, np.random.default_rng(1))["covered"] is None

@@ -1,16 +1,19 @@
-"""Errors of poses left out, without fitting again, are those of fits that were made again."""
+"""A model without a part of the poses, by one step that is proved, is that of a fit to the rest from nothing."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from planted import planted
+from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.least_squares import fit
+from elastocal.campaigns.campaign import Target
+from elastocal.fitting.least_squares import evaluated, fit
 from elastocal.fitting.observations import select_states, state_clusters
+from elastocal.fitting.parameters import stepped
 from elastocal.fitting.tolerances import with_size
 from elastocal.validation.held_out import position_residuals
-from elastocal.validation.left_out import certain_loss, left_out_squares
+from elastocal.validation.left_out import certain_loss, left_out_squares, refits
 
 
 def test_left_out_squares_are_those_of_refits(kuka):
@@ -53,3 +56,55 @@ def test_without_anything_to_fit_errors_are_the_residuals(kuka):
     np.testing.assert_allclose(
         left_out_squares(bare, campaign.observations), np.bincount(cluster, squares) / np.bincount(cluster)
     )
+
+
+def loaded_in(robot, loaded, poses=24):
+    """A fit of joint compliances twice the nominal ones to poses of which only some carry a load, and its observations."""
+    targets = [Target(name, robot.chain.end_effector.name, None) for name in "AB"]
+    model = made_model(robot.chain, targets, compliance=robot.compliance, identified=True)
+    states = made_states(6, poses, seed=1)
+    states = replace(states, wrench=np.where(loaded[:, None], states.wrench, 0.0))
+    estimate = replace(made_estimate(model, (0,), seed=2), coefficients=(2.0 * robot.compliance,))
+    seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(3))
+    return fit(model, seen, NOISE), seen
+
+
+def test_what_only_the_part_left_out_identifies_goes_back_to_where_fits_start(fanuc):
+    part = np.arange(24) // 6
+    fitted, seen = loaded_in(fanuc, part == 1)
+    (found,) = fitted.estimate.coefficients
+    assert not fitted.held[-6:].any() and found[0] > 1.9 * fanuc.compliance[0]
+    for number, refit in enumerate(refits(fitted, seen, part)):
+        (without,) = refit.estimate.coefficients
+        if number == 1:
+            np.testing.assert_allclose(without, fanuc.compliance, rtol=1e-12)
+            from_nothing = fit(fitted.model, refit.rest, NOISE).estimate
+            errors = [position_residuals(fitted.model, each, refit.left_out) for each in (refit.there, from_nothing)]
+            np.testing.assert_allclose(*errors, atol=1e-2 * NOISE.position_m)
+            assert np.abs(errors[0]).max() > 10 * NOISE.position_m
+        else:
+            assert without[0] > 1.9 * fanuc.compliance[0]
+
+
+def test_a_step_that_equations_after_it_do_not_prove_is_followed_by_others(fanuc):
+    """From an estimate far off, where what is linear about it says little of the rest."""
+    part = np.arange(24) // 6
+    fitted, seen = loaded_in(fanuc, np.ones(24, bool))
+    off = stepped(fitted.model, fitted.estimate, np.where(np.arange(len(fitted.held)) < 6, 0.3, 0.0))
+    far = evaluated(fitted.model, seen, NOISE, off)
+    for refit, again in zip(refits(far, seen, part), refits(fitted, seen, part), strict=True):
+        errors = [position_residuals(fitted.model, each.there, refit.left_out) for each in (refit, again)]
+        np.testing.assert_allclose(*errors, atol=1e-3 * NOISE.position_m)
+
+
+def test_a_target_that_only_the_part_left_out_shows_is_placed_as_from_nothing(fanuc):
+    part = np.arange(24) // 6
+    fitted, seen = loaded_in(fanuc, np.ones(24, bool))
+    kept = (seen.target != 1) | (part[seen.state] == 2)
+    some = replace(seen, state=seen.state[kept], target=seen.target[kept], position=seen.position[kept])
+    some = replace(some, rotation=None if seen.rotation is None else seen.rotation[kept])
+    fitted = fit(fitted.model, some, NOISE, fitted.estimate)
+    refit = list(refits(fitted, some, part))[2]
+    from_nothing = fit(fitted.model, refit.rest, NOISE).estimate
+    np.testing.assert_array_equal(refit.estimate.target_offset[1], from_nothing.target_offset[1])
+    assert np.abs(refit.estimate.target_offset[1] - fitted.estimate.target_offset[1]).max() > 1e-3

@@ -48,8 +48,9 @@ def test_errors_are_those_of_a_fit_to_the_rest(fanuc):
     for number in range(4):
         rest, left = (select_states(seen, mask) for mask in (part != number, part == number))
         refit = fit(fitted.model, rest, fitted.noise)
-        expected = position_errors(fitted.model, refit.estimate, left).distance
-        np.testing.assert_allclose(found.distance[part[seen.state] == number], expected, rtol=1e-9)
+        expected, mask = position_errors(fitted.model, refit.estimate, left).distance, part[seen.state] == number
+        # A ten thousandth of what the rest leaves unsure of the prediction, and that is less than the noise.
+        np.testing.assert_allclose(found.distance[mask], expected, atol=1e-4 * fitted.noise.position_m)
     np.testing.assert_array_equal(found.cluster, seen.cluster)
 
 

@@ -16,10 +16,9 @@ from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.remainder.catalogue import regressions
 from elastocal.remainder.protocol import Inputs, Part
 from elastocal.remainder.tuning import tuned
-from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_residuals
+from elastocal.validation.left_out import refits
 from elastocal.validation.placing import placed, same_campaign
-from elastocal.validation.splits import refits
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -69,20 +68,21 @@ class Corrected:
     setting: Setting | None
 
 
-def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
+def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case, beyond: np.ndarray) -> Corrected:
     """Predict held-out poses by a model and a regression on what it leaves of the training poses.
 
     The regression's setting and the width of its intervals come from cross-validation of the training poses, with the model
     fitted anew to each of its parts: nested cross-validation [1]. Poses of another campaign have their frames and targets
     fitted to what both leave of them.
 
-    `fitted`: to the training poses. `case`: of the training poses.
+    `fitted`: to the training poses. `case`: of the training poses. `beyond` (P,) of bool: held-out poses outside the range of
+    those fitted, as of `fitted_range.outside_poses`.
 
     [1] Varma, S. and Simon, R., Bias in error estimation when using cross-validation for model selection, BMC Bioinformatics 7,
         2006.
     """
     there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
-    outside, elsewhere = outside_poses(fitted, case, held_out)[there.cluster], not same_campaign(case, held_out)
+    outside, elsewhere = beyond[there.cluster], not same_campaign(case, held_out)
     found = _regression(plan, fitted, case, elsewhere)
     prediction = found.predictor(inputs_of(model, estimate, there, elsewhere))
     mean = np.where(outside[:, None], 0.0, prediction.mean) if plan.within_range else prediction.mean

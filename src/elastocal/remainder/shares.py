@@ -22,19 +22,20 @@ _REPLICATES = 1000
 
 
 def remainder_facts(
-    plan: Plan, declared: Fit, final: Fit, case: Case, held_out: Case, draws: np.random.Generator
+    plan: Plan, declared: Fit, final: Fit, case: Case, held_out: Case, beyond: np.ndarray, draws: np.random.Generator
 ) -> dict[str, Any]:
     """Held-out errors with a regression on what the final model leaves, beside those without.
 
-    `declared`, `final`: to the training poses. `case`: of the training poses. `draws`: of the bootstrap over poses. Returns
-    ``regression``, empty where none helps, and its ``words``; ``errors``, the summary of `held_out.summary` with it;
-    ``rms_ci95_m``; of the squared error that the declared model leaves the shares that effects (``physics``) and the regression
-    (``regression_share``) explain and that is ``left``; ``reduction_ci95`` of the RMS by the regression alone; ``covered``, the
-    share of coordinates inside the stated 95 % intervals, and ``half_width_m``, half of their median width within and outside
-    the range; ``outside``, poses outside the range of those fitted, at which nothing is corrected.
+    `declared`, `final`: to the training poses. `case`: of the training poses. `beyond`: as in `corrected`. `draws`: of the
+    bootstrap over poses. Returns ``regression``, empty where none helps, and its ``words``; ``errors``, the summary of
+    `held_out.summary` with it; ``rms_ci95_m``; of the squared error that the declared model leaves the shares that effects
+    (``physics``) and the regression (``regression_share``) explain and that is ``left``; ``reduction_ci95`` of the RMS by the
+    regression alone; ``covered``, the share of coordinates inside the stated 95 % intervals, and ``half_width_m``, half of
+    their median width within and outside the range; ``outside``, poses outside the range of those fitted, at which nothing is
+    corrected.
     """
     before, after = (position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (declared, final))
-    found = corrected(plan, final, case, held_out)
+    found = corrected(plan, final, case, held_out, beyond)
     with_it = Errors(np.linalg.norm(found.residual, axis=1), before.cluster)
     limits, reductions = intervals([after, with_it], _REPLICATES, draws)
     squares = [float((errors.distance**2).mean()) for errors in (before, after, with_it)]

@@ -10,25 +10,21 @@ all training poses: what is refitted is their size, so the errors carry the sele
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.observations import select_states, state_clusters
-from elastocal.fitting.registration import registered
+from elastocal.fitting.observations import state_clusters
 from elastocal.validation.held_out import Errors, intervals, position_errors, summary
-from elastocal.validation.placing import placed_estimate
+from elastocal.validation.left_out import refits
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from typing import Any
 
     from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Estimate
     from elastocal.fitting.observations import Observations, States
 
 # A quarter of the poses is about the share that campaigns hold out at random, so that both errors come from as many poses.
@@ -62,42 +58,12 @@ def splits_of(states: States) -> list[Split]:
     return [split for split in found if _fewest_left(split, configuration) >= FEWEST_TRAINING_POSES]
 
 
-@dataclass(frozen=True)
-class Refit:
-    """A model fitted without one part of some observations.
-
-    `within` (S,) of bool: states of the part left out. `estimate`: fitted to the rest. `there`: the same for the part left out.
-    """
-
-    within: np.ndarray
-    rest: Observations
-    left_out: Observations
-    estimate: Estimate
-    there: Estimate
-
-
-def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[Refit]:
-    """Fit a model anew without each part of the observations in turn.
-
-    A refit starts from the nominal robot, so that a parameter that only the part left out identifies does not keep its value,
-    and keeps the shapes of the fit. A session that is left out has its frame fitted to itself, see `placing.placed_estimate`.
-
-    `observations`: which it was fitted to, or some of them. `part` (S,) of int: of each state.
-    """
-    for number in np.unique(part):
-        within = part == number
-        rest, left_out = select_states(observations, ~within), select_states(observations, within)
-        start = replace(registered(fitted.model, rest), shapes=fitted.estimate.shapes)
-        refit = fit(fitted.model, rest, fitted.noise, start)
-        yield Refit(within, rest, left_out, refit.estimate, placed_estimate(refit, left_out))
-
-
 def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -> Errors:
     """Position errors of observations, each predicted by a refit without the part that it belongs to.
 
-    Leave-one-block-out cross-validation, see `refits`.
+    Leave-one-block-out cross-validation, see `left_out.refits`.
 
-    `fitted`, `observations`, `part`: as in `refits`.
+    `fitted`, `observations`, `part`: as in `left_out.refits`.
     """
     distance = np.empty(len(observations))
     for refit in refits(fitted, observations, part):

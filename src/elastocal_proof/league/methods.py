@@ -91,12 +91,12 @@ def entered(method: Method, fitted: Fit, case: Case, held_out: Case, split: str,
 
     `fitted`: its physical model, fitted to the training poses. `case`: of the training poses. `split`: one of `folds.SPLITS`.
     """
+    beyond = outside_poses(fitted, case, held_out)
     if method.regression is not None:
         plan = Plan(method.regression, blocks=split != RANDOM, within_range=method.within_range, seed=seed)
-        found = corrected(plan, fitted, case, held_out)
+        found = corrected(plan, fitted, case, held_out, beyond)
         std = np.full_like(found.residual, np.nan) if found.std is None else found.std
         return Entry(held_out.observations, found.residual, std, found.outside, found.setting)
     there = held_out.observations
     residual = position_residuals(*placed(fitted, case, held_out), there)
-    outside = outside_poses(fitted, case, held_out)[there.cluster]
-    return Entry(there, residual, np.full_like(residual, np.nan), outside, None)
+    return Entry(there, residual, np.full_like(residual, np.nan), beyond[there.cluster], None)
