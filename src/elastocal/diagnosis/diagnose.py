@@ -24,6 +24,7 @@ from elastocal.diagnosis.words import hypothesis_words
 from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.observations import sample_of
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.validation.left_out import certain_loss, left_out_squares
@@ -124,20 +125,20 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         # Where all measurements mean something else, no single row is wrong.
         part = fitted_to(case, np.ones(len(case.campaign.measurements), bool))
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
-    found, final, near = None, part.declared, None
+    found, about, near = None, part.declared, None
     errors = Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
-        found, final = _explained(part.case, part.declared, settings, seed, tell, near)
-        errors = gross_errors(final, part.noise, case.campaign.measurements, part.kept, settings)
+        found, about = _explained(part.case, part.declared, settings, seed, tell, near)
+        errors = gross_errors(about, part.noise, case.campaign.measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
         remaining = ~errors.gross | good
         if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
         # The model found looks at all rows once more, without these, before another search is made.
-        some = case.select(remaining)
-        about = fit(final.model, some.observations, final.noise, final.estimate, True, ON_THE_WAY)
+        some = sample_of(case.select(remaining).observations, settings.searched_observations)
+        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
         errors = gross_errors(about, part.noise, case.campaign.measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
         last, part = part, fitted_to(case, ~errors.gross | good, part)
@@ -149,6 +150,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         near = (about, found.conclusion.best.named) if relinearized else None
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared
+    final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True) if found else declared
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     lost: list[str] = []
@@ -212,7 +214,8 @@ def _explained(
 ) -> tuple[Evidence, Fit]:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
 
-    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``.
+    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. With it
+    the fit of the model found to what the search looks at.
     """
     candidates = list(case.candidates.values())
     about, searched = searched_part(declared, case.observations, settings)
@@ -245,12 +248,10 @@ def _explained(
         if not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit):
             break
         before = named
-    if named:
-        final = fit_with_sizes(declared, case.observations, noise, with_shapes_of(chosen, about), about)
-    else:
-        final = fit(declared.model, case.observations, noise, declared.estimate, reweighted=True)
+    if not named:
+        about = fit(declared.model, searched, noise, declared.estimate, True, ON_THE_WAY)
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
-    return Evidence(problem, found, alarm, conclusion, adopted), final
+    return Evidence(problem, found, alarm, conclusion, adopted), about
 
 
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:

@@ -129,8 +129,12 @@ def _target_columns(rotation: np.ndarray, rows: int, seen: np.ndarray) -> np.nda
 def _shape_laws(
     effect: Candidate, values: np.ndarray, shapes: np.ndarray, conditions: Conditions
 ) -> Iterator[dict[int, np.ndarray]]:
-    for number in range(len(shapes)):
-        shape = effect.shapes[number]
+    for number, shape in enumerate(effect.shapes):
+        if shape.tried > 1:
+            # A law that changes in jumps has no slope: a search finds its place, and a fit that took the jump of a row within a
+            # step for one would go to and fro.
+            yield {}
+            continue
         step = _SHAPE_STEP * max(abs(shapes[number]), shape.lowest, 0.1 * shape.highest)
         sides = []
         for sign in (1, -1):
