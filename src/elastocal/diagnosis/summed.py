@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.factored import Factored
 
-# Beyond this many values of whitened columns a problem is summed: as many as take 24 MB, of which there are ten copies; from some
-# thousand columns on, sums by factors cost less than the products of whole rows.
+# Beyond this many values of whitened columns a problem is summed: as many as take 24 MB, of which there are ten copies; from
+# some thousand columns on, sums by factors cost less than the products of whole rows.
 MOST_HELD = 3_000_000
 # Rows of the sample: several for each declared parameter, and enough to see which sizes of the pose error are out of question.
 SAMPLE_ROWS = 6000
