@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # some thousand columns on, sums by factors cost less than the products of whole rows.
 MOST_HELD = 3_000_000
 # Rows of the sample: several for each declared parameter, and enough to see which sizes of the pose error are out of question.
-SAMPLE_ROWS = 6000
+SAMPLE_ROWS = 3000
 # Values of whitened columns in a block of declared ones, and observations in a block of candidates, which come in factors.
 _BLOCK_VALUES = 1_500_000
 OBSERVATIONS_AT_ONCE = 500
