@@ -30,10 +30,10 @@ def test_rows_are_found_beside_an_effect_that_the_model_lacks(case, shifts):
 
 def test_the_same_rows_are_fitted_once(case):
     every = np.ones(len(case.campaign.measurements), bool)
-    part = fitted_to(case, every)
-    assert fitted_to(case, every.copy(), part) is part
+    part = fitted_to(case, every, SETTINGS)
+    assert fitted_to(case, every.copy(), SETTINGS, part) is part
     fewer = np.arange(len(every)) != 3
-    assert len(fitted_to(case, fewer, part).case.campaign.measurements) == len(every) - 1
+    assert len(fitted_to(case, fewer, SETTINGS, part).case.campaign.measurements) == len(every) - 1
 
 
 @pytest.mark.parametrize("times", [-4.0, 30.0, 300.0])

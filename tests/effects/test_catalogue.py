@@ -54,6 +54,18 @@ def chain(request, fanuc):
     return fanuc.chain if request.param == "fanuc" else chain_of((OTHER_CHAINS | ODD_CHAINS)[request.param])
 
 
+def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_other_places(chain):
+    joints = equipped(chain).joints
+    states, elsewhere = made_states(joints, 5, seed=1), made_states(joints, 5, seed=2)
+    one = conditions_on(chain, states)
+    other = replace(conditions_on(chain, elsewhere, 2 * one.compliance), joint_angles=one.joint_angles)
+    fixed = [candidate for candidate in candidates_on(one.sites).values() if candidate.fixed]
+    assert {candidate.effect for candidate in fixed} >= {"transmission_harmonic", "bearing_runout", "link_geometry"}
+    for candidate in fixed:
+        for law, again in zip(candidate.displacement(one), candidate.displacement(other), strict=True):
+            assert law.keys() == again.keys() and all((law[at] == again[at]).all() for at in law), candidate.key
+
+
 def test_names_and_families_are_those_of_the_design():
     assert {name: module.FAMILY for name, module in catalogue.effects().items()} == FAMILIES
 

@@ -291,7 +291,8 @@ def inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             raise np.linalg.LinAlgError("a matrix that is not positive definite")
         log_dets[number] = 2.0 * np.log(np.diag(factor)).sum()
         upper = lapack.dpotri(factor, lower=0, overwrite_c=1)[0]
-        found[number] = np.triu(upper) + np.triu(upper, 1).T
+        np.add(upper, upper.T, out=found[number])
+        np.fill_diagonal(found[number], np.diag(upper))
     return found, log_dets
 
 

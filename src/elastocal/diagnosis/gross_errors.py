@@ -141,7 +141,7 @@ class _Line:
 
     def white(self, values: np.ndarray, pose_rad: float) -> np.ndarray:
         """Whitened values (M, rows, k)."""
-        return np.linalg.solve(self.root(pose_rad), values)
+        return np.linalg.inv(self.root(pose_rad)) @ values
 
     def log_volume(self, pose_rad: float) -> np.ndarray:
         """Half the logarithm of the determinant of each variance, (M,)."""
@@ -153,7 +153,8 @@ class _Line:
         if covariance is None:
             return np.linalg.norm(white, axis=1)
         seen = self.white(self.sensitivities, pose_rad)
-        share, axes = np.linalg.eigh(seen @ covariance @ seen.transpose(0, 2, 1))
+        along = (seen.reshape(-1, seen.shape[2]) @ covariance).reshape(seen.shape)
+        share, axes = np.linalg.eigh(along @ seen.transpose(0, 2, 1))
         own = np.where(fitted[:, None], np.maximum(1.0 - share, _LEAST_OWN), 1.0 + share)
         along = (axes.transpose(0, 2, 1) @ white[..., None])[..., 0]
         return np.sqrt((along**2 / own).sum(axis=1))

@@ -256,11 +256,6 @@ def _flat(values: np.ndarray) -> np.ndarray:
     return values.swapaxes(0, 1).reshape(values.shape[0] * values.shape[1], values.shape[2])
 
 
-def searched_part(fitted: Fit, observations: Observations, settings: Settings) -> tuple[Fit, Observations]:
-    """What the search looks at of a fit and its observations: no more than so many, at poses spread over the campaign."""
-    return selected(fitted, observations, spread_poses(observations, settings.searched_observations))
-
-
 def selected(fitted: Fit, observations: Observations, chosen: np.ndarray) -> tuple[Fit, Observations]:
     """A fit and its observations in some of the states.
 
