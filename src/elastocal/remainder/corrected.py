@@ -114,7 +114,7 @@ def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> Tuned:
 
 
 def _inner_parts(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Iterator[Part]:
-    """Training poses in folds, the model fitted anew from nothing without each."""
+    """Training poses in folds, the model fitted anew without each."""
     states, model = observations.states, fitted.model
     pose = state_clusters(states)
     configuration = configurations(states.joint_angles, pose)
