@@ -18,8 +18,7 @@ from elastocal.fitting.displacement import conditions
 from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
-from elastocal.remainder.corrected import Plan
-from elastocal.remainder.shares import remainder_facts
+from elastocal.remainder.corrected import Plan, remainder_facts
 from elastocal.validation.fitted_range import outside_poses, repeat_warnings
 from elastocal.validation.held_out import (
     METRICS,
@@ -31,9 +30,9 @@ from elastocal.validation.held_out import (
     share_below_largest,
     summary,
 )
+from elastocal.validation.left_out import error_row, split_rows
 from elastocal.validation.placing import placed
 from elastocal.validation.span import count_configurations, joint_ranges
-from elastocal.validation.splits import error_row, split_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
