@@ -35,11 +35,6 @@ def test_splits_part_whole_poses_by_joint_space_and_sessions(fanuc):
     assert (np.bincount(two_loads.states.pose, split.part) == 2 * split.part[::2]).all()
 
 
-def test_too_few_poses_have_no_split(fanuc):
-    assert splits_of(planted(fanuc, {}, poses=6).observations.states) == []
-    assert len(splits_of(planted(fanuc, {}, poses=7).observations.states)) == 1
-
-
 def test_errors_are_those_of_a_fit_to_the_rest(fanuc):
     campaign = planted(fanuc, {"joint_offset@3": [1e-3]}, poses=16)
     seen, fitted = campaign.observations, campaign.declared
@@ -65,12 +60,6 @@ def test_measurements_of_a_part_do_not_reach_its_prediction(fanuc):
     np.testing.assert_allclose(after[mask], 1.0, atol=5 * before[mask].max())
     # The others are predicted from them, and do change.
     assert np.abs(after[~mask] - before[~mask]).max() > 1e-4
-
-
-def test_a_session_left_out_is_placed_by_itself(fanuc):
-    fitted, seen = of_sessions(fanuc)
-    found = cross_validated(fitted, seen, seen.states.session)
-    assert summary(found.distance)["rms_m"] == pytest.approx(np.sqrt(3) * NOISE.position_m, rel=0.25)
 
 
 def test_rows_say_each_block_and_all_and_that_a_missing_effect_was_found(fanuc):
