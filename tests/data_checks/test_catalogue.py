@@ -9,12 +9,12 @@ from made_campaigns import Plan, made, with_geometric_errors, with_other_complia
 from elastocal.data_checks.catalogue import fault_modules, faults
 
 PLANS = {
-    "base": Plan(poses=15),
+    "base": Plan(poses=10, loads=2),
     "tracker": Plan(poses=15, tracker=True),
     "positions": Plan(poses=20, tracker=True, oriented=False, loads=1, repeats=2),
-    "few poses": Plan(poses=8),
-    "small loads": Plan(poses=15, force=20.0),
-    "no noise": Plan(poses=15, noise=0.0),
+    "few poses": Plan(poses=8, loads=2),
+    "small loads": Plan(poses=10, loads=2, force=20.0),
+    "no noise": Plan(poses=10, loads=2, noise=0.0),
 }
 
 

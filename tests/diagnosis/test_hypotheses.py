@@ -74,13 +74,6 @@ def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equall
         )
 
 
-def test_one_mechanism_at_many_joints_costs_less_than_as_many_mechanisms():
-    offsets = [made_unit("joint_offset", (joint,), joint) for joint in range(5)]
-    others = [made_unit(name, (0,), 5 + number) for number, name in enumerate("abcd")]
-    prior = prior_of((*offsets, *others), SETTINGS)
-    assert prior.log_odds_of(offsets) > prior.log_odds_of([offsets[0], *others]) + 8
-
-
 def test_adding_a_unit_changes_the_log_odds_by_what_added_says():
     units = made_units()
     prior = prior_of(units, SETTINGS)
@@ -132,12 +125,6 @@ def test_laws_share_a_location_alike_and_shapes_of_a_law_by_the_part_of_the_rang
     assert found[0] == pytest.approx(0.5)
     np.testing.assert_allclose(found[1:], 0.5 * by_time.shapes[0].shares(lags))
     assert found[2] < 0.1 * found[1] and found[3] > 5 * found[2]
-
-
-def test_a_shape_that_is_tried_alone_has_all_of_its_law(catalogue):
-    (column,) = (c for c in catalogue if c.key == "link_elasticity[column]")
-    (unit,) = units_of([(column, (0.59,))], [], SETTINGS)
-    assert unit.log_prior == 0.0
 
 
 def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_of_physics(catalogue):

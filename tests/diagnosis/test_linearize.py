@@ -235,13 +235,6 @@ def factors(problem, sizes):
     return found
 
 
-def test_no_shape_is_looked_at_more_closely_where_none_matters(bent):
-    assert looked_at(bent, factors(bent, {})) == {}
-    assert looked_at(bent, factors(bent, {("setup_step", 5): 4.9})) == {}
-    # Nor where something else is far better.
-    assert looked_at(bent, factors(bent, {("setup_step", 5): 30.0, ("joint_offset@3", 0): 60.0})) == {}
-
-
 def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(bent):
     sizes = {("setup_step", 5): 30.0, ("setup_step", 6): 25.0, ("thermal_growth[time]", 1): 28.0, ("joint_offset@3", 0): 29.0}
     found = looked_at(bent, factors(bent, sizes))
@@ -266,26 +259,6 @@ def test_a_shape_that_was_fitted_elsewhere_than_tried_stays_among_those_looked_a
 def ends_of(candidate):
     (shape,) = candidate.shapes
     return shape.lowest, shape.highest
-
-
-def test_every_shape_of_the_catalogue_is_tried_within_its_range(campaign):
-    shaped = [candidate for candidate in campaign.all_candidates if candidate.shapes]
-    assert {candidate.effect for candidate in shaped} >= {"lost_motion", "stiffening", "thermal_growth", "setup_step"}
-    for candidate in shaped:
-        lowest, highest = ends_of(candidate)
-        tried = [value for (value,) in shapes_tried(candidate, campaign.declared)]
-        assert lowest <= min(tried) and max(tried) <= highest and len(set(tried)) == len(tried), candidate.key
-
-
-@pytest.mark.parametrize("end", [0, 1])
-@pytest.mark.parametrize("key", ["setup_step", "thermal_growth[time]", "lost_motion@2", "link_elasticity@3"])
-def test_a_shape_that_was_fitted_at_an_end_of_its_range_is_tried_there_and_not_beyond(campaign, key, end):
-    candidate = campaign.candidates[key]
-    ends = ends_of(candidate)
-    tried = [value for (value,) in shapes_tried(candidate, fitted_at(campaign, key, ends[end]))]
-    assert ends[end] in tried and min(tried) >= ends[0] and max(tried) <= ends[1]
-    # Only of a step others are tried beside, all on the one side that there is.
-    assert (len(tried) > 1) == (key == "setup_step")
 
 
 @pytest.mark.parametrize("key", ["setup_step", "thermal_growth[time]", "link_elasticity@3"])

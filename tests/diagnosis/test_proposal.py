@@ -79,12 +79,6 @@ def test_alternatives_that_are_left_aside_are_in_the_table_as_in_the_sentence(ku
     assert f"Whether hysteresis acts beside joint_tilt is {NOT_DISTINGUISHABLE}." in sentence
 
 
-def test_the_best_with_something_unknown_is_another_explanation_and_not_one_beside_it():
-    sentence = sentence_of(made(indistinguishable=(("joint_tilt", OTHER),)))
-    assert f"joint_tilt and joint_tilt with a related mechanism are {NOT_DISTINGUISHABLE}." in sentence
-    assert "beside" not in sentence
-
-
 @pytest.mark.parametrize(
     ("mechanisms", "expected"),
     [
@@ -106,21 +100,6 @@ def test_the_sentence_has_the_figures_after_all_poses_and_how_many_are_enough():
     )
     assert sentence_of(made(poses_needed=None)).endswith("90% needs more than 100 poses.")
     assert "measured at 0, 1, -1 times" in sentence_of(made(shares=LADDER))
-
-
-def test_facts_are_those_after_all_poses_and_json():
-    facts = json.loads(json.dumps(facts_of(made()), allow_nan=False))
-    assert facts == {
-        "poses": 2,
-        "reason": "",
-        "best": ["joint_tilt"],
-        "nearest": ["link_elasticity", OTHER],
-        "separation": 17.5,
-        "resolved": 0.87,
-        "poses_needed": 3,
-        "indistinguishable": [],
-        "sentence": sentence_of(made()),
-    }
 
 
 @pytest.mark.parametrize("reason", [NOTHING_MISSING, DATA_AT_FAULT])

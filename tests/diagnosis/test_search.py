@@ -105,13 +105,6 @@ def test_nothing_is_always_among_the_models_however_improbable():
     assert len(nothing.scales) == 0
 
 
-def test_no_model_has_two_laws_at_one_location():
-    found = posterior(problem_of("two mechanisms", settings=replace(Settings(), kept_models=10**6)))
-    for model in found.models:
-        places = [UNITS[number].place for number in model.units]
-        assert len(set(places)) == len(places)
-
-
 def test_laws_of_the_competitor_at_one_location_join_in_one_model():
     rows, laws = made_rows(poses=14), (made_unit(OTHER, (1,), [0, 1]), made_unit(OTHER, (1,), [2, 3], law=NEIGHBOURS))
     rows = replace(rows, residual=rows.residual + 0.8 * rows.candidates[:, :4].sum(axis=1))
@@ -156,14 +149,6 @@ def test_the_pose_error_of_a_model_is_the_one_of_the_measurements(tau):
     assert nothing.pose_error_rad == found.models[0].pose_error_rad == tau
 
 
-def test_sizes_of_a_model_come_in_the_order_of_its_units():
-    rows = made_rows(0, poses=14, candidates=10)
-    rows = replace(rows, residual=rows.residual + 2.0 * rows.candidates[:, 0] + rows.candidates[:, 3:5] @ [0.4, -0.6])
-    found = posterior(made_problem(rows, UNITS, tau=TAU)[0])
-    best = next(model for model in found.models if model.units == (0, 3))
-    assert best.scales[0] > best.scales[1] and len(best.scales) == 2
-
-
 def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
     """Of mechanisms at one location each: no single one of them shows, nor any two."""
     units = [made_unit(name, (1,), column, candidate=SimpleNamespace(key=name)) for column, name in enumerate("abc")]
@@ -196,31 +181,3 @@ def test_no_unit_of_a_model_is_smaller_than_measurements_can_show():
     found = posterior(held)
     assert (0,) in [model.units for model in found.models]
     assert all((model.scales >= problem.grid.scales[least]).all() for model in found.models)
-
-
-class Promising(_Searcher):
-    """Models in a row without an end: every second one is met with 15 more than it turns out to have."""
-
-    def __init__(self):
-        self.problem, self.met, self.measured = SimpleNamespace(settings=Settings(largest_model=20)), {(0,): 0.0}, {}
-        self.extended = set()
-
-    def measure(self, model):
-        self.met[model] = self.measured[model] = 0.0
-
-    def extend(self, model):
-        assert len(self.extended) < 1000, "the search does not end"
-        self.extended.add(model)
-        self.met[(model[0] + 1,)] = -1.0 if model[0] % 2 else 15.0
-
-
-def test_a_search_ends_where_extensions_promise_more_than_they_hold():
-    searcher = Promising()
-    searcher.grow()
-    assert 20 < len(searcher.extended) <= 40
-
-
-def test_the_posterior_is_the_same_each_time():
-    one, other = (posterior(problem_of("two mechanisms")) for _ in range(2))
-    assert [model.units for model in one.models] == [model.units for model in other.models]
-    np.testing.assert_array_equal(one.probabilities, other.probabilities)

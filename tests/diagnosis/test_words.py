@@ -16,7 +16,6 @@ from elastocal.diagnosis.words import (
     in_common,
     in_words,
     parameter_words,
-    physical_name,
 )
 from elastocal.effects.catalogue import candidates_on, effects
 from elastocal.figures.candidates import short_name
@@ -34,10 +33,6 @@ def test_no_two_candidates_are_printed_alike(chain):
     keys = list(candidates_on(equipped(chain_of(chain))))
     for printed in (candidate_words, short_name):
         assert len({printed(key) for key in keys}) == len(keys)
-
-
-def test_an_effect_without_words_falls_back_on_its_name():
-    assert physical_name("bearing_of_tomorrow") == "bearing of tomorrow"
 
 
 @pytest.mark.parametrize(
@@ -138,13 +133,6 @@ def test_keys_in_a_sentence_become_words_and_common_words_stay():
     assert in_words("payload: mass is -3 kg") == "weight of an undeclared payload: mass is -3 kg"
     said = in_words("transmission_ratio@3: per_q3 is -0.0042 rad/rad, more than 3 times what such an effect reaches")
     assert said.startswith("gear ratio or coupling error of joint 3: per movement of joint 3 is -0.0042 rad/rad, more than")
-
-
-def test_members_of_a_class_have_the_kind_of_their_families_in_common():
-    assert in_common("joint_tilt", ["link_elasticity"]) == "yielding"
-    assert in_common("joint_tilt", ["link_elasticity", "other"]) == "", "what is related may be of any kind"
-    assert in_common("stiffening", ["transmission_ratio"]) == "an error of a gear"
-    assert in_common("joint_tilt", ["payload"]) == in_common("joint_tilt", ["wrong_unit"]) == ""
 
 
 def test_every_family_of_the_catalogue_has_a_kind():

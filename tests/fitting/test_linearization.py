@@ -1,7 +1,7 @@
 """Sensitivities by central differences of the model's own exact residuals."""
 
 import numpy as np
-from synthetic import made_estimate, made_model, made_states, seen_exactly, slopes, small_steps, with_noise
+from synthetic import made_estimate, made_model, made_states, seen_exactly, slopes, small_steps
 
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.displacement import conditions
@@ -31,22 +31,6 @@ def test_a_mount_of_unknown_turn_and_a_known_one_at_an_unknown_place_have_their_
     expected = slopes(model, estimate, seen, around, steps)
     assert found.shape == expected.shape == (16, 6, 12) and (np.abs(expected).max(axis=(0, 1)) > 0).all()
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
-
-
-def test_frame_of_one_session_moves_only_its_own_measurements(full_case):
-    model, estimate, seen = full_case
-    columns = linearize(model, estimate, seen, conditions(model, estimate, seen.states)).sensitivities
-    later = seen.states.session[seen.state] == 4
-    assert not columns[later][..., :6].any() and not columns[~later][..., 6:12].any()
-    assert columns[later][..., 6:12].any() and columns[~later][..., :6].any()
-
-
-def test_known_frame_known_targets_and_no_effects_leave_no_parameters(fanuc):
-    model = made_model(fanuc.chain, (Target("B", "3DoF", (0.1, 0.0, -0.2)),), fitted_frames=False)
-    estimate, states = made_estimate(model), made_states(6, 5)
-    seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(0))
-    line = linearize(model, estimate, seen, conditions(model, estimate, states))
-    assert parameters(model, estimate) == [] and line.sensitivities.shape == (5, 3, 0)
 
 
 def test_coordinate_jacobian_is_that_of_each_target(full_case):

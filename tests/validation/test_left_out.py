@@ -32,14 +32,6 @@ def test_left_out_squares_are_those_of_refits(kuka):
     assert np.mean(found) > 1.2 * np.mean(inside / np.bincount(campaign.observations.cluster))
 
 
-def test_what_a_pose_alone_determines_is_no_error_of_it(kuka):
-    campaign = planted(kuka, {}, seed=4, poses=6)
-    states = replace(campaign.observations.states, session=state_clusters(campaign.observations.states))
-    seen = replace(campaign.observations, states=states)
-    fitted = fit(replace(campaign.declared.model, fitted_frames=True), seen, campaign.declared.noise)
-    assert np.isfinite(left_out_squares(fitted, seen)).all()
-
-
 @pytest.mark.parametrize(("shift", "loses"), [(-1.0, False), (0.1, False), (0.5, True)])
 def test_a_loss_is_certain_beyond_the_standard_error_of_the_difference(shift, loses):
     others = np.abs(np.random.default_rng(1).normal(3.0, 0.2, 25))
