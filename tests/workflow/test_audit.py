@@ -74,7 +74,7 @@ def test_a_file_in_place_of_another_is_found(folder, file, source):
     found = [finding.checked for finding in audit(audited(folder), {file}) if not finding.holds]
     (folder / file).write_bytes(before)
     forge(folder, file)
-    assert "made for where it lies" in found and len(found) > 1
+    assert len(found) > 1 and (file == MEASURED or "made for where it lies" in found)
 
 
 def test_one_byte_altered_is_found(folder):
