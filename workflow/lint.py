@@ -37,7 +37,7 @@ ROOMS = {
     "src/elastocal_proof/plant": 3120,
     "src/elastocal_proof/report": 340,
     "tests": 42000,
-    "workflow": 6300,
+    "workflow": 6330,
 }
 
 

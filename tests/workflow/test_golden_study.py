@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+pytestmark = pytest.mark.slow
 GOLDEN = sorted((Path(__file__).resolve().parents[1] / "golden").glob("study_*.csv"))
 
 

@@ -1,11 +1,13 @@
 """The audit: samples of every file of a finished run worked out again by libraries that share no code with the pipeline.
 
-`make audit` makes what is not made yet, then writes reports/audit.html and reports/audit.csv, and, where all checks
+`make audit` makes what `make paper` makes and is not there yet, then writes reports/audit.html and reports/audit.csv, and, where all checks
 hold, reports/audit.txt; where one does not, it ends with an error. Files of other targets, such as blind, are audited where they are.
 """
 
 # Targets that are audited where they have finished, by what each makes last.
 AUDITED_TOO = {
+    "study": "reports/study.pdf",
+    "loop": "reports/loop/campaigns.csv",
     "measured": "reports/loop/measured.csv",
     "league": "reports/league/all/league.csv",
     "league_small": "reports/league/small/league.csv",
