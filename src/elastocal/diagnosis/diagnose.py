@@ -231,7 +231,7 @@ def _explained(
         # The alarm comes before the measurements choose at which shapes to look more closely: it would no longer be exact.
         closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
         if closer:
-            problem = linearized(about, searched, candidates, settings, closer)
+            problem = linearized(about, searched, candidates, settings, closer, problem)
         found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise
