@@ -243,7 +243,7 @@ def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(monkeypatch):
     noise = GANTRY_NOISES["joints"]
     model, seen, left, right, sigma = linear_problem(noise, 60)
     expected, covariance = generalized_least_squares(left, right, sigma, PRIORS)
-    monkeypatch.setattr("elastocal.fitting.least_squares._MOST_STARTED_FROM", 20)
+    monkeypatch.setattr("elastocal.fitting.least_squares.STARTED_FROM", 20)
     found = fit(model, seen, noise)
     deviation = np.sqrt(np.diag(covariance))
     assert found.converged and len(found.residual) == 60
@@ -259,7 +259,7 @@ def test_a_fit_settles_roughly_on_some_measurements_and_then_exactly_on_all(monk
         return robustly(model, observations, *rest, **options)
 
     monkeypatch.setattr("elastocal.fitting.least_squares.robustly", watched)
-    monkeypatch.setattr("elastocal.fitting.least_squares._MOST_STARTED_FROM", 20)
+    monkeypatch.setattr("elastocal.fitting.least_squares.STARTED_FROM", 20)
     fit(model, seen, noise, settled=1e-4)
     (few, *first), (every, *last) = calls
     assert few <= 24 and first == [False, ON_THE_WAY]

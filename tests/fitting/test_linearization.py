@@ -1,10 +1,22 @@
 """Sensitivities by central differences of the model's own exact residuals."""
 
+from dataclasses import replace
+
 import numpy as np
-from synthetic import made_estimate, made_model, made_states, seen_exactly, slopes, small_steps
+from synthetic import (
+    NOISE,
+    candidate_on,
+    made_estimate,
+    made_model,
+    made_states,
+    seen_exactly,
+    slopes,
+    small_steps,
+)
 
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.displacement import conditions
+from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.parameters import parameters
 
@@ -41,3 +53,15 @@ def test_coordinate_jacobian_is_that_of_each_target(full_case):
     # Target B sits behind joint 3: what lies further out does not move it.
     assert not line.coordinate_jacobian[seen.target == 1][..., 3:6].any()
     assert line.coordinate_jacobian[seen.target != 1][..., 3:6].any()
+
+
+def test_the_place_of_a_jump_has_no_slope_where_a_row_is_within_a_step_of_it(fanuc):
+    model = made_model(fanuc.chain, effects=[candidate_on(fanuc.chain, "setup_step")])
+    states = made_states(6, 9, seed=3)
+    seen = seen_exactly(model, made_estimate(model, seed=4), states)
+    # A row at a half lies on the other side of the jump a step further on.
+    estimate = replace(made_estimate(model, seed=5), shapes=(np.array([0.5 - 1e-6]),))
+    line = linearize(model, estimate, seen, conditions(model, estimate, states))
+    assert not line.sensitivities[..., -1].any() and line.sensitivities[..., -2].any()
+    found = fit(model, seen, NOISE, estimate)
+    assert found.held[-1] and found.estimate.shapes[0] == estimate.shapes[0] and found.converged

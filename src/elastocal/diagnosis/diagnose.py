@@ -149,6 +149,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
         near = (about, found.conclusion.best.named) if relinearized else None
+        # Its statistics make room for those of the next search.
+        found = None
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared_to_all()
     final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True) if found else declared
@@ -231,7 +233,7 @@ def _explained(
         # The alarm comes before the measurements choose at which shapes to look more closely: it would no longer be exact.
         closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
         if closer:
-            problem = linearized(about, searched, candidates, settings, closer)
+            problem = linearized(about, searched, candidates, settings, closer, problem)
         found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise

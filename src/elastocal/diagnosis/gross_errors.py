@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
@@ -105,11 +106,11 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
         if not negligible:
             information = np.diag((sizes / priors) ** 2)
             for line in lines:
-                seen = line.white(line.sensitivities[..., free] * sizes, pose_rad).reshape(-1, len(sizes))
+                seen = line.white(line.about.sensitivities[..., free] * sizes, pose_rad).reshape(-1, len(sizes))
                 information += seen.T @ seen
             covariance = np.zeros((len(free), len(free)))
             covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
-        distance = np.concatenate([line.distance(pose_rad, covariance, np.ones(len(line.residual), bool)) for line in lines])
+        distance = np.concatenate([line.distance(pose_rad, covariance, np.ones(len(line.own), bool)) for line in lines])
         volume = np.concatenate([line.log_volume(pose_rad) for line in lines]).mean()
         rows = fitted.model.rows
         # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
@@ -120,11 +121,9 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
 
 @dataclass(frozen=True)
 class _Line:
-    """Rows about an estimate: residual (M, rows), sensitivities (M, rows, P), own variance (M, rows, rows), and that of a
-    radian in each joint."""
+    """Rows about an estimate: their linearisation, own variance (M, rows, rows), and that of a radian in each joint."""
 
-    residual: np.ndarray
-    sensitivities: np.ndarray
+    about: Linearization
     own: np.ndarray
     common: np.ndarray
 
@@ -133,7 +132,7 @@ class _Line:
         line = linearize(model, estimate, some, conditions(model, estimate, some.states))
         spread, jacobian = noise.spread(some), line.coordinate_jacobian[..., : model.sites.joints]
         own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
-        return cls(line.residual, line.sensitivities, own, jacobian @ jacobian.transpose(0, 2, 1))
+        return cls(line, own, jacobian @ jacobian.transpose(0, 2, 1))
 
     def root(self, pose_rad: float) -> np.ndarray:
         """Cholesky factor of the variance of each row."""
@@ -149,10 +148,10 @@ class _Line:
 
     def distance(self, pose_rad: float, covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
         """From the prediction by the other rows, in standard deviations, (M,)."""
-        white = self.white(self.residual[..., None], pose_rad)[..., 0]
+        white = self.white(self.about.residual[..., None], pose_rad)[..., 0]
         if covariance is None:
             return np.linalg.norm(white, axis=1)
-        seen = self.white(self.sensitivities, pose_rad)
+        seen = self.white(self.about.sensitivities, pose_rad)
         along = (seen.reshape(-1, seen.shape[2]) @ covariance).reshape(seen.shape)
         share, axes = np.linalg.eigh(along @ seen.transpose(0, 2, 1))
         own = np.where(fitted[:, None], np.maximum(1.0 - share, _LEAST_OWN), 1.0 + share)

@@ -126,8 +126,8 @@ class Settings:
     )
     searched_observations: int = _setting(
         5_000,
-        "averaged measurements, at poses spread over the campaign, that the search and every fit on the way look at: on UR10 A"
-        " they name all but the smallest of the effects that all 8,350 rows name (docs/method.md); the last fit takes all",
+        "averaged measurements, at poses spread over the campaign, that the search and every fit on the way look at; on UR10 A"
+        " they name all but the smallest of the effects that all 8,350 rows name (docs/method.md), and the last fit takes all",
     )
     linear_misfit: float = _setting(
         0.02,
