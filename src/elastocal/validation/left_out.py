@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 # errors, which is taken too. What is left is a share of that, from the weights of outliers and the curvature: no error of
 # prediction moves by a hundredth of its standard error.
 _PROVEN = 0.01
+# What a pose alone determines, such as the frame of a session of one pose, is no error of it: shares below are rounding.
+_ROUNDING = 1e-9
 # A quarter of the poses is about the share that campaigns hold out at random, so that both errors come from as many poses.
 JOINT_SPACE_BLOCKS = 4
 
@@ -102,16 +104,21 @@ def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterato
 def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
     """Mean square position error of each configuration as all others predict it, m², ndarray (configurations,).
 
-    By the step alone. What a configuration alone determines, such as the frame of a session of one pose, is no error of it.
+    By the step alone, in closed form, with what is held as in the fit.
     """
+    white = fitted.whitened(fitted.residual)
     states = observations.states
-    configuration = configurations(states.joint_angles, state_clusters(states))[state_clusters(states)]
-    steps = np.array([step for step, _ in _steps_without(fitted, observations, configuration)])
-    of_each, squares = configuration[observations.state], np.empty(len(observations))
-    for seen, plain, _ in fitted.sensitivities(observations):
-        moved = (plain[:, :3] @ steps[of_each[seen]][..., None])[..., 0]
-        squares[seen] = ((fitted.residual[seen, :3] - moved) ** 2).sum(axis=1)
-    return np.bincount(of_each, squares) / np.bincount(of_each)
+    configuration = configurations(states.joint_angles, state_clusters(states))[observations.cluster]
+    found = np.empty(configuration.max() + 1)
+    plain, whitened = (np.concatenate(parts) for parts in list(zip(*fitted.sensitivities(observations), strict=True))[1:])
+    for number in range(len(found)):
+        mine = configuration == number
+        rows = whitened[mine].reshape(mine.sum() * whitened.shape[1], len(fitted.held))
+        gain = fitted.covariance @ rows.T
+        inverse = np.linalg.pinv(np.eye(len(rows)) - rows @ gain, rcond=_ROUNDING, hermitian=True)
+        moved = plain[mine][:, :3] @ (gain @ (inverse @ white[mine].ravel()))
+        found[number] = ((fitted.residual[mine][:, :3] + moved) ** 2).sum(axis=1).mean()
+    return found
 
 
 def certain_loss(squares: np.ndarray, others: np.ndarray) -> bool:
