@@ -107,7 +107,9 @@ def test_one_campaign_has_one_accuracy_in_correct_and_certificate_to_the_digit(c
     assert words in corrected[1]
 
 
-@pytest.mark.parametrize(("off_m", "decision", "code"), [(3e-4, "pass", 0), (8e-4, "fail", 1)])
+@pytest.mark.parametrize(
+    ("off_m", "decision", "code"), [pytest.param(3e-4, "pass", 0, marks=pytest.mark.slow), (8e-4, "fail", 1)]
+)
 def test_a_robot_that_was_measured_at_corrected_targets_is_called_so_and_a_fail_exits_with_1(
     run, checkout, tmp_path, corrected, off_m, decision, code
 ):
