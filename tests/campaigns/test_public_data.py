@@ -51,10 +51,6 @@ def served(registered, monkeypatch, tmp_path):
     server.server_close()
 
 
-def test_the_address_is_by_commit(registered):
-    assert registered.address == "https://raw.githubusercontent.com/owner/name/c0ffee/data/values.csv"
-
-
 def test_file_of_the_given_folder_is_used_where_it_lies(registered, given, tmp_path):
     assert fetch("mine", {"mine": registered}, tmp_path / "cache") == given
     assert find_missing(["mine"], {"mine": registered}, tmp_path / "cache") is None
@@ -98,11 +94,3 @@ def test_what_is_missing_is_named_only_where_a_folder_stands_for_the_network(reg
     assert find_missing(["mine"], files, tmp_path / "cache") is None
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     assert find_missing(["mine"], files, tmp_path / "cache") == "mine/values.csv"
-
-
-def test_what_was_downloaded_before_is_at_hand(registered, served, monkeypatch, tmp_path):
-    served.write_bytes(CONTENTS)
-    files = {"mine": registered}
-    fetch("mine", files, tmp_path / "cache")
-    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "empty"))
-    assert find_missing(["mine"], files, tmp_path / "cache") is None

@@ -54,10 +54,6 @@ def chain(request, fanuc):
     return fanuc.chain if request.param == "fanuc" else chain_of((OTHER_CHAINS | ODD_CHAINS)[request.param])
 
 
-def test_names_and_families_are_those_of_the_design():
-    assert {name: module.FAMILY for name, module in catalogue.effects().items()} == FAMILIES
-
-
 def test_every_effect_says_whether_it_moves_the_robot_or_only_what_was_measured_of_it(fanuc):
     """A correction must not move the robot by an error of the tracker, its targets, the force sensor or the set-up."""
     sites = equipped(fanuc.chain)
@@ -369,14 +365,6 @@ def test_adding_an_effect_is_adding_one_module(fanuc, one_more_module):
     estimate.coefficients[0][:] = 0.02
     expected = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)[0] - [0, 0, 0.02]
     np.testing.assert_allclose(seen_exactly(sunk, estimate, states).position, expected, atol=1e-14)
-
-
-def test_declared_effects_are_all_their_candidates_in_the_order_declared(fanuc):
-    sites = equipped(fanuc.chain)
-    found = [candidate.key for candidate in declared_candidates(["payload", "force_bias"], sites)]
-    frames = [f"force_bias[{axes} axes{how}]" for how in ("", " in the pull") for axes in ("base", "flange")]
-    assert found == ["payload", "payload[mass]", *frames]
-    assert declared_candidates([], sites) == []
 
 
 def test_effect_that_the_catalogue_does_not_have_is_refused(fanuc):
