@@ -28,14 +28,6 @@ def test_refined_angles_reach_the_poses_from_nearby(name):
     np.testing.assert_allclose(find_poses(robot, found)[1][good], find_poses(robot, angles)[1][good], atol=1e-7)
 
 
-def test_what_is_out_of_reach_stays_unsolved():
-    robot = analysed("gp180")
-    position, rotation = find_poses(robot, draw_angles(robot, 3))
-    found, left = refine(robot, position * 5.0, rotation, draw_angles(robot, 3))
-    assert (left > 0.1).all()
-    assert np.isfinite(found).all()
-
-
 def test_a_smooth_path_stays_smooth_and_within_limits():
     robot = analysed("gp180")
     share = np.linspace(0.0, 1.0, 80)[:, None]

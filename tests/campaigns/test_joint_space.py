@@ -24,13 +24,6 @@ def test_blocks_do_not_depend_on_the_order_of_the_poses_nor_on_whole_turns():
     np.testing.assert_array_equal(blocks(angles + 2 * np.pi * rng.integers(-1, 2, (23, 6)), 4), found)
 
 
-def test_a_joint_that_hardly_moves_parts_nothing():
-    """Scaled by its spread alone, its noise of a tenth of a milliradian would count as much as the joint that moves."""
-    rng = np.random.default_rng(3)
-    angles = np.column_stack([np.linspace(-0.5, 0.5, 16), np.where(rng.random(16) < 0.5, 1e-4, -1e-4)])
-    np.testing.assert_array_equal(blocks(angles, 2), np.arange(16) // 8)
-
-
 @pytest.mark.parametrize(("poses", "joints"), [(2, 1), (5, 6), (20, 2), (60, 6)])
 def test_a_pose_is_beyond_the_range_from_the_margin_on_that_chance_leaves_once_in_twenty(poses, joints):
     """Of poses from a box: 2 n (1 + t)^(1 - P) / (P + 1) = 0.05, solved for the share t of the range."""
@@ -52,16 +45,6 @@ def test_a_joint_that_stood_still_is_beyond_its_range_from_a_fiftieth_of_a_radia
     """Whether there is one pose, a few, or so many that chance leaves their range less than once in twenty."""
     angles = np.full((poses, 1), 0.5)
     assert beyond_range(angles, 0.5 + sign * np.array([[0.01999], [0.02001]])).tolist() == [False, True]
-
-
-@pytest.mark.parametrize("count", [2, 3, 4, 5])
-def test_blocks_of_poses_along_a_line_are_its_pieces(count):
-    """One joint moves over half a turn: neighbours stay together, in as many pieces as there are blocks."""
-    angles = np.column_stack([np.linspace(-0.5, 0.5, 30), np.zeros(30)])
-    order = np.random.default_rng(7).permutation(30)
-    found = np.empty(30, int)
-    found[order] = blocks(angles[order], count)
-    assert np.count_nonzero(np.diff(found)) == count - 1 and len(set(found)) == count
 
 
 def test_a_pose_repeats_another_where_no_joint_stands_elsewhere_than_one_pose_may():

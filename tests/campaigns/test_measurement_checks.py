@@ -68,12 +68,6 @@ def test_the_same_measurement_twice_is_refused(cell):
         cell.read()
 
 
-def test_measurements_of_one_pose_at_other_angles_are_refused(cell):
-    cell.spoil(14, "q3", cell.table["q3"][8] + 0.025)
-    with refused(cell.measurements, "row 14, column q3", "0.025 rad from row 9", "within 0.02 rad"):
-        cell.read()
-
-
 def test_load_without_columns_of_the_wrench_is_refused(cell):
     cell.without(*WRENCH)
     with refused(cell.measurements, "row 5, column load", "found 1", "no columns fx"):

@@ -13,13 +13,6 @@ from elastocal.campaigns.measurements import CSV, read_measurements
 from elastocal.campaigns.reading import read_campaign
 
 
-def test_parquet_is_csv(cell):
-    from_csv = cell.read()
-    (cell.folder / "measurements.csv").unlink()
-    cell.write("parquet")
-    assert_same(read_campaign(cell.folder, cell.robots).measurements, from_csv.measurements)
-
-
 def test_blank_rows_and_blanks_around_cells_are_passed_over_and_counted(cell):
     cell.write()
     path = cell.folder / "measurements.csv"
@@ -84,15 +77,6 @@ def test_lines_before_the_header_are_passed_over_and_counted(cell):
     path.write_text(path.read_text(encoding="utf-8").replace("\n0,0,0,A", "\n0,0,no,A"), encoding="utf-8")
     with refused(cell.measurements, "row 1, column repeat (line 5)", "'no'"):
         read_campaign(cell.folder, cell.robots)
-
-
-def test_a_file_is_read_alike_in_pieces_of_any_size(cell, monkeypatch):
-    whole = cell.read().measurements
-    monkeypatch.setattr("elastocal.campaigns.measurements._ROWS_AT_A_TIME", 7)
-    assert_same(read_campaign(cell.folder, cell.robots).measurements, whole)
-    cell.spoil(20, "x", "1,0")
-    with refused(cell.measurements, "row 20, column x (line 21)", "'1,0'"):
-        cell.read()
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])

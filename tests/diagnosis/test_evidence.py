@@ -215,13 +215,6 @@ def test_half_normal_priors_of_two_coefficients_are_taken_one_by_one():
     assert found[0].log_evidence - found[1].log_evidence == pytest.approx(expected, abs=0.05)
 
 
-def test_the_wrong_sign_costs_and_the_right_one_pays_at_most_a_factor_of_two():
-    rows = quiet(13, (0, 0, 0.4))
-    free, right, wrong = (log_bayes_factor(rows, [made_unit("b", (1,), 2, sign)]) for sign in (0, 1, -1))
-    assert free < right < free + np.log(2) + 1e-9
-    assert wrong < free - 3.0
-
-
 def test_weights_of_sizes_are_log_normal_about_the_center_and_sum_to_one():
     settings = replace(SETTINGS, scales=(0.01, 0.1, 1.0), scale_center=0.1, scale_spread=(3.0, 0.7))
     weights = np.exp(scale_weights(settings))
@@ -232,11 +225,6 @@ def test_weights_of_sizes_are_log_normal_about_the_center_and_sum_to_one():
     assert np.exp(GRID.log_weights).sum() == pytest.approx(1.0) and GRID.scales[np.argmax(GRID.log_weights)] == 0.1
 
 
-def test_weights_of_the_pose_error_are_those_of_the_settings():
-    weights = np.exp(pose_weights(np.array([0.0, 1.0, 2.0, 3.0]), replace(SETTINGS, pose_error_probability=0.3)))
-    np.testing.assert_allclose(weights, [0.7, 0.1, 0.1, 0.1])
-
-
 @pytest.mark.parametrize(
     ("bounds", "kept"), [({}, slice(0, 6)), ({"smallest": 2}, slice(2, 6)), ({"smallest": 1, "largest": 4}, slice(1, 5))]
 )
@@ -244,17 +232,6 @@ def test_sizes_beyond_those_of_a_unit_weigh_nothing_and_the_others_as_before(bou
     some = np.exp(GRID.of(replace(UNITS[0], **bounds)))
     assert some.sum() == pytest.approx(1.0) and not np.delete(some, np.arange(6)[kept]).any()
     np.testing.assert_allclose(some[kept], np.exp(part_of_grid(kept).log_weights))
-
-
-def test_a_signal_beyond_the_largest_size_of_a_unit_is_paid_for():
-    """Wherever the search for the sizes starts, as on a grid without the larger ones."""
-    statistics = statistics_of(quiet(1, (6.0, -5.0)).products, TAU)
-    grids = GRID, part_of_grid(slice(5))
-    whole, cut = (evaluate(statistics, [UNITS[0]], grid, LOG_POSE, [0.1]).log_evidence for grid in grids)
-    for start in SETTINGS.scales:
-        found = evaluate(statistics, [replace(UNITS[0], largest=4)], GRID, LOG_POSE, [start])
-        assert found.log_evidence == pytest.approx(cut, abs=1e-8) and found.scales[0] == GRID.scales[4]
-    assert cut < whole - 1.0
 
 
 def test_the_prior_of_a_coefficient_over_all_sizes_has_the_deviation_of_its_draws():
@@ -277,17 +254,6 @@ def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():
     assert expected < brute_log_bayes_factor(rows, [unit]) - 1.0
     # Without it the model is the smaller one all the same.
     assert found.without[0] == pytest.approx(evaluated(rows, ()).log_evidence, abs=1e-8)
-
-
-def test_added_evidence_of_a_unit_is_none_at_sizes_that_it_may_not_have():
-    statistics = statistics_of(quiet(8, SIGNALS["a"]).products, TAU)
-    units = [*UNITS[:2], replace(UNITS[2], smallest=2)]
-    conditioned = condition(statistics, UNITS[0].columns, np.full(2, 0.3), LOG_POSE)
-    every, some = (added_evidence(conditioned, listed, [1, 2], GRID, statistics.freedom) for listed in (UNITS, units))
-    np.testing.assert_array_equal(some[:, 1], every[:, 1])
-    assert np.isneginf(some[:, 2, :2]).all()
-    shift = -logsumexp(GRID.log_weights[2:])
-    np.testing.assert_allclose(some[:, 2, 2:], every[:, 2, 2:] + shift)
 
 
 def test_moments_are_averaged_over_the_sizes_that_a_unit_may_have():

@@ -39,25 +39,6 @@ def made_units():
     )
 
 
-def test_probabilities_of_all_models_sum_to_one():
-    units, prior = made_units(), prior_of(made_units(), SETTINGS)
-    nothing = (1 - SETTINGS.mechanism_probability) ** 2 * (1 - SETTINGS.gravity_probability)
-    nothing *= 1 - SETTINGS.other_probability
-    total = sum(nothing * np.exp(prior.log_odds_of(model)) for model in every_model(units))
-    assert total == pytest.approx(1.0, abs=1e-12)
-
-
-def test_each_mechanism_is_there_with_the_probability_of_the_settings():
-    units, prior = made_units(), prior_of(made_units(), SETTINGS)
-    odds = [({unit.mechanism for unit in model}, np.exp(prior.log_odds_of(model))) for model in every_model(units)]
-    total, known = sum(value for _, value in odds), SETTINGS.mechanism_probability
-    other = SETTINGS.other_probability
-    assert known < other < 0.5
-    for mechanism, probability in (("harmonic", known), ("offset", known), ("link_weight", 0.5), (OTHER, other)):
-        there = sum(value for mechanisms, value in odds if mechanism in mechanisms)
-        assert there / total == pytest.approx(probability)
-
-
 def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equally_likely():
     units = made_units()[:5]
     prior = prior_of(units, SETTINGS)

@@ -213,20 +213,6 @@ def test_a_session_held_out_is_placed_and_judged(frame, kuka, config_folder, tmp
     assert_reaches_noise(case, held_out, 1.5)
 
 
-def spoilt(fitted, offset):
-    """The same fit with the offset of joint 3 elsewhere."""
-    values = (*fitted.estimate.coefficients[:-1], np.array([offset]))
-    return replace(fitted, estimate=replace(fitted.estimate, coefficients=values))
-
-
-def test_one_step_of_several_that_harms_is_named(made):
-    case, held_out, steps = made
-    worse = Step("with other", "effect", spoilt(steps[2].fitted, 0.5 * OFFSET))
-    found = judged([*steps[:3], worse], case, held_out)
-    assert "the step 'with other' raised the RMS error of the validation poses" in found.document["warnings"]
-    assert not any("'with joint_offset'" in warning for warning in found.document["warnings"])
-
-
 def test_another_campaign_as_test_has_frames_and_targets_of_its_own(kuka, config_folder, tmp_path):
     """Training in base axes; the test from a tracker that stands elsewhere."""
     table = seen_from_elsewhere(made_table(kuka, "other", seed=2, offset_of_joint_3=OFFSET))

@@ -87,14 +87,6 @@ def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_witho
     assert one.along[0][1] / np.sqrt(one.gram[0][1, 1]) > 20
 
 
-def test_an_effect_is_found_at_its_true_size(campaign):
-    found = problem_of(campaign)
-    unit, statistics = unit_of(found, "joint_offset@3"), found.problem.statistics
-    gram, along = statistics.gram[0][np.ix_(unit.columns, unit.columns)], statistics.along[0][unit.columns]
-    value = (along / gram[0]).item() * unit.sizes[0]
-    assert value == pytest.approx(5e-4, abs=4 * unit.sizes[0] / np.sqrt(gram.item()))
-
-
 def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_and_that_show(campaign):
     loud = {unit.key for unit in problem_of(campaign, keys=KEYS[:1]).problem.units if unit.mechanism == OTHER}
     quiet = replace(campaign.declared, noise=campaign.declared.noise.scaled(0.01))
@@ -245,15 +237,6 @@ def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_
     lags = np.geomspace(900.0, 36000.0, 5)
     closer = np.geomspace(lags[1], lags[3], 9)
     np.testing.assert_allclose(found["thermal_growth[time]"], closer)
-
-
-def test_a_shape_that_was_fitted_elsewhere_than_tried_stays_among_those_looked_at(campaign):
-    """A fit tries its own value alone, which is nowhere near the middle of the range."""
-    key = "thermal_growth[time]"
-    problem = problem_of(campaign, fitted_at(campaign, key, 1300.0), (key, "joint_offset@3")).problem
-    (values,) = looked_at(problem, factors(problem, {(key, 0): 30.0})).values()
-    below, above = np.geomspace(900.0, 1300.0, 5)[1:-1], np.geomspace(1300.0, 36000.0, 5)[1:-1]
-    np.testing.assert_allclose(values, [*below, 1300.0, *above])
 
 
 def ends_of(candidate):

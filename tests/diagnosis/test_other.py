@@ -52,14 +52,6 @@ def test_it_acts_by_each_law_at_every_joint_and_at_the_base():
     assert competitors(around()) == [*expected, *AT_THE_BASE]
 
 
-def test_laws_of_which_a_campaign_has_no_inputs_are_left_out():
-    """Without a load no force; in rows that are all but one, of unknown time, no time."""
-    still = {competitor.law for competitor in competitors(around(force=0.0)) if not competitor.location}
-    assert still == {TIME, PLACE}
-    alone = around(1, time_s=None, temperature_c=None)
-    assert competitors(alone) == []
-
-
 @pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)
 def test_a_joint_is_displaced_by_about_its_size_in_any_state(competitor):
     """Unloaded all features are of use; what is constant or straight in the angle has been taken off."""
@@ -81,16 +73,6 @@ def test_no_law_has_a_part_that_the_catalogue_has_a_name_for(competitor):
     np.testing.assert_allclose(free.mean(axis=1), 0.0, atol=1e-9 * size)
     if competitor.law in (OWN, NEIGHBOURS):
         np.testing.assert_allclose(free @ states.joint_angles[:, 3], 0.0, atol=1e-7 * size)
-
-
-@pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)
-def test_half_of_the_features_vanish_without_the_load(competitor):
-    wrench = made_states(7, 60, seed=1).wrench
-    wrench[:20] = 0.0
-    states = around(wrench=wrench)
-    found = waves(displacements(states, competitor, FEATURES))
-    zero = ~found[:, :20].any(axis=1)
-    assert zero.sum() == FEATURES // 2 and found[zero][:, 20:].any(axis=1).all()
 
 
 @pytest.mark.parametrize("law", [FORCE, TIME, PLACE])
@@ -187,12 +169,3 @@ def test_it_is_the_same_function_of_some_of_the_states(competitor):
     whole = waves(displacements(states, competitor, FEATURES))
     part = waves(displacements(at_states(states, slice(10, 25)), competitor, FEATURES, states))
     np.testing.assert_allclose(part, whole[:, 10:25], rtol=0, atol=1e-12 * JOINT_RAD)
-
-
-def test_what_is_constant_or_absent_is_no_input():
-    """A campaign without times and temperatures, or all at one of them that no mean of binary numbers hits, is the same."""
-    bare = around(time_s=None, temperature_c=None)
-    constant = around(time_s=np.full(60, 0.1), temperature_c=np.full(60, 21.3))
-    np.testing.assert_array_equal(
-        *(waves(displacements(states, Competitor((1,), TIME), FEATURES)) for states in (bare, constant))
-    )

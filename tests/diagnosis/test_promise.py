@@ -114,15 +114,6 @@ def test_log_factors_of_two_fixed_hypotheses_are_normal_with_mean_half_the_separ
     assert abs(promise.resolved(logs) - often) < 5 * np.sqrt(often * (1 - often) / (2 * PROMISE_DRAWS))
 
 
-def test_without_information_only_what_is_sure_already_is_resolved():
-    """A hypothesis that has 97 % is right in 97 % of all cases, and then resolved."""
-    for weights, expected in (((0.5, 0.5), 0.0), ((0.97, 0.03), 0.97), ((0.94, 0.06), 0.0)):
-        promise = Promise(fixed([1, 0], [0, 1], weights=weights), np.random.default_rng(2))
-        logs = promise.log_factors(np.zeros((2, 2)))
-        assert promise.resolved(logs) == pytest.approx(expected), weights
-        np.testing.assert_allclose(promise.separations(logs), 0.0, atol=1e-9)
-
-
 def test_models_of_one_hypothesis_count_together_by_their_weights():
     """Two models of one hypothesis that are as far apart as can be are nothing to resolve, and their prior is their sum."""
     members = fixed([1, 0], [-1, 0], [0, 1], weights=(0.15, 0.45, 0.4), hypotheses=(0, 0, 1))

@@ -110,10 +110,3 @@ def test_without_poses_there_is_a_reason_and_an_empty_table_with_the_same_column
     assert (facts["poses"], facts["separation"], facts["resolved"], facts["poses_needed"]) == (0, None, None, None)
     table, full = table_of(none, kuka), table_of(made(approach=None, reference_weight=np.zeros(2, bool)), kuka)
     assert table.empty and list(table.columns) == list(full.columns)
-
-
-def test_what_cannot_be_distinguished_is_named_where_no_pose_is_proposed():
-    none = without_poses(6, ("joint_tilt",), (("payload",),), NOT_DISTINGUISHABLE)
-    assert sentence_of(none) == (
-        "No further measurement is proposed. joint_tilt and payload are not distinguishable with this robot and tracker."
-    )

@@ -119,21 +119,3 @@ def test_remaining_noise_does_not_depend_on_the_noise_by_which_the_problem_was_w
         left = remaining_noise(replace(problem, statistics=scaled), models.models[0], least.scaled(times), least)
         assert left.position_m == pytest.approx(max(spread, 1.0) * least.position_m)
         np.testing.assert_allclose(left.joint_rad, max(spread, 1.0) * least.joint_rad)
-
-
-@pytest.mark.parametrize("factor", [0.25, 1.0, 9.0])
-def test_remaining_noise_is_at_least_the_noise(found, factor):
-    _, declared, line, models = found
-    problem = line.problem
-    scaled = replace(
-        problem.statistics, squares=factor * problem.statistics.squares, along=factor**0.5 * problem.statistics.along
-    )
-    problem = replace(problem, statistics=scaled)
-    model = replace(models.models[0], pose_error_rad=problem.statistics.pose_error_rad[2])
-    left = remaining_noise(problem, model, declared.noise, declared.noise)
-    expected = np.sqrt(max(mean_square_left(problem, model), 1.0))
-    assert left.position_m == pytest.approx(expected * declared.noise.position_m)
-    assert left.position_m >= declared.noise.position_m
-    assert left.pose_rad == pytest.approx(expected * model.pose_error_rad)
-    np.testing.assert_allclose(left.joint_rad, expected * declared.noise.joint_rad)
-    assert left.of_measurements.pose_rad == 0.0

@@ -11,9 +11,8 @@ from made_problems import made_problem, made_rows, made_unit
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.other import NEIGHBOURS
-from elastocal.diagnosis.search import _Searcher, initial_screening, pose_errors_within_reach, posterior
+from elastocal.diagnosis.search import _Searcher, initial_screening, posterior
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.statistics import Statistics
 
 TAU = [0.0, 0.3, 0.9]
 # Two laws at one location, two mechanisms at three and two locations, and the competitor.
@@ -90,11 +89,6 @@ def test_the_most_probable_model_is_the_one_that_made_the_measurements(signal, b
     assert [model.log_odds for model in found.models] == sorted((m.log_odds for m in found.models), reverse=True)
 
 
-def test_a_mechanism_at_all_its_locations_is_found_where_no_single_one_of_them_shows():
-    units = (*UNITS[:3], made_unit("tilt", (1,), 3), made_unit("tilt", (2,), 4))
-    assert posterior(cancelling(1.0, units)).models[0].units == (0, 1, 2)
-
-
 def test_nothing_is_always_among_the_models_however_improbable():
     problem = problem_of("two mechanisms")
     found, (nothing, _) = posterior(problem), initial_screening(problem)
@@ -125,19 +119,6 @@ def test_single_bayes_factors_are_those_of_the_models_with_one_unit(smallest):
     for number, unit in enumerate(problem.units):
         one = evaluate(problem.statistics, [unit], problem.grid, problem.log_pose, [0.1])
         assert factors[number] == pytest.approx(one.log_evidence - empty, abs=1e-6)
-
-
-def test_pose_errors_go_on_two_steps_beyond_the_most_likely_and_as_far_as_any_is_likely():
-    log_likelihood = {
-        "none": (0, -1, -12, -20, -30),
-        "some": (-20, -3, 0, -2, -30),
-        "flat": (0, 0, 0, -1, -10),
-        "all": (0, 0, 0, 0, 0),
-    }
-    for name, kept in {"none": 3, "some": 5, "flat": 4, "all": 5}.items():
-        taus, nothing = np.array([0.0, 1.0, 2.0, 4.0, 8.0]), np.zeros((5, 0, 0))
-        made = Statistics(taus, nothing, np.zeros((5, 0)), np.full(5, 50.0), np.array(log_likelihood[name], float), 50)
-        assert pose_errors_within_reach(made, Settings()).tolist() == [number < kept for number in range(5)], name
 
 
 @pytest.mark.parametrize("tau", TAU)

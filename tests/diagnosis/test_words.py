@@ -15,7 +15,6 @@ from elastocal.diagnosis.words import (
     hypothesis_words,
     in_common,
     in_words,
-    parameter_words,
 )
 from elastocal.effects.catalogue import candidates_on, effects
 from elastocal.figures.candidates import short_name
@@ -57,27 +56,6 @@ def test_no_two_candidates_are_printed_alike(chain):
 )
 def test_locations_are_gathered(effect, locations, expected):
     assert effect_words(effect, locations).endswith(expected)
-
-
-@pytest.mark.parametrize(
-    ("effect", "name", "expected"),
-    [
-        ("setup_step", "dx", "shift along x"),
-        ("frame 0", "rz", "rotation about z"),
-        ("setup_step", "when", "share of the measurements before it"),
-        ("transmission_harmonic", "cos_12q", "cos(12q)"),
-        ("bearing_runout", "radial_x_sin_1q", "radial x sin(q)"),
-        ("joint_dependent_stiffness", "cos_q", "cos(q)"),
-        ("motor_eccentricity", "cos_1_motor", "cos(motor angle)"),
-        ("motor_eccentricity", "sin_2_motor", "sin(2 × motor angle)"),
-        ("transmission_ratio", "per_q4", "per movement of joint 4"),
-        ("link_weight", "compliance_times_moment_z_of_link_6", "compliance times first moment z of link 6"),
-        ("link_elasticity", "bending_1_over_EI", "bending 1/(EI)"),
-        ("lost_motion", "half_play", "half play"),
-    ],
-)
-def test_parameters_are_named_as_an_engineer_names_them(effect, name, expected):
-    assert parameter_words(effect, name) == expected
 
 
 def test_locations_are_read_as_findings_write_them():

@@ -383,14 +383,6 @@ def test_adding_an_effect_is_adding_one_module(fanuc, one_more_module):
     np.testing.assert_allclose(seen_exactly(sunk, estimate, states).position, expected, atol=1e-14)
 
 
-def test_declared_effects_are_all_their_candidates_in_the_order_declared(fanuc):
-    sites = equipped(fanuc.chain)
-    found = [candidate.key for candidate in declared_candidates(["payload", "force_bias"], sites)]
-    frames = [f"force_bias[{axes} axes{how}]" for how in ("", " in the pull") for axes in ("base", "flange")]
-    assert found == ["payload", "payload[mass]", *frames]
-    assert declared_candidates([], sites) == []
-
-
 def test_effect_that_the_catalogue_does_not_have_is_refused(fanuc):
     with refused("campaign.yaml", "declared", "link_weight"):
         declared_candidates(["link_wait"], equipped(fanuc.chain), "campaign.yaml")

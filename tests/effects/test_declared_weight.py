@@ -161,17 +161,6 @@ def test_growth_of_gravity_with_each_correction_is_its_slope_on_the_coordinates_
         np.testing.assert_allclose(grown, change.T, rtol=0, atol=1e-10)
 
 
-def test_priors_are_those_of_the_robot_file(fanuc):
-    robot = replace(fanuc, masses=(Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1), Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2)))
-    found = candidate(sites_of(robot)).parameters
-    # A centre is off by its relative error times its distance from the joint, and lies anywhere in the girth of its link.
-    width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
-    assert 0.3 < width < 0.7
-    first, second = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5), np.hypot(10.0 * 0.01, 50.0 * width / 12**0.5)
-    assert [p.prior_std for p in found] == pytest.approx([20.0, *[first] * 3, 10.0, *[second] * 3])
-    assert [p.name for p in found[:2]] == ["mass_error_of_link_2", "moment_error_x_of_link_2"]
-
-
 def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(fanuc):
     """Half of each link at either end, six times the rated load in all: slopes of its potential energy."""
     states = made_states(6, 4, seed=7)
@@ -210,12 +199,6 @@ def test_gears_of_an_arm_without_an_external_load_are_loaded_by_its_weight(fanuc
         shapes = [shape.start for shape in known[key].shapes]
         assert displacements(known[key], around, *shapes).any(), key
     assert not displacements(known["force_scale"], around).any()
-
-
-def test_weights_of_links_are_offered_where_none_are_declared_and_a_payload_always(fanuc):
-    assert any(c.effect == "link_weight" for c in candidates_on(sites_of(fanuc)).values())
-    known = candidates_on(sites_of(weighed(fanuc)))
-    assert not any(c.effect == "link_weight" for c in known.values()) and {"payload", "payload[mass]"} <= set(known)
 
 
 @pytest.mark.parametrize("key", ["payload", "link_weight@1", "link_weight@2"])

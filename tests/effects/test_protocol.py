@@ -44,12 +44,6 @@ def test_a_shape_alone_stands_for_all_of_its_range_and_one_at_an_end_for_the_hal
     np.testing.assert_allclose(shape.shares([shape.highest, shape.lowest] if shape.tried else [36000.0, 900.0]), [0.5, 0.5])
 
 
-def test_values_outside_of_the_range_take_nothing_from_those_inside():
-    """Two at the far side of an end share what they would of a range that ends there: nothing but what is nearest."""
-    shape = Shape("when", "1", 0.5, 0.0, 1.0, tried=11)
-    np.testing.assert_allclose(shape.shares([-3.0, -2.0, 0.5, 1.5, 4.0]), [0.0, 0.0, 1.0, 0.0, 0.0], atol=1e-15)
-
-
 @pytest.mark.parametrize(
     ("joints", "detail", "location_name", "key", "location"),
     [

@@ -47,14 +47,6 @@ def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc)
         assert 0.1 < ours / fanuc.compliance[joint] < 3.0
 
 
-def test_loads_and_lengths_are_sized_by_the_rated_load_and_the_reach(fanuc):
-    sites = sites_of(replace(fanuc, payload_kg=100.0))
-    assert size_of("force_bias", "force", sites) == pytest.approx(0.01 * 100.0 * 9.80665)
-    assert size_of("payload", "mass", sites) == pytest.approx(15.0)
-    long = replace(sites, link_vectors_m=2.0 * sites.link_vectors_m)
-    assert size_of("link_geometry", "length", long) == pytest.approx(2.0 * size_of("link_geometry", "length", sites))
-
-
 def test_parameters_have_the_sign_of_the_table(fanuc):
     (tilt,) = sized("joint_tilt", "tilt", ["t"], "rad/(N m)", sites_of(fanuc), 0, over=4.0)
     assert (tilt.sign, tilt.plausible) == (1, pytest.approx(0.25 * fanuc.compliance[0]))

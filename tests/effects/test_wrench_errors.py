@@ -21,12 +21,6 @@ def wrench_of(force, lever):
     return np.concatenate([force, np.cross(lever, force)], axis=1)
 
 
-def test_a_place_that_turns_with_the_flange_is_found_from_the_moments(pulls):
-    force, rotation = pulls
-    lever = rotation @ PLACE
-    np.testing.assert_allclose(lever_of_pull(wrench_of(force, lever), rotation), lever, rtol=1e-9)
-
-
 def test_moments_that_are_a_hundredth_off_still_have_a_place_and_others_have_none(pulls):
     force, rotation = pulls
     wrench, rng = wrench_of(force, rotation @ PLACE), np.random.default_rng(1)

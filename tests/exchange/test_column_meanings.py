@@ -133,13 +133,6 @@ def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
     assert read_measurement_table(tmp_path / "t.csv", found.options).options == found.options
 
 
-def test_a_rail_is_measured_in_lengths_and_a_joint_in_angles(tmp_path):
-    robot = robot_of("Tx(q1) Rz(q2) [A]")
-    for names, unit in (("J1 [deg],J2", "J1 [deg]"), ("J1,J2 [mm]", "J2 [mm]")):
-        with refused(tmp_path / "t.csv", f"unit of {unit!r}", "--unit"):
-            table(tmp_path, f"{names},x,y,z\n1,2,{ROW}\n", PLAIN, robot)
-
-
 @pytest.mark.parametrize(
     ("names", "words"), [("J1,J2,J3", ["3 joints", "--ignore"]), ("J1", ["no column q2"]), ("a,b", ["no joint angles"])]
 )
@@ -147,14 +140,6 @@ def test_as_many_joints_as_the_robot_has_are_needed(tmp_path, names, words):
     text = f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n"
     with refused(tmp_path / "t.csv", "header", *words):
         table(tmp_path, text, PLAIN, robot_of("Rz(q1) Tx(1) Rz(q2) [A]"))
-
-
-def test_topics_have_positions_orientations_and_forces(tmp_path):
-    names = [f"/tcp/pose/position/{axis}" for axis in "xyz"] + [f"field.pose.orientation.{axis}" for axis in "wxyz"]
-    text = f"J1,/ft/wrench/force/x,/tcp/twist/linear/x,{','.join(names)}\n5,6,9,{ROW},1,0,0,0\n"
-    found = table(tmp_path, text)
-    assert [found.table[name][0] for name in ("x", "y", "z", "fx", "rx")] == [0.001, 0.002, 0.003, 6.0, 0.0]
-    assert found.ignored == ("/tcp/twist/linear/x",)
 
 
 @pytest.mark.parametrize("names", ["qx,qy,qz", "qw,qx", "Q_x,Q_y,Q_z"])

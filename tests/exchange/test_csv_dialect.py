@@ -122,14 +122,6 @@ def test_nameless_columns_and_rows_that_are_empty_throughout_are_left_out(tmp_pa
     assert read_text_table(write_text_file(tmp_path, text), is_header).columns == {"x": ("1",), "y": ("2",)}
 
 
-def test_a_nameless_column_with_values_is_called_by_its_place(tmp_path):
-    found = read_text_table(write_text_file(tmp_path, ",x,y\n0,1,2\n,3,4\n"), is_header)
-    assert found.columns == {"column 1": ("0", ""), "x": ("1", "3"), "y": ("2", "4")}
-    for text in ("x,y\n1,2,3\n", "x,y\n1,2,,3\n"):
-        with refused(tmp_path / "table.txt", "line 2", "one for each column"):
-            read_text_table(write_text_file(tmp_path, text), is_header)
-
-
 def test_columns_to_ignore_are_left_out_whatever_they_hold(tmp_path):
     path = write_text_file(tmp_path, "x;y;n;n\n1,5;2;1.5;1.2.3\n")
     with refused(path, "line 1", "'n' twice", "--ignore 'n'"):

@@ -23,7 +23,6 @@ ARM = (
     joint("end", "arm", "hand", "fixed", (1, 0, 0)),
 )
 GRIPPER = (link("grip", 1.0), joint("bolt", "hand", "grip", "fixed", (0, 0, 0.3)))
-FINGER = (link("finger", 1.0, (0, 0, 0.1)), joint("open", "hand", "finger", "prismatic", (0, 0, 0.2)))
 
 
 def test_what_is_bolted_on_weighs_with_the_link_that_carries_it(tmp_path):
@@ -36,14 +35,6 @@ def test_what_is_bolted_on_weighs_with_the_link_that_carries_it(tmp_path):
         "relative_std": URDF_MASS_STD,
     }
     assert found.notes == ()
-
-
-def test_what_moves_beside_the_chain_weighs_as_at_zero_and_is_told(tmp_path):
-    found = weights(tmp_path, *ARM, *FINGER, relative_std=0.5)
-    assert found.masses[1]["mass_kg"] == 3.0 and found.masses[1]["centre_m"] == pytest.approx([0.4, 0, 0.1])
-    assert found.masses[1]["relative_std"] == 0.5
-    (note,) = found.notes
-    assert "open" in note and "zero" in note
 
 
 def test_equal_masses_are_placeholders(tmp_path):

@@ -78,22 +78,6 @@ def test_sensor_and_joints_are_told_apart(rows):
         assert ((low < ratio / inflation) & (ratio / inflation < high)).all()
 
 
-def test_part_of_the_joints_is_seen_whatever_the_frame(fanuc):
-    """A frame that is turned turns the repeats with it: the noise must be the same."""
-    model, estimate, measurements = drawn(fanuc, 3, joint_rad=60e-6)
-    turned = replace(model, fitted_frames=True)
-    frames = made_estimate(turned, seed=4)
-    other = measurements.position @ frames.frame_rotation[0].T + frames.frame_position[0]
-    there = replace(estimate, frame_rotation=frames.frame_rotation, frame_position=frames.frame_position)
-    one, two = (
-        noise_from_repeats(model, estimate, measurements),
-        noise_from_repeats(turned, there, replace(measurements, position=other)),
-    )
-    assert one.joint_rad.any()
-    np.testing.assert_allclose(two.position_m, one.position_m, rtol=1e-3)
-    np.testing.assert_allclose(two.joint_rad, one.joint_rad, rtol=0.02, atol=1e-6)
-
-
 def test_noise_does_not_hang_on_what_the_model_lacks(fanuc):
     """Only differences between repeats count: a robot a millimetre off is as noisy as any."""
     model, estimate, measurements = drawn(fanuc, 5)
@@ -237,16 +221,6 @@ def test_positions_and_orientations_must_both_differ_by_more_than_a_sensor_can_r
         assert (found.position_m, found.orientation_rad) == pytest.approx((position_m, orientation_rad), rel=1e-6)
 
 
-@pytest.mark.parametrize(("poses", "told"), [(19, False), (20, True)])
-def test_sixty_contrasts_of_repeats_are_the_fewest_that_separate_the_joints_from_the_sensor(poses, told):
-    model, estimate = gantry()
-    parts = SENSOR_M * np.array([20.0, 1.0, 1.0]) * np.ones((poses, 1, 3))
-    found = noise_from_repeats(model, estimate, off_by(model, mirrored(parts)))
-    assert found.degrees_of_freedom == 3 * poses and found.joint_rad.any() == told
-    # Without a part of the joints all directions count alike.
-    assert found.position_m == pytest.approx(SENSOR_M * (1.0 if told else np.sqrt((20**2 + 2) / 3)), rel=1e-3)
-
-
 @pytest.mark.parametrize("rows", [3, 6])
 def test_a_joint_that_shifts_all_targets_has_the_maximum_of_its_likelihood_in_closed_form(rows):
     """What two targets make along the joint together has variance 2 s^2 + sigma^2, every other direction sigma^2."""
@@ -343,16 +317,6 @@ def test_declared_noise_is_doubted_beyond_the_range_of_chance_in_a_hundred_campa
     for share, warned in ((0.999, end == 0), (1.001, end == 1)):
         declared = campaign(fanuc, position_m=SENSOR_M / (share * limit))
         assert len(chosen_noise(declared, model, estimate, measurements)[1]) == warned
-
-
-def test_noise_of_single_measurements_is_scaled_and_what_a_pose_has_in_common_is_not():
-    noise = Noise("repeats", 1.0, 2.0, np.array([3.0, 4.0]), 50, 5.0)
-    found = noise.scaled(10.0)
-    assert (found.position_m, found.orientation_rad, found.joint_rad.tolist()) == (10.0, 20.0, [30.0, 40.0])
-    assert (found.source, found.degrees_of_freedom, found.pose_rad) == ("repeats", 50, 5.0)
-    alone = noise.of_measurements
-    assert (alone.position_m, alone.orientation_rad, alone.joint_rad.tolist()) == (1.0, 2.0, [3.0, 4.0])
-    assert alone.pose_rad == 0.0
 
 
 @pytest.mark.parametrize("rows", [3, 6])

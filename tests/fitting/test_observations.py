@@ -46,16 +46,6 @@ def test_repeats_of_a_pose_are_averaged():
     assert found.rotation is None and found.rows == 3
 
 
-def test_joint_angles_wrench_time_and_temperature_are_averaged_with_their_measurements():
-    time, warm = np.array([0.0, 2.0, 4.0, 8.0]), np.array([20.0, 21.0, 22.0, 25.0])
-    taken = measurements(FOUR, time_s=time, temperature_c=warm)
-    states = averaged(taken).states
-    np.testing.assert_allclose(states.time_s, [1.0, 6.0])
-    np.testing.assert_allclose(states.temperature_c, [20.5, 23.5])
-    np.testing.assert_allclose(states.joint_angles, taken.joint_angles.reshape(2, 2, 2).mean(axis=1))
-    np.testing.assert_allclose(states.wrench, taken.wrench.reshape(2, 2, 6).mean(axis=1))
-
-
 def test_sessions_poses_loads_and_targets_are_kept_apart():
     keys = [(s, p, load, r, t) for s in (0, 3) for p in (2, 7) for load in (0, 1) for r in (0, 1, 2) for t in (0, 1)]
     found = averaged(measurements(keys))
@@ -193,17 +183,6 @@ def test_a_wild_repeat_leaves_and_all_others_stay(repeats, off):
 def test_clean_noise_loses_nothing(repeats):
     """Of 3,600 poses: a rate of 1 in 1,000 is seen with a power of 0.97."""
     assert sum(len(rows_lost(repeated(repeats, poses=60, seed=seed))) for seed in range(60)) == 0
-
-
-def test_targets_loads_and_approaches_are_no_repeats_of_each_other():
-    """Nobody is outlying for being elsewhere than another state, target or sense of approach."""
-    keys = [(0, p, load, r, t) for p in range(5) for load in (0, 1) for r in range(8) for t in (0, 1)]
-    _, pose, load, repeat, target = np.array(keys).T
-    side = repeat % 2
-    away = 1e3 * np.column_stack([load, target, side]) + 1e4 * pose[:, None]
-    noise = np.random.default_rng(8).standard_normal((len(keys), 3))
-    approach = np.column_stack([2.0 * side - 1, np.ones(len(keys))])
-    assert rows_lost(measurements(keys, away + noise, approach=approach)) == []
 
 
 @pytest.mark.parametrize("group", [[0, 0, 1, 3, 3, 4], [3, 0, 4, 3, 0, 1]], ids=["rising", "in any order"])

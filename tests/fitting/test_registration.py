@@ -43,24 +43,6 @@ def test_frames_and_targets_are_found(fanuc, rows, sessions, targets):
     assert_known(found, true, rows)
 
 
-def one_joint_at_a_time(joints, steps):
-    """Sweeps from a home pose, as a circle-point measurement makes them."""
-    states = unloaded(made_states(joints, joints * steps, seed=5))
-    states.joint_angles[:] = np.linspace(0.1, 0.6, joints)
-    for joint in range(joints):
-        states.joint_angles[joint * steps : (joint + 1) * steps, joint] += np.linspace(-0.8, 0.8, steps)
-    return states
-
-
-@pytest.mark.parametrize("sessions", [(0,), (0, 1)])
-def test_frames_and_targets_are_found_from_one_joint_at_a_time(fanuc, sessions):
-    model = made_model(fanuc.chain)
-    states = one_joint_at_a_time(6, 12)
-    states.session[:] = np.arange(len(states)) % len(sessions)
-    true = made_estimate(model, sessions, seed=6)
-    assert_known(registered(model, seen_exactly(model, true, states)), true)
-
-
 def test_a_known_mount_keeps_its_turn_and_an_unknown_one_is_found(fanuc):
     targets = (Target("A", "6DoF", None, (0.1, -1.5, 0.2)), Target("B", "4DoF", (0.1, 0.0, 0.2), None))
     for fitted_frames in (False, True):

@@ -67,16 +67,6 @@ def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad, stat
     np.testing.assert_allclose(factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7)
 
 
-def test_noise_of_measurements_is_the_noise_without_what_a_pose_has_in_common(case):
-    seen, jacobian = case
-    values = np.random.default_rng(6).standard_normal((len(seen), seen.rows))
-    noise = replace(NOISE, pose_rad=1e-3)
-    found = [whitening(seen, jacobian, each).apply(values) for each in (noise.of_measurements, NOISE)]
-    np.testing.assert_array_equal(*found)
-    # A factor on the noise of measurements leaves what a pose has in common.
-    assert (noise.scaled(2.0).pose_rad, noise.scaled(2.0).position_m) == (1e-3, 2 * NOISE.position_m)
-
-
 def test_the_error_of_a_pose_is_not_averaged_by_repeats(case):
     """All of a pose moves together: as many times as it is read, its whitened size is that of one measurement."""
     seen, jacobian = case
@@ -104,14 +94,3 @@ def test_a_whitening_after_matrices_is_that_of_what_these_make(case, noise):
     values = rng.standard_normal((len(seen), seen.rows, 3))
     by = whitening(seen, jacobian, noise)
     np.testing.assert_allclose(by.after(maps).apply(values), by.apply(maps @ values), rtol=1e-8, atol=1e-6)
-
-
-def test_observations_that_follow_each_other_are_whitened_as_those_that_are_gathered(case):
-    """Each in a state of its own, in order and backwards."""
-    seen, jacobian = case
-    some = np.flatnonzero(np.diff(seen.state, prepend=-1))
-    alone = Observations(seen.states, seen.state[some], seen.target[some], seen.position[some], None)
-    values = np.random.default_rng(8).standard_normal((len(some), alone.rows, 2))
-    forward = whitening(alone, jacobian[some, : alone.rows], NOISE)
-    backward = replace(forward, blocks=tuple((members[::-1], factor[::-1]) for members, factor in forward.blocks))
-    np.testing.assert_allclose(forward.apply(values), backward.apply(values), rtol=1e-12)

@@ -188,15 +188,6 @@ def test_what_is_no_plain_document_is_refused_at_once(tmp_path, text, where, wor
         read(tmp_path, text)
 
 
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [("0", 0), ("-12", -12), ("+3", 3), (".5", 0.5), ("6.0e-5", 6e-5), ("007.5", 7.5), ("'010'", "010"), ("-.inf", -math.inf)],
-)
-def test_decimal_numbers_are_read(tmp_path, text, value):
-    found = read(tmp_path, f"a: {text}")["a"]
-    assert found == value and type(found) is type(value)
-
-
 @pytest.mark.parametrize(("text", "written"), [("6e-5", "6.0e-5"), ("6E5", "6.0e+5"), ("-1.5e5", "-1.5e+5")])
 def test_numbers_that_yaml_takes_for_text_come_with_the_way_to_write_them(tmp_path, text, written):
     document = read(tmp_path, f"name: x\nchain: x\nlengths_m: {{l: {text}}}\n")

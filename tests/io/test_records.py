@@ -60,12 +60,6 @@ def test_a_file_leads_back_to_every_job_behind_it_and_to_no_other(jobs):
     assert [job.name for job in jobs] == ["measure kuka", "fit kuka", "draw kuka"]
 
 
-def test_what_no_job_made_is_the_users_own_or_a_source(jobs):
-    assert jobs[0].own == (OWN,) and jobs[0].made_inputs == {}
-    assert [set(job.sources) for job in jobs] == [{CODE}] * 3
-    assert set(jobs[1].made_inputs) == {MEASURED} and jobs[1].inputs[CODE] == checksum(CODE)
-
-
 def test_records_stand_beside_what_the_pipeline_makes_and_nowhere_else(tmp_path):
     assert sorted(record_of("").parent.rglob("*.json")) == sorted(
         map(record_of, [MEASURED, FITTED, TABLE, DRAWN, "results/other.csv"])
@@ -96,14 +90,6 @@ def test_a_missing_record_is_an_error(output):
         jobs_behind([DRAWN])
     with refused(output, "", "no record of the job that made it"):
         input_digests([output])
-
-
-def test_a_file_that_is_added_to_a_folder_is_found_but_for_the_time_that_snakemake_notes_there():
-    Path(MEASURED, ".snakemake_timestamp").touch()
-    jobs_behind([DRAWN])
-    Path(MEASURED, "3.json").touch()
-    with refused(f"{MEASURED}/3.json", "", "other contents"):
-        jobs_behind([DRAWN])
 
 
 def test_a_file_that_was_made_again_since_another_read_it_is_found(jobs):

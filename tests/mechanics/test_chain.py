@@ -96,13 +96,6 @@ def test_faulty_chain_is_refused_in_one_line(text, words):
         parse_chain(text, {"l1": 1.0, "l2": 2.0}, "robots/x.yaml")
 
 
-def test_joint_in_two_places_is_one_coordinate_and_passive_in_the_second():
-    chain = chain_of("Tx(q1) Tz(0.5) Rz(q2) Tx(1) Ry(q3) Tx(1) Ry(-q3) [hand]")
-    assert [t.coordinate for t in chain.transforms if t.coordinate is not None] == [0, 1, 2, 2]
-    assert [place for place in range(len(chain.transforms)) if chain.is_passive(place)] == [6]
-    assert chain.moved_by(chain.end_effector) == (0, 1, 2)
-
-
 def test_stretches_are_the_rigid_parts_between_the_joints(kuka):
     assert stretches(kuka.chain) == (
         (1, (0.0, 0.0, 0.675)),

@@ -7,7 +7,6 @@ import pytest
 from support import refused
 
 from elastocal.io.documents import check_document
-from elastocal.mechanics.robot import Compensator, Mass
 from elastocal.mechanics.robot_file import document_of, joint_count, robot_from_document
 from elastocal.mechanics.usual_values import usual_compliance
 
@@ -115,13 +114,6 @@ def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):
         robot_from_document(document(**changes), "robots/two.yaml")
 
 
-def test_what_the_links_weigh_comes_in_their_order():
-    robot = robot_from_document(document(**WEIGHED))
-    assert robot.masses == (Mass(0, 90.5, (0.0, 0.0, 0.2), 0.2), Mass(2, 40, (0.5, 0.0, -0.02), 0.1))
-    assert robot.gravity_m_s2 == (0.0, 9.80665, 0.0) and robot.gear_ratio == (None, 171)
-    assert robot.compensator == Compensator(2, "spring") and robot.payload_kg == 12
-
-
 @pytest.mark.parametrize(
     "more",
     [{}, WEIGHED, TRACKED, REPORTED],
@@ -162,11 +154,3 @@ def test_robot_becomes_a_document_that_gives_it_back(more):
 def test_schema_refuses_weights_that_cannot_be(changes, key):
     with refused("robots/two.yaml", key):
         check_document(document(**changes), "robot", "robots/two.yaml")
-
-
-def test_prismatic_joints_are_in_metres_and_newtons():
-    robot = robot_from_document(TRACKED)
-    assert robot.chain.prismatic == (True, False, False) and robot.joints == 3
-    np.testing.assert_allclose(robot.joint_limits, [[-0.5, 4.0], [-np.pi, np.pi], [-np.pi / 2, np.pi / 2]], rtol=1e-15)
-    np.testing.assert_allclose(robot.reported_offset, [2.5, 0.0, np.pi / 2], rtol=1e-15)
-    np.testing.assert_allclose(robot.compliance, [2e-8, 1e-6, 2e-6], rtol=1e-15)

@@ -39,14 +39,6 @@ def columns_at(sites, angles, point, coordinates):
     return poses_and_jacobians(sites.chain, extended(sites, angles), sites.chain.point(point))[2][..., list(coordinates)]
 
 
-def test_base_moves_all_points_rigidly_in_base_axes(chain):
-    sites, angles = sites_of(chain), random_angles(np.random.default_rng(3), chain)
-    for point in chain.points:
-        x, y, z = poses(chain, angles, point)[0]
-        expected = np.block([[np.eye(3), np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])], [np.zeros((3, 3)), np.eye(3)]])
-        np.testing.assert_allclose(columns_at(sites, angles, point.name, sites.base), expected, rtol=0, atol=ROUNDING)
-
-
 def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
     sites, angles = sites_of(chain), random_angles(np.random.default_rng(4), chain)
     turning = [t for t in chain.transforms if t.coordinate is not None]
@@ -56,15 +48,6 @@ def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
         for point in chain.points:
             alone, own = columns_at(sites, angles, point.name, [about, joint]).T
             np.testing.assert_allclose(transform.sign * alone, own, rtol=0, atol=ROUNDING)
-
-
-def test_tilt_axes_turn_with_the_joint():
-    sites = sites_of(chain_of("Rz(q1) Tx(1) [end]"))
-    rx, ry, _ = sites.tilt[0]
-    across = columns_at(sites, np.array([np.pi / 2]), "end", [rx, ry])
-    # A quarter turn: the x axis behind the joint lies along y, where the link is too.
-    np.testing.assert_allclose(across[:, 0], [0, 0, 0, 0, 1, 0], atol=1e-15)
-    np.testing.assert_allclose(across[:, 1], [0, 0, -1, -1, 0, 0], atol=1e-15)
 
 
 @pytest.mark.parametrize(("point", "link"), [("2DoF", 2), ("3DoF", 3), ("4DoF", 4), ("6DoF", 6)])

@@ -116,10 +116,6 @@ def other_config(config):
     return other
 
 
-def test_robots_with_other_joints_and_points_pass(other_config, other_folder):
-    assert check_study(other_config, other_folder).points == {"plain": ("B",)}
-
-
 FAULTY_FILES = {
     "bad YAML": ("robots/arm.yaml", "name: [arm\n", "line 2", ["YAML"]),
     "empty": ("robots/arm.yaml", "", "", ["found nothing", "keys with values"]),

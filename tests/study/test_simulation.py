@@ -50,13 +50,6 @@ def test_joint_angles_are_uniform_within_the_limits(fanuc):
         assert low <= joint.min() and joint.max() <= high
 
 
-def test_offset_in_the_base_frame_gives_the_moment_of_that_lever(kuka):
-    wrench = draw(kuka).wrench
-    lever = np.array([0.0, 0.5, 0.0])
-    np.testing.assert_allclose(wrench[..., 3:], np.cross(lever, wrench[..., :3]), rtol=0, atol=1e-10)
-    assert (wrench[..., 4] == 0).all()
-
-
 def test_offset_in_the_tool_frame_turns_with_the_tool(kuka):
     base, tool = draw(kuka), draw(kuka, replace(PAPER, offset_frame="tool"))
     np.testing.assert_array_equal(tool.joint_angles, base.joint_angles)

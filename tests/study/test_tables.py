@@ -15,14 +15,6 @@ from elastocal.study.tables import (
 )
 
 
-def test_lengths_of_table4_are_those_at_which_a_bias_that_falls_as_one_over_the_length_meets_the_limits():
-    table = table4(metrics_of("A", 40.0), replicates_of("A", 40.0), ["arm"], ["A"], 200.0, 20, 1.0, 2.0).iloc[0]
-    assert table.k_sigma_20_percent == pytest.approx(2.0) and table.k_sigma_20_percent_fixed_joints == pytest.approx(1.0)
-    assert (table.n_k_sigma_1_percent, table.n_k_sigma_1_percent_fixed_joints, table.n_dev_2_um) == (40, 20, 20)
-    assert table.n_k_sigma_1_percent_std_error == pytest.approx(4.0)
-    assert table.dev_20_um == pytest.approx(2.0)
-
-
 def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law_it_follows():
     table = table4(metrics_of("A", 200.0), replicates_of("A", 200.0), ["arm"], ["A"], 200.0, 20, 1.0, 1.0).iloc[0]
     assert np.isinf(table.n_k_sigma_1_percent) and table.n_k_sigma_1_percent_std_error == pytest.approx(20.0)

@@ -1,19 +1,10 @@
 """Metrics, replicates and accuracy of one strategy from its identified compliances."""
 
-from itertools import pairwise
-
 import numpy as np
 from made_study_blocks import (
-    CONFIGURATIONS_OF_THE_TEST,
-    deflections_of,
     evaluated_in_one_block,
-    experiments_of,
-    identified,
     judge,
 )
-
-from elastocal.study.steps.evaluate import evaluate_strategy
-from elastocal.study.steps.weights import weight_blocks
 
 
 def make_same_estimates(robot, factors, sets=12):
@@ -21,26 +12,6 @@ def make_same_estimates(robot, factors, sets=12):
     lengths = len(factors)
     table = {"data_set": np.repeat(np.arange(sets), lengths), "length": np.tile(np.arange(1, lengths + 1), sets)}
     return table | {f"c{j + 1}": np.tile(c * np.array(factors), sets) for j, c in enumerate(robot.compliance)}
-
-
-def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
-    experiments = experiments_of(kuka, sets=12)
-    table = identified(kuka, strategies["3+6DoF-comb"], experiments, deflections_of(kuka, experiments, 5e-5))
-
-    counts, tests = weight_blocks("kuka", 1, 12, CONFIGURATIONS_OF_THE_TEST, 10)
-
-    def cut(columns, rows, edges):
-        return [{n: columns[n][rows * a : rows * b] for n in columns if n != "members"} for a, b in pairwise(edges)]
-
-    scores = judge(kuka)
-    whole, parts = (
-        evaluate_strategy(cut(table, 4, c), cut(counts, 10, c), tests, scores, (0,), "stiffness", "averaged_model", [2, 4])
-        for c in ((0, 12), (0, 1, 7, 12))
-    )
-    for one, other in zip(whole, parts, strict=True):
-        assert set(one) == set(other)
-        for name in one:
-            np.testing.assert_allclose(other[name], one[name], rtol=1e-8, atol=1e-12, err_msg=name)
 
 
 def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):

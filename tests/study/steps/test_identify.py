@@ -45,13 +45,6 @@ def test_exact_data_of_a_target_off_the_flange_give_the_true_compliances(kuka, s
     np.testing.assert_allclose(compliances(table, 4), np.tile(kuka.compliance, (5, 1)), rtol=tolerance)
 
 
-def test_identified_table_names_the_right_set_length_and_joint_pair(kuka, strategies):
-    experiments = experiments_of(kuka)
-    table = identified(kuka, strategies["6DoF"], experiments, deflections_of(kuka, experiments, 2e-4))
-    assert table["data_set"].tolist() == np.repeat(range(5), 4).tolist()
-    assert table["length"].tolist() == [1, 2, 3, 4] * 5
-
-
 @pytest.mark.parametrize("rows", [3, 6])
 def test_estimates_of_every_prefix_are_numpy_least_squares_of_its_measurements(kuka, strategies, rows):
     moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka, sets=3)
