@@ -143,3 +143,10 @@ def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell, holdou
     again["pose"] = [pose + POSES for pose in again["pose"]]
     cell.table = {name: [*column, *again[name]] for name, column in cell.table.items()}
     assert parts(cell)[1] == once | {(session, pose + POSES) for session, pose in once}
+
+
+def test_thirty_poses_of_one_configuration_are_refused(cell):
+    for name in [name for name in cell.table if name.startswith("q")]:
+        cell.table[name] = [cell.table[name][0]] * len(cell.table[name])
+    with refused(cell.source, "holdout", "1 configuration to fit and 0 held out", "at least 5 to fit"):
+        cell.read()

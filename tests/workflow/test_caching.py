@@ -153,8 +153,9 @@ for script in sys.argv[2:]:
         body = ast.parse((root / "workflow" / "scripts" / script).read_text()).body
         imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))]
         exec(compile(ast.Module(imports, []), script, "exec"), {})
-        # A catalogue looks up the modules beside it when it is asked.
-        for name in [name for name in sys.modules if name.startswith("elastocal.") and name.endswith(".catalogue")]:
+        # What is a catalogue looks up the modules beside it when it is asked.
+        found = [name for name, module in sys.modules.items() if hasattr(module, "modules_with")]
+        for name in set(found) - {"elastocal.io.modules"}:
             package = sys.modules[name.rpartition(".")[0]]
             sys.modules["elastocal.io.modules"].modules_with("__name__", package)
         files = [Path(m.__file__) for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
