@@ -140,3 +140,17 @@ def test_weak_defects_of_every_joint_together_raise_an_alarm_that_none_of_them_r
         problem, products = made_problem(replace(made, residual=made.residual + signal), units)
         found.append(alarm_of(problem, products, 0.0, np.random.default_rng(number)).p_value)
     assert np.median(found) <= 0.01
+
+
+def test_no_draw_is_made_where_none_could_reach_the_statistic_and_the_p_value_is_that_of_draws(monkeypatch):
+    from elastocal.diagnosis import alarm
+
+    made, draw = [], alarm.null_draws
+    monkeypatch.setattr(alarm, "null_draws", lambda *parts: made.append(parts) or draw(*parts))
+    (small, large), seen = (signalled(size) for size in (0.6, 20.0)), []
+    for problem, products in (small, large):
+        seen.append(alarm_of(problem, products, 0.0, np.random.default_rng(1)))
+    assert len(made) == 1 and seen[0].statistic < seen[1].statistic
+    monkeypatch.setattr(alarm, "_BEYOND_DRAWS", np.inf)
+    again = alarm_of(*large, 0.0, np.random.default_rng(1))
+    assert len(made) == 2 and again == seen[1] and again.p_value == 1 / 500
