@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from analysed_robots import analysed
 
-from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits, reach_m, refine, remove_turns
+from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits, reach_m, refine
 from elastocal.mechanics.kinematics import poses
 
 
@@ -52,14 +52,6 @@ def test_single_poses_are_found_without_a_start():
     angles = draw_angles(robot, 60, 3)
     _, left = along_path(robot, *find_poses(robot, angles))
     assert (left < SOLVED_M).mean() > 0.95
-
-
-def test_whole_turns_bring_angles_near_the_middle_or_a_start():
-    robot = analysed("ur10")
-    middle = robot.joint_limits.mean(axis=1)
-    turned = remove_turns(robot, middle + 0.3 + 4 * np.pi)
-    np.testing.assert_allclose(turned, middle + 0.3)
-    np.testing.assert_allclose(remove_turns(robot, turned, turned + 2 * np.pi), turned + 2 * np.pi)
 
 
 def test_limits_count_beyond_rounding_alone():
