@@ -2,7 +2,8 @@
 
 Each step is that of Levenberg and Marquardt [1] on the pose error, whose rotations count at the reach of the arm as lengths;
 batched over targets and starts. All solutions of all rows, and their copies whole turns away, are candidates of one path: that
-with the fewest large steps, and of these the one along which the joints move least, by dynamic programming (Viterbi [2]).
+without large steps where there is one, and of these the one along which the joints move least, by dynamic programming (Viterbi's
+algorithm [2]).
 
 [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, section 3.7, Springer,
     2009.
@@ -42,8 +43,8 @@ STEP_PER_TURN, STEP_BESIDE = 5.0, np.radians(10.0)
 _MOST_TURNS = 4
 # Solutions nearer than this are one, rad or m.
 _SAME = 1e-6
-# More than a path is long: fewest large steps first, then the way.
-_LARGE_STEP = 1e6
+# What steps are too large by comes first, then the way, then how far from the middle of the limits it lies.
+_TOO_LARGE, _OFF_MIDDLE = 1e4, 1e-5
 # No joint turns farther in a step, rad or m: beyond it the linearization means nothing.
 _LONGEST_STEP = 0.5
 
@@ -169,14 +170,16 @@ def _shortest_path(
         postures, never = lowest[order, rows], np.where(usable[order, rows], 0.0, np.inf)
         counts = np.maximum(1, np.ceil((high - low) / period - _ROUNDING)).astype(int)
         copies = [postures[..., j, None] + 2 * np.pi * np.arange(count) for j, count in enumerate(counts)]
-        path[rows] = _least_motion(copies, high + _ROUNDING, never, allowed_steps(robot, position[rows], rotation[rows]))
+        path[rows] = _least_motion(
+            copies, np.stack([low, high], axis=1), never, allowed_steps(robot, position[rows], rotation[rows])
+        )
     return path, np.where(usable.any(axis=0), np.where(usable, error, 0.0).max(axis=0), error[best])
 
 
-def _least_motion(copies: list[np.ndarray], high: np.ndarray, never: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-    """Angles (N, n) along which the fewest steps are larger than allowed (N - 1, n), and then the sum of all steps is least.
+def _least_motion(copies: list[np.ndarray], limits: np.ndarray, never: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+    """Angles (N, n) along which steps exceed what is allowed (N - 1, n) by least, and then the sum of all steps is least.
 
-    `copies`: of each joint its angle and those whole turns above (K, N, turns), of which those above `high` (n,) are none.
+    `copies`: of each joint its angle and those whole turns above (K, N, turns), none above its `limits` (n, 2).
     `never` (K, N): infinite where there is no such posture. A sum, so that the best turns of each joint are found apart: of two
     turns each, 2^n copies cost 2 n.
     """
@@ -189,12 +192,16 @@ def _least_motion(copies: list[np.ndarray], high: np.ndarray, never: np.ndarray,
     def steps(row: int, joint: int) -> np.ndarray:
         """What the steps of a joint to a row cost, (K, turns) of the row before by (K, turns) of this one."""
         step = np.abs(copies[joint][:, row - 1, :, None, None] - copies[joint][:, row])
-        return step + _LARGE_STEP * (step > allowed[row - 1, joint])
+        return step + _TOO_LARGE * np.maximum(step - allowed[row - 1, joint], 0.0)
 
     def standing(row: int) -> np.ndarray:
-        """Nothing for each copy of a row within the limits, else infinite, (K, turns of all joints)."""
-        beyond = [np.where(each[:, row] > limit, np.inf, 0.0) for each, limit in zip(copies, high, strict=True)]
-        return sum((along(each, joint) for joint, each in enumerate(beyond)), never[:, row].reshape(-1, *[1] * joints))
+        """What it costs to stand at each copy of a row, (K, turns of all joints)."""
+        found = never[:, row].reshape(-1, *[1] * joints)
+        for joint, (low, high) in enumerate(limits):
+            angle = copies[joint][:, row]
+            off = _OFF_MIDDLE * np.abs(angle - 0.5 * (low + high))
+            found = found + along(np.where(angle > high + _ROUNDING, np.inf, off), joint)
+        return found
 
     totals = [standing(0)]
     for row in range(1, never.shape[1]):
