@@ -117,9 +117,7 @@ def test_mirrored_positions_in_a_frame_that_nobody_knows_say_no_more_than_that(f
     assert find(campaign, with_measured(campaign, campaign.measurements.position[:, [1, 2, 0]])) == []
 
 
-@pytest.mark.parametrize(
-    ("factor", "unit"), [(1000, "millimetres"), (0.1, "tenth")]
-)
+@pytest.mark.parametrize(("factor", "unit"), [(1000, "millimetres"), (0.1, "tenth")])
 def test_positions_in_another_unit_are_named(campaign, factor, unit):
     (fault,) = find(campaign, with_measured(campaign, factor * campaign.measurements.position))
     assert (fault.name, fault.decisive) == ("wrong_unit", True) and unit in fault.detail

@@ -2,7 +2,7 @@
 
 Each step is that of Levenberg and Marquardt [1] on the pose error, whose rotations count at the reach of the arm as lengths;
 batched over targets and starts. All solutions of all rows, and their copies whole turns away, are candidates of one path: that
-without large steps where there is one, and of these the one along which the joints move least, by dynamic programming (Viterbi's
+without large steps where there is one, and of these that along which the joints move least, by dynamic programming (Viterbi's
 algorithm [2]).
 
 [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, section 3.7, Springer,
