@@ -51,7 +51,6 @@ def certificate(
 
     from rich.console import Console
 
-    from elastocal.application.certificate.use import use_at
     from elastocal.campaigns.reading import read_descriptions
     from elastocal.data_checks.protocol import data_at_fault
     from elastocal.exchange.target_path import read_target_path_of
@@ -59,7 +58,7 @@ def certificate(
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
-    from elastocal.loop.certificate import Wanted
+    from elastocal.loop.certificate import Wanted, use_at
     from elastocal.loop.certificate import certificate as certified
     from elastocal.loop.measured import measured_errors
     from elastocal.report.certificate_pages import write_certificate
