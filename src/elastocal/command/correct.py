@@ -105,7 +105,12 @@ def correct(
     bad = (found.status != OK).nonzero()[0]
     if len(bad) and not partial:
         rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in bad], _NAMED)
-        raise InputError(path, "", rows, "poses that the robot reaches within its limits, or --partial")
+        raise InputError(
+            path,
+            "",
+            rows,
+            "poses that the robot reaches within its limits, in the posture that q1..qn state if any, or --partial",
+        )
     good = found.status == OK
     if controller and not good.any():
         raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")
@@ -186,7 +191,11 @@ def _notes(campaign: Diagnosed, wrench: np.ndarray, day: date) -> list[str]:
     """For what a program holds: robot, campaign, day, loads (N, 6) and tool, one line each."""
     end = campaign.calibrated.robot.chain.end_effector
     sizes = [math.sqrt((part**2).sum(axis=1).max()) for part in (wrench[:, :3], wrench[:, 3:])]
-    load = f"force up to {sizes[0]:.4g} N, moment up to {sizes[1]:.4g} N m" if any(sizes) else "none beside the robot's own"
+    load = (
+        f"force up to {sizes[0]:.4g} N, moment up to {sizes[1]:.4g} N m"
+        if any(sizes)
+        else "none beside what the robot file states"
+    )
     return [
         f"robot: {campaign.calibrated.robot.name}",
         f"campaign: {campaign.name}",
