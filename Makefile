@@ -118,6 +118,7 @@ clean:
 .venv/ready: requirements/run.lock pyproject.toml | .venv/made
 	$(INSTALL) --no-deps --require-hashes -r requirements/run.lock
 	$(INSTALL) --no-deps --no-build-isolation -e .
+	$(BIN)/python -m compileall -q src
 	touch $@
 
 # What the audit needs besides.

@@ -37,17 +37,6 @@ def copy_study(folder: Path) -> Path:
     return folder
 
 
-def reduce_to_imports(folder: Path) -> None:
-    """Rewrite the scripts of a copy: they import what they import and touch their outputs.
-
-    `folder`: from `copy_study`.
-    """
-    for script in _scripts(folder):
-        tree = ast.parse(script.read_text(encoding="utf-8"))
-        imports = [ast.unparse(node) for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
-        script.write_text("\n".join([*imports, _TOUCH]), encoding="utf-8")
-
-
 def reduce_to_records(folder: Path) -> None:
     """Rewrite the scripts of a copy: they import nothing of ours, touch their outputs and record their job in ``jobs/``.
 

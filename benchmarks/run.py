@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     # With it comes numpy, whose threads are to be set first.
     from common import Row
 
-NAMES = ("kinematics", "identification", "study", "rerun", "scale", "loop", "large")
+NAMES = ("kinematics", "identification", "study", "rerun", "scale", "engine")
 REPORT = Path(__file__).resolve().parents[1] / "reports" / "benchmarks.csv"
 
 

@@ -1,6 +1,8 @@
 """Fixtures: the robots and strategies of the repository's own config."""
 
+import os
 import shutil
+import sys
 from pathlib import Path
 
 import hypothesis
@@ -9,6 +11,10 @@ import pytest
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.strategies import strategy_from_document
+
+# An environment may forbid programs to keep what they compile; half of a run of the tests would be compiling.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 

@@ -13,10 +13,6 @@ def test_the_message_is_place_then_what_was_found_then_what_is_allowed():
     assert str(error) == "robot.yaml: masses[2]: found -3 kg; allowed: a positive mass"
 
 
-def test_without_a_key_the_whole_file_is_the_place():
-    assert str(InputError("robot.yaml", "", "nothing", "a robot")) == "robot.yaml: found nothing; allowed: a robot"
-
-
 def test_the_message_stays_one_line_whatever_was_found():
     error = InputError("a.csv", "q1\n", "two\r\nlines,\ta tab\n\n", "one\nline")
     assert str(error) == "a.csv: q1: found two lines, a tab; allowed: one line"
@@ -30,11 +26,6 @@ def test_the_closest_of_the_names_that_are_allowed_comes_first_whatever_its_case
 def test_the_parts_can_be_read_one_by_one_as_they_were_given():
     error = InputError(Path("cells") / "a.csv", "q1", "two\nlines", "one")
     assert (error.source, error.key, error.found, error.allowed) == ("cells/a.csv", "q1", "two\nlines", "one")
-
-
-def test_whoever_catches_value_errors_catches_bad_input():
-    with pytest.raises(ValueError, match=r"^a\.csv: "):
-        raise InputError("a.csv", "", "nothing", "rows")
 
 
 @pytest.mark.parametrize("part", range(4))

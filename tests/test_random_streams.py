@@ -38,10 +38,6 @@ def test_another_seed_robot_purpose_or_data_set_gives_other_numbers(other):
     assert not np.isin(numbers(1, "kuka", "noise/6DoF", 3), numbers(*other)).any()
 
 
-def test_seed_and_robot_do_not_run_into_each_other():
-    assert not np.isin(numbers(1, "2kuka", "x", 0), numbers(12, "kuka", "x", 0)).any()
-
-
 def test_neighbouring_data_sets_do_not_overlap_however_far_they_are_drawn():
     one, other = numbers(1, "kuka", "x", 0, count=100_000), numbers(1, "kuka", "x", 1, count=100_000)
     assert not np.isin(one, other).any()
@@ -62,11 +58,6 @@ def test_draws_do_not_depend_on_order_number_or_blocks(order, cut):
         if block:
             for number, array in zip(block, draw(5, "kuka", "x", block, uniform), strict=True):
                 np.testing.assert_array_equal(array, expected[number])
-
-
-def test_draws_are_stacked_along_the_first_axis():
-    assert draw(5, "kuka", "x", [4, 9], uniform).shape == (2, 4, 3)
-    np.testing.assert_array_equal(draw(5, "kuka", "x", [4, 9], uniform)[1], uniform(stream(5, "kuka", "x", 9)))
 
 
 def test_draws_are_those_of_streams_of_their_own_whatever_the_one_before_left_over():

@@ -48,21 +48,6 @@ def test_what_a_placement_of_the_base_takes_up_is_an_error_in_the_base_frame_alo
     assert (base.accuracy("").frame, robot.accuracy("").frame) == (BASE, ROBOT)
 
 
-def test_one_pose_has_the_error_that_it_has_among_others(fanuc):
-    calibrated = set_scope(made_calibrated(fanuc, *USUAL), True)
-    angles = np.random.default_rng(2).uniform(-1, 1, (30, 6))
-    alone, among = (predict_errors(calibrated, some, NEUTRAL).error_m for some in (angles[:1], angles))
-    assert alone[0] == pytest.approx(among[0], rel=1e-12)
-
-
-def test_what_is_said_of_each_pose_needs_no_drawn_robots(fanuc):
-    calibrated, angles = set_scope(made_calibrated(fanuc, *USUAL), True), np.random.default_rng(2).uniform(-1, 1, (5, 6))
-    drawn, bare = (predict_errors(calibrated, angles, NEUTRAL, draws) for draws in (30, 0))
-    for name in ("parameters_m", "repeated_m", "std_rad", "error_m", "bound_m"):
-        np.testing.assert_array_equal(getattr(drawn, name), getattr(bare, name))
-    assert (len(drawn.rms_m), len(bare.rms_m)) == (30, 0)
-
-
 @pytest.mark.parametrize("unknown_base", [False, True])
 def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unknown_base):
     """Of 150 robots; 90 to 100 % are within nearly three standard errors."""
@@ -82,16 +67,6 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unkno
     assert np.sqrt(np.mean(np.square(rms))) == pytest.approx(stated.rms_m, rel=0.08)
     assert np.mean(np.array(rms) < stated.rms_bound_m) == pytest.approx(0.95, abs=0.05)
     assert np.mean(np.array(worst) < stated.worst_bound_m) == pytest.approx(0.95, abs=0.05)
-
-
-def test_joints_and_poses_add_what_each_has_of_its_own(turned):
-    angles = np.random.default_rng(2).uniform(-1, 1, (5, 6))
-    noise = replace(turned.noise, joint_rad=np.full(6, 3e-5), pose_rad=4e-5)
-    more = predict_errors(replace(turned, noise=noise), angles, NEUTRAL)
-    only = predict_errors(replace(turned, noise=replace(noise, joint_rad=np.full(6, 5e-5), pose_rad=0.0)), angles, NEUTRAL)
-    np.testing.assert_allclose(more.repeated_m, only.repeated_m, rtol=1e-12)
-    assert (more.error_m > more.parameters_m).all()
-    assert more.accuracy("").repeated_m == pytest.approx(np.sqrt((more.repeated_m**2).mean()))
 
 
 def test_what_the_form_of_the_model_leaves_open_is_in_every_figure(turned):
@@ -124,9 +99,3 @@ def test_statements_and_scopes_come_back_from_json(turned):
     np.testing.assert_array_equal(back.absorbed, known.scope.absorbed)
     one, other = (replace(each, origin=0, absorbed=0, absorbed_before=0) for each in (back, known.scope))
     assert one == other
-
-
-def test_a_sentence_says_whose_how_large_how_sure_and_what_became_of_the_noise(turned):
-    found = accuracy_sentence(predict_errors(set_scope(turned, True), np.zeros((3, 6)), NEUTRAL).accuracy("the targets"))
-    said = ("Predicted", "robot's own frame", "RMS over the targets (3)", "95 % sure", "at the worst", "noise is not in it")
-    assert all(words in found for words in said), found

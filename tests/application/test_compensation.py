@@ -14,7 +14,6 @@ from elastocal.application.calibrated import (
     OperatingConditions,
     coordinates_at_rest,
     end_effector,
-    forward,
     nominal_forward,
 )
 from elastocal.application.compensation import (
@@ -70,16 +69,6 @@ def test_corrected_targets_bring_the_robot_to_the_wanted_poses(name):
     assert np.abs(off).max() < 2e-9
     np.testing.assert_allclose(found.error_after[good], off, atol=2e-9)
     assert np.sqrt((found.error_before[good, :3] ** 2).sum(axis=1).mean()) > 1e-4
-
-
-def test_the_error_before_is_that_of_the_rigid_robots_targets():
-    robot = make_robot("gp180", *EFFECTS)
-    angles, operating = draw_states(robot, 20)
-    position, rotation = nominal_forward(robot.robot, angles)
-    found = find_joint_targets(robot, position, rotation, operating, angles)
-    np.testing.assert_allclose(nominal_forward(robot.robot, found.uncorrected)[0], position, atol=1e-7)
-    missed = pose_differences(position, rotation, *forward(robot, found.uncorrected, operating))
-    np.testing.assert_allclose(found.error_before, missed, atol=1e-12)
 
 
 def test_repeatability_is_that_of_the_joints_seen_through_the_jacobian():

@@ -14,7 +14,6 @@ from elastocal.application.accuracy import Accuracy
 from elastocal.application.calibrated import OperatingConditions, forward, prediction_covariance
 from elastocal.application.forward_model import KEY, SIDECAR, ForwardModel, model_document, read_calibrated
 from elastocal.application.sidecar import sidecar
-from elastocal.mechanics.robot import with_rigid_joints
 
 KEYS = ("joint_offset@2", "link_geometry@3", "lost_motion@2", "transmission_harmonic@1[orders 1-2]", "thermal_growth[time]")
 
@@ -43,13 +42,6 @@ def test_a_robot_with_weights_and_effects_comes_back_as_it_was(name):
     found, expected = (prediction_covariance(each, angles, operating) for each in (back, calibrated))
     np.testing.assert_array_equal(found, expected)
     np.testing.assert_array_equal(back.noise.joint_rad, calibrated.noise.joint_rad)
-
-
-def test_joints_that_were_taken_as_rigid_stay_rigid(kuka):
-    calibrated = made_calibrated(with_rigid_joints(kuka), "joint_offset@2", identified=False)
-    back = through_json(calibrated)
-    angles, operating = states(kuka)
-    np.testing.assert_array_equal(forward(back, angles, operating)[0], forward(calibrated, angles, operating)[0])
 
 
 def test_a_folder_gives_poses_and_targets_that_reach_them(tmp_path):

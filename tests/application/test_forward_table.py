@@ -28,14 +28,6 @@ def test_nominal_pose_and_error_together_are_where_the_robot_is(calibrated):
     np.testing.assert_allclose((turn * nominal).as_matrix(), rotation, atol=1e-12)
 
 
-def test_angles_fill_the_limits_evenly(calibrated):
-    table = forward_table(calibrated, 256, HANGING, 1)
-    low, high = calibrated.robot.joint_limits.T
-    share = (table[["q1", "q2", "q3"]].to_numpy() - low) / (high - low)
-    # A scrambled Sobol sequence of a power of two has one point in each of as many intervals.
-    np.testing.assert_array_equal(np.sort(np.floor(256 * share), axis=0), np.tile(np.arange(256)[:, None], 3))
-
-
 def test_interpolation_leaves_less_the_more_rows_there_are(calibrated):
     few, many = (interpolation_error_m(calibrated, forward_table(calibrated, n, HANGING, 1), HANGING, 2) for n in (64, 4096))
     assert few[1] == many[1] > few[0] > 5 * many[0]

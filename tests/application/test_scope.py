@@ -43,7 +43,8 @@ def all_that_leave_the_robot_alone(robot):
 def test_every_effect_that_no_command_contains_counts_as_error(fanuc):
     found = all_that_leave_the_robot_alone(fanuc)
     assert {candidate.effect for candidate in found.values()} >= {"setup_step", "frame_drift", "tracker_scale", "force_bias"}
-    for key, candidate in found.items():
+    # The last one of each effect.
+    for key, candidate in {candidate.effect: (key, candidate) for key, candidate in found.items()}.values():
         values, shapes = [p.plausible for p in candidate.parameters], [0.5 * (s.lowest + s.highest) for s in candidate.shapes]
         scope = scope_with(fanuc, candidate, values, shapes)
         assert scope.left_out == (key,) and scope.left_out_worst_m >= scope.left_out_m > 1e-7, key

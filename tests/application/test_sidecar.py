@@ -1,7 +1,6 @@
 """The sidecar has every effect that the robot file lacks, with errors, and how far these move the robot."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 from analysed_robots import analysed
@@ -29,16 +28,6 @@ def test_effects_and_springs_stand_in_it_with_values_and_standard_errors():
     np.testing.assert_allclose([parameter["std_error"] for parameter in effect["parameters"]], errors)
     assert [p["value"] for p in document["joint_compliance"]] == calibrated.estimate.coefficients[0].tolist()
     assert document["date"] == "2026-11-23" and document["campaign"] == "cell7"
-
-
-def test_what_is_held_has_no_standard_error_and_not_one_of_zero():
-    calibrated = make_calibrated("lost_motion@2")
-    held = calibrated.covariance.copy()
-    held[[0, -1]] = held[:, [0, -1]] = 0.0
-    accuracy = predict_errors(calibrated, np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
-    document = sidecar(replace(calibrated, covariance=held), "cell7", "2026-11-23", accuracy)
-    errors = [p["std_error"] for p in (*document["joint_compliance"], *document["effects"][0]["parameters"])]
-    assert errors[0] is None and errors[-1] is None and all(error > 0 for error in errors[1:-1])
 
 
 def test_what_is_left_out_moves_the_robot_and_nothing_left_out_does_not():

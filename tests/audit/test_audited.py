@@ -1,21 +1,26 @@
-"""What an audit reads of a run."""
+"""Streams as they are described are streams as they are drawn; rows of a sample."""
 
 import numpy as np
+import pytest
+
+from elastocal.random_streams import stream
+from elastocal_proof.audit.audited import numbers
 
 
-def test_experiments_and_deflections_have_the_axes_of_data_sets_and_configurations(run):
-    angles, wrench = run.experiments("two")
-    assert (angles.shape, wrench.shape) == ((4, 5, 2), (4, 5, 6))
-    assert run.deflections("data/simulated/two/ideal.parquet", "hand").shape == (4, 5, 6)
+@pytest.mark.parametrize("name", [(1, "kuka", "identification/force", 0), (7, "fanuc", "noise/6DoF/again", 999)])
+def test_numbers_are_those_of_the_pipeline(name):
+    assert (numbers(*name).random(5) == stream(*name).random(5)).all()
 
 
-def test_a_sample_is_the_same_each_time_and_another_for_another_file(run):
-    assert (run.pick("one", 1000) == run.pick("one", 1000)).all()
-    assert (run.pick("one", 1000) != run.pick("other", 1000)).any()
-    assert len(run.pick("one", 3)) == 3
+@pytest.mark.parametrize("place", range(4))
+def test_every_part_of_a_name_makes_other_numbers(place):
+    names = [1, "kuka", "force", 2]
+    other = list(names)
+    other[place] = 3 if isinstance(names[place], int) else "other"
+    assert not np.isclose(numbers(*names).random(5), numbers(*other).random(5)).any()
 
 
-def test_regressors_stand_point_by_point(run):
-    both = run.regressors("two", 1, 2, ["hand"])
-    expected = np.concatenate([run.regressor("two", 1, k, "hand") for k in range(2)])
-    assert (both == expected).all()
+def test_a_sample_is_drawn_by_the_name_of_the_file(run):
+    picked = run.pick("a", 1000)
+    assert len({*picked}) == 20 and (picked == run.pick("a", 1000)).all() and (picked != run.pick("b", 1000)).any()
+    assert run.pick("a", 3).tolist() == [0, 1, 2]

@@ -1,84 +1,80 @@
-"""The whole audit of a folder."""
+"""The whole audit of a folder: what is asked of every file, and the page."""
 
 import pytest
-from audited_campaigns import altered, audit_of, diagnosed_campaign
-from made_audits import CONFIGURATION, failed
-from planted_errors import forge
-from support import refused
+from made_audits import CONFIGURATION, ROBOT, failed, forge
 
+from elastocal.io.provenance import provenance as written_by
+from elastocal.io.records import recorded
+from elastocal.io.storage import write_table
+from elastocal.study.table_schemas import INITIAL
 from elastocal_proof.audit.audited import Audited
 from elastocal_proof.audit.findings import Finding
-from elastocal_proof.audit.whole import as_table, audit, require_all
+from elastocal_proof.audit.whole import CHECKS, as_table, audit, intact, page_of, provenance
+
+FILE = "results/initial/two.parquet"
 
 
-def test_an_empty_folder_is_no_finished_run(tmp_path):
-    assert [finding.holds for finding in audit(Audited(tmp_path, CONFIGURATION, {}, {}, 4))] == [False]
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "results/initial").mkdir(parents=True)
+    return Audited(tmp_path, CONFIGURATION, {"two": ROBOT}, {}, 4)
 
 
-def test_a_file_that_cannot_be_read_is_a_finding_and_no_traceback(tmp_path):
-    file = "results/budget/kuka.parquet"
-    (tmp_path / "results/budget").mkdir(parents=True)
-    (tmp_path / file).write_bytes(b"no table")
-    forge(tmp_path, file)
-    found = audit(Audited(tmp_path, CONFIGURATION, {}, {}, 4))
-    assert [finding.holds for finding in found] == [True, False, False]
-    assert "ArrowInvalid" in found[1].note
+def write(folder, seed=1, robot="two"):
+    block = {"data_set": [0], "configurations": [5], "mean": [1e-3], "mean_square": [1e-6], "maximum": [1e-3]}
+    write_table(folder.folder / FILE, INITIAL, [block], written_by({"seed": seed}, robot=robot))
+    forge(folder.folder, FILE)
 
 
-def test_a_run_of_which_a_check_does_not_hold_is_refused_by_the_file():
-    rows = [Finding("rows", "pandas", 1, 0.0, file="a.csv"), Finding("column x", "pandas", 3, 2.0, "found 1", "b.csv")]
-    with refused("b.csv", "column x", "1 of 2 checks"):
-        require_all(as_table(rows), "audit.html")
-    assert require_all(as_table(rows[:1]), "audit.html") == "1 files, 1 checks, 1 values compared: all hold\n"
-
-
-BARE = {"covariates": ()}
-# Robot, effects, whether it weighs, and how it is measured.
-HONEST = {
-    "nothing wrong, three kilonewtons": ("fanuc", (), False, {"force_N": 3000.0}),
-    "a joint off, no covariates": ("kuka", ("joint_offset",), False, BARE),
-    "a limber arm whose gear errs": ("iiwa14", ("transmission_harmonic",), False, BARE),
-    "links that bend, all points": ("kuka", ("link_elasticity",), False, {**BARE, "points": ("3DoF", "6DoF")}),
-    "declared weights": ("fanuc", ("joint_offset",), True, {}),
-    "declared weights, no covariates": ("abb", (), True, BARE),
-    "weights behind a parallelogram, declared noise": ("gp180", (), True, {"declared_noise": (6e-5, 6e-5)}),
-    "positions alone, a payload": ("abb", ("payload",), True, {"measured": "position"}),
-    "too small a declared noise, no repeats": (
-        *("kuka", (), False),
-        {**BARE, "measured": "position", "declared_noise": (2e-5, 2e-5), "repeats": 1, "repeated_poses": 0},
-    ),
-    "the tracker's frame": ("kuka", ("joint_offset",), False, {"frame": "tracker"}),
-    "declared geometry": ("kuka", (), False, {"declared": ("joint_offset", "link_geometry")}),
-    "a set-up that moved, repeats on both sides": ("kuka", ("setup_step",), False, {"repeated_poses": 12}),
-    "what no catalogue has": ("fanuc", ("outside:foreign_angle_stiffness",), False, BARE),
-}
-
-
-@pytest.mark.parametrize("case", HONEST)
-def test_an_honest_campaign_raises_no_alarm(case, tmp_path):
-    robot, effects, weighs, design = HONEST[case]
-    found = audit_of(diagnosed_campaign(tmp_path, robot, effects, weighs, **design))
-    assert [finding for finding in found if not finding.holds] == []
-    assert len(found) >= 18
-
-
-@pytest.fixture(scope="module")
-def weighing(tmp_path_factory):
-    """A campaign of which neither weights nor approaches are left out."""
-    return diagnosed_campaign(tmp_path_factory.mktemp("audited"), "fanuc", ("joint_offset",), weighs=True)
+def test_a_file_as_it_was_written_holds(folder):
+    write(folder)
+    found = audit(folder)
+    assert failed(found) == [] and len(found) == 5 and {each.file for each in found} == {FILE}
 
 
 @pytest.mark.parametrize(
-    ("file", "column", "row", "change", "expected"),
-    [
-        ("reports/loop/cell/residuals.parquet", "before_dy", 7, lambda v: v + 1e-7, "residuals of the declared model"),
-        ("reports/loop/cell/residuals.parquet", "after_dz", 7, lambda v: v + 1e-5, "train errors after"),
-        ("reports/loop/cell/residuals.parquet", "after_dz", -1, lambda v: v + 1e-5, "heldout errors after"),
-        ("results/loop/cell/steps.parquet", "value", 1, lambda v: 1.001 * v, "residuals of the declared model"),
-    ],
+    ("change", "checked"), [({"seed": 2}, "made by what is configured"), ({"robot": "other"}, "made for where it lies")]
 )
-def test_one_number_altered_is_found(weighing, file, column, row, change, expected):
-    """A residual by 0.1 µm, or by 10 µm where only means are known; a compliance by a thousandth of itself."""
-    with altered(weighing, file, (column, row), change):
-        found = failed(audit_of(weighing))
-    assert any(name.startswith(expected) for name in found), found
+def test_a_file_of_another_run_or_robot_is_found(folder, change, checked):
+    write(folder, **change)
+    assert failed(provenance(folder, FILE)) == [checked]
+
+
+def test_an_altered_and_a_missing_file_are_found(folder):
+    write(folder)
+    digest = recorded(folder.folder)[FILE]
+    with open(folder.folder / FILE, "ab") as file:
+        file.write(b"x")
+    assert not intact(folder, FILE, digest).holds
+    (folder.folder / FILE).unlink()
+    assert intact(folder, FILE, digest).note == "it is missing"
+
+
+def test_an_empty_folder_is_no_finished_run(folder):
+    assert [finding.holds for finding in audit(folder)] == [False]
+
+
+def test_a_file_that_cannot_be_read_is_a_finding_and_no_traceback(folder):
+    (folder.folder / FILE).write_bytes(b"no table")
+    forge(folder.folder, FILE)
+    found = audit(folder)
+    assert [finding.holds for finding in found] == [True, False] and "ArrowInvalid" in found[1].note
+
+
+GOOD = Finding("compliances", "numpy on pinocchio", 4, 1e-5, file="results/identified/kuka/200um/6DoF.parquet")
+BAD = Finding("column <dev>", "pinocchio", 2, 7.0, "found 1, expected 2", "data/simulated/kuka/ideal.parquet")
+BYTES = Finding("bytes as its job wrote them", "hashlib, SHA-256", 1, 0.0, file="reports/figures/fig3.pdf")
+
+
+def test_the_page_says_first_whether_all_holds_and_what_was_not_worked_out_again():
+    again, apart = page_of(as_table([GOOD, BYTES]), {"seed": "1"}).split("What was not worked out again")
+    assert "All 2 checks hold." in again and "What does not hold" not in again
+    assert "results/identified/*/*um/*.parquet" in again and "In <strong>1 files</strong>" in again
+    assert "reports/figures/*.pdf" in apart and "reports/figures/*.pdf" not in again
+    assert all(check.__doc__ for _, check in CHECKS)
+
+
+def test_what_does_not_hold_is_shown_and_nothing_of_it_is_run():
+    text = page_of(as_table([GOOD, BAD]), {})
+    assert "1 of 2 checks do not hold." in text and "column &lt;dev&gt;" in text and "http" not in text
+    assert "What was not worked out again" not in text

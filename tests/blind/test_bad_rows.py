@@ -7,11 +7,9 @@ import pytest
 from analysed_robots import ROBOTS
 
 from elastocal.io.storage import read_table, write_table
-from elastocal.study.configuration import parsed
 from elastocal_proof.blind import bad_rows as module
 from elastocal_proof.blind import schemas
 from elastocal_proof.blind.bad_rows import MIXTURE, compare_verdicts, draw_campaign, draw_seeds
-from elastocal_proof.blind.cases import PROOF
 from elastocal_proof.plant.bad_rows import BadReading
 from elastocal_proof.plant.campaigns import measured_table
 
@@ -64,12 +62,6 @@ def test_truths_come_as_often_as_the_mixture_says(drawn):
     assert all(len(made.defects) > 1 for made in drawn if made.kind in ("joint offsets", "two, large"))
 
 
-def test_no_robot_of_the_proof_is_among_the_defaults():
-    chosen = parsed((ROBOTS.parents[1] / "config.yaml").read_text(encoding="utf-8"), "config.yaml")["bad_rows"]
-    assert not set(chosen["robots"]) & set(PROOF)
-    assert len(chosen["robots"]) * chosen["each"] == 300
-
-
 @pytest.mark.slow
 def test_a_campaign_that_a_reader_takes_is_diagnosed_and_its_rows_go_to_a_file_and_back(tmp_path):
     seed = draw_seeds(KUKA, 1, 1)[0]
@@ -105,13 +97,3 @@ def test_of_a_slip_all_rows_that_contradict_the_robot_must_be_named():
     assert module._is_named(slip, {3, 4}) and not module._is_named(slip, {3, 5})
     small = BadReading("position", (7,), (6.0,))
     assert module._is_named(small, {7}) and not module._is_named(small, set())
-
-
-def test_a_file_that_is_refused_says_by_which_line(monkeypatch):
-    def refuses(folder, robots, seed):
-        raise module.InputError(f"{folder}/measurements.csv", "row 3", "nothing", "a number")
-
-    monkeypatch.setattr(module, "diagnosed", refuses)
-    found = compare_verdicts(KUKA, ROBOTS, draw_seeds(KUKA, 1, 1)[0])
-    assert set(found["damaged_verdict"]) == {"refused"} and "row 3" in found["damaged_found"][0]
-    assert "tmp" not in found["damaged_found"][0]

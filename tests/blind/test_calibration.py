@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_blind_documents import silence, truth, verdict
+from made_blind_documents import truth
 
 from elastocal_proof.blind.calibration import (
     by_chance,
@@ -11,20 +11,10 @@ from elastocal_proof.blind.calibration import (
     credible,
     expected_calibration_error,
     is_true,
-    reliability,
-    stated,
-    statements,
 )
 
 PAYLOAD = truth(("payload",))
 FOREIGN = truth(("outside:refraction",), group="outside")
-
-
-def said(*sets, alarm=0.001):
-    """A verdict that states probabilities of (mechanisms, probability)."""
-    listed = [{"mechanisms": list(names), "probability": share, "locations": {}} for names, share in sets]
-    nothing = next((share for names, share in sets if not names), 0.0)
-    return verdict("named") | {"probabilities": {"sets": listed, "mechanisms": {}, "nothing": nothing, "alarm_p_value": alarm}}
 
 
 @pytest.mark.parametrize(
@@ -62,23 +52,6 @@ def test_the_credible_set_is_the_smallest_that_reaches_95_per_cent():
     assert len(credible([(frozenset(), 0.97), (frozenset({"a"}), 0.03)])) == 1
 
 
-def test_a_statement_is_about_the_most_probable_set_whatever_the_order_of_the_file():
-    row = stated(PAYLOAD, said((("link_weight",), 0.3), (("payload",), 0.66), ((), 0.04)))
-    assert (row["top"], row["stated"], row["correct"], row["held"], row["set_size"]) == ("payload", 0.66, True, True, 2)
-    assert (row["nothing"], row["alarm_p_value"]) == (0.04, 0.001)
-    row = stated(PAYLOAD, said((("link_weight",), 0.8), (("payload",), 0.19)))
-    assert (row["correct"], row["held"]) == (False, True)
-    assert not stated(PAYLOAD, said((("link_weight",), 0.96), (("payload",), 0.04)))["held"]
-
-
-def test_verdicts_that_state_nothing_are_left_out():
-    fault = verdict("named") | {"probabilities": None}
-    table = statements([(PAYLOAD, silence()), (PAYLOAD, fault), (PAYLOAD, said((("payload",), 1.0)))])
-    assert len(table) == 1
-    assert statements([]).columns.tolist() == table.columns.tolist()
-    assert np.isnan(calibration_error(statements([]), 1)["rate"])
-
-
 def test_the_error_is_the_mean_distance_in_bins_weighted_by_their_cases():
     probability = np.array([0.95] * 10 + [0.55] * 5)
     correct = np.array([True] * 9 + [False] + [True] * 4 + [False])
@@ -109,15 +82,3 @@ def test_the_interval_of_the_error_holds_a_miscalibration_that_is_known():
         found = calibration_error(rows, seed)
         held += found["low"] <= 0.1 <= found["high"]
     assert held >= 88
-
-
-def test_the_diagram_has_each_case_in_one_bin_of_all_and_one_of_its_group():
-    null = truth()
-    entries = [(PAYLOAD, said((("payload",), 0.97)))] * 3 + [(PAYLOAD, said((("link_weight",), 0.35)))]
-    entries += [(null, said(((), 1.0)))] * 2 + [(truth(("payload",), robot="kuka"), said((("payload",), 0.2)))]
-    table = reliability(statements(entries))
-    whole = table[(table.robots == "proof") & (table.group == "all")].set_index("from")
-    assert whole.cases.to_dict() == {0.3: 1, 0.9: 5}
-    assert whole.loc[0.9, "hits"] == 5 and whole.loc[0.9, "stated"] == pytest.approx((3 * 0.97 + 2) / 5)
-    assert table[(table.robots == "proof") & (table.group != "all")].cases.sum() == 6
-    assert table[table.robots == "tuned"].cases.tolist() == [1, 1]

@@ -42,15 +42,6 @@ def test_worse_is_beyond_two_standard_errors(said, expected):
     assert (row["worse"], row["warned"], row["worse_unwarned"]) == expected
 
 
-def test_standard_error_is_the_verdicts_own():
-    """The interval of few poses is wider than 1.96 of them on either side, and not in the middle."""
-    said = verdict("named", reduction=(0.2, 0.6))
-    said["heldout"]["reduction_std_error"] = 0.07
-    row = case_row(truth(("payload",)), said, oracle())
-    assert row["reduction"] == pytest.approx(0.5)
-    assert row["reduction_std_error"] == 0.07
-
-
 @pytest.mark.parametrize(
     ("effects", "reduction", "expected"),
     [
@@ -79,32 +70,6 @@ def test_exact_aliases_are_told_by_the_truth_and_its_joints():
     assert ("force_scale", ()) in EXACT_ALIASES
 
 
-def test_an_arm_without_a_compensator_has_no_alias_of_one():
-    place = ("transmission_harmonic", 2)
-    on = {robot: case_row(truth(place, robot=robot), silence(), oracle())["exact_alias"] for robot in ("gp180", "iiwa14")}
-    assert on == {"gp180": True, "iiwa14": False}
-
-
 def test_a_fault_of_the_data_that_ended_a_diagnosis_has_no_errors():
     row = case_row(truth(("payload",)), verdict("named", effect("wrong_unit")) | {"heldout": None}, oracle())
     assert np.isnan(row["after_rms_m"]) and not row["worse"]
-
-
-def test_size_is_given_against_the_noise():
-    row = case_row(truth(("payload",), level=50.0), silence(), oracle())
-    assert (row["raw"], row["retained"], row["level_of"]) == (200.0, 50.0, "retained")
-    # 60 µm in all directions together, against 60 µm in each.
-    assert row["signal_over_noise"] == pytest.approx(1 / np.sqrt(3))
-    pair = case_row(truth(("payload",), ("joint_tilt", 2), group="pair"), silence(), oracle())
-    assert pair["signal_over_noise"] == pytest.approx(np.sqrt(2 / 3))
-
-
-def test_an_effect_without_its_covariate_is_hidden():
-    blind = {"covariates": ["time", "temperature"]}
-    assert case_row(truth(("hysteresis", 1), design=blind), silence(), oracle())["hidden"]
-    assert not case_row(truth(("frame_drift",), design=blind), silence(), oracle())["hidden"]
-
-
-def test_outside_of_the_catalogue_there_is_no_oracle():
-    row = case_row(truth(("outside:refraction",), group="outside"), silence(), None)
-    assert np.isnan(row["oracle_rms_m"]) and np.isnan(row["oracle_detected"])

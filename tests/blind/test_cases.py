@@ -18,22 +18,16 @@ from elastocal_proof.blind.cases import (
     SIZES,
     TUNED,
     Case,
-    block_of,
     cases_of,
-    declared_of,
     defects_of,
     design_of,
     make_case,
     specimen_of,
     write_manifest,
 )
-from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.campaigns import schedule_of
 from elastocal_proof.plant.defects import KINDS, with_defects
-from elastocal_proof.plant.drives import PoseError
 from elastocal_proof.plant.physical_robot import seen_poses
-from elastocal_proof.plant.sizing import Yardstick
-from elastocal_proof.plant.weights import centre_std_m
 
 
 def a_case(effects=(), levels=(), setting="usual", robot="fanuc", seed=5):
@@ -86,37 +80,6 @@ def test_cases_to_develop_on_are_in_no_other_size_even_at_the_same_seed():
     }
 
 
-def test_robots_that_cannot_have_a_compensator_are_those_without_one():
-    for name in (*PROOF, *TUNED):
-        arm = arm_from_file(ROBOTS / f"{name}.yaml")
-        absent = {effect for effect in KINDS if not KINDS[effect].locations(arm)}
-        cases = [case for case in cases_of(SIZES["full"], 1) if case.robot == name]
-        assert not absent & {effect for case in cases for effect in (*case.effects, case.alternative)}
-        assert absent <= {"compensator_torque", "compensator_stiffness"}
-
-
-def test_names_are_distinct_and_tell_neither_effect_nor_order():
-    cases = cases_of(SIZES["full"], 1)
-    assert len({case.name for case in cases}) == len(cases)
-    assert len({case.seed for case in cases}) == len(cases)
-    groups = [case.group for case in cases[:200]]
-    assert len(set(groups)) >= 4
-
-
-def test_more_cases_change_none_that_is_there_and_another_seed_changes_all():
-    few = {case.key: case for case in cases_of(SIZES["quick"], 1)}
-    more = {case.key: case for case in cases_of(replace(SIZES["quick"], none=30, single=2), 1)}
-    assert all(more[key] == case for key, case in few.items())
-    other = {case.name for case in cases_of(SIZES["quick"], 2)}
-    assert not other & {case.name for case in few.values()}
-
-
-def test_blocks_share_all_cases_out():
-    cases = cases_of(SIZES["quick"], 1)
-    blocks = [block_of(cases, number, 3) for number in (1, 2, 3)]
-    assert sorted((case for block in blocks for case in block), key=lambda case: case.name) == cases
-
-
 def test_a_single_case_has_its_effect_at_its_non_centrality(tmp_path):
     _, truth = made(a_case(("lost_motion",), (50.0,)), tmp_path)
     (defect,) = truth["defects"]
@@ -140,12 +103,6 @@ def test_what_no_size_makes_so_visible_has_the_largest_size_that_means_anything(
     ((defect, sizing),) = defects_of(case, specimen_of(case, ROBOTS), design_of(case))
     assert (defect.size, sizing["of"]) == (KINDS["force_scale"].largest, "raw")
     assert 10.0 < sizing["signal"]["raw"] < 1e4
-
-
-def test_a_pair_has_both_each_at_its_own_non_centrality(tmp_path):
-    _, truth = made(a_case(("joint_offset", "hysteresis"), (50.0, 200.0)), tmp_path)
-    assert [d["effect"] for d in truth["defects"]] == ["joint_offset", "hysteresis"]
-    assert [round(d["signal"]["retained"], -1) for d in truth["defects"]] == [50.0, 200.0]
 
 
 @pytest.mark.parametrize("setting", sorted(SETTINGS))
@@ -172,42 +129,11 @@ def test_weight_is_hidden_where_it_is_the_effect_and_declared_elsewhere(tmp_path
     assert len(told.robot.masses) == len(truth["masses"]) == 7
 
 
-def test_one_mechanism_at_several_joints_has_its_non_centrality_all_together(tmp_path):
-    case = replace(a_case(("joint_offset",), (200.0,)), group="several_joints")
-    robot, design = specimen_of(case, ROBOTS), design_of(case)
-    sized = defects_of(case, robot, design)
-    joints = [defect.joints for defect, _ in sized]
-    assert len(joints) >= 3 and len(set(joints)) == len(joints)
-    assert {defect.effect for defect, _ in sized} == {"joint_offset"}
-    yardstick = Yardstick(robot, schedule_of(robot.arm, design, case.seed), declared=declared_of(case, robot.arm))
-    together = yardstick.signal(with_defects(robot, [defect for defect, _ in sized]))
-    assert together.retained == pytest.approx(200.0, rel=0.011)
-    _, truth = made(case, tmp_path)
-    assert truth["case"]["effects"] == ["joint_offset"] and len(truth["defects"]) == len(joints)
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_gear_defects_under_gravity_sit_at_the_shoulder_or_the_elbow(seed):
     case = replace(a_case(("stiffening",), (200.0,), seed=seed), group="gear_gravity")
     ((defect, _),) = defects_of(case, specimen_of(case, ROBOTS), design_of(case))
     assert defect.joints in ((2,), (3,))
-
-
-def test_errors_of_poses_are_alike_in_all_joints_and_the_noise_is_declared_as_it_is():
-    case = a_case(setting="pose_common_15urad")
-    robot, design = specimen_of(case, ROBOTS), design_of(case)
-    assert design.repeats == 1 and design.declared_noise == (60e-6, 60e-6)
-    assert robot.drives == (PoseError((1.5e-5,) * 6),)
-
-
-def test_centres_off_the_line_lie_beyond_what_is_declared_and_three_kilonewtons_are_pulled():
-    usual, off = (specimen_of(a_case(setting=setting), ROBOTS) for setting in ("usual", "off_line_centres"))
-    declared = declared_of(a_case(), usual.arm)
-    moved = [np.subtract(b.aside_m, a.aside_m) for a, b in zip(usual.structure.masses, off.structure.masses, strict=True)]
-    assert 0.03 < np.abs(moved).max() <= 0.06
-    assert max(centre_std_m(mass) for mass in declared) < 0.07
-    schedule = schedule_of(usual.arm, design_of(a_case(setting="force_3kN")), 1)
-    assert np.linalg.norm(schedule.force, axis=1).max() == pytest.approx(3000.0)
 
 
 @pytest.mark.parametrize("setting", ["usual", "without_time_and_temperature"])

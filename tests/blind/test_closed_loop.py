@@ -5,9 +5,7 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 
-from elastocal.io.storage import read_table, write_table
 from elastocal_proof.blind import closed_loop as module
-from elastocal_proof.blind import schemas
 from elastocal_proof.blind.closed_loop import (
     DECLARED,
     FOUND,
@@ -16,7 +14,6 @@ from elastocal_proof.blind.closed_loop import (
     PARTS,
     TRUE,
     UNCORRECTED,
-    cases,
     closed_loop,
     hidden_effects,
 )
@@ -79,21 +76,6 @@ def test_every_hidden_effect_moves_the_robot_and_needs_no_covariate():
     found = hidden_effects(hidden_robot(ROBOTS / "iiwa14.yaml", 1)[0])
     assert "lost_motion" in found and "payload" in found
     assert not {"tracker_scale", "force_bias", "frame_drift", "hysteresis", "thermal_growth", "joint_offset"} & set(found)
-
-
-def test_cases_are_fresh_by_the_seed_and_each_effect_comes_as_often():
-    some = list(cases(ROBOTS / "gp180.yaml", 1, 2))
-    assert len(some) == 2 * len({effect for effect, _ in some})
-    assert set(some) != set(cases(ROBOTS / "gp180.yaml", 2, 2))
-    assert some == list(cases(ROBOTS / "gp180.yaml", 1, 2))
-
-
-def test_the_table_goes_to_a_file_and_back(table, tmp_path):
-    columns = {name: table[name].to_numpy() for name in table}
-    write_table(tmp_path / "t.parquet", schemas.closed_loop(6), [columns], {})
-    back = read_table(tmp_path / "t.parquet", schemas.closed_loop(6))
-    np.testing.assert_array_equal(back["reached_error_m"], table["reached_error_m"])
-    assert set(back["effect"]) == {"compensator_torque"}
 
 
 def test_with_slips_the_floor_is_the_same_in_the_declared_base_and_the_campaign_has_a_lost_beam(monkeypatch):

@@ -30,10 +30,3 @@ def test_each_case_is_counted_where_it_belongs():
     counts = table.drop(columns=["robots", "settings", "truth", "level"])
     assert counts.to_numpy().sum() == len(ENTRIES)
     assert set(table.truth) == {"none", "payload", "pair", "outside:refraction"}
-
-
-def test_hard_settings_are_apart():
-    table = confused(frame(tuple(ENTRIES[0][:3]), (truth(setting="outliers_5_percent"), silence(), oracle(1.0))))
-    assert sorted(table.settings) == ["hard", "usual"]
-    swept = truth(("payload",), group="sweep", setting="flange, one load, narrow")
-    assert confused(frame((swept, silence(), oracle(0.2)))).settings.tolist() == ["sweep"]

@@ -6,7 +6,6 @@ from analysed_robots import ROBOTS
 
 from elastocal.campaigns.columns import columns_of
 from elastocal.fitting.case import case_from
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.noise_estimation import estimated_noise
@@ -17,8 +16,6 @@ from elastocal_proof.blind.cases import Case, make_case
 pytestmark = pytest.mark.slow
 
 _SINE, _ROUNDING = 1e-6, 1e-7
-# Weight acts on the arm as it is bent: of a non-centrality of 200 a share of this, squared, leaves a thousandth.
-_BENT = 2e-3
 
 
 def directions(declared, observations, candidates):
@@ -68,15 +65,3 @@ def test_nothing_of_a_wrong_force_scale_is_left_off_the_compliances(seen):
     _, _, found = seen
     columns = [part for candidate, part in found if candidate.effect == "force_scale"]
     assert columns and not sum(part.shape[1] for part in columns)
-
-
-def test_the_weight_of_the_upper_arm_turns_joint_2_as_a_compensator_does(seen):
-    declared, observations, _ = seen
-    states = conditions(declared.model, declared.estimate, observations.states)
-    angle = states.joint_angles[:, 1]
-    waves = np.linalg.qr(np.array([np.cos(angle), np.sin(angle)]).T)[0]
-    torque = states.weight[2][:, 1]
-    assert np.linalg.norm(torque - waves @ (waves.T @ torque)) < _BENT * np.linalg.norm(torque)
-    # The weight of the forearm does not.
-    torque = states.weight[3][:, 1]
-    assert np.linalg.norm(torque - waves @ (waves.T @ torque)) > 0.01 * np.linalg.norm(torque)

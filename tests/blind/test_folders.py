@@ -6,14 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
 from analysed_robots import ROBOTS
 
 from elastocal.campaigns.holdout import split
 from elastocal.campaigns.reading import read_campaign
 from elastocal.errors import InputError
 from elastocal_proof.blind.folders import (
-    campaign_document,
     load_ground_truth,
     robot_document,
     write_blind_campaign,
@@ -117,18 +115,6 @@ def test_the_folder_is_the_same_with_and_without_a_defect_but_for_the_measuremen
         assert word not in content
 
 
-def test_the_campaigns_robot_file_has_the_declared_weights_and_none_where_none_are_declared(tmp_path, fanuc_specimen, small):
-    declared = declared_masses(fanuc_specimen.arm)
-    record = made(tmp_path / "declared", fanuc_specimen, small, declared=declared)
-    made(tmp_path / "hidden", fanuc_specimen, small)
-    given, hidden = (yaml.safe_load((tmp_path / name / "robot.yaml").read_text()) for name in ("declared", "hidden"))
-    assert [(m["link"], m["mass_kg"]) for m in given["masses"]] == [(m.link, m.mass_kg) for m in declared]
-    assert "masses" not in hidden and hidden == {key: value for key, value in given.items() if key != "masses"}
-    assert given["chain"] == yaml.safe_load((ROBOTS / "fanuc.yaml").read_text())["chain"]
-    off = [abs(m["mass_kg"] / d.mass_kg - 1) for m, d in zip(record["masses"], declared, strict=True)]
-    assert min(off) > 0 and max(off) < 0.31
-
-
 def test_the_record_is_sealed_outside_of_the_folder_by_its_hash(tmp_path, fanuc_specimen):
     record = {"defects": [truth_of(fanuc_specimen, Defect("lost_motion", (2,), 1e-4, 1))]}
     sealed = tmp_path / "sealed" / "case0.json"
@@ -161,21 +147,6 @@ def test_a_record_is_refused_anywhere_inside_the_campaigns_folder_however_the_pa
     assert write_truth(tmp_path / "blind" / "case00" / "case0.json", {}, folder)
 
 
-def test_equal_records_have_equal_hashes_whatever_the_order_of_their_keys(tmp_path):
-    one = write_truth(tmp_path / "a.json", {"seed": 1, "defects": []}, tmp_path / "blind")
-    other = write_truth(tmp_path / "b.json", {"defects": [], "seed": 1}, tmp_path / "blind")
-    assert one == other != write_truth(tmp_path / "c.json", {"defects": [], "seed": 2}, tmp_path / "blind")
-
-
-def test_the_last_poses_are_held_out_and_each_measuring_point_has_a_target(fanuc_specimen, small):
-    document = campaign_document("case0", fanuc_specimen.arm, small)
-    assert document["holdout"] == {"poses": [6, 7]}
-    assert list(document["targets"]) == ["2DoF", "3DoF", "4DoF", "6DoF"]
-    assert "noise" not in document
-    flange = campaign_document("case0", fanuc_specimen.arm, replace(small, points=("flange",)))
-    assert flange["targets"] == {"6DoF": {"point": "6DoF", "offset_m": [0, 0, 0]}}
-
-
 def test_only_a_compensated_arm_has_a_compensator_in_its_robot_file_and_gravity_is_the_structures(fanuc_specimen):
     bare = {"name": "x", "masses": [1], "gravity_m_s2": [0, 0, 1], "payload_kg": 1, "compensator": {"joint": 3, "kind": "gas"}}
     arm = replace(fanuc_specimen.arm, rated_kg=165.04)
@@ -184,15 +155,6 @@ def test_only_a_compensated_arm_has_a_compensator_in_its_robot_file_and_gravity_
     assert document["compensator"] == {"joint": 3, "kind": "gas"} and "masses" not in document
     assert robot_document({"name": "x"}, arm, (), (0.0, 0.0, 0.0))["compensator"] == {"joint": 2, "kind": "spring"}
     assert "compensator" not in robot_document(bare, replace(arm, compensated=False), (), (0.0, 0.0, 0.0))
-
-
-def test_the_sealed_record_has_the_specimens_own_compliances_and_noise(tmp_path, fanuc_specimen, small):
-    robot = replace(fanuc_specimen, tracker=Tracker(sigma_m=2e-5, sigma_m_per_m=5e-6, sigma_rad=3e-5))
-    record = made(tmp_path / "c", robot, small)
-    np.testing.assert_allclose(record["compliance_urad_per_Nm"], 1e6 * robot.compliance)
-    assert np.abs(np.array(record["compliance_urad_per_Nm"]) / [1.23, 0.37, 0.46, 2.68, 2.70, 2.72] - 1).min() > 1e-4
-    assert record["noise"] == {"sigma_m": 2e-5, "sigma_m_per_m": 5e-6, "sigma_rad": 3e-5}
-    assert record["measurements"] == len(read_campaign(tmp_path / "c", ROBOTS).measurements)
 
 
 @pytest.fixture

@@ -1,19 +1,14 @@
 """The name after further poses: every case counts at every number of poses, and a single name stands."""
 
-import numpy as np
-import pandas as pd
 import pytest
 from made_verdicts import truth, verdict_of
 from scipy.stats import beta
 
 from elastocal_proof.blind.follow_up_scores import (
     followed,
-    poses_needed,
-    promised,
     promises_kept,
     rates,
     with_one_effect,
-    with_prospects,
 )
 
 
@@ -70,32 +65,6 @@ def test_rates_count_what_was_said_last(cases):
     assert row(table, "proof", "random", 5)["other_verdict"] == 1
     assert row(table, "proof", "random", 20)["right_name"] == 0.5
     assert row(table, "tuned", "random", 20)["cases"] == 1
-
-
-def test_a_truth_that_no_single_name_can_be_right_for_is_counted_apart(cases):
-    assert set(cases.loc[~with_one_effect(cases), "case"]) == {"d"}
-    other = rates(cases[~with_one_effect(cases)])
-    assert row(other, "proof", "random", 20)["wrong_name"] == 1
-
-
-def test_poses_needed_are_those_of_the_cases_that_reached_the_name(cases):
-    table = poses_needed(cases[with_one_effect(cases)]).set_index(["robots", "arm"])
-    assert table.loc[("proof", "proposed")].tolist() == [2, 1, 5]
-    assert table.loc[("proof", "random")].tolist() == [2, 1, 20]
-
-
-def test_aliases_that_the_proposal_cannot_tell_are_set_apart(cases):
-    assert set(cases.loc[with_prospects(cases), "case"]) == {"b", "d"}
-    proposals = pd.DataFrame({"case": ["a", "b", "c"] * 2, "separation": [1.0, 2.0, 8.0, 3.0, 30.0, 40.0]})
-    # As read from a file, where nothing is missing data.
-    proposals["indistinguishable"] = [np.nan, "", "joint_tilt"] * 2
-    assert promised(proposals) == {"a": 3.0, "b": 30.0, "c": 0.0}
-
-
-def test_nothing_followed_up_makes_empty_tables():
-    none = followed(TRUTHS, {}, [], promised(pd.DataFrame({"case": []})))
-    assert rates(none[with_one_effect(none)]).empty and poses_needed(none).empty
-    assert "right_name" in rates(none) and isinstance(none, pd.DataFrame)
 
 
 def test_promises_are_counted_of_cases_whose_proposal_makes_one_after_all_poses(cases):

@@ -65,6 +65,7 @@ def test_without_an_effect_it_is_the_declared_model(offset):
     assert found["heldout"] == verdict["heldout"]["before"] and not found["detected"]
 
 
+@pytest.mark.slow
 def test_p_values_of_effects_that_are_not_there_are_uniform(tmp_path):
     """Friction at each of six joints that have none, together by Fisher's method at 0.1 % at either end.
 
@@ -84,6 +85,7 @@ def test_outside_of_the_catalogue_there_is_none(offset):
     assert oracle({"defects": [{"effect": "outside:refraction", "joints": []}]}, verdict, folder, ROBOTS.as_posix(), 1) is None
 
 
+@pytest.mark.slow
 def test_without_its_covariate_not_even_the_oracle_sees_it(offset, tmp_path):
     truth, folder = made(tmp_path, "hysteresis", setting="without_approach")
     verdict = diagnosed(folder, ROBOTS.as_posix(), 1)

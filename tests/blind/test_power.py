@@ -1,6 +1,5 @@
 """Detection by size beside the oracle, and what cannot be found."""
 
-import numpy as np
 import pytest
 from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 
@@ -28,17 +27,6 @@ def test_an_effect_has_a_row_for_each_level_beside_the_oracle():
     assert 0 < row.detected_low < 0.5 < row.detected_high < 1
     assert table.loc[("payload", 200.0), "detected"] == 1.0
     assert row.signal_rms_um == pytest.approx(60.0)
-
-
-def test_all_effects_together_leave_out_what_is_absorbed():
-    table = powers(frame((truth(("payload",)), PAYLOAD, oracle()), (scale(), silence(), oracle(1.0)))).set_index("effect")
-    assert table.loc["all", "cases"] == 1
-    assert table.loc["force_scale", "level_of"] == "raw"
-
-
-def test_foreign_effects_have_no_oracle():
-    row = powers(frame((truth(("outside:refraction",), group="outside"), silence(), None))).set_index("effect").loc["all"]
-    assert row.oracle_cases == 0 and np.isnan(row.oracle_detected) and row.group == "outside"
 
 
 def test_reasons_are_absorption_missing_covariates_and_implausible_size():

@@ -5,7 +5,7 @@ import pytest
 from made_folders import made_folder
 
 from elastocal.campaigns.reading import read_campaign
-from elastocal.diagnosis.proposal import Proposal, without_poses
+from elastocal.diagnosis.proposal import Proposal
 from elastocal_proof.blind import proposed as module
 from elastocal_proof.blind.proposed import proposed
 
@@ -58,13 +58,6 @@ def test_as_many_poses_as_wanted_are_looked_for_within_the_joint_limits_on_the_g
     assert asked[0]["ladder"] == (0.0, 1.0, -0.5) and len(table) == 3
 
 
-def test_the_table_has_angles_as_the_controller_reports_them_and_the_loads(asked, folder, config_folder, kuka):
-    table = proposed(folder, config_folder / "robots", 3, (0.0, 1.0), 4)
-    angles = table[[f"q{joint}" for joint in range(1, 7)]].to_numpy()
-    np.testing.assert_allclose(angles, kuka.reported_angles(asked[0]["proposal"].joint_angles))
-    assert table.fz.tolist() == [-500.0] * 3 and table.effect.tolist() == ["a or b"] * 3
-
-
 def test_poses_follow_from_the_seed_and_differ_between_campaigns(asked, folder, config_folder, kuka, tmp_path):
     other = made_folder(tmp_path / "case_2", kuka, "case_2")
     first, again, seed, name = (
@@ -73,9 +66,3 @@ def test_poses_follow_from_the_seed_and_differ_between_campaigns(asked, folder, 
     )
     assert first == again
     assert first != seed and first != name
-
-
-def test_where_nothing_is_ambiguous_the_table_has_its_columns_and_no_row(asked, folder, config_folder, monkeypatch):
-    monkeypatch.setattr(module, "propose", lambda *arguments: without_poses(6, ("a",), (), "nothing is missing"))
-    table = proposed(folder, config_folder / "robots", 3, (0.0, 1.0), 4)
-    assert table.empty and {"pose", "q6", "fz", "separation"} <= set(table)

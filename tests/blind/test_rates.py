@@ -1,6 +1,5 @@
 """Shares of cases and their exact intervals."""
 
-import numpy as np
 import pytest
 from scipy.stats import binomtest
 
@@ -23,15 +22,6 @@ def test_without_a_single_hit_or_miss_the_other_end_is_in_closed_form(cases):
     end = 1.0 - 0.025 ** (1.0 / cases)
     assert (never["rate"], never["low"], never["high"]) == (0.0, 0.0, pytest.approx(end))
     assert (always["rate"], always["low"], always["high"]) == (1.0, pytest.approx(1.0 - end), 1.0)
-
-
-def test_without_cases_there_is_no_rate_and_the_interval_is_everything():
-    found = rate([])
-    assert np.isnan(found["rate"]) and (found["cases"], found["low"], found["high"]) == (0, 0.0, 1.0)
-
-
-def test_hits_may_come_one_by_one_and_as_numpy_values():
-    assert rate(value > 2 for value in np.arange(5)) == rate([False, False, False, True, True])
 
 
 def test_a_head_names_the_share_and_both_ends_of_its_interval():

@@ -57,21 +57,6 @@ def test_the_same_seed_fills_in_the_same_and_another_one_other_noise(robot, angl
     assert 1e-6 < np.abs(one["x"] - other["x"]).max() < 1e-3
 
 
-def test_rows_of_one_state_are_read_of_one_arm_at_rest(robot, angles):
-    """Two targets of known distance keep it but for the noise, in whatever order the rows come."""
-    targets = {"A": {"point": FLANGE, "offset_m": [0.1, 0, 0]}, "B": {"point": FLANGE, "offset_m": [0, 0, 0]}}
-    filled = filled_sheet(
-        sheet_of(angles, ("A", "B")).sample(frac=1, random_state=3),
-        {"targets": targets, "frame": "base", "measured": "position"},
-        robot,
-        1,
-    )
-    both = filled.pivot(index="pose", columns="target", values=["x", "y", "z"])
-    apart = np.linalg.norm(both.xs("A", axis=1, level=1) - both.xs("B", axis=1, level=1), axis=1)
-    np.testing.assert_allclose(apart, 0.1, atol=5e-4)
-    assert "rx" not in filled
-
-
 def test_a_reflector_of_unknown_offset_sits_at_one_place_within_a_decimetre(robot, angles):
     known, unknown = (filled_sheet(sheet_of(angles), document(offset=o), robot, 1) for o in ([0, 0, 0], "unknown"))
     turn = Rotation.from_rotvec(known[["rx", "ry", "rz"]].to_numpy())
@@ -91,12 +76,6 @@ def test_a_mount_is_turned_as_stated_and_anywhere_where_it_is_unknown(robot, ang
     assert np.ptp(mounts[1], axis=0).max() < 1e-3 and np.linalg.norm(mounts[1][0]) > 0.1
 
 
-def test_readings_in_the_frame_of_the_tracker_keep_distances(robot, angles):
-    base, own = (filled_sheet(sheet_of(angles), document(frame), robot, 1)[["x", "y", "z"]] for frame in ("base", "tracker"))
-    np.testing.assert_allclose(np.linalg.norm(own.diff(), axis=1)[1:], np.linalg.norm(base.diff(), axis=1)[1:], atol=1e-12)
-    assert np.linalg.norm(own - base, axis=1).min() > 1.0
-
-
 def test_a_load_deflects_the_arm_along_it(robot, angles):
     filled = filled_sheet(sheet_of(angles, forces=[(0, 0, 0), (0, 0, -100)]), document(), robot, 1)
     z = filled.pivot(index="pose", columns="load", values="z")
@@ -108,13 +87,6 @@ def test_commands_reach_what_a_sheet_reads_but_for_noise(robot, angles):
     position, _ = reached(robot, angles, np.zeros((5, 6)), 9)
     off = filled[["x", "y", "z"]].to_numpy() - position
     assert 1e-6 < np.abs(off).max() < 5e-4
-
-
-def test_a_moment_without_its_force_is_refused_with_its_row(robot, angles):
-    sheet = sheet_of(angles)
-    sheet.loc[2, "mz"] = 3.0
-    with pytest.raises(InputError, match="moment of row 3"):
-        filled_sheet(sheet, document(), robot, 1)
 
 
 def test_the_hidden_effect_follows_from_the_seed_or_is_named(tmp_path):

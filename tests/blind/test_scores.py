@@ -3,7 +3,7 @@
 import pytest
 from made_verdicts import truth, verdict_of
 
-from elastocal_proof.blind.scores import PROOF, TUNED, leading, outcome
+from elastocal_proof.blind.scores import outcome
 
 TILTED = {"misplaced": {"shift_m": [0.0, 0.0, 2e-4], "turn_rad": [3e-4, 0.0, 0.0]}}
 OUTCOMES = {
@@ -64,18 +64,3 @@ def test_outcome_is(name):
     sealed, verdict, expected = OUTCOMES[name]
     row = outcome(sealed, verdict)
     assert {key for key, value in row.items() if value is True} == expected
-
-
-def test_the_robot_of_tuning_is_told_from_those_of_the_proof():
-    document = truth("payload")
-    assert outcome(document, verdict_of("adequate"))["robots"] == "proof"
-    assert outcome(document | {"case": document["case"] | {"robot": "kuka"}}, verdict_of("adequate"))["robots"] == "tuned"
-
-
-@pytest.mark.parametrize("kinds", [[PROOF], [TUNED, PROOF], [TUNED, TUNED, PROOF, TUNED]])
-def test_robots_of_the_proof_go_before_the_one_that_was_tuned_on(kinds):
-    assert leading(kinds) == leading(iter(kinds)) == "proof"
-
-
-def test_the_tuned_robot_is_shown_where_there_is_no_other():
-    assert leading([TUNED, TUNED]) == leading([]) == "tuned"

@@ -1,10 +1,9 @@
 """What no instrument reads is refused by row and column; what honest ones read is not."""
 
-import numpy as np
 import pytest
 from support import refused
 
-from elastocal.campaigns.column_bounds import BOUNDS, find_beyond
+from elastocal.campaigns.column_bounds import BOUNDS
 from elastocal.campaigns.measurements import file_columns
 
 IMPOSSIBLE = {
@@ -24,23 +23,3 @@ def test_what_physics_does_not_allow_is_refused_by_row_and_column(cell, column, 
     cell.spoil(14, column, entry)
     with refused(cell.measurements, f"row 14, column {column} (line 15)", BOUNDS[column].allowed):
         cell.read()
-
-
-@pytest.mark.parametrize("entry", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("column", BOUNDS)
-def test_what_is_no_number_is_beyond_every_bound(column, entry):
-    good = 0.5 * (BOUNDS[column].least + BOUNDS[column].largest)
-    assert find_beyond(column, np.array([good, entry, good])) == 1 and find_beyond(column, np.array([good])) is None
-
-
-def test_a_column_without_a_bound_is_within():
-    assert find_beyond("pose", np.array([1e30])) is None
-
-
-def test_honest_readings_are_within():
-    """A freezer and a foundry, calendar time, a tracker far from its origin, an interferometer and a camera."""
-    honest = {
-        **{"temperature_c": [-150, -30, 20, 120], "time_s": [-3600, 0, 1.6e9, 1.3e10], "x": [-80.0, 5e6], "fz": [-3e4]},
-        "u95_m": [2e-6, 1e-3, 2e-2],
-    }
-    assert all(find_beyond(name, np.array(values, float)) is None for name, values in honest.items())

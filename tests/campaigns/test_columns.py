@@ -108,17 +108,3 @@ def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_
     assert (columns["x"], columns["y"], columns["z"]) == ([1.0, 4.0], [2.0, 5.0], [3.0, 6.0])
     assert (columns["row"], columns["q2"], columns["mz"], columns["time_s"]) == ([91, 92], [0.2, 0.4], [16, 26], [71, 81])
     assert columns["outside_range"] == [False, True]
-
-
-def test_residuals_of_positions_have_no_rotation():
-    columns = residuals_of(3)
-    empty = {f"{stage}_{axis}" for stage in ("before", "after") for axis in ("rx", "ry", "rz")}
-    assert {name for name, values in columns.items() if np.isnan(values).any()} == empty
-    assert columns["after_dz"].tolist() == [202.0, 205.0]
-
-
-@pytest.mark.parametrize("held_out", [False, True])
-def test_all_residuals_of_a_part_are_held_out_or_none_is(held_out):
-    columns = residuals_of(6, held_out, time_s=None)
-    assert columns["held_out"].tolist() == [held_out] * 2 and columns["held_out"].dtype == bool
-    assert np.isnan(columns["time_s"]).all()

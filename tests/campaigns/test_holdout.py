@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from made_cells import DOCUMENT, POSES, Cell
 from support import refused
 
-from elastocal.campaigns.holdout import measured_poses, split
+from elastocal.campaigns.holdout import split
 
 
 def poses_of(measurements):
@@ -20,11 +20,6 @@ def parts(cell, **holdout):
     fitted, held_out = map(poses_of, split(cell.read()))
     assert fitted.isdisjoint(held_out)
     return fitted, held_out
-
-
-def test_seed_of_a_fraction_is_1_where_none_is_given(cell):
-    cell.document["holdout"] = {"fraction": 0.2}
-    assert cell.read().holdout == {"fraction": 0.2, "seed": 1}
 
 
 def test_split_parts_no_pose_of_any_session(cell):
@@ -46,28 +41,12 @@ def test_split_is_the_same_whatever_the_order_of_the_rows(tmp_path_factory, rand
     assert parts(cell) == expected
 
 
-def test_another_seed_holds_out_other_poses(cell):
-    found = {frozenset(parts(cell, fraction=0.3, seed=seed)[1]) for seed in range(5)}
-    assert len(found) > 1 and {*map(len, found)} == {3}
-
-
 def test_a_block_of_neighbours_is_held_out_by_its_seed(cell):
     found = {frozenset(parts(cell, blocks=3, seed=seed)[1]) for seed in range(20)}
     # Blocks part the poses: whatever the seed, it is one of three, which together are all.
     assert len(found) == 3 and sum(map(len, found)) == POSES == len(frozenset.union(*found))
     cell.document["holdout"] = {"blocks": 3}
     assert cell.read().holdout == {"blocks": 3, "seed": 1}
-
-
-@pytest.mark.parametrize("named", [7, [7]])
-def test_sessions_are_held_out_as_a_whole(cell, named):
-    cell.repeat_as_session_7()
-    assert [{session for session, _ in part} for part in parts(cell, session=named)] == [{0}, {7}]
-
-
-def test_named_poses_are_held_out_in_every_session_or_in_one(cell):
-    cell.repeat_as_session_7()
-    assert parts(cell, poses=[4, [7, 2]])[1] == {(0, 4), (7, 4), (7, 2)}
 
 
 @pytest.mark.parametrize(
@@ -114,22 +93,6 @@ def test_a_block_goes_by_where_a_pose_stands_and_not_by_how_often_it_was_measure
             again[name] += [column[n] if name != "repeat" else 2 + number for n in more]
     cell.table = again
     assert parts(cell) == before
-
-
-def test_poses_are_numbered_by_session_and_then_by_pose_wherever_their_rows_are(cell):
-    cell.repeat_as_session_7()
-    cell.keep(np.random.default_rng(3).permutation(len(cell.table["pose"])))
-    measurements = cell.read().measurements
-    pairs, index = measured_poses(measurements)
-    assert pairs.tolist() == [[session, pose] for session in (0, 7) for pose in range(POSES)]
-    np.testing.assert_array_equal(pairs[index], np.column_stack([measurements.session, measurements.pose]))
-
-
-def test_a_session_that_was_not_measured_is_refused_beside_one_that_was(cell):
-    cell.repeat_as_session_7()
-    cell.document["holdout"] = {"session": [7, 8]}
-    with refused(cell.source, "holdout.session", "found 8", "sessions that were measured: 0, 7"):
-        cell.read()
 
 
 @pytest.mark.parametrize(

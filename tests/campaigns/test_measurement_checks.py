@@ -41,19 +41,6 @@ def test_whole_file_in_degrees_or_millimetres_is_refused(cell, tmp_path):
             spoilt.read()
 
 
-@pytest.mark.parametrize("angle", [1.2, 1.7])
-def test_a_joint_just_beyond_its_limit_or_with_a_wrong_sign_is_no_degrees(cell, angle):
-    for row in range(1, 9):
-        cell.spoil(row, "q2", angle)
-    assert len(cell.read().measurements) == len(cell.table["pose"])
-
-
-def test_joint_angles_are_judged_in_the_models_convention(cell):
-    cell.arm["reported_joints"] = {"offset_deg": [0, 180, 0]}
-    cell.table["q2"] = [angle - np.pi for angle in cell.table["q2"]]
-    assert len(cell.read().measurements) == len(cell.table["pose"])
-
-
 def test_a_clock_that_runs_backwards_is_refused(cell):
     cell.table["time_s"] = [-time for time in cell.table["time_s"]]
     with refused(cell.measurements, "row 73, column time_s", "the poses before it were measured later", "rise"):
@@ -78,12 +65,6 @@ def test_the_same_measurement_twice_is_refused(cell):
     cell.spoil(7, "repeat", 0)
     found = "pose 0, load 1, repeat 0, target A again"
     with refused(cell.measurements, "row 7", found, "first in row 5"):
-        cell.read()
-
-
-def test_measurements_of_one_pose_at_other_angles_are_refused(cell):
-    cell.spoil(14, "q3", cell.table["q3"][8] + 0.025)
-    with refused(cell.measurements, "row 14, column q3", "0.025 rad from row 9", "within 0.02 rad"):
         cell.read()
 
 

@@ -13,13 +13,6 @@ from elastocal.campaigns.measurements import CSV, read_measurements
 from elastocal.campaigns.reading import read_campaign
 
 
-def test_parquet_is_csv(cell):
-    from_csv = cell.read()
-    (cell.folder / "measurements.csv").unlink()
-    cell.write("parquet")
-    assert_same(read_campaign(cell.folder, cell.robots).measurements, from_csv.measurements)
-
-
 def test_blank_rows_and_blanks_around_cells_are_passed_over_and_counted(cell):
     cell.write()
     path = cell.folder / "measurements.csv"
@@ -86,15 +79,6 @@ def test_lines_before_the_header_are_passed_over_and_counted(cell):
         read_campaign(cell.folder, cell.robots)
 
 
-def test_a_file_is_read_alike_in_pieces_of_any_size(cell, monkeypatch):
-    whole = cell.read().measurements
-    monkeypatch.setattr("elastocal.campaigns.measurements._ROWS_AT_A_TIME", 7)
-    assert_same(read_campaign(cell.folder, cell.robots).measurements, whole)
-    cell.spoil(20, "x", "1,0")
-    with refused(cell.measurements, "row 20, column x (line 21)", "'1,0'"):
-        cell.read()
-
-
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
 def test_more_measurements_than_fit_into_memory_are_refused(cell, kind, monkeypatch):
     cell.write(kind)
@@ -156,29 +140,12 @@ def test_file_that_is_no_table_is_refused(cell, text, key, words):
         read_campaign(cell.folder, cell.robots)
 
 
-def test_parquet_that_cannot_be_read_is_refused(cell):
-    cell.write()
-    (cell.folder / "measurements.csv").rename(cell.folder / "measurements.parquet")
-    with refused((cell.folder / "measurements.parquet").as_posix(), "", "no readable Parquet file"):
-        read_campaign(cell.folder, cell.robots)
-
-
 def test_a_column_that_parquet_has_twice_is_refused_with_the_file_named(cell):
     cell.write("parquet")
     path = cell.folder / "measurements.parquet"
     table = pq.read_table(path)
     pq.write_table(table.append_column("x", table["x"]), path)
     with refused(path.as_posix(), "header", "column 'x' twice", "each column once"):
-        read_campaign(cell.folder, cell.robots)
-
-
-def test_parquet_whose_text_is_no_utf8_is_refused(cell):
-    cell.write("parquet")
-    names = pa.array([b"\xd8"] * len(cell.table["pose"]), pa.binary())
-    broken = pa.Array.from_buffers(pa.string(), len(names), names.buffers())
-    path = cell.folder / "measurements.parquet"
-    pq.write_table(pa.table(cell.table | {"target": broken}), path)
-    with refused(path.as_posix(), "", "no readable Parquet file"):
         read_campaign(cell.folder, cell.robots)
 
 

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from elastocal.campaigns.places import is_file, is_file_in
+from elastocal.campaigns.places import is_file_in
 
 
 @pytest.fixture
@@ -41,8 +41,3 @@ def places(tmp_path):
 def test_a_file_is_where_its_links_lead(places, path, inside):
     assert is_file_in(places / path, places / "cell") is inside
     assert is_file_in(places / path, places / "linked", places / "alias") is inside
-
-
-def test_what_no_path_can_be_is_no_file(places):
-    assert is_file(places / "cell/out")
-    assert not any(is_file(places / name) for name in ("cell", "cell/pipe", "x" * 5000, "\0", "cell/deep/a/b"))

@@ -57,10 +57,6 @@ def served(registered, monkeypatch, tmp_path):
     server.server_close()
 
 
-def test_the_address_is_by_commit(registered):
-    assert registered.address == "https://raw.githubusercontent.com/owner/name/c0ffee/data/values.csv"
-
-
 def test_file_of_the_given_folder_is_used_where_it_lies(registered, given, tmp_path):
     assert fetch("mine", {"mine": registered}, tmp_path / "cache", tmp_path / "box") == given
     assert find_missing(["mine"], {"mine": registered}, tmp_path / "cache", tmp_path / "box") is None

@@ -81,30 +81,6 @@ def test_uncertainties_of_measurements_are_read_and_stand_alone(cell):
         cell.read()
 
 
-def test_no_wrench_column_at_all_means_no_load(cell):
-    cell.keep(np.flatnonzero(np.equal(cell.table["load"], 0)))
-    cell.without(*WRENCH)
-    np.testing.assert_array_equal(cell.read().measurements.wrench, np.zeros((len(cell.table["load"]), 6)))
-
-
-def test_orientations_are_left_aside_where_positions_are_measured(cell):
-    cell.document["measured"] = "position"
-    assert cell.read().measurements.rotation_vector is None
-
-
-def test_robot_is_found_by_its_name_as_well(cell):
-    cell.document["robot"] = "planar"
-    assert cell.read().robot.name == "three joints"
-
-
-def test_joint_angles_are_those_of_the_model(cell):
-    cell.arm["reported_joints"] = {"matrix": [[1, 0, 0], [0, -1, 0], [0, 1, 1]], "offset_deg": [0, -30, 0]}
-    reported = np.column_stack([cell.table[f"q{j}"] for j in (1, 2, 3)])
-    measurements = cell.read().measurements
-    expected = np.column_stack([reported[:, 0], -reported[:, 1] - np.pi / 6, reported[:, 1] + reported[:, 2]])
-    np.testing.assert_allclose(measurements.joint_angles, expected, rtol=0, atol=1e-15)
-
-
 def test_sense_of_approach_is_that_of_the_models_joints(cell):
     cell.arm["reported_joints"] = {"matrix": [[1, 0, 0], [0, -1, 0], [0, 1, 1]]}
     second, third = np.array(cell.table["approach2"]), np.array(cell.table["approach3"])
@@ -132,13 +108,6 @@ def test_other_campaign_is_the_test_of_all_measurements(cell, tmp_path):
     assert len(other.measurements) == len(campaign.measurements)
 
 
-def test_two_campaigns_may_test_each_other(cell, tmp_path):
-    cell.write()
-    other_campaign(cell, tmp_path, holdout={"campaign": "../cell7"})
-    other = held_out_campaign(cell.read(), cell.folder, cell.robots)
-    assert held_out_campaign(other, tmp_path / "other", cell.robots).name == "cell7"
-
-
 def test_campaign_that_holds_out_its_own_poses_has_no_other(cell):
     assert held_out_campaign(cell.read(), cell.folder, cell.robots) is None
 
@@ -153,12 +122,6 @@ def test_five_poses_are_the_fewest_that_another_campaign_may_test(cell, tmp_path
     else:
         training, held_out = split(cell.read())
         assert set(training.pose.tolist()) == set(range(5)) and len(held_out) == 0
-
-
-def test_all_of_another_campaign_is_the_test_even_where_that_one_holds_out_poses_of_its_own(cell, tmp_path):
-    other_campaign(cell, tmp_path, holdout={"poses": [0, 1]})
-    other = held_out_campaign(cell.read(), cell.folder, cell.robots)
-    assert set(other.measurements.pose.tolist()) == set(range(POSES))
 
 
 def add_session(cell):
@@ -177,17 +140,6 @@ def test_folds_hold_every_pose_of_every_session_once_and_are_of_one_size(cell, o
     assert max(map(len, folds)) - min(map(len, folds)) <= 1
     # Dealt out in turn, so that each fold is spread over the campaign.
     assert [tuple(folds[n % of][n // of]) for n in range(len(there))] == there
-
-
-@pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_fold_is_a_holdout_that_holds_out_just_its_poses(cell, number):
-    add_session(cell)
-    cell.write()
-    fold = folds_of(cell.folder, cell.robots, number, 3)
-    cell.document["holdout"] = fold
-    training, held_out = split(cell.read())
-    found = [set(zip(some.session.tolist(), some.pose.tolist(), strict=True)) for some in (training, held_out)]
-    assert found[1] == {tuple(pair) for pair in fold["poses"]} and not found[0] & found[1]
 
 
 def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
@@ -244,29 +196,6 @@ def test_faulty_document_is_refused_in_one_line(cell, changes, key, words):
     cell.document |= changes
     with refused(f"{cell.source}: ", f" {key}", *words):
         cell.read(effects=["joint_offset", "payload"])
-
-
-@pytest.mark.parametrize("position", [1e-6, 1e-3, 1e-2, 80 * 6e-6 + 15e-6])
-def test_noise_of_an_interferometer_a_camera_a_humanoid_and_a_tracker_far_away_is_read(cell, position):
-    cell.document["noise"] = {"position_m": position, "orientation_rad": min(10 * position, 0.1), "joint_rad": position}
-    assert cell.read().noise == cell.document["noise"]
-
-
-def test_declared_effects_are_not_checked_without_a_list_of_them(cell):
-    cell.document["declared"] = ["anything"]
-    assert cell.read().declared == ("anything",)
-
-
-def test_fault_of_the_robot_file_names_that_file(cell):
-    cell.arm["chain"] = "Tz(0.4) Rz(q1)"
-    with refused((cell.folder / "arm.yaml").as_posix(), "chain", "measuring point"):
-        cell.read()
-
-
-@pytest.mark.parametrize("robot", ["arm.yaml", "planar"])
-def test_missing_folder_is_refused(cell, robot):
-    with refused(cell.source, "", "readable file"):
-        read_campaign(cell.folder, cell.robots)
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,9 @@
 """Simulated campaigns: without noise they are the elastostatics of the study, with noise they are as planned."""
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.reading import read_campaign
 from elastocal.campaigns.simulation import Plan, draw_measurements
-from elastocal.campaigns.writing import write_campaign
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.elastostatics import exact_deflections, generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
@@ -71,19 +66,6 @@ def test_the_plan_is_kept(kuka):
         assert len(np.unique(angles[table["pose"] == pose], axis=0)) == 1
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-4])
-def test_noise_is_of_its_size_and_new_at_each_measurement(noise, kuka):
-    plan = replace(PLAN, poses=120, noise_m=noise, noise_rad=3 * noise)
-    exact, read = (draw_measurements(kuka, p, 4, "noise") for p in (PLAN, plan))
-    exact = draw_measurements(kuka, replace(plan, noise_m=0.0, noise_rad=0.0), 4, "noise")
-    off = np.column_stack([read[axis] - exact[axis] for axis in "xyz"])
-    names = ("rx", "ry", "rz")
-    turned, true = (Rotation.from_rotvec(np.column_stack([table[name] for name in names])) for table in (read, exact))
-    turn = (turned * true.inv()).as_rotvec()
-    assert off.std() == pytest.approx(noise, rel=0.08) and turn.std() == pytest.approx(3 * noise, rel=0.08, abs=1e-9)
-    assert not noise or len(np.unique(off)) == off.size
-
-
 def test_elastic_links_deflect_beyond_the_reduced_robot(kuka, kuka_extended):
     """The extended robot under load is off the reduced one with the same joints, and both are one unloaded."""
     elastic, stiff = (draw_measurements(robot, PLAN, 5, "same") for robot in (kuka_extended, kuka))
@@ -92,27 +74,3 @@ def test_elastic_links_deflect_beyond_the_reduced_robot(kuka, kuka_extended):
     loaded = elastic["load"] > 0
     assert off[~loaded].max() < 1e-12
     assert np.median(off[loaded]) > 1e-5
-
-
-def test_numbers_depend_on_seed_and_name_alone(kuka):
-    plan = replace(PLAN, noise_m=1e-4, noise_rad=1e-4)
-    one, again = draw_measurements(kuka, plan, 6, "a"), draw_measurements(kuka, plan, 6, "a")
-    for name in one:
-        np.testing.assert_array_equal(one[name], again[name])
-    for seed, name in ((7, "a"), (6, "b")):
-        assert (draw_measurements(kuka, plan, seed, name)["q1"] != one["q1"]).any()
-
-
-def test_it_makes_a_campaign_that_reads(kuka, tmp_path, config_folder):
-    table = draw_measurements(kuka, PLAN, 8, "reads")
-    document = {
-        "campaign": "reads",
-        "robot": "kuka",
-        "measured": "pose",
-        "frame": "base",
-        "targets": {point: {"point": point, "offset_m": [0, 0, 0]} for point in POINTS},
-    }
-    write_campaign(tmp_path / "reads", document, table, kuka.joints)
-    campaign = read_campaign(tmp_path / "reads", config_folder / "robots")
-    assert len(campaign.measurements) == len(table["pose"])
-    np.testing.assert_array_equal(campaign.measurements.position[:, 0], table["x"])

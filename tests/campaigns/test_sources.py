@@ -8,7 +8,7 @@ import yaml
 from support import refused
 
 from elastocal.campaigns.reading import campaign_files
-from elastocal.campaigns.sources import campaign_sources, named_campaigns, named_league, user_campaign
+from elastocal.campaigns.sources import campaign_sources, named_campaigns, user_campaign
 from elastocal.io.documents import read_document
 
 
@@ -27,12 +27,6 @@ def test_campaigns_of_the_repository_pass(config, config_folder):
 def of_one_campaign(config, name="mine"):
     nobody = config["league"] | {"data": {"all": {}}}
     return config | {"loop": config["loop"] | {"main": [name], "campaigns": [], "measured": []}, "league": nobody}
-
-
-def test_a_data_set_of_two_leagues_is_named_once(config):
-    names = named_league(config)
-    assert len(set(names)) == len(names) and set(names) <= set(named_campaigns(config))
-    assert {"fanuc_cpa", "fanuc_static"} <= set(names)
 
 
 SIMULATED = {
@@ -73,11 +67,6 @@ def campaigns_folder(config_folder, tmp_path):
     return tmp_path
 
 
-def test_a_file_among_the_campaigns_is_a_campaign(config, campaigns_folder):
-    (campaigns_folder / "campaigns" / "another.yaml").write_text(yaml.safe_dump(SIMULATED | {"poses": 9}))
-    assert campaign_sources(of_one_campaign(config, "another"), campaigns_folder)["another"]["poses"] == 9
-
-
 @pytest.mark.parametrize(
     "fault",
     FAULTY_SOURCES,
@@ -88,12 +77,6 @@ def test_fault_in_a_campaigns_file_is_one_line_that_names_it(fault, config, camp
     path.write_text(yaml.safe_dump({k: v for k, v in (SIMULATED | changes).items() if v is not None}))
     with refused(path.as_posix(), key, *words):
         campaign_sources(of_one_campaign(config), campaigns_folder, "study.yaml")
-
-
-@pytest.mark.parametrize("name", ["mina", "../campaigns/mine/no", "zzz"])
-def test_a_campaign_without_a_file_is_refused(name, config, campaigns_folder):
-    with refused("study.yaml", "campaigns", repr(name), "mine"):
-        campaign_sources(of_one_campaign(config, name), campaigns_folder, "study.yaml")
 
 
 def users_folder(tmp_path, **changes):
@@ -167,11 +150,6 @@ def test_fault_in_a_users_own_campaign_is_one_line_that_names_its_file(fault, co
     folder = users_folder(tmp_path, **changes)
     with refused(f"{folder}/campaign.yaml", key, *words):
         user_campaign(config | {"campaign": folder}, config_folder / "robots", tmp_path)
-
-
-def test_a_users_folder_that_is_not_there_is_one_line(config, config_folder, tmp_path):
-    with refused(f"{tmp_path.as_posix()}/none/campaign.yaml", ""):
-        user_campaign(config | {"campaign": f"{tmp_path.as_posix()}/none"}, config_folder / "robots", tmp_path)
 
 
 def test_two_campaigns_of_one_name_are_refused_while_both_are_there(config, config_folder, tmp_path):

@@ -22,13 +22,6 @@ def test_written_campaign_is_the_one_read(cell, tmp_path, kind):
     assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["campaign.yaml", f"measurements.{kind}"]
 
 
-def test_campaign_written_as_another_kind_leaves_one_file_of_measurements(cell, tmp_path):
-    cell.write()
-    for kind in ("csv", "parquet"):
-        write_campaign(tmp_path / "again", cell.document | {"robot": "planar"}, cell.table, 3, kind)
-    assert len(read_campaign(tmp_path / "again", cell.robots).measurements) == len(cell.table["pose"])
-
-
 def test_parquet_of_a_written_campaign_carries_units_and_meanings(cell, tmp_path):
     write_campaign(tmp_path / "again", cell.document, cell.table, 3)
     schema = pq.read_schema(tmp_path / "again" / "measurements.parquet")
@@ -48,9 +41,3 @@ def test_campaign_that_cannot_be_written_leaves_the_one_before_it(cell, tmp_path
     with pytest.raises((ValueError, pa.ArrowException), match=r"argument|length"):
         write_campaign(folder, document, cell.table | {"q3": cell.table["q3"][1:]}, 3, kind)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-
-
-def test_document_that_the_schema_refuses_is_not_written(cell, tmp_path):
-    with refused((tmp_path / "again" / "campaign.yaml").as_posix(), "frame", "tracker | base"):
-        write_campaign(tmp_path / "again", cell.document | {"frame": "world"}, cell.table, 3)
-    assert not (tmp_path / "again").exists()

@@ -3,6 +3,7 @@
 import pytest
 from analysed_robots import ROBOTS
 from certified import record_jobs
+from selected import slow_but
 
 from elastocal.campaigns.reading import campaign_files
 from elastocal.command import campaign
@@ -38,7 +39,7 @@ def another_numpy(_):
     return "numpy 1.0", f"numpy {environment('.')['numpy']}"
 
 
-@pytest.mark.parametrize("change", [edited_pins, another_numpy])
+@pytest.mark.parametrize("change", slow_but([another_numpy], [edited_pins, another_numpy]))
 def test_results_of_another_environment_are_refused_by_every_command_unless_that_is_accepted(
     in_checkout, elastocal, refusal, capsys, change
 ):

@@ -41,6 +41,7 @@ def test_pages_and_document_are_written_beside_the_report(issued):
     assert document["conformity"]["decision"] in result.output
 
 
+@pytest.mark.slow
 def test_a_joint_that_slipped_between_two_campaigns_is_seen(run, checkout, tmp_path):
     certified_checkout(checkout, "later", 2e-3)
     result = run(checkout / "later", "--tolerance", "0.5mm", "--compare", checkout / "made", "--output", tmp_path / "out")
@@ -106,7 +107,9 @@ def test_one_campaign_has_one_accuracy_in_correct_and_certificate_to_the_digit(c
     assert words in corrected[1]
 
 
-@pytest.mark.parametrize(("off_m", "decision", "code"), [(3e-4, "pass", 0), (8e-4, "fail", 1)])
+@pytest.mark.parametrize(
+    ("off_m", "decision", "code"), [pytest.param(3e-4, "pass", 0, marks=pytest.mark.slow), (8e-4, "fail", 1)]
+)
 def test_a_robot_that_was_measured_at_corrected_targets_is_called_so_and_a_fail_exits_with_1(
     run, checkout, tmp_path, corrected, off_m, decision, code
 ):
@@ -124,6 +127,7 @@ def test_a_prediction_that_fails_exits_with_1(run, checkout, tmp_path):
     assert result.exit_code == 1 and result.output.startswith("! fail") and "Nobody has measured" in result.output
 
 
+@pytest.mark.slow
 def test_a_stated_use_is_what_is_judged_and_denies_a_pass_where_it_lies_beyond_what_was_fitted(
     run, checkout, corrected, tmp_path
 ):

@@ -1,23 +1,14 @@
 """What a user sees of a campaign, and the exit code."""
 
-import json
-
 import numpy as np
 import pytest
 from analysed_robots import analysed
 from made_folders import made_folder, made_table
 
-from elastocal.command.check import lines
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return made_folder(tmp_path_factory.mktemp("check") / "made", analysed("kuka"))
-
-
-@pytest.fixture(scope="module")
-def facts(elastocal, folder):
-    return json.loads(elastocal("check", folder, "--json").stdout)
 
 
 def test_headings_say_what_was_read_identified_and_testable(elastocal, folder):
@@ -29,24 +20,6 @@ def test_headings_say_what_was_read_identified_and_testable(elastocal, folder):
         assert any(line.startswith(f"  {words}") or words in line for line in rest), words
     assert any(line.startswith("! ") for line in rest)
     assert rest[-1] == f"next: elastocal diagnose {folder}"
-
-
-@pytest.mark.parametrize(
-    ("loads", "force", "words"),
-    [
-        ([0, 1, 7], 1234.0, "unloaded and 2 loads of up to 1,234 N; "),
-        ([7], 150.4, "1 load of up to 150 N; "),
-        ([0], 0.0, "unloaded; "),
-    ],
-)
-def test_labels_of_loads_are_counted_and_not_printed_as_newtons(facts, loads, force, words):
-    assert any(text.startswith(words) for _, text in lines(facts | {"loads": loads, "largest_force_N": force}))
-
-
-def test_a_fitted_mount_is_shown_with_its_rotation(facts):
-    assert facts["campaign"] == "made" and facts["mounts"] == [] and not any(name == "mount" for name, _ in lines(facts))
-    shown = lines(facts | {"mounts": [{"target": "TMAC", "rotation_rad": [0.0, 0.1, 1.5707963]}]})
-    assert ("mount", "TMAC: rotation [0.0000, 0.1000, 1.5708] rad in the frame of its point, fitted") in shown
 
 
 def test_faults_of_the_data_end_in_exit_code_one(elastocal, tmp_path):

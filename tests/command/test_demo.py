@@ -1,4 +1,4 @@
-"""The demonstration runs the commands that it prints, in their order; workflow/test_afternoon.py goes the whole way with them."""
+"""The demonstration runs the commands that it prints, in their order; test_afternoon.py goes the whole way with them."""
 
 import shlex
 

@@ -46,10 +46,6 @@ def show(terminal):
     return text.getvalue()
 
 
-def test_without_a_terminal_every_line_stands_as_it_is():
-    assert show(False) == "".join(LINES)
-
-
 def test_on_a_terminal_jobs_move_a_bar_and_the_verdict_stays():
     text = show(True)
     assert "judge_campaign cell7" in text

@@ -25,14 +25,6 @@ def test_a_table_becomes_measurements_and_the_options_are_kept(elastocal, words,
     assert lines[0] == "pose,load,repeat,target,q1,x,y,z" and lines[1].startswith("1,0,0,smr,1.57079") and "1.0005" in lines[1]
 
 
-def test_an_import_is_repeated_by_its_options(elastocal, words, tmp_path):
-    assert elastocal(*words(*OPTIONS)).exit_code == 0
-    kept = [(tmp_path / "cell" / name).read_bytes() for name in ("measurements.csv", "import.yaml")]
-    (tmp_path / "cell" / "import.yaml").rename(tmp_path / "import.yaml")
-    assert elastocal(*words("--options", tmp_path / "import.yaml", "--force")).exit_code == 0
-    assert [(tmp_path / "cell" / name).read_bytes() for name in ("measurements.csv", "import.yaml")] == kept
-
-
 def test_measurements_that_are_there_stay_unless_forced_and_an_empty_sheet_is_filled(elastocal, refusal, words, tmp_path):
     (tmp_path / "cell").mkdir()
     sheet = tmp_path / "cell" / "measurements.csv"
@@ -85,31 +77,3 @@ def test_every_import_ends_with_what_was_read_how_and_what_was_left_out(elastoca
         assert any(line.startswith("note: ") and note in line for line in lines), note
     again = elastocal(*words("--options", tmp_path / "cell" / "import.yaml", "--force", text=text))
     assert again.exit_code == 0 and again.output.splitlines()[:-1] == lines[:-1]
-
-
-def test_encoding_and_thousands_may_be_stated(elastocal, refusal, words, tmp_path):
-    text = "J1;X;Y;Z\n90;1.000,5;2;3\n"
-    assert "--thousands" in refusal(*words(*OPTIONS, text=text))
-    assert elastocal(*words(*OPTIONS, "--thousands", "point", "--encoding", "cp1252", text=text)).exit_code == 0
-    kept = (tmp_path / "cell" / "import.yaml").read_text()
-    assert "thousands: point" in kept and "encoding: cp1252" in kept
-    assert "1.0005" in (tmp_path / "cell" / "measurements.csv").read_text()
-
-
-ROBOT = "name: two\njoint_names: [pan, lift]\nchain: Rz(q1) Tx(1) Rz(q2) Tx(1) [end]\n"
-
-
-def test_joints_are_called_as_the_robot_of_the_option_or_of_the_campaign_has_them(elastocal, refusal, words, tmp_path):
-    text = "lift;pan;X;Y;Z\n2;1;10;2;3\n"
-    assert "--robot" in refusal(*words(*OPTIONS, text=text))
-    (tmp_path / "robot.yaml").write_text(ROBOT)
-    assert "q1 from 'pan' in deg" in elastocal(*words(*OPTIONS, "--robot", tmp_path / "robot.yaml", text=text)).output
-    cell = tmp_path / "cell"
-    (cell / "measurements.csv").unlink()
-    (cell / "robot.yaml").write_text(ROBOT)
-    targets = "{smr: {point: end, offset_m: [0, 0, 0]}}"
-    (cell / "campaign.yaml").write_text(
-        f"campaign: a\nrobot: robot.yaml\nmeasured: position\nframe: base\ntargets: {targets}\n"
-    )
-    assert "q1 from 'pan' in deg" in elastocal(*words(*OPTIONS, text=text)).output
-    assert "3 joints" in refusal(*words(*OPTIONS, "--force", text="J1;J2;J3;X;Y;Z\n2;1;1;10;2;3\n"))

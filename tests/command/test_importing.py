@@ -24,12 +24,6 @@ def of_urdf(output, *more, parts=ARM):
     return "import", "urdf", written(output.parent, *parts), "--base", "base", "--tip", "hand", "-o", output, *more
 
 
-def test_what_can_be_imported_is_said_without_being_told_what_to_import(elastocal):
-    shown = elastocal("import").output
-    assert "URDF" in shown and "Denavit-Hartenberg" in shown
-    assert "0.1625" in elastocal("import", "dh", "--help").output
-
-
 def test_a_table_becomes_a_robot_file_in_the_units_and_the_notation_asked_for(elastocal, output):
     units = "--angles", "rad", "--lengths", "mm", "--modified", "--name", "arm 1"
     result = elastocal(*of_table(output, "d,a,alpha\n100,400,pi/2\n", *units))
@@ -57,14 +51,3 @@ def test_a_file_that_is_there_stays_unless_forced(elastocal, refusal, output, wo
 
 def test_nothing_is_written_of_what_is_refused(refusal, output):
     assert "tip" in refusal(*of_urdf(output, parts=(*ARM[:2], ARM[3]))) and not output.exists()
-
-
-@pytest.mark.parametrize("option", [("--angles", "gon"), ("--lengths", "inch")])
-def test_other_units_are_no_options(elastocal, output, option):
-    assert elastocal(*of_table(output, PLAIN, *option)).exit_code == 2
-
-
-def test_decimal_commas_are_stated(elastocal, refusal, output):
-    words = of_table(output, "d_m;a_m;alpha_deg\n0;1,5;0\n")
-    assert "--decimal comma" in refusal(*words)
-    assert elastocal(*words, "--decimal", "comma").exit_code == 0 and "Tx(1.5)" in output.read_text()

@@ -4,7 +4,6 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import elastocal
 from elastocal.command import main
 from elastocal.errors import InputError
 
@@ -74,15 +73,6 @@ HELP = list(every_help(main.app))
 def test_help_is_whole_at_80_columns_and_has_an_example(words, text):
     assert not re.search(r"\w\.\.\.$", text, re.MULTILINE) and max(map(len, text.splitlines())) <= 80
     assert re.search(r"\n  Examples?:\n    elastocal ", text) or words == ("import",)
-
-
-def test_subcommands_are_listed_in_the_order_of_the_work():
-    listed = re.findall(r"^  (\w+)  +\S", HELP[0][1].partition("Commands:")[2], re.MULTILINE)
-    assert listed == ["demo", "import", "init", "plan", "check", "diagnose", "correct", "certificate", "export"]
-
-
-def test_the_version_is_printed():
-    assert CliRunner().invoke(main.app, ["--version"]).output == f"elastocal {elastocal.__version__}\n"
 
 
 def test_every_module_of_a_subcommand_is_registered():

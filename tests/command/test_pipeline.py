@@ -46,23 +46,9 @@ def test_without_a_checkout_here_the_one_of_the_package_is_used(tmp_path, monkey
     assert workplace() == pipeline()
 
 
-@pytest.mark.parametrize("missing", ["Snakefile", "config/robots"])
-def test_a_workflow_of_other_people_is_no_checkout(made, monkeypatch, missing):
-    path = made / missing
-    path.rmdir() if path.is_dir() else path.unlink()
-    monkeypatch.chdir(made)
-    assert made not in (pipeline(), workplace())
-
-
 def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_working_directory(installed, tmp_path):
     assert pipeline() == installed
     assert workplace() == tmp_path / "mine"
-
-
-def test_a_checkout_comes_before_what_is_installed(installed, tmp_path):
-    (tmp_path / "mine" / "config" / "robots").mkdir(parents=True)
-    (tmp_path / "mine" / "Snakefile").write_text("")
-    assert pipeline() == workplace() == tmp_path / "mine"
 
 
 def test_a_package_without_a_pipeline_is_refused_in_one_line(installed, monkeypatch):

@@ -26,6 +26,7 @@ def test_a_plan_is_a_table_a_picture_and_a_folder_to_fill_in(run, tmp_path):
     assert (table["expected_accuracy_m"] > 0).all() and set(table["load"]) == {0, 1, 2}
 
 
+@pytest.mark.slow
 def test_as_few_poses_as_reach_a_wanted_accuracy(run, tmp_path):
     many = ("--force", 80, "--pull", "--poses", 22, "--output", tmp_path / "few.csv")
     few = run(*many, "--accuracy", "0.5mm")
@@ -80,6 +81,7 @@ def test_three_reflectors_on_one_flange_are_three_targets_of_their_sensor(run, t
     assert set(sheet["target"].value_counts()) == {len(sheet) // 4} and set(sheet["target"]) == {"A", "B", "C", "6DoF"}
 
 
+@pytest.mark.slow
 def test_noise_that_is_stated_goes_before_that_of_the_sensor(run, tmp_path):
     words = ("--measured", "pose", "--noise", "50um", "--orientation-noise", "0.1mrad")
     assert run("--folder", tmp_path / "cell", *words).exit_code == 0

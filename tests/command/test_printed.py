@@ -6,12 +6,7 @@ import pytest
 from rich.console import Console
 from support import refused
 
-from elastocal.command.printed import iso_date, print_answer, print_lines, printed
-
-
-@pytest.mark.parametrize(("text", "line"), [("4711", "4711"), (" KR 270-7 ", "KR 270-7"), ("é" * 60, "é" * 60)])
-def test_a_line_is_taken_without_the_blanks_around_it(text, line):
-    assert printed("--serial", text) == line
+from elastocal.command.printed import iso_date, print_lines, printed
 
 
 @pytest.mark.parametrize("text", ["", "  ", "47\n11", "4711\n", "47\t11", "47\x1b[31m", "47\u202811", "47\u202e11", "4" * 61])
@@ -20,23 +15,12 @@ def test_nothing_or_more_than_a_line_is_refused(text):
         printed("--serial", text)
 
 
-def test_a_date_is_taken_as_it_is():
-    assert iso_date("--date", "2024-02-29") == "2024-02-29"
-
-
 @pytest.mark.parametrize(
     "text", ["", "today", "20.11.2026", "20261120", "2026-W47-5", "2026-02-29", "2026-13-01", "2026-11-20\n", " 2026-11-20"]
 )
 def test_anything_else_than_a_date_of_the_calendar_is_refused(text):
     with refused("--date", "", "such as 2026-11-20"):
         iso_date("--date", text)
-
-
-def test_an_answer_comes_first_and_what_to_do_next_comes_last():
-    console = Console(file=io.StringIO())
-    print_answer(True, "done", ["a detail", "! a warning"], "elastocal check cell", console)
-    print_answer(False, "refused", [], "", console)
-    assert console.file.getvalue() == "✓ done\n  a detail\n! a warning\nnext: elastocal check cell\n! refused\n"
 
 
 def test_lines_are_printed_as_they_are_but_for_what_would_steer_a_terminal():

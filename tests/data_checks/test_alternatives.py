@@ -7,7 +7,7 @@ import pytest
 from made_campaigns import Plan, made, with_other_compliances
 from scipy.spatial.transform import Rotation
 
-from elastocal.data_checks.alternatives import find, placements
+from elastocal.data_checks.alternatives import find
 from elastocal.mechanics.kinematics import poses
 
 
@@ -39,12 +39,6 @@ def test_a_joint_counted_from_its_neighbour_is_named_with_it(campaign, sign, wor
     assert words in fault.detail
 
 
-def test_two_joints_counted_the_other_way_round_are_both_named(campaign):
-    angles = campaign.measurements.joint_angles * [1, -1, 1, 1, -1, 1]
-    found = find(campaign, replace(campaign.measurements, joint_angles=angles))
-    assert [fault.joints for fault in found] == [(2,), (5,)]
-
-
 def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
     """Where the controller counts from elsewhere, turning the column is not turning the angle of the model."""
     reported_matrix = np.diag([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
@@ -53,13 +47,6 @@ def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
     reported = (campaign.measurements.joint_angles - robot.reported_offset) @ reported_matrix
     reported[:, 2] *= -1
     angles = reported @ reported_matrix + robot.reported_offset
-    (fault,) = find(campaign, replace(campaign.measurements, joint_angles=angles))
-    assert fault.joints == (3,)
-
-
-def test_a_joint_that_is_still_in_most_poses_is_named(fanuc):
-    campaign = made(fanuc, 4, Plan(poses=40, tracker=True, oriented=False), moving={2: 3})
-    angles = campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1]
     (fault,) = find(campaign, replace(campaign.measurements, joint_angles=angles))
     assert fault.joints == (3,)
 
@@ -87,13 +74,6 @@ def with_turned_mount(campaign, turn, moved_m=0.0):
     return with_measured(campaign, campaign.measurements.position + place, vectors)
 
 
-def in_another_frame(campaign):
-    rotation, place = ELSEWHERE
-    vectors = campaign.measurements.rotation_vector
-    turned = None if vectors is None else (rotation * Rotation.from_rotvec(vectors)).as_rotvec()
-    return with_measured(campaign, rotation.apply(campaign.measurements.position) + place, turned)
-
-
 EXCHANGED = {
     "x = y, y = x": [[0, 1, 0], [1, 0, 0], [0, 0, 1]],
     "z = -z": np.diag([1, 1, -1]),
@@ -107,14 +87,6 @@ def test_exchanged_axes_of_positions_are_named(campaign, words):
     (fault,) = find(campaign, with_measured(campaign, written))
     assert (fault.name, fault.decisive) == ("swapped_axes", True)
     assert fault.detail.endswith(f"measurements fit with {words}")
-
-
-def test_mirrored_positions_in_a_frame_that_nobody_knows_say_no_more_than_that(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=14, tracker=True, oriented=False))
-    (fault,) = find(campaign, with_measured(campaign, campaign.measurements.position[:, [1, 0, 2]]))
-    assert fault.name == "swapped_axes" and "mirrored" in fault.detail
-    # The frame takes up what only turns.
-    assert find(campaign, with_measured(campaign, campaign.measurements.position[:, [1, 2, 0]])) == []
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1000, "millimetres"), (0.1, "tenth")])
@@ -135,18 +107,6 @@ def test_angles_in_the_columns_of_the_rotation_vector_are_named(campaign, letter
     angles = Rotation.from_rotvec(campaign.measurements.rotation_vector).as_euler(letters)
     (fault,) = find(campaign, with_measured(campaign, vectors=angles))
     assert words in fault.detail
-
-
-@pytest.mark.parametrize("oriented", [True, False])
-def test_a_frame_that_is_not_the_base_is_named_with_the_transform(fanuc, oriented):
-    campaign = made(fanuc, 1, Plan(poses=14, oriented=oriented))
-    (fault,) = find(campaign, in_another_frame(campaign))
-    assert fault.name == "wrong_frame"
-    assert fault.detail.startswith("measurements do not lie in the base frame: the robot would stand 2.1 m away")
-    told = np.array([value.value for value in fault.parameters[:6]])
-    rotation, place = ELSEWHERE
-    np.testing.assert_allclose(told, [*place, *rotation.as_rotvec()], atol=1e-4)
-    assert [value.unit for value in fault.parameters[:6]] == ["m"] * 3 + ["rad"] * 3
 
 
 def test_positions_in_another_frame_than_orientations_are_named_by_themselves(fanuc):
@@ -183,22 +143,6 @@ def test_a_target_that_is_mounted_anew_between_sessions_is_named_with_how_far(ca
     assert values["shift"] == pytest.approx(np.linalg.norm(shift), rel=0.02)
 
 
-def test_a_target_of_its_own_for_each_session_was_not_mounted_anew(campaign):
-    measurements = replace(campaign.measurements, session=campaign.measurements.target)
-    names = [change.name for change in placements(replace(campaign, measurements=measurements))]
-    assert "mounted_anew" not in names
-    measurements = replace(campaign.measurements, session=(campaign.measurements.pose >= 10).astype(np.int32))
-    assert [change.name for change in placements(replace(campaign, measurements=measurements))][-1] == "mounted_anew"
-
-
-@pytest.mark.parametrize("joint", [1, 2])
-def test_a_wrong_frame_and_a_wrong_sense_are_both_named(fanuc, joint):
-    campaign = made(fanuc, 1, Plan(poses=14))
-    angles = campaign.measurements.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
-    found = find(campaign, replace(in_another_frame(campaign), joint_angles=angles))
-    assert [(fault.name, fault.joints) for fault in found] == [("wrong_frame", ()), ("wrong_sign", (joint + 1,))]
-
-
 def known_targets(fanuc, factor=1.0, which=slice(None)):
     """A campaign whose targets sit 0.1 m or so off their points, written so many times as large."""
     offsets = 0.1 * np.array([[1.0, 0.3, -0.5], [-0.4, 1.0, 0.2], [0.3, 0.4, 1.0], [1.0, -1.0, 0.5]])
@@ -214,11 +158,6 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
     targets = tuple(replace(t, offset_m=tuple(o)) for t, o in zip(plain.targets, written, strict=True))
     seen = replace(plain.measurements, position=position + 6e-5 * rng.standard_normal(position.shape))
     return replace(plain, targets=targets, measurements=seen)
-
-
-def test_target_offsets_as_they_are_are_no_fault(fanuc):
-    campaign = known_targets(fanuc)
-    assert find(campaign, campaign.measurements) == []
 
 
 @pytest.mark.parametrize(
@@ -248,12 +187,6 @@ def test_a_base_that_stands_a_little_off_stops_nothing(fanuc, shift):
     assert len(found) == (shift > 0.02)
 
 
-def test_the_first_joint_far_off_its_zero_stops_nothing(fanuc):
-    """It turns everything about the vertical, as a base does that is turned."""
-    campaign = made(fanuc, 1, Plan(poses=14), true_offset=[0.02, 0, 0, 0, 0, 0])
-    assert not [fault for fault in find(campaign, campaign.measurements) if fault.decisive]
-
-
 def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
     """In a frame that nobody knows, axes and rotation vectors exchanged together are mirrored in one way or another."""
     campaign = made(fanuc, 1, Plan(poses=14, tracker=True))
@@ -269,9 +202,9 @@ def test_measurements_of_nothing_are_mended_by_nothing(campaign):
 
 
 def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_one_place(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=14, tracker=True, oriented=False))
-    angles = 0.3 + 1e-3 * np.random.default_rng(2).normal(size=(20, 6))
-    position, pose = np.random.default_rng(3).normal(0.0, 1.0, (20, 3)), campaign.measurements.pose
+    campaign = made(fanuc, 1, Plan(poses=8, loads=1, tracker=True, oriented=False))
+    angles = 0.3 + 1e-3 * np.random.default_rng(2).normal(size=(8, 6))
+    position, pose = np.random.default_rng(3).normal(0.0, 1.0, (8, 3)), campaign.measurements.pose
     assert find(campaign, replace(campaign.measurements, joint_angles=angles[pose], position=position[pose])) == []
 
 

@@ -9,12 +9,12 @@ from made_campaigns import Plan, made, with_geometric_errors, with_other_complia
 from elastocal.data_checks.catalogue import fault_modules, faults
 
 PLANS = {
-    "base": Plan(poses=15),
+    "base": Plan(poses=10, loads=2),
     "tracker": Plan(poses=15, tracker=True),
     "positions": Plan(poses=20, tracker=True, oriented=False, loads=1, repeats=2),
-    "few poses": Plan(poses=8),
-    "small loads": Plan(poses=15, force=20.0),
-    "no noise": Plan(poses=15, noise=0.0),
+    "few poses": Plan(poses=8, loads=2),
+    "small loads": Plan(poses=10, loads=2, force=20.0),
+    "no noise": Plan(poses=10, loads=2, noise=0.0),
 }
 
 
@@ -32,12 +32,6 @@ def test_nothing_decisive_is_found_where_the_model_lacks_something(kuka, plan, s
     true_robot = with_geometric_errors(with_other_compliances(kuka, seed, 0.5), seed, 0.01)
     campaign = made(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3)
     assert not [fault for fault in faults(campaign, campaign.measurements) if fault.decisive]
-
-
-def test_two_faults_of_the_loads_are_both_named(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=20))
-    measurements = replace(campaign.measurements, wrench=-campaign.measurements.wrench / 9.80665)
-    assert [fault.name for fault in faults(campaign, measurements)] == ["wrong_sign", "wrong_unit"]
 
 
 def test_a_wrong_sign_is_not_called_shuffled_rows(fanuc):
@@ -59,9 +53,3 @@ def test_every_fault_of_the_design_is_there_and_of_family_data():
         "wrong_unit",
     }
     assert {module.FAMILY for module in fault_modules().values()} == {"data"}
-
-
-def test_a_module_stands_behind_those_that_it_comes_after():
-    order = list(fault_modules())
-    for name, module in fault_modules().items():
-        assert all(order.index(other) < order.index(name) for other in module.AFTER)

@@ -29,16 +29,6 @@ def test_angles_that_stand_still_while_the_measurements_move_are_named(campaign)
     assert fault.detail.startswith("the joint angles are the same in all 12 poses")
 
 
-def test_one_target_that_stands_still_is_named(campaign):
-    position = np.where(campaign.measurements.target[:, None] == 2, 1.0, campaign.measurements.position)
-    (fault,) = find(campaign, replace(campaign.measurements, position=position))
-    assert "of T4DoF" in fault.detail
-
-
-def test_measurements_as_they_are_are_no_fault(campaign):
-    assert find(campaign, campaign.measurements) == []
-
-
 def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
     campaign = made(fanuc, 1, Plan(poses=12, noise=0.0, loads=0), moving={1: 0, 2: 0, 3: 0, 4: 0, 5: 0})
     assert np.ptp(campaign.measurements.position[campaign.measurements.target == 3, 2]) < 1e-9

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made
 from scipy.spatial.transform import Rotation
-from scipy.stats import median_abs_deviation
 from support import PinocchioPoint
 
-from elastocal.data_checks.placement import placed, placed_by, rms, robust_sigma, robustly_placed, spread, trimmed_rms
+from elastocal.data_checks.placement import placed, robust_sigma, robustly_placed, spread
 from elastocal.fitting.observations import single_observations
 
 EXACT = Plan(poses=12, loads=1, noise=0.0, force=0.0)
@@ -69,31 +68,6 @@ def test_every_target_is_placed_by_measurements_of_its_own_however_widely_they_s
     assert np.median(found.distance[wide]) < 2 * 0.02
 
 
-def test_a_turned_orientation_is_the_angle_of_its_turn(exact):
-    seen = exact.measurements
-    angles = np.linspace(0.0, 3.0, len(seen))
-    axes = np.random.default_rng(4).standard_normal((len(seen), 3))
-    turns = Rotation.from_rotvec(angles[:, None] * axes / np.linalg.norm(axes, axis=1, keepdims=True))
-    estimate = placed(exact, seen).estimate
-    turned = (turns * Rotation.from_rotvec(seen.rotation_vector)).as_rotvec()
-    found = placed_by(exact, replace(seen, rotation_vector=turned), estimate)
-    np.testing.assert_allclose(found.turn, angles, rtol=0, atol=1e-6)
-
-
-def test_without_orientations_there_is_no_turn(fanuc):
-    campaign = made(fanuc, 1, replace(EXACT, oriented=False))
-    found = placed(campaign, campaign.measurements)
-    assert found.turn is None and found.predicted_rotation is None and found.measured_rotation is None
-
-
-def test_a_given_frame_is_used_as_it_is(exact):
-    found = placed(exact, exact.measurements)
-    rotation = found.estimate.frame_rotation[0]
-    moved = replace(found.estimate, frame_position=found.estimate.frame_position + rotation @ [0.0, 0.0, 0.25])
-    shifted = placed_by(exact, exact.measurements, moved)
-    np.testing.assert_allclose(shifted.measured - shifted.predicted, [[0.0, 0.0, -0.25]] * len(exact.measurements), atol=1e-9)
-
-
 def test_each_session_of_a_tracker_has_a_frame_of_its_own(fanuc):
     campaign = made(fanuc, 1, replace(EXACT, tracker=True, poses=20))
     seen = campaign.measurements
@@ -121,12 +95,6 @@ def test_poses_are_spread_over_the_campaign_at_their_lowest_load_and_first_repea
     assert (np.diff(place) > 0).all()
 
 
-def test_every_session_is_spread_by_itself(fanuc):
-    seen = made(fanuc, 1, Plan(poses=12, loads=0)).measurements
-    found = spread(replace(seen, session=(seen.pose > 2).astype(np.int32)), 3)
-    assert [sorted(set(found.pose[found.session == session].tolist())) for session in (0, 1)] == [[0, 1, 2], [3, 7, 11]]
-
-
 def test_every_measurement_is_an_observation_in_a_state_of_its_own(exact):
     rng = np.random.default_rng(6)
     seen = exact.measurements.select(rng.permutation(len(exact.measurements)))
@@ -140,20 +108,6 @@ def test_every_measurement_is_an_observation_in_a_state_of_its_own(exact):
     np.testing.assert_array_equal(found.position, seen.position)
     np.testing.assert_allclose(found.rotation, Rotation.from_rotvec(seen.rotation_vector).as_matrix())
     assert single_observations(replace(seen, rotation_vector=None)).rotation is None
-
-
-def test_root_mean_squares_are_those_by_hand():
-    assert rms(np.array([[3.0, -4.0], [0.0, 0.0]])) == 2.5
-    # Of ten distances the largest one is left out, of one none.
-    assert trimmed_rms(np.array([100.0, *[2.0] * 9])) == 2.0
-    assert trimmed_rms(np.array([5.0])) == 5.0
-    assert trimmed_rms(np.array([1.0, 7.0])) == 1.0
-
-
-def test_robust_deviation_of_one_component_is_the_normal_median_absolute_deviation():
-    values = np.random.default_rng(7).standard_normal(101)
-    values -= np.median(values)
-    assert robust_sigma(np.abs(values), 1) == pytest.approx(median_abs_deviation(values, scale="normal"), rel=1e-9)
 
 
 @pytest.mark.parametrize("components", [1, 2, 3])

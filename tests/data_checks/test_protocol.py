@@ -28,10 +28,6 @@ def test_every_module_names_its_faults_its_family_and_the_modules_before_it(name
     assert isinstance(module.AFTER, tuple) and set(module.AFTER) <= set(fault_modules()) - {name}
 
 
-def test_what_the_faults_have_in_common_is_no_fault_of_its_own():
-    assert not {"deflections", "placement", "protocol"} & set(fault_modules())
-
-
 def test_a_verdict_with_a_fault_beside_effects_finds_the_data_at_fault_and_one_without_does_not():
     effect = {"family": "gravity"}
     assert data_at_fault({"effects": [effect, fault_entry(FAULT)]})

@@ -53,13 +53,6 @@ def test_members_are_the_posteriors_of_dense_generalized_least_squares_at_the_po
         assert len(absent) and not members.means[number, absent].any()
 
 
-def test_members_know_their_hypothesis_and_their_share_of_the_probability():
-    members, _ = posterior_of(made_rows(1))
-    assert members.names == (("offset",), ("tilt",)) and members.hypothesis.tolist() == [0, 0, 1]
-    odds = np.exp([2.0, 0.5, 1.0])
-    np.testing.assert_allclose(np.exp(members.log_weights), odds / odds.sum())
-
-
 def test_places_of_further_targets_are_unknown_to_a_metre_and_tied_to_nothing():
     plain, with_places = (posterior_of(made_rows(1), added=added)[0] for added in (0, 2))
     for before, after, columns in zip(plain.precisions, with_places.precisions, with_places.columns, strict=True):
@@ -85,17 +78,6 @@ def test_drawn_coefficients_have_the_mean_and_covariance_of_the_posterior_and_th
         assert np.abs(off.mean(axis=0)).max() < 5 / np.sqrt(draws)
         assert np.abs(off.T @ off / draws - covariance / np.outer(size, size)).max() < 5 * np.sqrt(2 / draws)
         assert not np.delete(found, columns, axis=1).any()
-
-
-def test_without_some_hypotheses_the_others_keep_their_models_and_share_all_of_the_probability():
-    members = members_like(4, hypotheses=(0, 1, 2, 0))
-    left = members.without([1])
-    assert left.names == (("h0",), ("h2",)) and left.hypothesis.tolist() == [0, 1, 0]
-    kept = np.exp(members.log_weights[[0, 2, 3]])
-    np.testing.assert_allclose(np.exp(left.log_weights), kept / kept.sum())
-    np.testing.assert_array_equal(left.means, members.means[[0, 2, 3]])
-    for mine, theirs in zip(left.precisions, (members.precisions[n] for n in (0, 2, 3)), strict=True):
-        np.testing.assert_array_equal(mine, theirs)
 
 
 def members_like(count, hypotheses, seed=0, certain=None, weights=None):
@@ -168,16 +150,3 @@ def test_entropy_of_fixed_models_is_that_of_their_bhattacharyya_coefficients():
     expected = 0.7 * np.log1p(0.3 / 0.7 * close) + 0.3 * np.log1p(0.7 / 0.3 * close)
     np.testing.assert_allclose(criterion.left(information), expected, rtol=1e-4)
     assert separation.min() < 2 < separation.max()
-
-
-def test_models_of_one_hypothesis_are_nothing_to_resolve():
-    members = members_like(3, (0, 0, 0), seed=7)
-    left = Criterion.of(members, np.random.default_rng(8)).left(np.array([np.zeros((5, 5)), np.eye(5)]))
-    np.testing.assert_allclose(left, 0.0, atol=1e-12)
-
-
-def test_work_grows_with_the_cube_of_a_models_coefficients():
-    """Two, three and four coefficients; four draws of each of three models, of five unknowns."""
-    members = members_like(3, (0, 1, 2))
-    assert [len(columns) for columns in members.columns] == [2, 3, 4]
-    assert Criterion.of(members, np.random.default_rng(9)).work == 8 + 27 + 64 + 12 * 5 * 5

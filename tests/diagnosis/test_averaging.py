@@ -118,14 +118,6 @@ def test_coefficients_are_averaged_over_the_models_that_have_them(made):
     assert {owner for owner, _ in averaged(line, both, both.models[1], OWNERS).shift} == {"declared", "a", "b"}
 
 
-def test_models_that_hold_next_to_nothing_are_left_out(made):
-    _, line = made
-    best = ((0,), [0.3], 0.0, 0.999)
-    found = [posterior_of(best, *rest) for rest in ((), [((0, 1), [0.3, 1.0], 0.0, 0.001)])]
-    one, other = (averaged(line, each, each.models[0], OWNERS) for each in found)
-    assert one == other
-
-
 def most_probable(rows, problem, model):
     """Coefficients of a model, dense: at its sizes, and at the pose error that is then most probable."""
     columns = np.concatenate([np.zeros(0, int), *(problem.units[number].columns for number in model.units)])
@@ -162,14 +154,6 @@ def test_a_model_is_expected_to_help_where_the_expected_square_of_the_error_fall
     for model in found.models:
         falls = expected_square(rows, line.problem, found, model) < expected_square(rows, line.problem, found, None)
         assert expected_to_help(on_the_mean(line.problem), found, model) == (falls and len(model.units) > 0)
-
-
-def test_what_is_there_or_not_helps_where_it_is_more_probable_than_not(made):
-    """The whole of an effect is twice its mean at a probability of a half."""
-    _, line = made
-    for probability, helps in ((0.49, False), (0.51, True)):
-        found = posterior_of(((0,), [0.3], 0.0, probability), ((), [], 0.0, 1 - probability))
-        assert expected_to_help(on_the_mean(line.problem), found, found.models[0]) == helps
 
 
 def test_what_other_models_predict_as_well_helps_however_improbable_it_is_by_itself():

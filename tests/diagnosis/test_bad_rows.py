@@ -86,7 +86,7 @@ def test_the_clean_file_is_diagnosed_right_and_loses_no_row(clean):
 @pytest.mark.parametrize(
     ("damage", "size_m"),
     [
-        (off_by(1e-3), 1e-3),
+        pytest.param(off_by(1e-3), 1e-3, marks=pytest.mark.slow),
         (off_by(0.1), 0.1),
         *(pytest.param(damage, None, marks=pytest.mark.slow) for damage in (lost_beam, held_point, wrong_angle)),
     ],
@@ -122,6 +122,7 @@ def test_two_swapped_rows_leave_the_verdict_and_are_both_named(tmp_path, clean):
     assert named_rows(found) == [8, 30]
 
 
+@pytest.mark.slow
 def test_three_rows_of_zeros_are_named_where_nothing_else_is_wrong(tmp_path):
     """Offsets are declared here, and so fitted: without the three rows nothing is missing."""
     found = verdict_on(tmp_path, [(lost_beam, row) for row in (3, 22, 50)], declared=["joint_offset"])

@@ -35,8 +35,7 @@ CALLERS = {
     "workflow/scripts/diagnose_cases.py": "blind proof",
     "workflow/scripts/diagnose_follow_ups.py": "follow-ups",
     "workflow/scripts/diagnose_league_folds.py": "makes the call on the training poses of each fold of the league",
-    "benchmarks/loop.py": "times the call on the case that `cases_in` gives",
-    "benchmarks/large.py": "benchmark of the engine",
+    "benchmarks/engine.py": "benchmark of the engine",
 }
 
 
@@ -193,7 +192,7 @@ def test_next_experiment_is_proposed_for_the_same_diagnosis(folder, monkeypatch)
 def test_benchmark_of_the_engine_times_the_same_verdict(kind, both, monkeypatch, capsys):
     """The script that it gives to a process of its own, in this one: the two calls by hand."""
     folder, expected = both[kind]
-    tree = ast.parse((BENCHMARKS / "large.py").read_text(encoding="utf-8"))
+    tree = ast.parse((BENCHMARKS / "engine.py").read_text(encoding="utf-8"))
     assigned = (node for node in tree.body if isinstance(node, ast.Assign))
     (script,) = (ast.literal_eval(n.value) for n in assigned if getattr(n.targets[0], "id", "") == "SCRIPT")
     seen = []
@@ -203,9 +202,9 @@ def test_benchmark_of_the_engine_times_the_same_verdict(kind, both, monkeypatch,
         return seen[-1]
 
     monkeypatch.setattr(judging, "judge", judged)
-    monkeypatch.setattr(sys, "argv", ["script", ROBOTS.as_posix(), "1", folder.as_posix()])
+    monkeypatch.setattr(sys, "argv", ["script", ROBOTS.as_posix(), folder.as_posix()])
     exec(compile(script, "SCRIPT", "exec"), {})
-    assert json.loads(capsys.readouterr().out)["candidates"] == len(cases_in(folder, ROBOTS)[0].candidates)
+    assert json.loads(capsys.readouterr().out)["measurements"] == len(cases_in(folder, ROBOTS)[0].observations)
     (verdict,) = seen
     # A benchmark of the engine states no accuracy of a corrected robot, nor what each cause costs.
     wanted = {name: value for name, value in expected.items() if name != "accuracy"}

@@ -38,11 +38,6 @@ def test_angles_are_the_smallest_principal_ones(problem):
     assert found[0, 1] < 1.0
 
 
-def test_some_units_have_the_angles_that_they_have_among_all(problem):
-    problem, _ = problem
-    np.testing.assert_allclose(angles_between(problem, [3, 1]), angles_between(problem, [0, 1, 2, 3])[np.ix_([3, 1], [3, 1])])
-
-
 def test_nearest_angle_is_that_to_the_nearest_found_unit(problem):
     problem, _ = problem
     every = angles_between(problem, [0, 1, 2, 3])

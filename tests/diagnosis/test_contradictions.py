@@ -23,10 +23,6 @@ def with_noise(fitted, **changes):
     return replace(fitted, noise=replace(fitted.noise, **changes))
 
 
-def test_a_model_that_leaves_its_noise_contradicts_nothing(fitted):
-    assert contradictions(fitted, fitted.noise, SETTINGS) == []
-
-
 @pytest.mark.parametrize(("factor", "count"), [(4.9, 0), (5.1, 1), (270.0, 1)])
 def test_scatter_far_beyond_the_noise_measured_is_one(fitted, factor, count):
     left, repeats = with_noise(fitted, position_m=factor * fitted.noise.position_m), replace(fitted.noise, source="repeats")

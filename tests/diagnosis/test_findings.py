@@ -78,16 +78,6 @@ def test_parameters_have_their_values_errors_and_priors(found):
     assert entry["value"] == pytest.approx(3.1e-4) and entry["std_error"] == 4e-5
 
 
-def test_what_a_search_has_chosen_is_marked_as_such(campaign):
-    step = campaign.candidates["setup_step"]
-    model, start = campaign.declared.model.with_effects([step]), campaign.declared.estimate.with_effects([step])
-    count = len(campaign.declared.parameters) + len(step.parameters) + len(step.shapes)
-    stated = {"covariance": np.eye(count), "held": np.arange(count) == count - 1}
-    fitted = replace(campaign.declared, model=model, estimate=start, **stated)
-    entries = parameter_entries(step, fitted, Averaged({}, {}))
-    assert [entry.get("shape", False) for entry in entries] == [False] * 6 + [True] and entries[-1]["name"] == "setup_step when"
-
-
 def declared_springs(fitted, compliance):
     """The same fit of a campaign that takes the compliances from the robot file."""
     kept = [n for n, effect in enumerate(fitted.model.effects) if effect.effect != "joint_compliance"]
@@ -134,13 +124,6 @@ def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, campaign, kuka)
     assert entry["unit"] == "m" and entry["value"] == pytest.approx(largest, rel=0.02)
     assert entry["std_error"] == pytest.approx(entry["value"] / 20.0, rel=1e-3)
     assert sag_entries("joint_tilt", [effect_of(fitted, "joint_tilt@2")], taken, campaign.observations) == []
-
-
-def test_nothing_is_implausible_about_values_within_their_limits(found):
-    fitted, entries = found
-    assert implausible(fitted, entries, rated_kg=165.0) == []
-    # A wrong sign within its error is no statement.
-    assert implausible(with_value(fitted, "joint_tilt@2", -1e-8, 1e-8), entries) == []
 
 
 def test_the_wrong_sign_is_named(found):

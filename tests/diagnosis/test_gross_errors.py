@@ -33,7 +33,7 @@ def test_the_distance_of_a_row_is_that_from_a_fit_without_it(cases):
     case, _ = cases
     measurements = case.campaign.measurements
     every = np.ones(len(measurements), bool)
-    whole, without = fitted_to(case, every), fitted_to(case, np.arange(len(measurements)) != BAD)
+    whole, without = fitted_to(case, every, SETTINGS), fitted_to(case, np.arange(len(measurements)) != BAD, SETTINGS)
     found = []
     for part in (whole, without):
         yardstick = yardstick_of(part.declared, whole.noise, part.case.campaign.measurements)

@@ -39,25 +39,6 @@ def made_units():
     )
 
 
-def test_probabilities_of_all_models_sum_to_one():
-    units, prior = made_units(), prior_of(made_units(), SETTINGS)
-    nothing = (1 - SETTINGS.mechanism_probability) ** 2 * (1 - SETTINGS.gravity_probability)
-    nothing *= 1 - SETTINGS.other_probability
-    total = sum(nothing * np.exp(prior.log_odds_of(model)) for model in every_model(units))
-    assert total == pytest.approx(1.0, abs=1e-12)
-
-
-def test_each_mechanism_is_there_with_the_probability_of_the_settings():
-    units, prior = made_units(), prior_of(made_units(), SETTINGS)
-    odds = [({unit.mechanism for unit in model}, np.exp(prior.log_odds_of(model))) for model in every_model(units)]
-    total, known = sum(value for _, value in odds), SETTINGS.mechanism_probability
-    other = SETTINGS.other_probability
-    assert known < other < 0.5
-    for mechanism, probability in (("harmonic", known), ("offset", known), ("link_weight", 0.5), (OTHER, other)):
-        there = sum(value for mechanisms, value in odds if mechanism in mechanisms)
-        assert there / total == pytest.approx(probability)
-
-
 def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equally_likely():
     units = made_units()[:5]
     prior = prior_of(units, SETTINGS)
@@ -72,13 +53,6 @@ def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equall
         np.testing.assert_allclose(
             [v for p, v in by_places.items() if len(p) == size], counts[size - 1] * odds / [3, 3, 1][size - 1]
         )
-
-
-def test_one_mechanism_at_many_joints_costs_less_than_as_many_mechanisms():
-    offsets = [made_unit("joint_offset", (joint,), joint) for joint in range(5)]
-    others = [made_unit(name, (0,), 5 + number) for number, name in enumerate("abcd")]
-    prior = prior_of((*offsets, *others), SETTINGS)
-    assert prior.log_odds_of(offsets) > prior.log_odds_of([offsets[0], *others]) + 8
 
 
 def test_adding_a_unit_changes_the_log_odds_by_what_added_says():
@@ -132,12 +106,6 @@ def test_laws_share_a_location_alike_and_shapes_of_a_law_by_the_part_of_the_rang
     assert found[0] == pytest.approx(0.5)
     np.testing.assert_allclose(found[1:], 0.5 * by_time.shapes[0].shares(lags))
     assert found[2] < 0.1 * found[1] and found[3] > 5 * found[2]
-
-
-def test_a_shape_that_is_tried_alone_has_all_of_its_law(catalogue):
-    (column,) = (c for c in catalogue if c.key == "link_elasticity[column]")
-    (unit,) = units_of([(column, (0.59,))], [], SETTINGS)
-    assert unit.log_prior == 0.0
 
 
 def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_of_physics(catalogue):

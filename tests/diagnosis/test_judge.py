@@ -103,15 +103,6 @@ def test_residuals_are_measured_less_predicted_for_every_measurement_in_its_orde
     assert sorted(rows) == list(range(1, len(rows) + 1))
 
 
-def test_each_measurement_stands_by_itself_and_the_training_ones_come_first(made):
-    """As many rows as measurements, repeats included, though the fit averages them."""
-    case, held_out, steps = made
-    first, second = blocks_of(diagnosis_of(case, steps), held_out)
-    assert len(first["row"]) == len(case.campaign.measurements) > len(case.observations)
-    assert len(second["row"]) == len(held_out.campaign.measurements)
-    assert {*zip(first["session"], first["pose"], strict=True)}.isdisjoint(zip(second["session"], second["pose"], strict=True))
-
-
 def test_figures_before_and_after(made):
     case, held_out, steps = made
     found = judged(steps, case, held_out)
@@ -220,45 +211,6 @@ def test_a_session_held_out_is_placed_and_judged(frame, kuka, config_folder, tmp
     case, held_out = cases_in(tmp_path / "made", config_folder / "robots")
     assert set(case.campaign.measurements.session) == {1} and set(held_out.campaign.measurements.session) == {2}
     assert_reaches_noise(case, held_out, 1.5)
-
-
-def spoilt(fitted, offset):
-    """The same fit with the offset of joint 3 elsewhere."""
-    values = (*fitted.estimate.coefficients[:-1], np.array([offset]))
-    return replace(fitted, estimate=replace(fitted.estimate, coefficients=values))
-
-
-def test_a_maximum_that_grows_is_a_warning(made):
-    case, held_out, steps = made
-    wrong = spoilt(fitted_of(steps, "effect"), -2 * OFFSET)
-    found = judged([*steps[:2], Step("with joint_offset", "effect", wrong)], case, held_out)
-    assert found.document["heldout"]["after"]["max_m"] > found.document["heldout"]["before"]["max_m"]
-    figures = [1e3 * found.document["heldout"][stage]["max_m"] for stage in ("before", "after")]
-    grown = f"the largest error of the validation poses grew from {figures[0]:.3f} to {figures[1]:.3f} mm"
-    assert [line for line in found.document["warnings"] if line.startswith("the largest error of the validation ")] == [grown]
-    assert "the step 'with joint_offset' raised the RMS error of the validation poses" in found.document["warnings"]
-
-
-def test_one_step_of_several_that_harms_is_named(made):
-    case, held_out, steps = made
-    worse = Step("with other", "effect", spoilt(steps[2].fitted, 0.5 * OFFSET))
-    found = judged([*steps[:3], worse], case, held_out)
-    assert "the step 'with other' raised the RMS error of the validation poses" in found.document["warnings"]
-    assert not any("'with joint_offset'" in warning for warning in found.document["warnings"])
-
-
-def test_nothing_found_has_nothing_to_warn_of(made):
-    case, held_out, steps = made
-    found = judged(steps[:2], case, held_out)
-    assert about_errors(found) == [] and found.document["heldout"]["before"] == found.document["heldout"]["after"]
-    assert found.document["heldout"]["reduction_ci95"] == [0.0, 0.0] and found.document["heldout"]["reduction_std_error"] == 0.0
-
-
-def test_without_a_known_noise_there_is_no_floor(made):
-    case, held_out, steps = made
-    noise = replace(NOISE, source="residual")
-    steps = [replace(step, fitted=replace(step.fitted, noise=noise)) for step in steps[:3]]
-    assert judged(steps, case, held_out).document["heldout"]["noise_floor_rms_m"] is None
 
 
 def test_another_campaign_as_test_has_frames_and_targets_of_its_own(kuka, config_folder, tmp_path):

@@ -87,14 +87,6 @@ def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_witho
     assert one.along[0][1] / np.sqrt(one.gram[0][1, 1]) > 20
 
 
-def test_an_effect_is_found_at_its_true_size(campaign):
-    found = problem_of(campaign)
-    unit, statistics = unit_of(found, "joint_offset@3"), found.problem.statistics
-    gram, along = statistics.gram[0][np.ix_(unit.columns, unit.columns)], statistics.along[0][unit.columns]
-    value = (along / gram[0]).item() * unit.sizes[0]
-    assert value == pytest.approx(5e-4, abs=4 * unit.sizes[0] / np.sqrt(gram.item()))
-
-
 def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_and_that_show(campaign):
     loud = {unit.key for unit in problem_of(campaign, keys=KEYS[:1]).problem.units if unit.mechanism == OTHER}
     quiet = replace(campaign.declared, noise=campaign.declared.noise.scaled(0.01))
@@ -235,13 +227,6 @@ def factors(problem, sizes):
     return found
 
 
-def test_no_shape_is_looked_at_more_closely_where_none_matters(bent):
-    assert looked_at(bent, factors(bent, {})) == {}
-    assert looked_at(bent, factors(bent, {("setup_step", 5): 4.9})) == {}
-    # Nor where something else is far better.
-    assert looked_at(bent, factors(bent, {("setup_step", 5): 30.0, ("joint_offset@3", 0): 60.0})) == {}
-
-
 def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(bent):
     sizes = {("setup_step", 5): 30.0, ("setup_step", 6): 25.0, ("thermal_growth[time]", 1): 28.0, ("joint_offset@3", 0): 29.0}
     found = looked_at(bent, factors(bent, sizes))
@@ -254,38 +239,9 @@ def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_
     np.testing.assert_allclose(found["thermal_growth[time]"], closer)
 
 
-def test_a_shape_that_was_fitted_elsewhere_than_tried_stays_among_those_looked_at(campaign):
-    """A fit tries its own value alone, which is nowhere near the middle of the range."""
-    key = "thermal_growth[time]"
-    problem = problem_of(campaign, fitted_at(campaign, key, 1300.0), (key, "joint_offset@3")).problem
-    (values,) = looked_at(problem, factors(problem, {(key, 0): 30.0})).values()
-    below, above = np.geomspace(900.0, 1300.0, 5)[1:-1], np.geomspace(1300.0, 36000.0, 5)[1:-1]
-    np.testing.assert_allclose(values, [*below, 1300.0, *above])
-
-
 def ends_of(candidate):
     (shape,) = candidate.shapes
     return shape.lowest, shape.highest
-
-
-def test_every_shape_of_the_catalogue_is_tried_within_its_range(campaign):
-    shaped = [candidate for candidate in campaign.all_candidates if candidate.shapes]
-    assert {candidate.effect for candidate in shaped} >= {"lost_motion", "stiffening", "thermal_growth", "setup_step"}
-    for candidate in shaped:
-        lowest, highest = ends_of(candidate)
-        tried = [value for (value,) in shapes_tried(candidate, campaign.declared)]
-        assert lowest <= min(tried) and max(tried) <= highest and len(set(tried)) == len(tried), candidate.key
-
-
-@pytest.mark.parametrize("end", [0, 1])
-@pytest.mark.parametrize("key", ["setup_step", "thermal_growth[time]", "lost_motion@2", "link_elasticity@3"])
-def test_a_shape_that_was_fitted_at_an_end_of_its_range_is_tried_there_and_not_beyond(campaign, key, end):
-    candidate = campaign.candidates[key]
-    ends = ends_of(candidate)
-    tried = [value for (value,) in shapes_tried(candidate, fitted_at(campaign, key, ends[end]))]
-    assert ends[end] in tried and min(tried) >= ends[0] and max(tried) <= ends[1]
-    # Only of a step others are tried beside, all on the one side that there is.
-    assert (len(tried) > 1) == (key == "setup_step")
 
 
 @pytest.mark.parametrize("key", ["setup_step", "thermal_growth[time]", "link_elasticity@3"])

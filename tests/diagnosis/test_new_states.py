@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from open_alternatives import ELASTIC, LADDER, SETTINGS, diagnosed, keys_like, limits, pieces
 from planted import planted, two_loads_a_pose
-from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis import new_states
@@ -47,13 +46,6 @@ def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka):
     # Declared parameters that measurements do not show have their prior, of information one, and only rounding beside it.
     size = np.sqrt(np.diag(expected) + 1e-6)
     np.testing.assert_allclose(total / np.outer(size, size), expected / np.outer(size, size), atol=1e-6)
-
-
-def test_weights_up_to_the_rated_payload_are_considered(ambiguous, kuka):
-    states = ambiguous[1].observations.states
-    heavy = new_states.reach_of(states, replace(kuka, payload_kg=2000.0), limits(kuka), LADDER, False)
-    assert heavy.largest_N == pytest.approx(2000 * 9.80665)
-    assert new_states.reach_of(states, replace(kuka, payload_kg=1.0), limits(kuka), LADDER, False).largest_N < 1e4
 
 
 def test_loads_that_always_hang_stay_vertical(ambiguous, kuka):
@@ -157,15 +149,6 @@ def test_loads_along_one_line_are_pulled_either_way_and_never_across(states, kuk
     assert set(along) == {-1.0, 1.0}
 
 
-def test_poses_are_drawn_between_the_joint_limits_but_within_one_turn(states, kuka):
-    wide = new_states.reach_of(states, kuka, np.tile([-10.0, 0.5], (6, 1)), None, False)
-    angles = new_states.drawn(wide, 400, np.random.default_rng(1)).joint_angles
-    assert (angles >= -np.pi).all() and (angles <= 0.5).all()
-    # Each joint reaches both ends of its range to a twentieth: missed by 2,400 draws with a probability of 1e-8.
-    span = np.pi + 0.5
-    assert (angles.min(axis=0) < -np.pi + span / 20).all() and (angles.max(axis=0) > 0.5 - span / 20).all()
-
-
 def test_a_side_of_approach_is_one_for_all_shares_where_it_is_chosen_and_drawn_for_each_where_a_ladder_is_given(states, kuka):
     rng = np.random.default_rng(2)
     chosen, given = (new_states.approaches(reached(states, kuka, ladder), 50, rng) for ladder in (None, LADDER))
@@ -232,19 +215,3 @@ def test_information_of_many_entries_is_that_of_each_by_itself(ambiguous, kuka, 
     louder = replace(apart, noise=apart.noise.scaled(2.0))
     np.testing.assert_allclose(4 * louder.information(entries, [0]), alone[0], rtol=1e-9, atol=1e-10 * np.abs(found).max())
     assert instrument.information(entries.at([]), [0, 1]).shape == (0, instrument.unknowns, instrument.unknowns)
-
-
-def test_entries_are_taken_and_joined_with_all_that_belongs_to_them(states, kuka):
-    reach = reached(states, kuka, weights=True)
-    one, other = (new_states.drawn(reach, count, np.random.default_rng(count)) for count in (4, 3))
-    both = one.then(other)
-    assert len(both) == 7
-    for name in ("joint_angles", "wrench", "approach", "weighed"):
-        np.testing.assert_array_equal(getattr(both.at([5, 1]), name), [getattr(other, name)[1], getattr(one, name)[1]])
-    assert replace(one, approach=None).then(other).approach is None
-
-
-def test_loads_turn_with_their_moments():
-    wrench = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]])
-    quarter = Rotation.from_rotvec([[0.0, 0.0, np.pi / 2]])
-    np.testing.assert_allclose(new_states._turned(wrench, quarter), [[-2.0, 1.0, 3.0, -5.0, 4.0, 6.0]], atol=1e-15)

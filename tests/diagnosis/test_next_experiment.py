@@ -60,15 +60,6 @@ def test_proposal_separates_half_as_much_again_as_random_poses_and_resolves_more
     assert (np.diff(proposal.separation) > -0.3).all() and proposal.separation[-1] > proposal.separation[0]
 
 
-def test_proposal_is_within_reach(ambiguous, proposal, kuka):
-    low, high = limits(kuka).T
-    assert ((proposal.joint_angles >= low) & (proposal.joint_angles <= high)).all()
-    largest = np.linalg.norm(ambiguous[1].observations.states.wrench[:, :3], axis=1).max()
-    np.testing.assert_allclose(np.linalg.norm(proposal.wrench[:, :3], axis=1), largest)
-    assert proposal.shares == LADDER and proposal.approach is None and not proposal.reference_weight.any()
-    assert proposal.points == ("3DoF", "6DoF")
-
-
 def test_models_belong_to_the_hypothesis_that_they_state_and_not_to_that_of_their_parts(ambiguous, kuka, monkeypatch):
     """A model of a law beside a smooth error may state one alone, for all models of a hypothesis even."""
 

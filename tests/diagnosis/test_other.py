@@ -23,7 +23,6 @@ from elastocal.diagnosis.other import (
     law_of,
 )
 from elastocal.effects.conditions import at_states
-from elastocal.mechanics.robot import Mass
 
 FEATURES = 40
 AT_A_JOINT = [Competitor((4,), law) for law in (OWN, NEIGHBOURS, TIME)]
@@ -53,19 +52,6 @@ def test_it_acts_by_each_law_at_every_joint_and_at_the_base():
     assert competitors(around()) == [*expected, *AT_THE_BASE]
 
 
-def test_names_tell_the_laws_of_a_location_apart():
-    listed = competitors(around())
-    assert len({(each.location, each.name) for each in listed}) == len(listed)
-
-
-def test_laws_of_which_a_campaign_has_no_inputs_are_left_out():
-    """Without a load no force; in rows that are all but one, of unknown time, no time."""
-    still = {competitor.law for competitor in competitors(around(force=0.0)) if not competitor.location}
-    assert still == {TIME, PLACE}
-    alone = around(1, time_s=None, temperature_c=None)
-    assert competitors(alone) == []
-
-
 @pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)
 def test_a_joint_is_displaced_by_about_its_size_in_any_state(competitor):
     """Unloaded all features are of use; what is constant or straight in the angle has been taken off."""
@@ -87,26 +73,6 @@ def test_no_law_has_a_part_that_the_catalogue_has_a_name_for(competitor):
     np.testing.assert_allclose(free.mean(axis=1), 0.0, atol=1e-9 * size)
     if competitor.law in (OWN, NEIGHBOURS):
         np.testing.assert_allclose(free @ states.joint_angles[:, 3], 0.0, atol=1e-7 * size)
-
-
-@pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)
-def test_half_of_the_features_vanish_without_the_load(competitor):
-    wrench = made_states(7, 60, seed=1).wrench
-    wrench[:20] = 0.0
-    states = around(wrench=wrench)
-    found = waves(displacements(states, competitor, FEATURES))
-    zero = ~found[:, :20].any(axis=1)
-    assert zero.sum() == FEATURES // 2 and found[zero][:, 20:].any(axis=1).all()
-
-
-@pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)
-def test_features_are_the_principal_ones_of_many_over_the_states_of_the_campaign(competitor):
-    """The same first ones however many, in falling order; 8 of 64 hold more than half of the squares."""
-    few, many = ((waves(displacements(around(), competitor, count)) ** 2).sum(axis=1) for count in (16, 128))
-    for some, all_of_them in zip(np.split(few, 2), np.split(many, 2), strict=True):
-        np.testing.assert_allclose(some, all_of_them[:8], rtol=1e-9)
-        assert (np.diff(all_of_them) < 1e-12 * all_of_them[0]).all()
-        assert some.sum() > 0.5 * all_of_them.sum()
 
 
 @pytest.mark.parametrize("law", [FORCE, TIME, PLACE])
@@ -197,55 +163,9 @@ def test_own_law_and_neighbours_go_by_the_torque_and_the_place_by_where_the_end_
 
 
 @pytest.mark.parametrize("competitor", EVERY, ids=named)
-def test_it_is_the_same_each_time(competitor):
-    states = around()
-    np.testing.assert_array_equal(*(waves(displacements(states, competitor, FEATURES)) for _ in range(2)))
-
-
-@pytest.mark.parametrize("law", [OWN, NEIGHBOURS, TIME])
-def test_it_is_another_one_at_each_joint_and_by_each_law(law):
-    """At joints with the same inputs, too: those of time."""
-    states = around(force=0.0)
-    one, other = (waves(displacements(states, Competitor((joint,), law), FEATURES)) for joint in (2, 3))
-    assert np.abs(one - other).max() > 0.1 * JOINT_RAD
-    elsewhere = waves(displacements(states, Competitor((2,), OWN if law == NEIGHBOURS else NEIGHBOURS), FEATURES))
-    assert np.abs(one - elsewhere).max() > 0.1 * JOINT_RAD
-
-
-@pytest.mark.parametrize("competitor", EVERY, ids=named)
 def test_it_is_the_same_function_of_some_of_the_states(competitor):
     """Normalised by the campaign: what is made in parts is what is made at once."""
     states = around()
     whole = waves(displacements(states, competitor, FEATURES))
     part = waves(displacements(at_states(states, slice(10, 25)), competitor, FEATURES, states))
     np.testing.assert_allclose(part, whole[:, 10:25], rtol=0, atol=1e-12 * JOINT_RAD)
-
-
-def test_it_is_smooth_in_the_angles():
-    """A hundredth of a radian changes it by a few hundredths of its size."""
-    states = around(force=0.0)
-    moved = replace(states, joint_angles=states.joint_angles + 0.01)
-    one, other = (waves(displacements(each, Competitor((3,), NEIGHBOURS), FEATURES, states)) for each in (states, moved))
-    change = np.sqrt(((one - other) ** 2).sum(axis=0))
-    assert 0 < change.max() < 0.15 * JOINT_RAD
-
-
-def test_what_is_constant_or_absent_is_no_input():
-    """A campaign without times and temperatures, or all at one of them that no mean of binary numbers hits, is the same."""
-    bare = around(time_s=None, temperature_c=None)
-    constant = around(time_s=np.full(60, 0.1), temperature_c=np.full(60, 21.3))
-    np.testing.assert_array_equal(
-        *(waves(displacements(states, Competitor((1,), TIME), FEATURES)) for states in (bare, constant))
-    )
-
-
-def test_a_torque_of_rounding_is_neither_an_input_nor_a_load():
-    """The axis of joint 1 stands upright by way of a turn: the weight that hangs on it turns it by rounding alone."""
-    upright = "Ry(90deg) Tx(-0.4) Rx(q1) Tz(0.1) Ry(q2) Tx(-0.7) Ry(q3) Tx(-0.6) [hand]"
-    robot = replace(robot_of(upright), masses=(Mass(2, 80.0, (0.3, 0.0, 0.1), 0.1),))
-    states = conditions_on(robot, made_states(3, 60, seed=2, force=0.0))
-    torque = np.abs(states.total[:, 0])
-    assert 0 < torque.max() < 1e-9 and np.abs(states.total[:, 1]).max() > 10.0
-    weightless = conditions_on(robot_of(upright), made_states(3, 60, seed=2, force=0.0))
-    one, other = (waves(displacements(each, Competitor((1,), OWN), FEATURES)) for each in (states, weightless))
-    np.testing.assert_array_equal(one, other)

@@ -15,12 +15,12 @@ from elastocal.diagnosis.proposal import MOST_POSES, WANTED_PROBABILITY
 def test_promised_separation_is_twice_the_mean_log_bayes_factor_of_simulated_measurements(ambiguous, kuka):
     """Measurements row by row and their normal densities, against the promise from information alone; 600 draws of each.
 
-    Kolmogorov-Smirnov at 0.1 % sees a shift of 0.3 standard deviations with a power of 0.9; means at 4 standard errors.
+    Kolmogorov-Smirnov at 0.1 % sees a shift of 0.4 standard deviations with a power of 0.9; means at 4 standard errors.
     """
     members, instrument, reach = pieces(ambiguous[0], kuka)
     rng = np.random.default_rng(0)
     targets = list(range(len(instrument.model.targets)))
-    entries = new_states.drawn(reach, 30, rng)
+    entries = new_states.drawn(reach, 15, rng)
     rows = instrument.rows(entries, targets).reshape(-1, instrument.unknowns)
     promise = Promise(members, rng)
     information = instrument.information(entries, targets).sum(axis=0)
@@ -114,24 +114,6 @@ def test_log_factors_of_two_fixed_hypotheses_are_normal_with_mean_half_the_separ
     assert abs(promise.resolved(logs) - often) < 5 * np.sqrt(often * (1 - often) / (2 * PROMISE_DRAWS))
 
 
-def test_separation_of_the_best_from_itself_is_none_and_from_a_twin_too():
-    """A third that predicts the same as the best, and one that is far."""
-    promise = Promise(fixed([1, 0], [1, 0], [0, 1]), np.random.default_rng(1))
-    found = promise.separations(promise.log_factors(information_for(16.2)))
-    assert found[0] == 0.0 and found[1] == pytest.approx(0.0, abs=1e-6)
-    # The smaller of twice the mean and what belongs to the share that is resolved: sampling makes it smaller than 16.2.
-    assert 13.0 < found[2] < 17.0
-
-
-def test_without_information_only_what_is_sure_already_is_resolved():
-    """A hypothesis that has 97 % is right in 97 % of all cases, and then resolved."""
-    for weights, expected in (((0.5, 0.5), 0.0), ((0.97, 0.03), 0.97), ((0.94, 0.06), 0.0)):
-        promise = Promise(fixed([1, 0], [0, 1], weights=weights), np.random.default_rng(2))
-        logs = promise.log_factors(np.zeros((2, 2)))
-        assert promise.resolved(logs) == pytest.approx(expected), weights
-        np.testing.assert_allclose(promise.separations(logs), 0.0, atol=1e-9)
-
-
 def test_models_of_one_hypothesis_count_together_by_their_weights():
     """Two models of one hypothesis that are as far apart as can be are nothing to resolve, and their prior is their sum."""
     members = fixed([1, 0], [-1, 0], [0, 1], weights=(0.15, 0.45, 0.4), hypotheses=(0, 0, 1))
@@ -142,15 +124,6 @@ def test_models_of_one_hypothesis_count_together_by_their_weights():
     assert abs((drawn > 0).mean() - 0.25) < 5 * np.sqrt(0.25 * 0.75 / PROMISE_DRAWS)
     far = 1e4 * np.eye(2)
     assert promise.resolved(promise.log_factors(far)) == pytest.approx(1.0)
-
-
-def test_experiments_are_compared_on_the_same_random_numbers():
-    """So that ten times the information never resolves less of the same draws, and one experiment has one answer."""
-    promise = Promise(fixed([1, 0], [0, 1]), np.random.default_rng(4))
-    found = [promise.resolved(promise.log_factors(information_for(size))) for size in (1, 3, 6, 10, 16, 25)]
-    assert found == sorted(found) and found[-1] > 0.95
-    again = promise.resolved(promise.log_factors(information_for(6)))
-    assert again == found[2]
 
 
 def test_separation_resolved_solves_its_equation_and_is_none_where_nothing_is_resolved():

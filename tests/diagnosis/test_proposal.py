@@ -79,12 +79,6 @@ def test_alternatives_that_are_left_aside_are_in_the_table_as_in_the_sentence(ku
     assert f"Whether hysteresis acts beside joint_tilt is {NOT_DISTINGUISHABLE}." in sentence
 
 
-def test_the_best_with_something_unknown_is_another_explanation_and_not_one_beside_it():
-    sentence = sentence_of(made(indistinguishable=(("joint_tilt", OTHER),)))
-    assert f"joint_tilt and joint_tilt with a related mechanism are {NOT_DISTINGUISHABLE}." in sentence
-    assert "beside" not in sentence
-
-
 @pytest.mark.parametrize(
     ("mechanisms", "expected"),
     [
@@ -108,21 +102,6 @@ def test_the_sentence_has_the_figures_after_all_poses_and_how_many_are_enough():
     assert "measured at 0, 1, -1 times" in sentence_of(made(shares=LADDER))
 
 
-def test_facts_are_those_after_all_poses_and_json():
-    facts = json.loads(json.dumps(facts_of(made()), allow_nan=False))
-    assert facts == {
-        "poses": 2,
-        "reason": "",
-        "best": ["joint_tilt"],
-        "nearest": ["link_elasticity", OTHER],
-        "separation": 17.5,
-        "resolved": 0.87,
-        "poses_needed": 3,
-        "indistinguishable": [],
-        "sentence": sentence_of(made()),
-    }
-
-
 @pytest.mark.parametrize("reason", [NOTHING_MISSING, DATA_AT_FAULT])
 def test_without_poses_there_is_a_reason_and_an_empty_table_with_the_same_columns(reason, kuka):
     none = without_poses(6, ("joint_tilt",), (), reason)
@@ -131,10 +110,3 @@ def test_without_poses_there_is_a_reason_and_an_empty_table_with_the_same_column
     assert (facts["poses"], facts["separation"], facts["resolved"], facts["poses_needed"]) == (0, None, None, None)
     table, full = table_of(none, kuka), table_of(made(approach=None, reference_weight=np.zeros(2, bool)), kuka)
     assert table.empty and list(table.columns) == list(full.columns)
-
-
-def test_what_cannot_be_distinguished_is_named_where_no_pose_is_proposed():
-    none = without_poses(6, ("joint_tilt",), (("payload",),), NOT_DISTINGUISHABLE)
-    assert sentence_of(none) == (
-        "No further measurement is proposed. joint_tilt and payload are not distinguishable with this robot and tracker."
-    )

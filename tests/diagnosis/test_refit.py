@@ -7,8 +7,8 @@ import pytest
 from planted import planted
 
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected, with_shapes_of
-from elastocal.diagnosis.search import Model, posterior
+from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected
+from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.linearization import linearize
@@ -63,16 +63,6 @@ def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurem
     np.testing.assert_allclose(deviations, [0.5 * before, before, before], rtol=1e-12)
 
 
-def test_a_later_fit_starts_from_the_shapes_that_one_before_has_found(kuka):
-    campaign = planted(kuka, {"thermal_growth[time]": [2e-5]}, seed=4)
-    candidate = campaign.candidates["thermal_growth[time]"]
-    tried = ((candidate, np.array([candidate.shapes[0].start])),)
-    found = fit_with_sizes(campaign.declared, campaign.observations, campaign.declared.noise, tried)
-    ((same, shapes),) = with_shapes_of(tried, found)
-    assert same is candidate and shapes[0] != candidate.shapes[0].start
-    assert shapes[0] == found.values_of(candidate.key)[1][0]
-
-
 def test_the_fit_finds_what_was_planted_and_converges(found):
     campaign, declared, line, models = found
     final = fit_with_sizes(declared, campaign.observations, declared.noise, selected(line, models.models[0]))
@@ -98,13 +88,6 @@ def test_a_fit_that_starts_near_another_one_ends_where_it_ends_without(found, wi
         deviation = np.sqrt(np.diag(expected.covariance))[-len(moved) :]
         # Robust weights follow the estimate, so that what remains is some times the last step.
         assert final.converged and (np.abs(moved) <= (10e-3 + settled) * deviation).all()
-
-
-def test_the_competitor_and_the_base_are_no_effects_of_the_fit(found):
-    _, _, line, _ = found
-    other = next(number for number, unit in enumerate(line.problem.units) if unit.candidate is None)
-    chosen = selected(line, Model((other,), 0.0, np.array([0.1]), 0.0))
-    assert chosen == ()
 
 
 def test_mean_square_left_is_that_of_the_penalised_fit(found):
@@ -136,21 +119,3 @@ def test_remaining_noise_does_not_depend_on_the_noise_by_which_the_problem_was_w
         left = remaining_noise(replace(problem, statistics=scaled), models.models[0], least.scaled(times), least)
         assert left.position_m == pytest.approx(max(spread, 1.0) * least.position_m)
         np.testing.assert_allclose(left.joint_rad, max(spread, 1.0) * least.joint_rad)
-
-
-@pytest.mark.parametrize("factor", [0.25, 1.0, 9.0])
-def test_remaining_noise_is_at_least_the_noise(found, factor):
-    _, declared, line, models = found
-    problem = line.problem
-    scaled = replace(
-        problem.statistics, squares=factor * problem.statistics.squares, along=factor**0.5 * problem.statistics.along
-    )
-    problem = replace(problem, statistics=scaled)
-    model = replace(models.models[0], pose_error_rad=problem.statistics.pose_error_rad[2])
-    left = remaining_noise(problem, model, declared.noise, declared.noise)
-    expected = np.sqrt(max(mean_square_left(problem, model), 1.0))
-    assert left.position_m == pytest.approx(expected * declared.noise.position_m)
-    assert left.position_m >= declared.noise.position_m
-    assert left.pose_rad == pytest.approx(expected * model.pose_error_rad)
-    np.testing.assert_allclose(left.joint_rad, expected * declared.noise.joint_rad)
-    assert left.of_measurements.pose_rad == 0.0

@@ -14,7 +14,7 @@ from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
-from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, CORRELATIONS, MODELS, STEPS
+from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, MODELS, STEPS
 from elastocal.loop.whole import cases_in
 
 
@@ -86,13 +86,6 @@ def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_
     assert propose(diagnosis, kuka.joint_limits, Settings(), np.random.default_rng(0)).best == ("joint_offset",)
 
 
-def test_an_effect_that_is_expected_to_help_is_adopted(found):
-    diagnosis, _ = found
-    assert [entry["adopted"] for entry in diagnosis.document["effects"]] == [True]
-    assert [step.kind for step in diagnosis.steps] == ["frames", "declared", "effect"]
-    assert not any("stays as declared" in warning for warning in diagnosis.document["warnings"])
-
-
 @pytest.mark.parametrize("kind", ["found", "faulty"])
 def test_a_diagnosis_comes_back_and_is_judged_the_same(kind, request, tmp_path):
     diagnosis, held_out = request.getfixturevalue(kind)
@@ -116,16 +109,6 @@ def test_a_diagnosis_comes_back_and_is_judged_the_same(kind, request, tmp_path):
     ]
     assert json.loads(json.dumps(same[0])) == json.loads(json.dumps(same[1]))
     assert [row["step"] for row in one.rows] == [row["step"] for row in other.rows]
-
-
-def test_the_effect_found_has_its_prior_in_the_table(found, tmp_path):
-    diagnosis, _ = found
-    steps = there_and_back(tmp_path / "s.parquet", STEPS, tables.step_blocks(diagnosis))
-    last = steps["step"] == len(diagnosis.steps) - 1
-    mine = last & (steps["owner"] == "joint_offset@3")
-    prior = steps["prior_std"][mine]
-    assert mine.sum() == 1 and prior[0] in np.array(Settings().scales) * 1e-3
-    assert np.isnan(steps["prior_std"][last & np.char.startswith(steps["owner"].astype(str), "frame ")]).all()
 
 
 def test_models_table_is_the_posterior(found, tmp_path):
@@ -182,9 +165,3 @@ def test_tables_of_a_faulty_campaign_have_no_rows_but_for_the_candidates(faulty,
     assert len(there_and_back(tmp_path / "f.parquet", CONFOUNDING, [tables.confounding_columns(diagnosis)])["one"]) == 0
     candidates = there_and_back(tmp_path / "c.parquet", CANDIDATES, [tables.candidate_columns(diagnosis)])
     assert set(candidates["note"]) == {"the measurements are at fault"} and not candidates["chosen"].any()
-
-
-def test_correlations_are_of_the_final_model(found, tmp_path):
-    diagnosis, _ = found
-    table = there_and_back(tmp_path / "r.parquet", CORRELATIONS, [tables.final_correlations(diagnosis)])
-    assert any("joint_offset@3" in name for name in (*table["one"], *table["other"]))

@@ -59,13 +59,6 @@ def test_flat_priors_give_restricted_maximum_likelihood():
     np.testing.assert_allclose(np.diff(found.log_likelihood), np.diff(logs), rtol=1e-6)
 
 
-@pytest.mark.parametrize(("prior", "expected"), [(1e6, 5), (1e-6, 0)])
-def test_freedom_is_what_the_declared_model_leaves(prior, expected):
-    """All of its parameters where they are free, none of them where their priors hold them."""
-    rows = made_rows(3, declared=5, prior=prior)
-    assert statistics_of(rows.products, TAU).freedom == len(rows.pose) - expected
-
-
 def _orthonormal(columns):
     """Gram-Schmidt, twice, in extended precision."""
     basis = []
@@ -115,14 +108,6 @@ def test_the_order_of_rows_and_the_scale_of_declared_columns_do_not_matter():
     for name in ("gram", "along", "squares"):
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
     np.testing.assert_allclose(np.diff(one.log_likelihood), np.diff(other.log_likelihood), rtol=1e-9)
-
-
-def test_at_takes_some_sizes_of_the_pose_error():
-    whole = statistics_of(made_rows(7).products, TAU)
-    some = whole.at(np.array([1, 3]))
-    np.testing.assert_array_equal(some.pose_error_rad, TAU[[1, 3]])
-    for name in ("gram", "along", "squares", "log_likelihood"):
-        np.testing.assert_array_equal(getattr(some, name), getattr(whole, name)[[1, 3]])
 
 
 # Moments are compared at 5 standard errors: each test fails by chance once in some ten thousand seeds, and sees with a power of
@@ -178,20 +163,3 @@ def test_draws_of_white_noise_leave_a_chi_square():
     gram = statistics_of(rows.products, [0.0]).gram[0]
     explained = (along[0] * np.linalg.solve(gram, along[0])).sum(axis=0)
     assert kstest(explained, chi2(len(gram)).cdf).pvalue > 1e-3
-
-
-def test_draws_are_the_same_for_one_seed():
-    rows = made_rows(16)
-    one, other = (null_draws(rows.products, 0.3, TAU, 5, np.random.default_rng(17)) for _ in range(2))
-    np.testing.assert_array_equal(one[0], other[0])
-    np.testing.assert_array_equal(one[1], other[1])
-
-
-def test_without_candidates_it_is_as_if_there_were_none():
-    rows = made_rows(4, candidates=5, joint_rad=0.2)
-    taus = np.array([0.0, 0.3])
-    found = statistics_of(rows.products.without_candidates, taus)
-    expected = statistics_of(replace(rows, candidates=rows.candidates[:, :0]).products, taus)
-    assert found.gram.shape == (2, 0, 0) and found.freedom == expected.freedom
-    np.testing.assert_allclose(found.squares, expected.squares, rtol=1e-10)
-    np.testing.assert_allclose(found.log_likelihood, expected.log_likelihood, rtol=1e-10)

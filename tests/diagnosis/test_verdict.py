@@ -17,11 +17,9 @@ from elastocal.diagnosis.verdict import (
     CLASS,
     NAMED,
     NOT_TESTABLE,
-    SEVERAL,
     UNEXPLAINED,
     concluded,
     hypotheses_of,
-    location_probabilities,
 )
 
 OF_THE_ROBOT, OF_THE_SETUP = SimpleNamespace(family="geometry"), SimpleNamespace(family="drift")
@@ -65,38 +63,16 @@ def test_one_mechanism_with_enough_of_the_probability_is_named():
     assert list(found.mechanisms) == ["offset", "payload"]
 
 
-@pytest.mark.parametrize(("more", "verdict"), [(0.01, NAMED), (-0.01, CLASS)])
-def test_what_is_enough_is_a_setting(more, verdict):
-    probability = 1.0 - Settings().ambiguity_loss - Settings().width_loss + more
-    assert conclusion(((OFFSET_2,), probability), ((PAYLOAD,), 1 - probability)).verdict == verdict
-
-
-def test_a_missed_effect_costs_more_than_a_class():
-    """Losses of a class: 0.2 and what it misses; of no statement five times the probability that there is an effect."""
-    assert conclusion(((OFFSET_2,), 0.05)).verdict == CLASS
-    assert conclusion(((OFFSET_2,), 0.03)).verdict == UNEXPLAINED
-
-
 def test_the_alarm_decides_that_something_is_missing_and_the_posterior_what():
     """A name needs the probability that is asked for, of which "nothing" has its part, too."""
     found = conclusion(((OFFSET_2,), 0.12), ((PAYLOAD,), 0.02))
     assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
 
 
-def test_an_alarm_that_no_model_explains_better_than_nothing_does_is_unexplained():
-    found = conclusion(((OFFSET_2,), 0.02), ((PAYLOAD,), 0.01))
-    assert found.verdict == UNEXPLAINED and found.best.mechanisms == () and found.alternatives == {}
-
-
 def test_an_ambiguous_mechanism_is_a_class_of_those_worth_a_line():
     found = conclusion(((OFFSET_2,), 0.5), ((PAYLOAD,), 0.3), ((TILT,), 0.19), ((TILT, PAYLOAD), 0.001))
     assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
     assert found.alternatives == {"offset": ("payload", "tilt")}
-
-
-def test_alternatives_that_are_not_worth_a_line_are_not_listed():
-    found = conclusion(((OFFSET_2,), 0.55), ((PAYLOAD,), 0.435), ((TILT,), 0.015))
-    assert found.verdict == CLASS and found.alternatives == {"offset": ("payload",)}
 
 
 def test_a_mechanism_beside_the_competitor_is_a_class_with_a_related_one():
@@ -121,29 +97,6 @@ def test_the_competitor_alone_means_unexplained():
     found = conclusion(((OTHER_1,), 0.4), ((OTHER_1, OTHER_2), 0.3), ((OFFSET_2,), 0.3))
     assert found.verdict == UNEXPLAINED and found.best.mechanisms == (OTHER,) and found.best.named == ()
     assert found.alternatives == {}
-
-
-def test_the_competitor_as_a_mere_possibility_leaves_a_class():
-    found = conclusion(((OTHER_1,), 0.45), ((OFFSET_2,), 0.3), ((OFFSET_3,), 0.25))
-    assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
-    assert found.alternatives == {"offset": (OTHER,)}
-
-
-def test_two_mechanisms_are_several_each_with_its_own_alternatives():
-    found = conclusion(((OFFSET_2, PAYLOAD), 0.7), ((TILT, PAYLOAD), 0.25), ((OFFSET_2,), 0.04))
-    assert found.verdict == SEVERAL and found.best.mechanisms == ("offset", "payload")
-    assert found.alternatives == {"offset": ("tilt",), "payload": ()}
-
-
-def test_several_have_at_least_two_names_even_where_a_single_set_is_the_most_probable():
-    found = conclusion(((OFFSET_2,), 0.3), ((TILT, PAYLOAD), 0.25), ((OFFSET_2, PAYLOAD), 0.25), ((OFFSET_2, TILT), 0.2))
-    assert found.verdict == SEVERAL and found.best.mechanisms == ("payload", "tilt")
-
-
-def test_a_class_has_one_name_even_where_a_pair_is_the_most_probable_set():
-    found = conclusion(((OFFSET_2, PAYLOAD), 0.4), ((OFFSET_2,), 0.3), ((TILT,), 0.3))
-    assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
-    assert "tilt" in found.alternatives["offset"]
 
 
 def test_nothing_is_testable_where_only_the_competitor_is_left():
@@ -172,23 +125,3 @@ def test_hypotheses_gather_locations_laws_and_sum_to_one():
     # The most probable of its models stands for each.
     assert [h.model for h in found] == [0, 2, 4]
     assert sum(h.probability for h in found) == pytest.approx(1.0)
-
-
-def test_nothing_is_a_hypothesis_even_where_no_model_of_it_was_kept():
-    posterior = Posterior((Model((0,), 40.0, np.ones(1), 0.0),), np.ones(1))
-    (nothing,) = [h for h in hypotheses_of(PROBLEM, posterior) if not h.mechanisms]
-    assert nothing.probability == 0.0 and nothing.model == -1
-
-
-def test_locations_are_given_that_the_mechanism_is_there():
-    posterior = made_posterior(((OFFSET_2,), 0.3), ((OFFSET_3,), 0.1), ((OFFSET_2, OFFSET_3), 0.1), ((PAYLOAD,), 0.3))
-    assert location_probabilities(PROBLEM, posterior, "offset") == pytest.approx({(2,): 0.8, (3,): 0.4})
-    assert location_probabilities(PROBLEM, posterior, "payload") == pytest.approx({(): 1.0})
-
-
-@pytest.mark.parametrize("locations", [[(2,), (3,), ("arm",)], [("arm",), (3,), (2,)], [(3,), (2,), ("arm",)]])
-def test_equally_probable_locations_stand_in_the_order_of_their_units(locations):
-    """As in any process, whatever the seed of its hashes, by which a set orders texts."""
-    units = [made_unit("offset", location, number) for number, location in enumerate(locations)]
-    problem = made_problem(made_rows(), units)[0]
-    assert list(location_probabilities(problem, made_posterior(((0, 1, 2), 0.9)), "offset")) == locations

@@ -15,8 +15,6 @@ from elastocal.diagnosis.words import (
     hypothesis_words,
     in_common,
     in_words,
-    parameter_words,
-    physical_name,
 )
 from elastocal.effects.catalogue import candidates_on, effects
 from elastocal.figures.candidates import short_name
@@ -34,10 +32,6 @@ def test_no_two_candidates_are_printed_alike(chain):
     keys = list(candidates_on(equipped(chain_of(chain))))
     for printed in (candidate_words, short_name):
         assert len({printed(key) for key in keys}) == len(keys)
-
-
-def test_an_effect_without_words_falls_back_on_its_name():
-    assert physical_name("bearing_of_tomorrow") == "bearing of tomorrow"
 
 
 @pytest.mark.parametrize(
@@ -62,27 +56,6 @@ def test_an_effect_without_words_falls_back_on_its_name():
 )
 def test_locations_are_gathered(effect, locations, expected):
     assert effect_words(effect, locations).endswith(expected)
-
-
-@pytest.mark.parametrize(
-    ("effect", "name", "expected"),
-    [
-        ("setup_step", "dx", "shift along x"),
-        ("frame 0", "rz", "rotation about z"),
-        ("setup_step", "when", "share of the measurements before it"),
-        ("transmission_harmonic", "cos_12q", "cos(12q)"),
-        ("bearing_runout", "radial_x_sin_1q", "radial x sin(q)"),
-        ("joint_dependent_stiffness", "cos_q", "cos(q)"),
-        ("motor_eccentricity", "cos_1_motor", "cos(motor angle)"),
-        ("motor_eccentricity", "sin_2_motor", "sin(2 × motor angle)"),
-        ("transmission_ratio", "per_q4", "per movement of joint 4"),
-        ("link_weight", "compliance_times_moment_z_of_link_6", "compliance times first moment z of link 6"),
-        ("link_elasticity", "bending_1_over_EI", "bending 1/(EI)"),
-        ("lost_motion", "half_play", "half play"),
-    ],
-)
-def test_parameters_are_named_as_an_engineer_names_them(effect, name, expected):
-    assert parameter_words(effect, name) == expected
 
 
 def test_locations_are_read_as_findings_write_them():
@@ -138,13 +111,6 @@ def test_keys_in_a_sentence_become_words_and_common_words_stay():
     assert in_words("payload: mass is -3 kg") == "weight of an undeclared payload: mass is -3 kg"
     said = in_words("transmission_ratio@3: per_q3 is -0.0042 rad/rad, more than 3 times what such an effect reaches")
     assert said.startswith("gear ratio or coupling error of joint 3: per movement of joint 3 is -0.0042 rad/rad, more than")
-
-
-def test_members_of_a_class_have_the_kind_of_their_families_in_common():
-    assert in_common("joint_tilt", ["link_elasticity"]) == "yielding"
-    assert in_common("joint_tilt", ["link_elasticity", "other"]) == "", "what is related may be of any kind"
-    assert in_common("stiffening", ["transmission_ratio"]) == "an error of a gear"
-    assert in_common("joint_tilt", ["payload"]) == in_common("joint_tilt", ["wrong_unit"]) == ""
 
 
 def test_every_family_of_the_catalogue_has_a_kind():

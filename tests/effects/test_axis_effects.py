@@ -33,10 +33,6 @@ def test_motor_turns_the_joint_once_and_twice_per_turn_of_its_own(fanuc):
     assert not np.delete(made, 4, axis=2).any()
 
 
-def test_motor_without_a_known_ratio_has_no_candidate(fanuc):
-    assert not any(key.startswith("motor_eccentricity") for key in candidates_on(replace(equipped(fanuc), gear_ratio=None)))
-
-
 def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
     known, states = candidates_on(equipped(fanuc)), made_states(6, 5, seed=3)
     bands = [c for c in known.values() if c.effect == "transmission_order" and c.joints == (3,)]

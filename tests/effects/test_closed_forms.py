@@ -408,10 +408,6 @@ def test_a_wrong_sign_factor_or_axis_of_any_parameter_would_be_seen(effect, arms
     assert looked_at
 
 
-def test_there_is_no_closed_form_without_an_effect():
-    assert set(CLOSED_FORMS) <= set(catalogue.effects())
-
-
 @pytest.mark.parametrize("chain", CHAINS)
 def test_springs_of_the_declared_model_turn_each_joint_by_its_torque(chain, arms):
     def closed(arm, law, name):

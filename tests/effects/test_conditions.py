@@ -27,12 +27,3 @@ def test_time_and_temperature_are_there_where_they_change(kuka, column, name):
     assert name in offered(sites, replace(states, **{column: np.arange(5.0)}))
     assert name not in offered(sites, replace(states, **{column: np.full(5, 20.0)}))
     assert name not in offered(sites, replace(states, **{column: None}))
-
-
-def test_an_approach_is_there_where_it_is_known_of_a_joint(kuka):
-    sites, states = sites_of(kuka), made_states(6, 5, seed=1)
-    known = np.zeros((5, 6))
-    assert "approach" not in offered(sites, replace(states, approach=known))
-    known[2, 3] = -1
-    assert "approach" in offered(sites, replace(states, approach=known))
-    assert "approach" not in offered(sites, replace(states, approach=None))

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.stats import chi2
-from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, chain_of, robot_of
+from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
 from synthetic import (
     NOISE,
     conditions_on,
@@ -27,7 +27,6 @@ from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.parameters import parameters
-from elastocal.fitting.prediction import residuals
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.motion import motion
@@ -162,32 +161,6 @@ def test_growth_of_gravity_with_each_correction_is_its_slope_on_the_coordinates_
         np.testing.assert_allclose(grown, change.T, rtol=0, atol=1e-10)
 
 
-def test_priors_are_those_of_the_robot_file(fanuc):
-    robot = replace(fanuc, masses=(Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1), Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2)))
-    found = candidate(sites_of(robot)).parameters
-    # A centre is off by its relative error times its distance from the joint, and lies anywhere in the girth of its link.
-    width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
-    assert 0.3 < width < 0.7
-    first, second = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5), np.hypot(10.0 * 0.01, 50.0 * width / 12**0.5)
-    assert [p.prior_std for p in found] == pytest.approx([20.0, *[first] * 3, 10.0, *[second] * 3])
-    assert [p.name for p in found[:2]] == ["mass_error_of_link_2", "moment_error_x_of_link_2"]
-
-
-def test_centre_of_a_slender_link_may_lie_forty_millimetres_off_all_the_same():
-    arm = chain_of("Rz(q1) Tz(0.3) Ry(q2) Tz(0.3) [hand]")
-    sites = replace(sites_of(arm), masses=(Mass(2, 4.0, (0.0, 0.0, 0.0), 0.1),))
-    assert [p.prior_std for p in candidate(sites).parameters] == pytest.approx([0.4, *[4.0 * 0.04] * 3])
-
-
-def test_robot_without_masses_bears_the_external_load_alone(fanuc):
-    states = made_states(6, 4, seed=7)
-    around = conditions_on(fanuc, states)
-    assert around.total is around.load and around.mass_torques.shape[0] == 0
-    unloaded = replace(states, wrench=np.zeros((4, 6)))
-    assert "load" in offered(around.sites, states) and "load" not in offered(around.sites, unloaded)
-    assert "load" in offered(sites_of(weighed(fanuc)), unloaded)
-
-
 def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(fanuc):
     """Half of each link at either end, six times the rated load in all: slopes of its potential energy."""
     states = made_states(6, 4, seed=7)
@@ -211,18 +184,6 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
     assert not around.total[:, :6].any()
 
 
-@pytest.mark.parametrize(("chain", "first"), [("Rz(q1) Tz(1) Ry(q2) Tx(1) [end]", 1), ("Tz(q1) Tz(1) Ry(q2) Tx(1) [end]", 2)])
-def test_a_weight_that_is_only_usual_bends_columns_and_rails_and_nothing_behind_a_joint_that_turns(chain, first):
-    """Behind such a joint `link_weight` has the masses free; declared masses and external loads test all."""
-    sites = sites_of(chain_of(chain))
-    known, usual, declared = candidates_on(sites), frozenset({"load"}), frozenset({"load", "load on the joints"})
-    assert known["base_compliance"].needs <= usual and known["joint_tilt@1"].needs <= usual
-    for joint in (1, 2):
-        found = known[f"link_elasticity@{joint}"].needs
-        assert found <= declared and (found <= usual) == (joint < first)
-    assert (known["joint_tilt@2"].needs <= usual) == (first == 2)
-
-
 def test_gears_of_an_arm_without_an_external_load_are_loaded_by_its_weight(fanuc):
     robot, states = weighed(fanuc), made_states(6, 6, seed=8)
     states.wrench[:] = 0.0
@@ -238,12 +199,6 @@ def test_gears_of_an_arm_without_an_external_load_are_loaded_by_its_weight(fanuc
         shapes = [shape.start for shape in known[key].shapes]
         assert displacements(known[key], around, *shapes).any(), key
     assert not displacements(known["force_scale"], around).any()
-
-
-def test_weights_of_links_are_offered_where_none_are_declared_and_a_payload_always(fanuc):
-    assert any(c.effect == "link_weight" for c in candidates_on(sites_of(fanuc)).values())
-    known = candidates_on(sites_of(weighed(fanuc)))
-    assert not any(c.effect == "link_weight" for c in known.values()) and {"payload", "payload[mass]"} <= set(known)
 
 
 @pytest.mark.parametrize("key", ["payload", "link_weight@1", "link_weight@2"])
@@ -296,18 +251,6 @@ REAL = (
     Mass(5, 30.0, (0.03, 0.0, 0.0), 0.1),
 )
 TARGETS = (Target("hand", "6DoF", (0.1, 0.05, 0.02)), Target("elbow", "3DoF", (0.0, 0.1, 0.05)))
-
-
-def test_prediction_with_declared_weight_is_a_pure_function_of_the_estimate(fanuc):
-    model = made_model(weighed(fanuc), compliance=fanuc.compliance)
-    estimate, states = made_estimate(model, seed=13), made_states(6, 5, seed=14)
-    seen = seen_exactly(model, estimate, states)
-    nominal = made_estimate(model, seed=13, size=0.0)
-    # Loads where another estimate takes the robot to move the prediction by nanometres only.
-    found = residuals(model, estimate, seen, conditions(model, nominal, states))
-    np.testing.assert_allclose(found, 0.0, atol=1e-6)
-    again = linearize(model, estimate, seen, conditions(model, nominal, states)).conditions
-    np.testing.assert_allclose(residuals(model, estimate, seen, again), 0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("name", ODD_CHAINS)

@@ -34,13 +34,6 @@ def test_drift_of_a_state_does_not_hang_on_the_other_states(key, fanuc):
 SPACING, WHEN = 1 / 12, 0.655
 
 
-def test_steps_are_tried_at_every_twelfth_of_a_campaign_but_its_ends(fanuc):
-    """None of them a shift of all measurements but a few; the one nearest to a step has all but a 24th on the right side."""
-    (when,) = candidate_on(fanuc.chain, "setup_step").shapes
-    np.testing.assert_allclose(when.values(3), np.arange(1, 12) / 12)
-    assert (when.lowest, when.highest) == pytest.approx((1 / 12, 11 / 12))
-
-
 def test_moved_setup_is_found_without_a_clock(fanuc):
     """A step of 0.3 mm in the middle of 40 measurements is fitted where it is, and leaves a misfit where it is not.
 

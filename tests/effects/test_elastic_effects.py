@@ -1,7 +1,5 @@
 """Effects that are linear in the load, beyond their closed forms: where they act, and that elastic bodies are reciprocal."""
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 from support import OTHER_CHAINS, chain_of
@@ -30,11 +28,6 @@ def test_links_that_bend_are_those_with_a_length(name, fanuc):
     column = {"link_elasticity[column]"} if lengths[0] > 0.05 else set()
     together = f"link_elasticity@{'+'.join(map(str, long))}[one section]"
     assert found == {*(f"link_elasticity@{link}" for link in long), *column, together}
-
-
-def test_any_two_joints_may_yield_to_the_torque_of_each_other(fanuc):
-    pairs = [c.joints for c in candidates_on(sites_of(fanuc.chain)).values() if c.effect == "cross_compliance"]
-    assert pairs == list(combinations(range(1, 7), 2))
 
 
 def test_compensator_stiffens_the_shoulder_as_an_angle_dependent_stiffness_would_and_by_twice_the_angle(fanuc):

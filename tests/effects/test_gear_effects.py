@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import TRACK, chain_of
+from support import chain_of
 from synthetic import candidate_on, conditions_on, displacements, equipped, made_states
 
 from elastocal.effects import transmission_harmonic
@@ -96,20 +96,3 @@ def test_hysteresis_has_the_sign_of_the_approach_and_is_nothing_where_a_joint_wa
     chain, senses = chain_of(TURNTABLE), [-1.0, 0.0, 1.0]
     made = displacements(candidate_on(chain, "hysteresis@1"), under([100.0, -50.0, 0.0], senses))
     np.testing.assert_array_equal(made[0, :, 0], senses)
-
-
-def test_a_track_has_friction_in_metres_and_no_gear_that_turns():
-    found = candidates_on(equipped(chain_of(TRACK)))
-    units = {key: c.parameters[0].unit for key, c in found.items() if c.effect == "hysteresis"}
-    assert units == {"hysteresis@1": "m"} | {f"hysteresis@{joint}": "rad" for joint in (2, 3, 4)}
-    assert found["hysteresis@1"].parameters[0].plausible == 2e-5
-    for effect, count in (("lost_motion", 1), ("stiffening", 2)):
-        joints = [c.joints for c in found.values() if c.effect == effect]
-        assert joints == [(2,), (3,), (4,)] * count
-
-
-def test_bands_of_orders_of_one_gear_are_different_locations(kuka):
-    """Two bands are two terms of one mechanism and may both be there, which alternatives of one location may not."""
-    found = transmission_harmonic.candidates(sites_of(kuka))
-    assert len({candidate.location for candidate in found}) == len(found)
-    assert {candidate.location[0] for candidate in found} == {1, 2, 3, 4, 5, 6}

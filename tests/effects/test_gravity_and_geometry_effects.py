@@ -5,16 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import chain_of
-from synthetic import candidate_on, conditions_on, displacements, made_estimate, made_model, made_states, seen_exactly
+from synthetic import candidate_on, conditions_on, displacements, made_states
 
-from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import conditions
-from elastocal.fitting.prediction import predict
-from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
-from elastocal_proof.plant.tracker import EccentricNest
 
 
 def test_link_weight_of_the_arm_may_be_that_of_all_links_with_a_length(fanuc):
@@ -78,24 +73,6 @@ def test_compensator_torque_spans_the_formula_of_a_spring_with_a_short_crank(sta
     # What is left is of second order in crank over length.
     assert leftovers[0] < 0.005
     assert leftovers[1] < 0.4 * leftovers[0]
-
-
-def predicted(chain, key, values, states):
-    """Position and rotation of the last point of a stiff robot with one effect."""
-    target = (Target("A", chain.end_effector.name, (0.0, 0.0, 0.0)),)
-    candidate = candidate_on(chain, key)
-    model = made_model(chain, target, 6, fitted_frames=False, compliance=np.zeros(chain.coordinates), effects=(candidate,))
-    estimate = replace(made_estimate(model), coefficients=(np.array(values, float),))
-    return predict(model, estimate, seen_exactly(model, estimate, states), conditions(model, estimate, states))
-
-
-def test_eccentric_nest_of_the_plant_is_in_the_catalogue(fanuc):
-    states = made_states(6, 7, seed=9, span=3.0)
-    still = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)
-    expected = EccentricNest(1e-4).moved(*still, states.joint_angles[:, 5])
-    names = [p.name for p in candidate_on(fanuc.chain, "nest_eccentricity").parameters]
-    values = [1e-4 if name in ("cos_y_2q", "sin_z_2q") else 0.0 for name in names]
-    np.testing.assert_allclose(predicted(fanuc.chain, "nest_eccentricity", values, states)[0], expected, rtol=0, atol=1e-14)
 
 
 def test_nest_is_no_candidate_where_the_last_joint_does_not_turn():

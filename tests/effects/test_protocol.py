@@ -31,10 +31,6 @@ def test_shapes_between_two_are_inside_and_evenly_spread_with_the_middle_among_t
     np.testing.assert_allclose(found[3], ends[2])
 
 
-def test_a_shape_that_must_be_tried_often_is_tried_evenly_from_end_to_end():
-    np.testing.assert_allclose(TRIED[0].values(3), np.linspace(0.0, 1.0, 11), atol=1e-15)
-
-
 @pytest.mark.parametrize("few", [1, 2, 3, 7])
 def test_a_few_values_of_a_shape_grow_by_one_factor_from_the_lowest_and_on_to_the_highest(few):
     """900 s to 36000 s is a factor of 40: a few values part it in so many and one more equal factors, without the ends."""
@@ -42,24 +38,10 @@ def test_a_few_values_of_a_shape_grow_by_one_factor_from_the_lowest_and_on_to_th
     np.testing.assert_allclose(TRIED[1].values(few), expected, rtol=1e-12)
 
 
-def test_a_shape_that_is_tried_once_is_tried_where_it_starts():
-    assert Shape("taper", "1", 0.3, 0.0, 0.6, tried=1).values(3).tolist() == [0.3]
-
-
 @pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
 def test_a_shape_alone_stands_for_all_of_its_range_and_one_at_an_end_for_the_half_next_to_it(shape):
     assert shape.shares([shape.start]).tolist() == [1.0]
     np.testing.assert_allclose(shape.shares([shape.highest, shape.lowest] if shape.tried else [36000.0, 900.0]), [0.5, 0.5])
-
-
-def test_shapes_evenly_tried_over_the_range_have_half_a_share_at_its_ends():
-    np.testing.assert_allclose(TRIED[0].shares(TRIED[0].values(3)), [0.05, *[0.1] * 9, 0.05])
-
-
-def test_values_outside_of_the_range_take_nothing_from_those_inside():
-    """Two at the far side of an end share what they would of a range that ends there: nothing but what is nearest."""
-    shape = Shape("when", "1", 0.5, 0.0, 1.0, tried=11)
-    np.testing.assert_allclose(shape.shares([-3.0, -2.0, 0.5, 1.5, 4.0]), [0.0, 0.0, 1.0, 0.0, 0.0], atol=1e-15)
 
 
 @pytest.mark.parametrize(

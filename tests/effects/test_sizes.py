@@ -1,11 +1,12 @@
 """The table of priors: complete, in the documentation as in the code, and in units of the arm."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from elastocal.effects.catalogue import candidates_on, effects
+from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.sizes import SIZES, size_of, sized
 from elastocal.mechanics.sites import sites_of
 
@@ -26,12 +27,8 @@ def test_documentation_prints_the_table():
         f"| {s.effect}, {s.quantity} | {s.share:g} | {s.of} | {'+-'[s.sign < 0] if s.sign else ''} | {s.most:g} | {s.reason} |"
         for s in SIZES
     ]
-    text = METHOD.read_text(encoding="utf-8")
-    assert [line for line in lines if line not in text] == [] and text.count("\n| ") == len(lines) + 1
-
-
-def test_every_effect_has_a_line_and_no_line_is_unused():
-    assert {size.effect for size in SIZES} == set(effects())
+    (table,) = re.findall(r"<details>.*?</details>", METHOD.read_text(encoding="utf-8"), re.DOTALL)
+    assert [line for line in lines if line not in table] == [] and table.count("\n| ") == len(lines) + 1
 
 
 def test_what_yields_is_sized_by_the_compliance_of_the_arm_and_nothing_else_is(fanuc):
@@ -49,20 +46,6 @@ def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc)
     for joint in range(6):
         ours = size_of("joint_tilt", "tilt", sites_of(rigid), joint)
         assert 0.1 < ours / fanuc.compliance[joint] < 3.0
-
-
-def test_loads_and_lengths_are_sized_by_the_rated_load_and_the_reach(fanuc):
-    sites = sites_of(replace(fanuc, payload_kg=100.0))
-    assert size_of("force_bias", "force", sites) == pytest.approx(0.01 * 100.0 * 9.80665)
-    assert size_of("payload", "mass", sites) == pytest.approx(15.0)
-    long = replace(sites, link_vectors_m=2.0 * sites.link_vectors_m)
-    assert size_of("link_geometry", "length", long) == pytest.approx(2.0 * size_of("link_geometry", "length", sites))
-
-
-def test_what_gears_are_inspected_for_has_no_larger_sizes_and_what_rests_on_a_guess_has(fanuc):
-    most = {candidate.effect: {p.most for p in candidate.parameters} for candidate in candidates_on(sites_of(fanuc)).values()}
-    assert most["transmission_order"] == most["transmission_harmonic"] == {1.0}
-    assert most["joint_tilt"] == most["lost_motion"] == {3.0}
 
 
 def test_parameters_have_the_sign_of_the_table(fanuc):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from synthetic import candidate_on, conditions_on, displacements, made_states
 
 from elastocal.effects.protocol import LOADED_JOINTS, Parameter
 from elastocal.effects.wrench_errors import Axis, at_flange_and_in_pull, base_and_flange, lever_of_pull
@@ -22,18 +21,6 @@ def wrench_of(force, lever):
     return np.concatenate([force, np.cross(lever, force)], axis=1)
 
 
-def test_a_place_that_turns_with_the_flange_is_found_from_the_moments(pulls):
-    force, rotation = pulls
-    lever = rotation @ PLACE
-    np.testing.assert_allclose(lever_of_pull(wrench_of(force, lever), rotation), lever, rtol=1e-9)
-
-
-def test_a_place_that_stays_while_the_flange_turns_is_found_as_well(pulls):
-    force, rotation = pulls
-    lever = np.tile(PLACE, (8, 1))
-    np.testing.assert_allclose(lever_of_pull(wrench_of(force, lever), rotation), lever, rtol=1e-9)
-
-
 def test_moments_that_are_a_hundredth_off_still_have_a_place_and_others_have_none(pulls):
     force, rotation = pulls
     wrench, rng = wrench_of(force, rotation @ PLACE), np.random.default_rng(1)
@@ -44,17 +31,6 @@ def test_moments_that_are_a_hundredth_off_still_have_a_place_and_others_have_non
         assert lever.any() == found
         if found:
             np.testing.assert_allclose(lever, rotation @ PLACE, atol=0.02)
-
-
-def test_a_pull_without_a_moment_acts_at_the_point_itself(pulls):
-    force, rotation = pulls
-    np.testing.assert_array_equal(lever_of_pull(wrench_of(force, np.zeros((8, 3))), rotation), np.zeros((8, 3)))
-
-
-def test_moments_that_no_pull_makes_stay_as_they_are_when_the_force_turns(fanuc):
-    around = conditions_on(fanuc.chain, made_states(6, 5, seed=1))
-    laws = (candidate_on(fanuc.chain, f"force_misalignment[base axes{how}]") for how in ("", " in the pull"))
-    np.testing.assert_array_equal(*(displacements(law, around) for law in laws))
 
 
 def test_changes_of_a_wrench_are_those_of_a_unit_by_hand():

@@ -45,12 +45,6 @@ def test_joints_may_be_counted_by_an_index_or_from_0_and_have_the_names_of_topic
     assert bool(found.notes) == ("0" in names[0])
 
 
-def test_an_index_is_no_unit(tmp_path):
-    names = {f"q{joint + 1}": f"q_d[{joint}]" for joint in range(6)}
-    found = table(tmp_path, f"{','.join(names.values())},x,y,z\n{SIX},{ROW}\n", replace(PLAIN, columns=names))
-    assert found.options.units["q1"] == "deg"
-
-
 @pytest.mark.parametrize(
     ("names", "columns", "words"),
     [
@@ -91,10 +85,6 @@ def test_a_quaternion_beside_joints_is_a_question(tmp_path, joints, parts):
         np.testing.assert_allclose(got, turns.as_rotvec(), atol=1e-5)
 
 
-def test_four_joints_that_are_no_quaternion_are_joints(tmp_path):
-    assert table(tmp_path, f"q1,q2,q3,q4,x,y,z\n0.5,0.5,0.5,0.5,{ROW}\n10,20,30,40,{ROW}\n").joints == 4
-
-
 @pytest.mark.parametrize("others", ["A,B,C", "W,P,R", "A [deg],B [deg],C [deg]", "E4,E5,E6"])
 @pytest.mark.parametrize("external", ["E1,E2,E3", "E1"])
 def test_external_axes_beside_an_orientation_are_a_question(tmp_path, others, external):
@@ -111,10 +101,6 @@ def test_external_axes_beside_an_orientation_are_a_question(tmp_path, others, ex
     found = table(tmp_path, text, replace(options, columns=dict(zip(("e1", "e2", "e3"), names, strict=True))))
     expected = Rotation.from_euler("ZYX", [10, 20, 30], degrees=True).as_rotvec()
     np.testing.assert_allclose([found.table[name][0] for name in ("rx", "ry", "rz")], expected)
-
-
-def test_euler_angles_with_nothing_beside_them_are_what_the_option_says(tmp_path):
-    assert "rx" in table(tmp_path, f"q1,x,y,z,E1,E2,E3\n1,{ROW},1,2,3\n", replace(PLAIN, rotation="euler:ZYX")).table
 
 
 def test_a_label_that_is_no_pose_is_a_question(tmp_path):
@@ -147,13 +133,6 @@ def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
     assert read_measurement_table(tmp_path / "t.csv", found.options).options == found.options
 
 
-def test_a_rail_is_measured_in_lengths_and_a_joint_in_angles(tmp_path):
-    robot = robot_of("Tx(q1) Rz(q2) [A]")
-    for names, unit in (("J1 [deg],J2", "J1 [deg]"), ("J1,J2 [mm]", "J2 [mm]")):
-        with refused(tmp_path / "t.csv", f"unit of {unit!r}", "--unit"):
-            table(tmp_path, f"{names},x,y,z\n1,2,{ROW}\n", PLAIN, robot)
-
-
 @pytest.mark.parametrize(
     ("names", "words"), [("J1,J2,J3", ["3 joints", "--ignore"]), ("J1", ["no column q2"]), ("a,b", ["no joint angles"])]
 )
@@ -161,14 +140,6 @@ def test_as_many_joints_as_the_robot_has_are_needed(tmp_path, names, words):
     text = f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n"
     with refused(tmp_path / "t.csv", "header", *words):
         table(tmp_path, text, PLAIN, robot_of("Rz(q1) Tx(1) Rz(q2) [A]"))
-
-
-def test_topics_have_positions_orientations_and_forces(tmp_path):
-    names = [f"/tcp/pose/position/{axis}" for axis in "xyz"] + [f"field.pose.orientation.{axis}" for axis in "wxyz"]
-    text = f"J1,/ft/wrench/force/x,/tcp/twist/linear/x,{','.join(names)}\n5,6,9,{ROW},1,0,0,0\n"
-    found = table(tmp_path, text)
-    assert [found.table[name][0] for name in ("x", "y", "z", "fx", "rx")] == [0.001, 0.002, 0.003, 6.0, 0.0]
-    assert found.ignored == ("/tcp/twist/linear/x",)
 
 
 @pytest.mark.parametrize("names", ["qx,qy,qz", "qw,qx", "Q_x,Q_y,Q_z"])
@@ -200,19 +171,6 @@ def test_a_unit_of_the_row_that_the_header_contradicts_is_a_question_and_options
     assert table(tmp_path, text, replace(PLAIN, units={"q1": "deg"})).table["q1"][0] == np.pi / 2
 
 
-def test_a_first_row_of_words_that_are_no_units_is_no_row_of_units(tmp_path):
-    with refused(tmp_path / "t.csv", "line 2, column q1", "'degrees?'"):
-        table(tmp_path, f"q1,x,y,z\ndegrees?,mm,mm,mm\n90,{ROW}\n")
-
-
-def test_what_may_surprise_is_noted(tmp_path):
-    found = table(tmp_path, f"q1,x,y,z,fz,time\n90,{ROW},4,5\n", replace(PLAIN, units={"angles": "rad", "lengths": "mm"}))
-    assert "'time' in s, as nothing states a unit" in found.notes
-    assert "units as usual, as nothing states them: 'fz' in N" in found.notes
-    assert any("'q1' goes to 90 rad, 14.3 turns" in note and "--angles deg" in note for note in found.notes)
-    assert table(tmp_path, f"q1,x,y,z,fz [N],time [s]\n90,{ROW},4,5\n").notes == ()
-
-
 ARM = ("shoulder_pan", "shoulder_lift", "elbow")
 
 
@@ -242,11 +200,6 @@ def test_positions_are_of_the_joints_that_names_say_in_whatever_order(tmp_path, 
     np.testing.assert_array_equal(again.table["q2"], found.table["q2"])
     with refused(tmp_path / "t.csv", "header", "elbow, gripper", "--robot FILE", "--column q1="):
         table(tmp_path, f"{head}\n{rows}")
-
-
-def test_names_that_count_joints_need_no_robot(tmp_path):
-    found = table(tmp_path, "name0,name1,position0,position1,x,y,z\njoint_2,joint_1,2,1,1,2,3\n")
-    assert [found.table[f"q{joint}"][0] for joint in (1, 2)] == pytest.approx(np.radians([1, 2]))
 
 
 def test_a_name_that_changes_is_refused_with_its_line(tmp_path):

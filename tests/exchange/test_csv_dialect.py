@@ -3,7 +3,6 @@
 import itertools
 
 import pytest
-from durations import growth
 from support import refused
 
 from elastocal.exchange import csv_dialect
@@ -33,11 +32,6 @@ def test_separator_decimal_mark_encoding_and_header_are_found_out(tmp_path, sepa
     assert found.lines == (5,)
 
 
-def test_a_separator_at_the_end_of_rows_and_quotes_are_read(tmp_path):
-    found = read_text_table(write_text_file(tmp_path, 'x;y;"a;b"\n1;2;3;\n'), is_header)
-    assert found.columns == {"x": ("1",), "y": ("2",), "a;b": ("3",)}
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -60,11 +54,6 @@ def test_what_cannot_be_read_is_refused_with_its_line(tmp_path, text, words):
         read_text_table(write_text_file(tmp_path, text), is_header)
 
 
-def test_lines_that_end_in_any_way_are_counted_as_editors_count_them(tmp_path):
-    found = read_text_table(write_text_file(tmp_path, "x;y\r1;2\r\n3;4\n\n5;6"), is_header)
-    assert found.lines == (2, 3, 5) and found.columns["y"] == ("2", "4", "6")
-
-
 def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch):
     path = write_text_file(tmp_path, "x;y\n" + "1;2\n" * 200)
     monkeypatch.setattr(csv_dialect, "MOST_LINES", 200)
@@ -73,19 +62,6 @@ def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch)
     monkeypatch.setattr(csv_dialect, "LARGEST_BYTES", 100)
     with refused(path, "", "more than 100 bytes"):
         read_text_table(path, is_header)
-
-
-def test_ten_times_as_many_columns_take_about_ten_times_as_long(tmp_path):
-    def read(columns):
-        with refused(tmp_path / "table.txt", "line 2"):
-            read_text_table(write_text_file(tmp_path, ";".join(["x", "y", *map(str, range(columns))]) + "\n1;2\n"), is_header)
-
-    assert growth(lambda: read(1_000), lambda: read(10_000)) < 20
-
-
-def test_a_missing_file_is_refused(tmp_path):
-    with refused((tmp_path / "none.csv").as_posix(), "", "no such file", "a table"):
-        read_text_table(tmp_path / "none.csv", is_header)
 
 
 @pytest.mark.parametrize(
@@ -144,14 +120,6 @@ def test_two_headers_behind_comment_marks_are_a_question_and_a_plain_one_goes_be
 )
 def test_nameless_columns_and_rows_that_are_empty_throughout_are_left_out(tmp_path, text):
     assert read_text_table(write_text_file(tmp_path, text), is_header).columns == {"x": ("1",), "y": ("2",)}
-
-
-def test_a_nameless_column_with_values_is_called_by_its_place(tmp_path):
-    found = read_text_table(write_text_file(tmp_path, ",x,y\n0,1,2\n,3,4\n"), is_header)
-    assert found.columns == {"column 1": ("0", ""), "x": ("1", "3"), "y": ("2", "4")}
-    for text in ("x,y\n1,2,3\n", "x,y\n1,2,,3\n"):
-        with refused(tmp_path / "table.txt", "line 2", "one for each column"):
-            read_text_table(write_text_file(tmp_path, text), is_header)
 
 
 def test_columns_to_ignore_are_left_out_whatever_they_hold(tmp_path):

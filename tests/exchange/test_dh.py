@@ -8,13 +8,12 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from imported_tables import UR5E
 from scipy.spatial.transform import Rotation
 from support import refused
 from synthetic import made_states
 
 from elastocal.effects.conditions import conditions_of
-from elastocal.exchange.dh import _lengths_of, _slid_words, robot_from_dh
+from elastocal.exchange.dh import _slid_words, robot_from_dh
 from elastocal.exchange.dh_table import DhOptions
 from elastocal.exchange.robot_text import robot_text
 from elastocal.io.documents import read_document
@@ -99,19 +98,6 @@ def test_the_ur_of_this_project_is_its_table(tmp_path, config_folder):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
 
 
-def test_the_example_of_the_docstring_is_a_ur5e(tmp_path):
-    path = tmp_path / "ur5e.csv"
-    path.write_text(UR5E)
-    result = robot_from_dh(path)
-    assert result.document["chain"] == (
-        "Rz(q1) Tz(0.1625) Rx(90deg) Rz(q2) Tx(-0.425) Rz(q3) Tx(-0.3922) Rz(q4) Tz(0.1333) Rx(90deg) Rz(q5) Tz(0.0997)"
-        " Rx(-90deg) Rz(q6) Tz(0.0996) [flange]"
-    )
-    assert result.document["name"] == "ur5e" and "joint_names" not in result.document
-    assert "joint_limits_deg" not in result.document and not result.robot.compliance_known
-    assert "standard" in result.origin and any("a turn either way" in note for note in result.notes)
-
-
 def test_limits_compliances_names_and_points_come_along(tmp_path):
     header = "joint,d,a,alpha,type,lower,upper,compliance_urad_per_Nm,point"
     path = write(tmp_path, [("rail", 0, 0, 90, "P", 0, 2, 0.02, ""), ("arm", 1, 1, 0, "R", "", "", 5, "elbow at")], header)
@@ -170,12 +156,6 @@ def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(tmp_pa
     assert_stands_and_weighs(robot, weighed, modified, {"wrist": 4, "flange": 5}, 1e-4)
 
 
-def test_lengths_that_do_not_cancel_are_still_refused(tmp_path):
-    rows = [(0, 300, 0, 90, "R", "", ""), (0, -300, 0, 0, "R", "", "")]
-    with refused(write(tmp_path, rows), "chain", "metres"):
-        robot_from_dh(tmp_path / "arm.csv", options=PLAIN)
-
-
 def homogeneous(rotation, shift):
     return pin.SE3(rotation, np.array(shift, float)).homogeneous
 
@@ -204,14 +184,3 @@ def test_poses_of_all_points_are_those_of_the_pieces(seed, kinds):
                 position, rotation = poses(chain, q[None], chain.point(name))
                 np.testing.assert_allclose(position[0], at[:3, 3], rtol=0, atol=1e-9)
                 np.testing.assert_allclose(rotation[0], at[:3, :3], rtol=0, atol=1e-9)
-
-
-def test_parallel_axes_come_to_one_another():
-    gaps = [
-        [(np.eye(4), "")],
-        [(homogeneous(np.eye(3), [0.4, 0, 300.0]), "")],
-        [(homogeneous(np.eye(3), [0, 0, -299.9]), "end")],
-    ]
-    words, slides = _slid_words(gaps, "RR")
-    assert words == ["Rz(q1)", "Tx(0.4)", "Rz(q2)", "Tz(0.1)", "[end]"] and slides.tolist() == [0.0, 0.0, -300.0]
-    assert _lengths_of(words) == 0.5

@@ -11,21 +11,11 @@ from elastocal.exchange.fixed_transforms import (
     displacement_words,
     express_axis,
     rotation_about,
-    shift_word,
-    turn_word,
-    yaw_pitch_roll,
 )
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import poses
 
 angles = st.one_of(st.floats(-np.pi, np.pi), st.sampled_from([np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9, np.pi / 2 - 1e-13, 0.0]))
-
-
-@given(angles, angles, angles)
-def test_any_rotation_comes_back_at_a_right_pitch_too(roll, pitch, yaw):
-    rotation = pin.rpy.rpyToMatrix(roll, pitch, yaw)
-    found = yaw_pitch_roll(rotation)
-    np.testing.assert_allclose(pin.rpy.rpyToMatrix(*reversed(found)), rotation, rtol=0, atol=1e-11)
 
 
 @given(angles, angles, angles, st.tuples(*[st.floats(-2, 2)] * 3))
@@ -36,19 +26,6 @@ def test_a_displacement_is_what_its_words_make(roll, pitch, yaw, shift):
     position, rotation = poses(chain, np.zeros((1, 1)), chain.end_effector)
     np.testing.assert_allclose(position[0], shift, rtol=0, atol=1e-11)
     np.testing.assert_allclose(rotation[0], transform[:3, :3], rtol=0, atol=1e-11)
-
-
-def test_nothing_is_left_out_and_signs_stand_before_numbers():
-    assert displacement_words(np.eye(4)) == []
-    assert (shift_word("x", -0.25), turn_word("y", np.pi / 2), shift_word("z", 1e-14)) == ("Tx(-0.25)", "Ry(90deg)", None)
-    assert shift_word("x", 1e-7) == "Tx(0.0000001)"
-
-
-@pytest.mark.parametrize("axis", [(0, 0, 2.0), (0, -1, 0), (1, 1e-15, 0)])
-def test_an_axis_of_the_frame_is_itself(axis):
-    before, letter, sign, after = express_axis(np.array(axis))
-    assert before == after == [] and letter == "xyz"[int(np.argmax(np.abs(axis)))] and (sign == "-") == (min(axis) < 0)
-    np.testing.assert_array_equal(axis_rotation(np.array(axis)), np.eye(3))
 
 
 @given(st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 1e-3), st.floats(-3, 3))

@@ -22,13 +22,6 @@ def test_an_unknown_key_is_refused(tmp_path):
         read_import_options(tmp_path / "import.yaml")
 
 
-@pytest.mark.parametrize("text", ["columns: {null: J1}\n", "units: {1: mm}\n", "columns: {q1: 2}\n"])
-def test_names_and_headers_are_texts(tmp_path, text):
-    (tmp_path / "import.yaml").write_text(text)
-    with refused((tmp_path / "import.yaml").as_posix(), text.partition(":")[0]):
-        read_import_options(tmp_path / "import.yaml")
-
-
 HEADER = "pose;load;repeat;target;done;q1_mm;q2_deg;q1;q2;fx;fy;fz;mx;my;mz;x;y;z;rx;ry;rz"
 ROW = "1;0;0;A;x;250;57,296;0,25;1,00000384;0;0;0;0;0;0;1,5;2,5;3,5;0,1;0,2;0,3"
 
@@ -46,15 +39,6 @@ def test_a_saved_sheet_is_asked_nothing(tmp_path):
     assert found.options.rotation == "vector"
 
 
-def test_stated_units_go_before_those_of_the_sheet(tmp_path):
-    assert read(tmp_path, units={"lengths": "mm"}).table["x"] == pytest.approx(1.5e-3)
-
-
 def test_degrees_that_are_not_the_angle_are_refused_by_line(tmp_path):
     with refused((tmp_path / "sheet.csv").as_posix(), "line 2, column q2_deg", "'58.296'", "57.296, which is q2"):
         read(tmp_path, ROW.replace("57,296", "58,296"))
-
-
-def test_another_table_with_both_columns_is_asked(tmp_path):
-    with refused((tmp_path / "sheet.csv").as_posix(), "header", "both"):
-        read(tmp_path, header=HEADER.replace("done", "note"))

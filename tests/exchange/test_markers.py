@@ -76,15 +76,6 @@ def test_what_was_commanded_is_no_target_and_a_number_behind_plain_names_is_a_qu
     assert table(tmp_path, text, replace(PLAIN, target="a", columns=columns)).table["x"].tolist() == [0.001]
 
 
-def test_orientations_and_uncertainties_go_with_their_marker(tmp_path):
-    names = ["x", "y", "z", "qw", "qx", "qy", "qz", "u95"]
-    text = f"q1,{','.join(f'{marker}_{name}' for marker in TWO for name in names)}\n"
-    text += "1,1,2,3,1,0,0,0,0.01,4,5,6,0,1,0,0,0.02\n"
-    found = table(tmp_path, text, replace(PLAIN, targets={"A": "A", "B": "B"}, units=PLAIN.units | {"u95_m": "mm"}))
-    np.testing.assert_allclose(found.table["rx"], [0.0, np.pi])
-    np.testing.assert_allclose(found.table["u95_m"], [1e-5, 2e-5])
-
-
 @pytest.mark.parametrize(
     ("headers", "words"),
     [
@@ -97,15 +88,6 @@ def test_what_only_one_target_has_is_a_question(tmp_path, headers, words):
     text = f"q1,{headers}\n1,{','.join('1' * len(headers.split(',')))}\n"
     with refused(tmp_path / "t.csv", "header", *words):
         table(tmp_path, text, replace(PLAIN, targets={"A": "A", "B": "B"}))
-
-
-def test_a_marker_that_was_not_seen_is_left_out_where_that_is_stated(tmp_path):
-    text = "q1,A_x,A_y,A_z,B_x,B_y,B_z\n1,1,2,3,4,5,6\n2,1,2,3,,,\n"
-    options = replace(PLAIN, targets={"A": "A", "B": "B"})
-    with refused(tmp_path / "t.csv", "line 3", "no position of B", "--skip-empty"):
-        table(tmp_path, text, options)
-    found = table(tmp_path, text, replace(options, skip_empty=True))
-    assert found.table["target"].tolist() == ["A", "B", "A"] and found.skipped == 1
 
 
 @pytest.mark.parametrize("above", ["Name,,SMR1,SMR1,SMR1,SMR2,SMR2,SMR2", ",,SMR1,,,SMR2,,", ",,SMR1,,,SMR2"])

@@ -19,13 +19,6 @@ def test_angles_lengths_and_forces_come_in_si_units(tmp_path):
     assert (row["time_s"], row["target"], row["pose"], row["load"], row["repeat"]) == (2.0, "smr", 1, 1, 0)
 
 
-def test_forces_that_the_robot_exerts_are_turned_round(tmp_path):
-    options = ImportOptions(units={"angles": "deg", "lengths": "mm"}, target="smr", wrench="by-robot")
-    found = table(tmp_path, "q1,x,y,z,fx,fy,fz\n0,1,2,3,5,0,-7\n", options)
-    assert [found.table[name][0] for name in ("fx", "fy", "fz")] == [-5.0, 0.0, 7.0]
-    assert not np.signbit(found.table["fy"]).any()
-
-
 def test_poses_loads_and_repeats_are_counted_where_no_column_has_them(tmp_path):
     rows = ["0,0", "0,0", "0,9", "0,9", "10,0", "10,-9", "10,9", "0.001,9"]
     found = table(tmp_path, "q1,fz,x,y,z\n" + "\n".join(f"{row},1,2,3" for row in rows))
@@ -55,11 +48,6 @@ def test_ten_times_as_many_poses_take_about_ten_times_as_long_to_number(tmp_path
         assert table(tmp_path, "q1,x,y,z\n" + rows, PLAIN).table["pose"][-1] == poses
 
     assert growth(lambda: read(1_000), lambda: read(10_000)) < 20
-
-
-def test_labels_of_poses_are_numbered_and_numbers_stay(tmp_path):
-    assert table(tmp_path, "pose,q1,x,y,z\nP7,1,1,2,3\nP2,2,1,2,3\nP7,1,1,2,3\n").table["pose"].tolist() == [1, 2, 1]
-    assert table(tmp_path, "pose,q1,x,y,z\n7,1,1,2,3\n2,2,1,2,3\n").table["pose"].tolist() == [7, 2]
 
 
 def test_a_homogeneous_matrix_gives_position_and_orientation(tmp_path):

@@ -50,11 +50,6 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
         np.testing.assert_allclose(rotation[number], at.rotation, rtol=0, atol=1e-9)
 
 
-def test_links_of_another_robot_keep_their_order_and_names(tmp_path):
-    path = write(tmp_path, {"lower": ORIGINS["forearm"], "fore": ORIGINS["wrist_1"]})
-    assert robot_from_dh(path).robot.joint_names == ("lower", "fore")
-
-
 @pytest.mark.parametrize(
     ("document", "key", "words"),
     [

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.exchange.rotations import columns_of_rotation, is_rotation, rotation_vectors
+from elastocal.exchange.rotations import rotation_vectors
 
 ORIENTATIONS = Rotation.random(20, random_state=3)
 
@@ -55,16 +55,3 @@ def test_rounded_values_pass_and_what_is_no_rotation_is_marked():
         True,
         True,
     ]
-
-
-@pytest.mark.parametrize(
-    ("text", "known"),
-    [("none", True), ("euler:ZYZ", True), ("euler:zyx", True), ("euler:ZZY", False), ("euler:Zyx", False), ("rpy", False)],
-)
-def test_names_of_notations(text, known):
-    assert is_rotation(text) == known
-
-
-def test_euler_angles_are_found_by_axis_or_by_number():
-    assert columns_of_rotation("euler:ZYX", ["rx", "ry", "rz"]) == ("rz", "ry", "rx")
-    assert columns_of_rotation("euler:ZYZ", ["rx", "ry", "rz"]) == ("e1", "e2", "e3")

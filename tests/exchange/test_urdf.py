@@ -68,11 +68,6 @@ def test_a_part_of_the_tree_stands_and_weighs_as_in_the_whole(tmp_path):
     assert {mass.link for mass in robot.masses} == {0, 1, 2, 3}
 
 
-def test_limits_are_degrees_and_metres(tmp_path):
-    robot = robot_from_urdf(written(tmp_path, *ARM), "base", "flange").robot
-    np.testing.assert_allclose(robot.joint_limits, [[-1.5, 2.0], [-2 * np.pi, 2 * np.pi], [-0.1, 0.25], [-2, 2]], atol=1e-9)
-
-
 @pytest.mark.parametrize("limits", [None, (-1e16, 1e16)])
 def test_no_limits_and_those_that_stand_for_none_are_a_turn_either_way(tmp_path, limits):
     free = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), limits=limits))
@@ -95,11 +90,6 @@ def test_limits_that_look_like_degrees_are_asked_for(tmp_path, limits):
     np.testing.assert_allclose(radians.robot.joint_limits[0], limits)
 
 
-def test_two_turns_either_way_are_no_question(tmp_path):
-    path = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), limits=(-12.5664, 12.5664)))
-    assert robot_from_urdf(path, "a", "b").document["joint_limits_deg"][0][1] == pytest.approx(720, abs=0.01)
-
-
 def test_a_shift_without_limits_is_refused(tmp_path):
     path = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", "prismatic", limits=None))
     with refused(path, "joint 'j': limit", "metres"):
@@ -112,21 +102,6 @@ def test_what_a_urdf_does_not_say_is_not_made_up(tmp_path):
     assert {mass.relative_std for mass in result.robot.masses} == {0.3}
     assert any("no compliances" in note for note in result.notes)
     assert any("30 %, by assumption" in note for note in result.notes)
-
-
-def test_angles_of_few_digits_stay_and_are_told(tmp_path):
-    parts = (link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), rpy=(1.5708, 0, 0)))
-    result = robot_from_urdf(written(tmp_path, *parts), "a", "b")
-    assert "Rx(90.0002104591" in result.document["chain"]
-    assert any("few digits" in note and note.endswith(" j") for note in result.notes)
-    exact = (*parts[:2], joint("j", "a", "b", xyz=(0, 0, 1), rpy=(np.pi / 2, 0, 0)))
-    assert not any("few digits" in note for note in robot_from_urdf(written(tmp_path, *exact), "a", "b").notes)
-
-
-def test_millimetres_are_refused(tmp_path):
-    path = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 500)))
-    with refused(path, "chain", "metres"):
-        robot_from_urdf(path, "a", "b")
 
 
 @settings(max_examples=20, deadline=None)

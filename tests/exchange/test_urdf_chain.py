@@ -5,7 +5,7 @@ from made_urdf import assert_same_poses, joint, link, written
 from support import refused
 
 from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.exchange.urdf_chain import chain_between, parent_joints, point_name
+from elastocal.exchange.urdf_chain import chain_between
 from elastocal.exchange.urdf_reading import read_urdf
 
 TREE = (
@@ -26,12 +26,6 @@ def test_a_plain_chain_is_read_as_a_person_would_write_it(tmp_path):
     assert found.notation == "Tz(0.5) Rz(q1) Tx(0.4) Ry(q2) [hand]"
     assert [one.name for one in found.joints] == ["j1", "j2"]
     assert chain(tmp_path, "root").notation == "Tz(1) Tz(0.5) Rz(q1) Tx(0.4) Ry(q2) [hand]"
-
-
-def test_links_on_the_way_become_measuring_points(tmp_path):
-    assert chain(tmp_path, points=["arm"]).notation == "Tz(0.5) Rz(q1) [arm] Tx(0.4) Ry(q2) [hand]"
-    assert chain(tmp_path, points=["base", "hand"]).notation.startswith("[base] Tz(0.5)")
-    assert point_name("tool [a] b") == "tool__a__b"
 
 
 @pytest.mark.parametrize(
@@ -107,8 +101,3 @@ def test_points_that_would_have_one_name_are_refused(tmp_path):
     parts = (link("a"), link("b c"), link("b_c"), joint("j", "a", "b c"), joint("k", "b c", "b_c"))
     with refused("made.urdf", "point", "blanks"):
         chain(tmp_path, "a", "b_c", ["b c"], parts)
-
-
-def test_each_link_but_the_root_has_a_joint_above(tmp_path):
-    above = parent_joints(read_urdf(written(tmp_path, *TREE)))
-    assert {name: one.name for name, one in above.items()} == {"base": "foot", "arm": "j1", "hand": "j2", "other": "side"}

@@ -154,26 +154,6 @@ def test_names_meshes_inertias_limits_and_mimic_are_as_they_were_in_both(cell):
     assert [g.meshPath for g in shapes[0].geometryObjects] == [g.meshPath for g in shapes[1].geometryObjects] != []
 
 
-def test_a_joint_that_mimics_one_of_the_chain_takes_its_offset_too(tmp_path):
-    parts = [link(name) for name in "abcde"]
-    parts.append(joint("one", "a", "b", "revolute", (0, 0, 0.4), (0.1, 0, 0), (0, -1, 0)))
-    parts.append(joint("two", "b", "c", "revolute", (0.2, 0, 0.3), (0, 0.5, 0), (0, 0, 1)))
-    parts.append(joint("three", "c", "d", "revolute", (0.1, 0, 0.3), (0, 0, 0.2), (0.3, 1, 0.2), mimic=("one", -1.0, 0.3)))
-    parts.append(joint("end", "d", "e", "fixed", (0.1, 0, 0.1)))
-    path = written(tmp_path, *parts)
-    robot = robot_from_urdf(path, "a", "e").robot
-    keys = ("joint_offset@1", "joint_offset@2", "link_geometry@1", "link_geometry@2")
-    calibrated = fold_effects(made_calibrated(robot, *keys, identified=False)).robot
-    output, _ = export_arm((path, robot, calibrated))
-    assert_same_poses(calibrated, output, "a", "e", lambda values: {"three": 0.3 - values["one"]})
-
-
-def test_what_changes_nothing_gives_the_file_back_to_the_byte(cell):
-    path, robot, _ = cell
-    same = write_calibrated_origins(path, robot, robot)
-    assert same.content == path.read_bytes() and same.changed == 0
-
-
 def test_a_controller_that_counts_otherwise_keeps_the_joint_values_of_the_urdf(cell):
     path, robot, calibrated = cell
     sense = np.diag([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])

@@ -28,13 +28,6 @@ def test_links_joints_and_masses_are_there_and_no_geometry(tmp_path):
     assert urdf.links[1].mass == 2.0 and urdf.links[1].centre.tolist() == [0, 0, 1]
 
 
-def test_a_robot_without_a_name_has_that_of_the_file_and_namespaces_say_nothing(tmp_path):
-    text = robot(*SOUND).replace(
-        '<robot name="made">', '<robot xmlns="http://www.ros.org" xmlns:xacro="http://ros.org/wiki/xacro">'
-    )
-    assert read_urdf(file_of(tmp_path, text)).name == "made"
-
-
 @pytest.mark.parametrize("text", [BOMB, OUTSIDE], ids=["entities of entities", "an entity outside"])
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
 def test_entities_are_refused_before_they_are_looked_at(tmp_path, text, encoding):

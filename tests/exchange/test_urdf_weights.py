@@ -23,7 +23,6 @@ ARM = (
     joint("end", "arm", "hand", "fixed", (1, 0, 0)),
 )
 GRIPPER = (link("grip", 1.0), joint("bolt", "hand", "grip", "fixed", (0, 0, 0.3)))
-FINGER = (link("finger", 1.0, (0, 0, 0.1)), joint("open", "hand", "finger", "prismatic", (0, 0, 0.2)))
 
 
 def test_what_is_bolted_on_weighs_with_the_link_that_carries_it(tmp_path):
@@ -38,44 +37,12 @@ def test_what_is_bolted_on_weighs_with_the_link_that_carries_it(tmp_path):
     assert found.notes == ()
 
 
-def test_what_is_bolted_to_what_is_bolted_on_is_placed_through_both(tmp_path):
-    grip = (link("grip"), joint("bolt", "hand", "grip", "fixed", (0, 0, 0.3), (0, 0, np.pi / 2)))
-    camera = (link("camera", 2.0, (0, 0, 0.1)), joint("mount", "grip", "camera", "fixed", (0.2, 0, 0), (np.pi / 2, 0, 0)))
-    found = weights(tmp_path, *ARM, *grip, *camera)
-    # Of the camera: 1 m out, 0.3 m up, 0.2 m along the grip's x axis, which is y; 0.1 m along its z axis, which is x.
-    assert found.masses[1]["centre_m"] == pytest.approx([(0.1 + 1.1) / 2, 0.1, 0.15])
-
-
-def test_what_moves_beside_the_chain_weighs_as_at_zero_and_is_told(tmp_path):
-    found = weights(tmp_path, *ARM, *FINGER, relative_std=0.5)
-    assert found.masses[1]["mass_kg"] == 3.0 and found.masses[1]["centre_m"] == pytest.approx([0.4, 0, 0.1])
-    assert found.masses[1]["relative_std"] == 0.5
-    (note,) = found.notes
-    assert "open" in note and "zero" in note
-
-
-def test_what_moves_beside_the_column_weighs_on_no_joint(tmp_path):
-    other = (link("other", 50.0), joint("second arm", "base", "other"))
-    found = weights(tmp_path, *ARM, *other)
-    assert found.masses[0]["mass_kg"] == 9.0 and found.notes == ()
-
-
-def test_what_stands_before_the_base_is_not_the_robots(tmp_path):
-    found = weights(tmp_path, link("cart", 100.0), joint("feet", "cart", "base", "fixed"), *ARM)
-    assert found.masses[0]["mass_kg"] == 9.0
-
-
 def test_equal_masses_are_placeholders(tmp_path):
     parts = [link(name, 2.0) for name in "abcd"] + [joint(f"j{n}", "abcd"[n], "abcd"[n + 1]) for n in range(3)]
     found = weights(tmp_path, *parts, base="a", tip="d")
     assert found.masses == [] and "2 kg: placeholders" in found.notes[0]
     other = weights(tmp_path, link("a", 2.1), *parts[1:], base="a", tip="d")
     assert len(other.masses) == 4
-
-
-def test_without_masses_none_are_written(tmp_path):
-    found = weights(tmp_path, link("base"), link("hand"), joint("j", "base", "hand"))
-    assert found.masses == [] and "no masses" in found.notes[0]
 
 
 def test_behind_a_passive_joint_a_mass_is_told(tmp_path):

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from made_urdf import Pinocchio, assert_same_poses
+from made_urdf import Pinocchio
 
 from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.exchange.urdf_writing import urdf_of
@@ -49,14 +49,3 @@ def test_mujoco_loads_it_and_no_joint_is_without_effort_or_speed(tmp_path, name)
     assert (by_pinocchio.effortLimit > 0).all() and (by_pinocchio.velocityLimit > 0).all()
     heavy = sum(mass.mass_kg for mass in robot.masses if mass.link)
     assert model.body_mass[1:].sum() == pytest.approx(heavy, abs=1e-4)
-
-
-def test_pinocchio_reads_it_too(tmp_path):
-    robot = analysed("fanuc_static")
-    names = [f"joint_{j}" for j in range(1, 7)]
-    assert_same_poses(robot, write_urdf(tmp_path, robot), "base", robot.chain.end_effector.name, names=names)
-
-
-def test_a_controller_that_couples_joints_is_said_in_a_comment(tmp_path):
-    assert "couples joints" in urdf_of(analysed("fanuc_cpa"))
-    assert "couples joints" not in urdf_of(analysed("gp180"))

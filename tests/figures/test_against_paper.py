@@ -41,18 +41,6 @@ def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
     assert find_points(figure.axes[5], "D") == [(30.0, 0.0, False)]
 
 
-def test_the_legend_says_what_is_the_papers_and_what_is_expected():
-    figure = scores(comparison(), expectations(), TITLES)
-    assert legend_entries(figure)[-1] == "expectation in closed form" and "paper" in legend_entries(figure)
-    assert_nothing_cut_off(figure)
-
-
-def test_without_robots_of_the_paper_a_note_says_so():
-    table = comparison().assign(studies_mean=np.nan)
-    (axis,) = scores(table, expectations(), TITLES).axes
-    assert "prints nothing" in axis.texts[0].get_text()
-
-
 def test_samples_show_quartiles_and_nearly_the_whole_range_of_single_data_sets_in_millimetres():
     figure = table2_samples({"fanuc": INITIAL, "kuka": INITIAL}, PRINTED, {"fanuc": "Fanuc", "kuka": "Kuka"})
     expected = {"mean": (1.0, 2.0), "std": (0.1, 0.3), "max": (5.0, 7.0)}

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from drawn_figures import legend_entries, row_labels
+from drawn_figures import row_labels
 from made_loop_tables import step_rows
 
-from elastocal.figures.before_after import METRICS, before_after, step_name
+from elastocal.figures.before_after import METRICS, before_after
 
 
 def test_bars_for_every_model_and_measure():
@@ -18,17 +18,6 @@ def test_bars_for_every_model_and_measure():
         assert len([line for line in axis.lines if line.get_gid() == "interval"]) == len(steps)
         assert len([line for line in axis.lines if line.get_gid() == "open interval"]) == (len(steps) if metric == "p95" else 0)
         assert len([line for line in axis.lines if line.get_gid() == "noise floor"]) == 1
-
-
-def test_no_line_where_the_noise_is_not_known():
-    figure = before_after(step_rows(effects=()))
-    assert not [line for line in figure.axes[0].lines if line.get_gid() == "noise floor"]
-
-
-def test_long_names_of_models_wrap():
-    name = "with " + ", ".join(f"transmission_harmonic@{joint}[orders 31-36]" for joint in range(1, 7))
-    assert max(map(len, step_name(name).splitlines())) <= 26
-    assert "and 3 more" in step_name(name).replace("\n", " ")
 
 
 def lines_of(axis, gid):
@@ -61,14 +50,6 @@ def test_models_stand_from_top_to_bottom_in_the_order_of_the_table():
     assert axis.get_yticks().tolist() == sorted(axis.get_yticks()) and axis.get_ylim()[0] > axis.get_ylim()[1]
 
 
-def test_errors_of_a_millimetre_are_in_millimetres():
-    steps = step_rows(largest_m=4e-3)
-    axis = before_after(steps, 1e-4).axes[0]
-    assert axis.get_xlabel() == "error (mm)"
-    assert axis.patches[0].get_width() == pytest.approx(1e3 * steps[0]["heldout_mean_m"])
-    assert lines_of(axis, "noise floor")[0][0][0] == pytest.approx(0.1)
-
-
 @pytest.mark.parametrize("floor_m, scale", [(1.3e-5, "linear"), (None, "linear"), (1.1e-5, "log")])
 def test_the_axis_is_logarithmic_where_the_smallest_would_be_lost_beside_the_largest(floor_m, scale):
     for axis in before_after(step_rows(effects=()), floor_m).axes:
@@ -76,17 +57,3 @@ def test_the_axis_is_logarithmic_where_the_smallest_would_be_lost_beside_the_lar
         low, high = axis.get_xlim()
         drawn = [bar.get_width() for bar in axis.patches] + ([1e6 * floor_m] if floor_m else [])
         assert low < min(drawn) and high > max(drawn)
-
-
-def test_the_legend_names_the_kinds_of_models_that_there_are_and_the_noise_where_it_is_known():
-    common = ["95 % interval over poses", "on fitted poses"]
-    without = before_after(step_rows(effects=()))
-    assert legend_entries(without) == ["frames and targets only", "declared model", *common]
-    with_noise = legend_entries(before_after(step_rows(), 5e-5))
-    assert with_noise == [
-        "frames and targets only",
-        "declared model",
-        "with the effects found",
-        *common,
-        "RMS that noise alone leaves",
-    ]

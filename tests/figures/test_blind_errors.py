@@ -2,7 +2,6 @@
 
 import pandas as pd
 import pytest
-from drawn_figures import assert_nothing_cut_off, legend_entries
 
 from elastocal_proof.figures.blind_errors import errors_against_oracle
 
@@ -44,38 +43,6 @@ def test_the_share_of_cases_rises_by_one_case_at_each_excess_over_the_oracle():
     low, high = right.get_xlim()
     assert low < -1 and high > 50
     assert right.get_xlabel() == "RMS after the diagnosis above the oracle's (%)"
-
-
-def test_lines_mark_the_oracle_itself_and_five_per_cent_above_it():
-    left, right = errors_against_oracle(of_cases(("single", 50.0, 110, 100), ("pair", 50.0, 400, 300))).axes
-    same, above = left.lines
-    assert same.get_ydata().tolist() == same.get_xdata().tolist()
-    assert above.get_ydata().tolist() == pytest.approx([1.05 * value for value in above.get_xdata()])
-    upright = [line for line in right.lines if line.get_drawstyle() == "default"]
-    assert [line.get_xdata()[0] for line in upright] == pytest.approx([0.0, 5.0])
-    assert left.get_xlim() == left.get_ylim() and left.get_xlim()[0] < 100 and left.get_xlim()[1] > 400
-    assert (left.get_xlabel(), left.get_ylabel()) == ("of the oracle (µm)", "after the diagnosis (µm)")
-
-
-def test_robots_of_the_tuning_are_not_drawn_beside_those_of_the_proof():
-    table = pd.concat([of_cases(("single", 50.0, 110, 100)), of_cases(("single", 50.0, 900, 100), robots="tuned")])
-    figure = errors_against_oracle(table)
-    assert sum(len(collection.get_offsets()) for collection in figure.axes[0].collections) == 1
-    assert legend_entries(figure) == [
-        "detected",
-        "not detected",
-        "as good as the oracle",
-        "5 % above it",
-        "one effect, non-centrality 50",
-    ]
-    assert_nothing_cut_off(figure)
-
-
-def test_without_cases_both_panels_are_empty_and_can_be_drawn():
-    figure = errors_against_oracle(of_cases())
-    assert not any(len(collection.get_offsets()) for collection in figure.axes[0].collections)
-    assert not [line for line in figure.axes[1].lines if line.get_drawstyle() != "default"]
-    assert_nothing_cut_off(figure)
 
 
 def test_a_case_without_a_held_out_error_leaves_the_others_drawn():

@@ -2,11 +2,8 @@
 
 import numpy as np
 import pandas as pd
-import pytest
-from drawn_figures import assert_nothing_cut_off, row_labels, texts, texts_in_axes
-from matplotlib.colors import to_rgb
+from drawn_figures import assert_nothing_cut_off, row_labels, texts_in_axes
 
-from elastocal_proof.blind.power import powers
 from elastocal_proof.figures.blind_power import confusion_map, power_map
 
 POWER = ["detected", "held", "named", "oracle_detected"]
@@ -54,50 +51,12 @@ def heat(axis):
     return np.ma.filled(axis.images[0].get_array().astype(float), np.nan)
 
 
-def luminance(colour):
-    value = np.array(colour)
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722]
-
-
-def test_each_share_has_its_colour_and_all_but_the_smallest_their_number():
-    rows = [power_rows("payload", 50.0, 0.04), power_rows("payload", 200.0, 0.046), power_rows("lost_motion", 50.0, 0.6)]
-    figure = power_map(pd.DataFrame([*rows, power_rows("lost_motion", 200.0, 1.0)]))
-    np.testing.assert_allclose(heat(figure.axes[0]), [[0.6, 1.0], [0.04, 0.046]])
-    # Small shares, which nearly every cell of a large table has, are left to their colour.
-    assert [text.get_text() for text in figure.axes[0].texts] == ["60", "100", "5"]
-
-
-@pytest.mark.parametrize("share", [0.05, 0.5, 0.56, 1.0])
-def test_a_number_stands_out_from_the_colour_of_its_share(share):
-    axis = power_map(pd.DataFrame([power_rows("payload", 50.0, share)])).axes[0]
-    ink, face = (luminance(colour) for colour in (to_rgb(axis.texts[0].get_color()), axis.images[0].to_rgba([share])[0, :3]))
-    # Ratio of contrast as of WCAG 2.2.
-    assert (max(ink, face) + 0.05) / (min(ink, face) + 0.05) > 2.5
-
-
-def test_each_panel_shows_its_own_column():
-    row = power_rows("payload", 50.0, 0.0) | {"oracle_detected": 0.9, "detected": 0.8, "held": 0.7, "named": 0.6}
-    figure = power_map(pd.DataFrame([row]))
-    assert [heat(axis).item() for axis in figure.axes] == [0.9, 0.8, 0.7, 0.6]
-    titles = [axis.get_title().replace("\n", " ") for axis in figure.axes]
-    assert titles == ["the oracle detects", "detected", "right name, alone or in a class", "right name alone"]
-    assert {axis.get_xlabel() for axis in figure.axes} == {"non-centrality"}
-
-
 def test_a_level_at_which_an_effect_has_no_case_stays_empty():
     rows = [power_rows("payload", 50.0, 0.5), power_rows("payload", 200.0, 0.9), power_rows("lost_motion", 200.0, 0.7)]
     axis = power_map(pd.DataFrame(rows)).axes[0]
     assert row_labels(axis) == ["payload", "lost motion"]
     np.testing.assert_array_equal(np.isnan(heat(axis)), [[False, False], [True, False]])
     assert [text.get_text() for text in axis.texts] == ["50", "90", "70"]
-
-
-def test_a_run_without_single_effects_or_usual_settings_is_a_note():
-    assert texts(power_map(powers(pd.DataFrame(columns=["robots", "group", "truth", "level", "level_of"])))) == [
-        "This run has no case with one effect."
-    ]
-    hard = pd.DataFrame([confusion_row("payload", 50.0, settings="hard", adequate=4)])
-    assert texts(confusion_map(hard)) == ["This run has no case in the usual setting."]
 
 
 def test_right_names_are_framed_and_shares_of_a_row_add_up_to_one():

@@ -1,9 +1,8 @@
 """Rates of the blind proof are dots with their intervals, beside their targets."""
 
-import numpy as np
 import pandas as pd
 import pytest
-from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels, texts, texts_in_axes
+from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels, texts_in_axes
 
 from elastocal_proof.blind.coverage import covered
 from elastocal_proof.figures.blind_rates import coverage_by_effect, rates_and_targets
@@ -37,17 +36,6 @@ def test_coverage_has_a_row_for_each_kind_and_numbers_of_intervals():
     assert texts_in_axes(figure) == ["1", "2", "2", "intervals"]
 
 
-def test_a_quantity_without_a_case_is_stated_and_has_neither_dot_nor_interval():
-    rows = [
-        summary_row("detected at 50", np.nan, 0.0, 1.0, (0.97, 1.0)),
-        summary_row("held-out RMS after, over the oracle's, mean", 1.02, 1.01, 1.03, (0.0, 1.05)),
-    ]
-    figure = rates_and_targets(pd.DataFrame(rows))
-    assert row_labels(figure.axes[0]) == ["detected at 50"] and len(figure.axes[0].patches) == 1
-    assert not figure.axes[0].lines and len(figure.axes[1].lines) == 2
-    assert texts_in_axes(figure) == ["no cases"]
-
-
 def of_summary(*rows):
     return rates_and_targets(pd.DataFrame(rows))
 
@@ -62,16 +50,6 @@ def test_robots_of_the_proof_and_of_the_tuning_stand_side_by_side_in_one_row():
     assert len(figure.axes[0].patches) == 1
     assert legend_entries(figure) == ["robots of the proof", "robots on which it was developed", "target"]
     assert_nothing_cut_off(figure)
-
-
-def test_settings_are_named_in_words():
-    rates = of_summary(summary_row("false alarms, pose common 15urad", 0.05, 0.02, 0.09, (0.0, 0.06))).axes[0]
-    assert row_labels(rates) == ["false alarms, errors common to a pose,\n15 µrad"]
-
-
-def test_a_target_of_a_single_value_is_centred_on_it():
-    (bar,) = of_summary(summary_row("alarms", 0.05, 0.02, 0.09, (0.05, 0.05))).axes[0].patches
-    assert bar.get_x() + bar.get_width() / 2 == pytest.approx(5.0) and 0 < bar.get_width() < 2
 
 
 def test_excesses_over_the_oracle_lie_on_an_axis_that_is_symmetric_and_holds_every_interval():
@@ -109,9 +87,3 @@ def test_coverage_is_a_dot_with_its_interval_on_an_axis_that_holds_it():
     assert (band.get_x(), band.get_x() + band.get_width()) == (92, 98)
     assert legend_entries(figure) == ["of another law than the catalogue's", "all together", "target, 92 to 98 %"]
     assert_nothing_cut_off(figure)
-
-
-def test_coverage_of_no_interval_is_a_note():
-    assert texts(coverage_by_effect(covered(pd.DataFrame()))) == [
-        "This run has no interval that a true value can be compared with."
-    ]

@@ -2,7 +2,7 @@
 
 import pandas as pd
 import pytest
-from drawn_figures import assert_nothing_cut_off, texts_in_axes
+from drawn_figures import texts_in_axes
 
 from elastocal_proof.figures.blind_reliability import reliability_diagram
 
@@ -38,17 +38,3 @@ def test_intervals_reach_from_their_lower_to_their_upper_end():
     ]
     diagonal = next(line for line in shares.lines if line.get_linestyle() == ":")
     assert diagonal.get_xydata().tolist() == [[0, 0], [1, 1]]
-
-
-def test_numbers_of_cases_of_both_kinds_of_robots_share_the_width_of_their_bin():
-    figure = of_bins(("proof", 0.5, 0.6, 0.55, 0.5, 0.2, 0.9, 10), ("tuned", 0.5, 0.6, 0.56, 0.6, 0.3, 0.8, 3))
-    shares, counts = figure.axes
-    one, other = counts.patches
-    assert one.get_x() == pytest.approx(0.51) and other.get_x() + other.get_width() == pytest.approx(0.59)
-    assert one.get_x() + one.get_width() == pytest.approx(other.get_x())
-    assert [text.get_text() for text in shares.get_legend().get_texts()] == [
-        "robots of the proof",
-        "robots on which it was developed",
-    ]
-    assert counts.get_ylabel() == "cases" and counts.get_xlabel().startswith("stated probability")
-    assert_nothing_cut_off(figure)

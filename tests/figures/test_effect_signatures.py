@@ -5,7 +5,7 @@ import pytest
 from analysed_robots import analysed
 
 from elastocal.effects.catalogue import effects
-from elastocal.figures.effect_signatures import list_candidates, signature, signature_figure
+from elastocal.figures.effect_signatures import list_candidates, signature
 
 
 @pytest.fixture(scope="module")
@@ -50,12 +50,3 @@ def test_a_drift_begins_at_nothing_and_a_step_happens_in_the_middle(arm):
     assert not drift[0].any() and drift[-1].any()
     half = len(step) // 2
     assert not step[:half].any() and np.abs(step[half:]).max(axis=1).all()
-
-
-def test_the_figure_has_three_panels_on_one_scale_with_units(arm):
-    figure = signature_figure(signature("lost_motion", arm))
-    angle, force, time = figure.axes
-    assert angle.get_ylim() == force.get_ylim() == time.get_ylim()
-    assert "(°)" in angle.get_xlabel() and "(N)" in force.get_xlabel() and "(h)" in time.get_xlabel()
-    assert "(mm)" in angle.get_ylabel()
-    assert [text.get_text() for text in time.get_legend().texts] == ["along x", "along y", "along z"]

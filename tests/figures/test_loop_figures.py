@@ -37,7 +37,7 @@ FIGURES = {
 }
 
 
-@pytest.mark.parametrize("name", slow_but(["candidates", "before_after"], FIGURES))
+@pytest.mark.parametrize("name", slow_but(["before_after"], FIGURES))
 def test_nothing_is_cut_off_and_a_rerun_gives_the_same_bytes(name, tmp_path):
     for run in "ab":
         drawn = FIGURES[name]()

@@ -9,7 +9,6 @@ from made_study_tables import budget as budget_frame
 from made_study_tables import costs as costs_frame
 from made_study_tables import designs as designs_frame
 from made_study_tables import ladder as ladder_frame
-from matplotlib.text import Text
 
 from elastocal.figures.questions import budget, costs, designs, ladder, metrics
 
@@ -23,11 +22,6 @@ def test_the_ladder_has_a_line_for_each_length_in_the_panel_of_its_noise():
     np.testing.assert_array_equal(first.lines[0].get_xydata(), [[0, 40], [1, 20]])
     assert legend_entries(figure) == ["20", "40"]
     assert_nothing_cut_off(figure)
-
-
-def test_without_a_robot_with_links_a_note_says_so():
-    (axis,) = ladder(pd.DataFrame(columns=ladder_frame().columns)).axes
-    assert "no robot" in axis.texts[0].get_text()
 
 
 def test_points_stand_in_their_row_with_both_budgets():
@@ -60,11 +54,6 @@ def test_metrics_have_a_row_each_and_strategies_stand_where_their_ratio_is():
     assert one.get_xdata().tolist() == [1.0, 1.0] and other.get_xdata().tolist() == [1.2, 0.5]
     assert legend_entries(figure) == ["6DoF", "staged"]
     assert_nothing_cut_off(figure)
-
-
-def test_costs_of_an_accuracy_that_no_set_of_points_reaches_are_a_note():
-    figure = costs(costs_frame().assign(ratio=np.nan), TITLES, 60.0)
-    assert "no set of points reaches 60 µm" in " ".join(text.get_text() for text in figure.findobj(Text))
 
 
 def test_costs_have_a_line_for_each_set_of_points_over_the_first():

@@ -13,7 +13,6 @@ from elastocal.figures.residuals import (
     bins_of,
     components,
     length_unit,
-    middle_of_cells,
     quantities,
     residuals,
     running_quartiles,
@@ -35,41 +34,11 @@ def test_residuals_have_a_panel_for_each_quantity_that_varies():
     assert figure.axes[0].get_ylabel() == "residual (µm)"
 
 
-def test_residuals_leave_out_what_was_not_recorded_or_did_not_vary():
-    table = residual_table(loaded=False, timed=False)
-    table["q4"][:] = 0.3
-    assert labels_of(residuals(table)) == [f"angle of joint {joint} (°)" for joint in (1, 2, 3, 5, 6)]
-
-
-def test_the_joint_behind_the_residual_is_said_to_explain_it():
-    figure = residuals(residual_table(poses=120, loaded=False))
-    component, shares = figure.axes[1].get_title(loc="left").split(": ")
-    before, after = (float(share) for share in shares.removesuffix(" %").split(" → "))
-    assert component == "vertical" and before > 90 and after < 10
-
-
 def test_held_out_measurements_are_marked_apart():
     table = residual_table()
     clouds = [artist for artist in residuals(table).axes[0].collections if isinstance(artist, PathCollection)]
     sizes = [len(cloud.get_offsets()) for cloud in clouds]
     assert sizes == 2 * [(~table["held_out"]).sum(), table["held_out"].sum()]
-
-
-def test_one_stage_is_drawn_where_nothing_was_found():
-    figure = residuals(residual_table(found=False))
-    assert "with the effects found" not in texts(figure)
-    assert len(quivers(arrows(residual_table(found=False)).axes[0])) == 1
-
-
-def test_many_points_are_pixels():
-    table = residual_table(poses=400)
-    assert all(cloud.get_rasterized() for cloud in residuals(table).findobj(PathCollection) if len(cloud.get_offsets()))
-
-
-def test_millimetres_where_residuals_are_large():
-    table = residual_table()
-    table |= {name: 100 * values for name, values in table.items() if name.startswith(("before_d", "after_d"))}
-    assert residuals(table).axes[0].get_ylabel() == "residual (mm)"
 
 
 def test_components_are_those_about_the_vertical_and_along_the_force():
@@ -78,12 +47,6 @@ def test_components_are_those_about_the_vertical_and_along_the_force():
     table |= {"fx": np.array([0.0, 0.0]), "fy": np.array([0.0, -5.0]), "fz": np.array([0.0, 0.0])}
     expected = [[2.0, -1.0, 3.0, np.nan], [1.0, 2.0, 3.0, -2.0]]
     np.testing.assert_allclose(components(table, "before"), expected, atol=1e-12)
-
-
-def test_chance_explains_nothing():
-    rng = np.random.default_rng(0)
-    assert share_explained(bins_of(rng.uniform(size=2000)), rng.normal(size=2000)) < 0.01
-    assert share_explained(np.zeros(5, int), np.full(5, np.nan)) == 0.0
 
 
 def test_no_line_crosses_a_gap():
@@ -99,17 +62,6 @@ def test_large_campaigns_draw_one_state_of_each_cell():
     figure = arrows(residual_table(poses=500))
     assert max(len(quiver.X) for quiver in quivers(figure.axes[0])) < 500
     assert any("one state of each cell" in text for text in texts(figure))
-
-
-def test_the_middle_of_each_cell_is_taken():
-    at = np.array([[0.1, 0.1], [0.2, 0.2], [0.3, 0.3], [5.0, 5.0]])
-    assert sorted(middle_of_cells(at, np.array([3.0, 1.0, 2.0, 9.0]), 1.0)) == [2, 3]
-
-
-def test_residuals_of_one_pose_are_a_note():
-    table = residual_table(loaded=False, timed=False)
-    table |= {f"q{joint}": np.full(len(table["pose"]), 0.3) for joint in range(1, 7)}
-    assert any("nothing to draw them against" in text for text in texts(residuals(table)))
 
 
 def state_means(table):
@@ -174,14 +126,6 @@ def test_time_begins_at_zero_and_is_in_hours_beyond_two(last_s, label, end):
     table["time_s"] = np.linspace(500.0, 500.0 + last_s, len(table["pose"]))
     found = quantities(table)[label]
     assert (found.min(), found.max()) == (0.0, pytest.approx(end))
-
-
-def test_angles_are_in_degrees_and_the_force_is_its_size():
-    table = residual_table()
-    table |= {"fx": 3.0 * table["load"], "fy": -4.0 * table["load"], "fz": 12.0 * table["load"]}
-    found = quantities(table)
-    np.testing.assert_allclose(np.radians(found["angle of joint 2 (°)"]), table["q2"])
-    assert set(found["force (N)"]) == {0.0, 13.0}
 
 
 @pytest.mark.parametrize("largest_m, unit", [(0.99e-3, (1e6, "µm")), (1.01e-3, (1e3, "mm"))])

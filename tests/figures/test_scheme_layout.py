@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drawn_schemes import DRAWN
 
-from elastocal.figures.scheme_layout import DRAWING_MM, Joint, Point, Segment, lay_out, project_on_paper, view_of
+from elastocal.figures.scheme_layout import DRAWING_MM, Joint, Point, Segment, lay_out, project_on_paper
 from elastocal.figures.scheme_sheet import SYMBOL_RADIUS_MM
 from elastocal.mechanics.robot import with_target_offset
 
@@ -92,16 +92,6 @@ def test_labels_are_the_lengths_of_the_chain_in_millimetres(drawn):
         assert name == f"$l_{{{number}}}$" and float(value.replace("\N{MINUS SIGN}", "-")) == pytest.approx(length, abs=0.05)
 
 
-def test_a_longer_link_is_not_drawn_shorter_than_one_that_carries_as_many_joints(drawn):
-    _, items, depth = drawn
-    size = {0: [], 1: [], 2: []}
-    for segment in of(Segment, items):
-        drawn_mm = np.linalg.norm(segment.end - segment.start) / np.linalg.norm(project_on_paper(segment.direction, depth))
-        size[len(segment.carried)].append((segment.length_m, round(drawn_mm, 6)))
-    for pairs in size.values():
-        assert [drawn_mm for _, drawn_mm in sorted(pairs)] == sorted(drawn_mm for _, drawn_mm in pairs)
-
-
 def test_measuring_points_stand_at_their_place_on_the_arm_and_only_an_offset_moves_them():
     robot = DRAWN["kuka"]
     points = of(Point, LAID_OUT.get("kuka", lay_out(robot.chain))[0])
@@ -110,17 +100,3 @@ def test_measuring_points_stand_at_their_place_on_the_arm_and_only_an_offset_mov
     moved = of(Point, lay_out(with_target_offset(robot, (0.0, 0.1, 0.05)).chain)[0])
     assert all(np.linalg.norm(point.place - point.node) > 5 for point in moved if np.linalg.norm(point.offset))
     assert [point for point in moved if np.linalg.norm(point.offset)]
-
-
-@pytest.mark.parametrize("name, right", [("kuka", 0), ("fanuc", 0), ("pitch about x", 1), ("three axes that meet", 0)])
-def test_the_view_is_that_in_which_most_joints_point_into_the_paper(name, right):
-    view = view_of(DRAWN[name].chain)
-    assert view[0, right] == 1 and view[1].tolist() == [0, 0, 1]
-    # Right, up and towards the reader are right-handed, so into the paper is the other way.
-    np.testing.assert_array_equal(np.cross(view[0], view[1]), -view[2])
-
-
-def test_what_lies_in_the_plane_of_the_paper_keeps_its_place():
-    depth = np.array([0.5, 0.25])
-    np.testing.assert_array_equal(project_on_paper(np.array([3.0, 4.0, 0.0]), depth), [3, 4])
-    np.testing.assert_array_equal(project_on_paper(np.array([3.0, 4.0, -2.0]), depth), [2, 3.5])

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from elastocal.figures.scheme_sheet import LEGEND_ROW_MM, MARGIN_MM, WIDTH_MM, Sheet, fill_rows, write_subscript
+from elastocal.figures.scheme_sheet import MARGIN_MM, WIDTH_MM, Sheet, fill_rows
 
 UP = np.array([0.0, 1.0])
 PLACE = np.zeros(2)
@@ -26,15 +25,6 @@ def overlaps(one, other):
     return bool((one[:2] < other[2:]).all() and (other[:2] < one[2:]).all())
 
 
-def test_a_subscript_of_two_digits_stays_below():
-    assert write_subscript("q", 12) == "$q_{12}$"
-
-
-def test_rows_fill_one_after_another():
-    assert fill_rows([4, 4, 4, 11, 1], 10, gap=2) == [[0, 1], [2], [3], [4]]
-    assert fill_rows([4, 4, 2], 10, gap=0) == [[0, 1, 2]]
-
-
 @settings(max_examples=10)
 @given(st.lists(st.floats(0.1, 12), min_size=1, max_size=12), st.floats(0, 3))
 def test_no_row_is_too_wide_and_none_has_room_for_the_next(widths, gap):
@@ -46,16 +36,6 @@ def test_no_row_is_too_wide_and_none_has_room_for_the_next(widths, gap):
 
     assert all(len(row) == 1 or width(row) <= 10 + 1e-9 for row in rows)
     assert all(width([*row, later[0]]) > 10 - 1e-9 for row, later in pairwise(rows))
-
-
-@pytest.mark.parametrize("away", [(0, 1), (1, 0), (0, -1), (-1, 0)])
-def test_a_label_with_room_stands_close_to_its_anchor_on_the_wanted_side(away):
-    sheet = Sheet()
-    sheet.label("$q_{1}$", [PLACE], np.array(away, float), (3.0, 9.0), "joint-1")
-    at, frames, leaders = label_of(sheet, "joint-1")
-    assert at @ away == pytest.approx(np.abs(at).max()) and not frames and not leaders
-    box = sheet.taken[-1]
-    assert np.linalg.norm(np.clip(PLACE, box[:2], box[2:])) == pytest.approx(3.0)
 
 
 def test_labels_keep_off_what_is_drawn_and_off_each_other():
@@ -83,33 +63,6 @@ def test_a_label_that_had_to_move_away_has_a_leader_to_its_anchor():
     # It ends at the frame's edge.
     gap = np.abs(leader[1] - at) - extent / 2
     assert 0 <= gap.max() < 0.5
-
-
-def test_a_label_on_a_full_sheet_is_written_all_the_same():
-    sheet = Sheet()
-    sheet.taken = np.array([[-500.0, -500.0, 500.0, 500.0]])
-    sheet.label("TCP", [PLACE], UP, (3.0, 4.0), "point-TCP")
-    at, _, leaders = label_of(sheet, "point-TCP")
-    assert np.linalg.norm(at) < 10 and not leaders
-
-
-def test_the_legend_is_centred_in_rows_that_fit_the_page_and_returns_its_lower_end():
-    sheet, drawn = Sheet(), []
-    entries = [(drawn.append, 8.0, f"entry number {number} of them all") for number in range(5)]
-    bottom = sheet.legend(entries, 20.0, 100.0)
-    heights = sorted({place[1] for place in drawn}, reverse=True)
-    assert len(drawn) == 5 and np.diff(heights).tolist() == [-LEGEND_ROW_MM] * (len(heights) - 1)
-    assert len(heights) > 1 and heights[0] == 100.0 and heights[-1] - LEGEND_ROW_MM < bottom < heights[-1]
-    sheet.finish((20 - WIDTH_MM / 2 + MARGIN_MM, bottom), (20 + WIDTH_MM / 2 - MARGIN_MM, 104))
-    # So fine that hinting of the letters does not matter.
-    sheet.figure.set_dpi(1200)
-    renderer = FigureCanvasAgg(sheet.figure).get_renderer()
-    for height in heights:
-        texts = [text for text in sheet.axes.texts if text.get_position()[1] == height]
-        boxes = [text.get_window_extent(renderer).transformed(sheet.axes.transData.inverted()) for text in texts]
-        left = min(place[0] - 4.0 for place in drawn if place[1] == height)
-        assert (left + max(box.x1 for box in boxes)) / 2 == pytest.approx(20.0, abs=0.5)
-        assert max(box.x1 for box in boxes) - left < WIDTH_MM - 2 * MARGIN_MM
 
 
 @pytest.mark.parametrize("width, page", [(50.0, WIDTH_MM), (200.0, 200.0 + 2 * MARGIN_MM)])

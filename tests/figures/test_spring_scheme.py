@@ -2,7 +2,7 @@
 
 import pytest
 from drawn_figures import texts
-from drawn_schemes import DRAWN, assert_about_160_mm_wide_and_drawn_alike, assert_no_overlap
+from drawn_schemes import DRAWN, assert_no_overlap
 
 from elastocal.figures.spring_scheme import spring_scheme
 
@@ -19,7 +19,3 @@ def test_spring_scheme_has_a_spring_for_each_joint_and_each_elastic_link():
 @pytest.mark.parametrize("robot", DRAWN.values(), ids=DRAWN)
 def test_any_serial_chain_draws_without_a_text_on_another(robot):
     assert_no_overlap(spring_scheme(robot))
-
-
-def test_the_scheme_is_about_160_mm_wide_and_drawn_alike_each_time():
-    assert_about_160_mm_wide_and_drawn_alike(spring_scheme)

@@ -3,13 +3,12 @@
 import numpy as np
 import pandas as pd
 import pytest
-from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels, texts_in_axes
+from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
 from matplotlib.colors import same_color
 
 from elastocal.figures.strategies import (
     accuracy_of_one_data_set,
     bias_and_accuracy,
-    deviations,
     noise_impact,
     over_studies,
     stiffness_errors,
@@ -95,39 +94,6 @@ def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
     marks = [line for line in first.lines if line.get_marker() == "D"]
     assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [[[4, 2.2]], [[5, 3]]]
     assert marks[0].get_color() == first.lines[1].get_color()
-
-
-def test_lines_begin_where_the_mean_of_the_inverse_exists():
-    frame = metrics_of("kuka", "6DoF", 10.0, untrusted=2)
-    (axis,) = deviations(frame, PRINTED, "Kuka", "kuka", ["6DoF"], 2.5).axes
-    assert axis.lines[0].get_xdata().tolist() == [3, 4, 5]
-
-
-def test_deviations_of_one_robot_are_in_micrometres_and_each_strategy_keeps_its_look():
-    figure = deviations(
-        METRICS.assign(deviation=METRICS.deviation * np.where(METRICS.robot == "kuka", 1, 5)),
-        PRINTED,
-        "Kuka",
-        "kuka",
-        ORDER,
-        2.5,
-    )
-    (axis,) = figure.axes
-    one, other, limit, printed = axis.lines
-    assert printed.get_xydata().tolist() == [[4, 6]]
-    np.testing.assert_allclose(one.get_xydata(), np.column_stack([LENGTHS, 10 / LENGTHS]))
-    np.testing.assert_allclose(other.get_ydata(), 20 / LENGTHS)
-    assert band(axis.collections[0])[5] == pytest.approx((1.8, 2.2))
-    assert limit.get_ydata()[0] == 2.5 and texts_in_axes(figure) == ["2.5 µm"]
-    assert one.get_color() != other.get_color() and one.get_linestyle() != other.get_linestyle()
-    assert axis.get_ylabel() == "dev, equation 15 (µm)" and axis.get_xlim() == (2, 5.1)
-    assert_nothing_cut_off(figure)
-
-
-def test_one_estimator_under_two_names_is_one_line():
-    twice = pd.concat([METRICS, METRICS[METRICS.strategy == "6DoF"].assign(strategy="6DoF again")])
-    figure = deviations(twice, PRINTED, "Kuka", "kuka", [*ORDER, "6DoF again"], 2.5)
-    assert legend_entries(figure) == [*ORDER, PAPER]
 
 
 def test_bias_and_accuracy_puts_the_averaged_model_below_the_error_of_one_data_set():

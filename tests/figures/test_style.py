@@ -1,17 +1,15 @@
 """The common look of all figures: sizes, lines that stay apart, and files without dates that appear whole or not at all."""
 
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import matplotlib as mpl
 import numpy as np
 import pytest
-from drawn_figures import texts
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.image import imread
 from PIL import Image
 
-from elastocal.figures.style import DASHES, PALETTE, WIDTH_MM, ink_on, line_style, note, panels, save, save_svg, styled
+from elastocal.figures.style import PALETTE, WIDTH_MM, ink_on, note, panels, save, save_svg, styled
 from elastocal.io.origin import Origin
 
 # Machado, Oliveira and Fernandes 2009, severity 1, on linear RGB.
@@ -47,23 +45,10 @@ def test_a_figure_has_its_size_in_millimetres_and_a_grid_of_axes_even_for_one():
     assert axes[1, 2].get_ylim() == (0, 7)
 
 
-def test_a_note_is_its_text_alone():
-    figure = note("Nothing to draw.")
-    assert texts(figure) == ["Nothing to draw."] and not figure.axes[0].axison
-
-
 def test_the_look_holds_inside_a_figure_function_and_nowhere_else():
     outside = dict(mpl.rcParams)
     assert styled(lambda: (mpl.rcParams["font.size"], mpl.rcParams["axes.spines.top"]))() == (8, False)
     assert dict(mpl.rcParams) == outside
-
-
-def test_the_first_eight_lines_differ_in_colour_and_the_ninth_begins_anew():
-    styles = [line_style(index) for index in range(9)]
-    assert len({style["color"] for style in styles}) == len(PALETTE) == len(DASHES) == 8
-    assert styles[8] == styles[0]
-    # Lines that coincide show through the gaps of the upper one.
-    assert all(one["linestyle"] != other["linestyle"] for one, other in pairwise(styles))
 
 
 @pytest.mark.parametrize("eye", DICHROMATS.values(), ids=DICHROMATS)
@@ -85,12 +70,6 @@ def test_the_same_figure_gives_the_same_bytes_without_a_date(tmp_path):
     assert "Software" not in Image.open(files[0][1]).info
 
 
-def test_pictures_have_150_dots_an_inch_and_fonts_of_the_pdf_are_true_type(tmp_path):
-    pdf, png = save_both(panels(1, 1, 25.4)[0], tmp_path)
-    assert imread(png).shape[:2] == (150, int(150 * WIDTH_MM / 25.4))
-    assert b"/Type3" not in pdf.read_bytes() and b"/CIDFontType2" in pdf.read_bytes()
-
-
 def test_a_figure_that_cannot_be_drawn_leaves_the_earlier_file_as_it_was(tmp_path):
     (tmp_path / "figure.pdf").write_text("earlier", encoding="utf-8")
     figure = Figure()
@@ -104,11 +83,6 @@ def test_a_figure_that_cannot_be_drawn_leaves_the_earlier_file_as_it_was(tmp_pat
 @pytest.mark.parametrize(("colour", "ink"), [((1, 1, 1), "black"), ((0, 0, 0), "white"), ((0.5, 0.5, 0.5), "black")])
 def test_numbers_on_a_colour_have_the_ink_of_the_higher_contrast(colour, ink):
     assert ink_on((*colour, 1.0)) == ink
-
-
-def test_blue_carries_white_although_a_green_as_bright_carries_black():
-    assert ink_on((0.0, 0.0, 1.0)) == "white"
-    assert ink_on((0.0, 1.0, 0.0)) == "black"
 
 
 def test_an_svg_is_the_same_in_every_run_and_its_letters_are_letters(tmp_path):

@@ -5,7 +5,6 @@ import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries
 from matplotlib.colors import to_hex
 
-from elastocal_proof.blind.sweep import against_angle, swept
 from elastocal_proof.figures.sweep import sweep
 
 OUTCOMES = ["right", "class", "wrong", "other"]
@@ -42,16 +41,4 @@ def test_each_pair_has_a_panel_in_which_a_bin_keeps_its_place():
     assert [label.get_text() for label in pair.get_xticklabels()] == ["5", "20"]
     assert [(text.get_text(), text.get_position()[0]) for text in figure.axes[0].texts] == [("4", 0), ("2", 1)]
     assert pair.get_xlabel() == "angle up to (°)" and figure.axes[0].get_ylabel() == "share of cases"
-    assert_nothing_cut_off(figure)
-
-
-def test_more_pairs_than_columns_fill_a_second_row():
-    figure = sweep(of_bins(*[(f"pair {number}", 5.0, 1, 1.0, 0.0, 0.0, 0.0) for number in range(5)]))
-    rows = {axis.get_subplotspec().rowspan.start for axis in figure.axes if axis.axison}
-    assert rows == {0, 1} and sum(axis.axison for axis in figure.axes) == 5
-
-
-def test_a_benchmark_without_a_sweep_has_an_empty_panel_that_can_be_drawn():
-    figure = sweep(against_angle(swept({}, {})))
-    assert not figure.axes[0].patches
     assert_nothing_cut_off(figure)

@@ -1,12 +1,10 @@
 """A campaign put together again from its description and its table."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made
-from support import refused
 
 from elastocal.campaigns.columns import columns_of
 from elastocal.fitting.case import case_from, noise_facts, noise_from
@@ -93,30 +91,11 @@ def test_repeats_are_averaged_without_those_far_off_which_the_campaign_keeps(cam
             np.testing.assert_allclose(case.observations.position[row], [seen.position[kept].mean(axis=0)], atol=1e-12)
 
 
-def test_a_target_on_a_point_that_the_robot_does_not_have_is_refused(campaign, config_folder):
-    with refused("cell7/campaign.yaml", "targets.A.point", "'7DoF'", "6DoF"):
-        case_of(campaign, config_folder, targets={"A": {"point": "7DoF", "offset_m": [0, 0, 0]}})
-
-
 def test_noise_comes_back_from_its_document():
     noise = Noise("repeats", 1e-5, 2e-5, np.array([1e-6, 0, 3e-6]), 77, 2e-6)
     back = noise_from({"noise": noise_facts(noise), "warnings": []})
     np.testing.assert_array_equal(back.joint_rad, noise.joint_rad)
     assert replace(back, joint_rad=None) == replace(noise, joint_rad=None)
-
-
-def test_noise_facts_are_json_in_si_units():
-    noise = Noise("declared", 1e-5, 2e-5, np.array([1e-6, 0.0]))
-    facts = json.loads(json.dumps(noise_facts(noise), allow_nan=False))
-    assert facts == {
-        "source": "declared",
-        "position_m": 1e-5,
-        "orientation_rad": 2e-5,
-        "joint_rad": [1e-6, 0.0],
-        "degrees_of_freedom": 0,
-        "pose_rad": 0.0,
-        "usual_m": 0.0,
-    }
 
 
 def test_a_verdict_that_has_more_of_the_noise_gives_the_same_noise():

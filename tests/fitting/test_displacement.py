@@ -8,8 +8,8 @@ from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import conditions, displaced_coordinates, joint_compliances
-from elastocal.fitting.prediction import predict, residuals
+from elastocal.fitting.displacement import conditions, displaced_coordinates
+from elastocal.fitting.prediction import predict
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
 from elastocal.mechanics.kinematics import poses
 
@@ -55,24 +55,6 @@ def test_load_is_taken_at_the_deflected_pose_as_a_solver_of_the_equilibrium_find
     torques = joint_torques(fanuc.chain, states.joint_angles, states.wrench, end)
     there = poses(fanuc.chain, states.joint_angles + fanuc.compliance * torques, end)[0]
     assert np.linalg.norm(there - ends[1], axis=1).max() > 5e-5
-
-
-def test_wrench_acts_at_the_last_measuring_point_and_not_at_a_target_on_it(fanuc):
-    chain = replace(fanuc.chain, points=tuple(replace(p, offset_m=(0.3, 0.2, 0.1)) for p in fanuc.chain.points))
-    states = made_states(6, 5, seed=5)
-    loads = [conditions(model, made_estimate(model), states).load for model in (made_model(chain), made_model(fanuc.chain))]
-    np.testing.assert_allclose(*loads, rtol=0, atol=1e-11)
-
-
-def test_identified_compliances_replace_the_nominal_ones(fanuc):
-    fixed = made_model(fanuc.chain, compliance=fanuc.compliance)
-    free = made_model(fanuc.chain, compliance=9 * fanuc.compliance, identified=True)
-    estimate, states = made_estimate(fixed, seed=6), made_states(6, 5, seed=7)
-    same = replace(estimate.with_effects(free.effects), coefficients=(fanuc.compliance,))
-    np.testing.assert_array_equal(joint_compliances(free, same), fanuc.compliance)
-    np.testing.assert_array_equal(joint_compliances(fixed, estimate), fanuc.compliance)
-    seen = seen_exactly(fixed, estimate, states)
-    np.testing.assert_allclose(residuals(free, same, seen, conditions(free, same, states)), 0.0, atol=1e-14)
 
 
 def test_effects_add_up_on_the_coordinates_of_the_sites(fanuc):

@@ -64,15 +64,6 @@ def test_products_are_those_of_the_columns_written_out(given_columns):
     np.testing.assert_allclose(columns.times_by_pose(right, pose), expected, atol=1e-10)
 
 
-def test_products_of_entries_add_up_over_parts():
-    columns, _, _ = made(3, observations=20)
-    halves = [
-        Factored(columns.displacements, columns.jacobian[part], columns.state[part]) for part in (slice(9), slice(9, None))
-    ]
-    total = sum(half.gram_of_entries() for half in halves)
-    np.testing.assert_allclose(columns.folded_gram(total), columns.gram(), atol=1e-10)
-
-
 @pytest.mark.parametrize("size", [1.0, 1e6])
 def test_what_two_columns_have_in_common_is_known_to_the_rounding_of_their_squares(size):
     """A column and one that is a thousandth off it."""

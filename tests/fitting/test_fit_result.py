@@ -95,23 +95,3 @@ def test_a_fit_that_keeps_neither_conditions_nor_jacobian_finds_the_same_again(f
     for one, other in zip(gathered(forgotten, seen)[:2], gathered(found, seen)[:2], strict=True):
         # What was kept is that of the last step, which ended a thousandth of a standard error away.
         np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(other).max())
-
-
-def test_the_column_of_a_joint_offset_is_the_jacobian_of_its_joint(fitted):
-    found, seen = fitted
-    plain, _, _ = gathered(found, seen)
-    (column,) = [number for number, (owner, _) in enumerate(found.parameters) if owner == "joint_offset@3"]
-    np.testing.assert_allclose(plain[..., column], found.joint_jacobian[..., 2], rtol=0, atol=1e-6)
-    assert len(found.parameters) == plain.shape[-1] == len(found.held) == len(found.covariance)
-
-
-def test_whitened_rows_without_joint_noise_are_divided_by_the_sensor_and_multiplied_by_the_root_of_the_weight(fanuc):
-    model = model_of(fanuc, "joint_offset@3")
-    states = two_loads_a_pose(6, 8, seed=14)
-    seen = with_noise(seen_exactly(model, made_estimate(model, seed=15), states), np.random.default_rng(16))
-    found = fit(model, seen, replace(NOISE, joint_rad=np.zeros(6)))
-    found = replace(found, weights=np.linspace(0.1, 1.0, len(seen)))
-    values = np.random.default_rng(17).standard_normal((len(seen), 3, 2))
-    expected = values * np.sqrt(found.weights)[:, None, None] / 60e-6
-    np.testing.assert_allclose(found.whitened(values), expected, rtol=1e-12)
-    np.testing.assert_allclose(found.whitened(values[..., 0]), expected[..., 0], rtol=1e-12)

@@ -1,10 +1,22 @@
 """Sensitivities by central differences of the model's own exact residuals."""
 
+from dataclasses import replace
+
 import numpy as np
-from synthetic import made_estimate, made_model, made_states, seen_exactly, slopes, small_steps, with_noise
+from synthetic import (
+    NOISE,
+    candidate_on,
+    made_estimate,
+    made_model,
+    made_states,
+    seen_exactly,
+    slopes,
+    small_steps,
+)
 
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.displacement import conditions
+from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.parameters import parameters
 
@@ -33,22 +45,6 @@ def test_a_mount_of_unknown_turn_and_a_known_one_at_an_unknown_place_have_their_
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
-def test_frame_of_one_session_moves_only_its_own_measurements(full_case):
-    model, estimate, seen = full_case
-    columns = linearize(model, estimate, seen, conditions(model, estimate, seen.states)).sensitivities
-    later = seen.states.session[seen.state] == 4
-    assert not columns[later][..., :6].any() and not columns[~later][..., 6:12].any()
-    assert columns[later][..., 6:12].any() and columns[~later][..., :6].any()
-
-
-def test_known_frame_known_targets_and_no_effects_leave_no_parameters(fanuc):
-    model = made_model(fanuc.chain, (Target("B", "3DoF", (0.1, 0.0, -0.2)),), fitted_frames=False)
-    estimate, states = made_estimate(model), made_states(6, 5)
-    seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(0))
-    line = linearize(model, estimate, seen, conditions(model, estimate, states))
-    assert parameters(model, estimate) == [] and line.sensitivities.shape == (5, 3, 0)
-
-
 def test_coordinate_jacobian_is_that_of_each_target(full_case):
     model, estimate, seen = full_case
     around = conditions(model, estimate, seen.states)
@@ -57,3 +53,15 @@ def test_coordinate_jacobian_is_that_of_each_target(full_case):
     # Target B sits behind joint 3: what lies further out does not move it.
     assert not line.coordinate_jacobian[seen.target == 1][..., 3:6].any()
     assert line.coordinate_jacobian[seen.target != 1][..., 3:6].any()
+
+
+def test_the_place_of_a_jump_has_no_slope_where_a_row_is_within_a_step_of_it(fanuc):
+    model = made_model(fanuc.chain, effects=[candidate_on(fanuc.chain, "setup_step")])
+    states = made_states(6, 9, seed=3)
+    seen = seen_exactly(model, made_estimate(model, seed=4), states)
+    # A row at a half lies on the other side of the jump a step further on.
+    estimate = replace(made_estimate(model, seed=5), shapes=(np.array([0.5 - 1e-6]),))
+    line = linearize(model, estimate, seen, conditions(model, estimate, states))
+    assert not line.sensitivities[..., -1].any() and line.sensitivities[..., -2].any()
+    found = fit(model, seen, NOISE, estimate)
+    assert found.held[-1] and found.estimate.shapes[0] == estimate.shapes[0] and found.converged

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import optimize
 from scipy.optimize import brentq, check_grad
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
@@ -13,7 +14,6 @@ from synthetic import made_estimate, made_measurements, made_model
 from elastocal.campaigns.campaign import Campaign, Target
 from elastocal.fitting import noise as noise_module
 from elastocal.fitting.noise import (
-    FEWEST,
     Noise,
     chosen_noise,
     declared_noise,
@@ -78,22 +78,6 @@ def test_sensor_and_joints_are_told_apart(rows):
         assert ((low < ratio / inflation) & (ratio / inflation < high)).all()
 
 
-def test_part_of_the_joints_is_seen_whatever_the_frame(fanuc):
-    """A frame that is turned turns the repeats with it: the noise must be the same."""
-    model, estimate, measurements = drawn(fanuc, 3, joint_rad=60e-6)
-    turned = replace(model, fitted_frames=True)
-    frames = made_estimate(turned, seed=4)
-    other = measurements.position @ frames.frame_rotation[0].T + frames.frame_position[0]
-    there = replace(estimate, frame_rotation=frames.frame_rotation, frame_position=frames.frame_position)
-    one, two = (
-        noise_from_repeats(model, estimate, measurements),
-        noise_from_repeats(turned, there, replace(measurements, position=other)),
-    )
-    assert one.joint_rad.any()
-    np.testing.assert_allclose(two.position_m, one.position_m, rtol=1e-3)
-    np.testing.assert_allclose(two.joint_rad, one.joint_rad, rtol=0.02, atol=1e-6)
-
-
 def test_noise_does_not_hang_on_what_the_model_lacks(fanuc):
     """Only differences between repeats count: a robot a millimetre off is as noisy as any."""
     model, estimate, measurements = drawn(fanuc, 5)
@@ -102,25 +86,6 @@ def test_noise_does_not_hang_on_what_the_model_lacks(fanuc):
         noise_from_repeats(model, estimate, replace(measurements, position=measurements.position + o)) for o in (0, off)
     )
     np.testing.assert_allclose(two.position_m, one.position_m, rtol=1e-6)
-
-
-@pytest.mark.parametrize(("poses", "repeats"), [(20, 1), (1, 2)])
-def test_too_few_repeats_say_nothing(fanuc, poses, repeats):
-    one_target = TARGETS[:1]
-    model, estimate, measurements = drawn(fanuc, 7, poses=poses, repeats=repeats, targets=one_target)
-    assert 3 * poses * (repeats - 1) < FEWEST
-    assert noise_from_repeats(model, estimate, measurements) is None
-    declared = campaign(fanuc, position_m=1e-4, orientation_rad=2e-4)
-    noise, warnings = chosen_noise(declared, model, estimate, measurements)
-    assert (noise.source, noise.position_m, noise.orientation_rad, noise.degrees_of_freedom) == ("declared", 1e-4, 2e-4, 0)
-    assert not noise.joint_rad.any() and warnings == []
-
-
-def test_repeats_missing_a_target_are_left_out_and_the_others_kept(fanuc):
-    model, estimate, measurements = drawn(fanuc, 9, poses=10, repeats=3)
-    incomplete = (measurements.pose == 0) & (measurements.repeat == 1) & (measurements.target == 2)
-    found = noise_from_repeats(model, estimate, measurements.select(~incomplete))
-    assert found.degrees_of_freedom == (9 * 2 + 1) * 9
 
 
 @pytest.mark.parametrize("rows", [3, 6])
@@ -141,19 +106,6 @@ def test_a_few_wild_repeats_do_not_raise_the_noise(fanuc, rows):
     assert 0.85 * clean.degrees_of_freedom < found.degrees_of_freedom < clean.degrees_of_freedom
     # These targets tell little of the joints of the wrist.
     np.testing.assert_allclose(found.joint_rad[:3], clean.joint_rad[:3], rtol=0.15)
-
-
-def test_declared_noise_is_that_of_the_campaign(fanuc):
-    assert declared_noise(campaign(fanuc)) is None
-    found = declared_noise(campaign(fanuc, position_m=1e-4))
-    assert (found.position_m, found.orientation_rad, found.source) == (1e-4, 1e-4, "declared")
-    assert not found.joint_rad.any() and found.usual_m == 0.0
-
-
-@pytest.mark.parametrize("joints", [2e-5, [1e-5, 2e-5, 3e-5, 0.0, 0.0, 1e-6]])
-def test_repeatability_of_joints_may_be_declared_for_all_or_for_each(fanuc, joints):
-    found = declared_noise(campaign(fanuc, position_m=1e-4, joint_rad=joints))
-    np.testing.assert_array_equal(found.joint_rad, np.broadcast_to(joints, 6))
 
 
 def test_uncertainties_of_measurements_are_the_declared_noise(fanuc):
@@ -178,11 +130,6 @@ def test_repeats_of_positions_that_are_stated_to_be_worse_are_weighed_accordingl
     np.testing.assert_allclose(found.position_m, usual, rtol=0.05)
 
 
-def test_nothing_said_of_noise_is_a_warning(fanuc):
-    noise, warnings = chosen_noise(campaign(fanuc), *drawn(fanuc, 10, repeats=1))
-    assert noise is None and len(warnings) == 1 and "noise" in warnings[0]
-
-
 @pytest.mark.parametrize(("factor", "warned"), [(1.0, False), (2.0, True), (0.5, True)])
 def test_declared_noise_is_checked_against_repeats_which_are_used(fanuc, factor, warned):
     drawn_data = drawn(fanuc, 11)
@@ -197,30 +144,18 @@ def test_declared_noise_is_checked_against_repeats_which_are_used(fanuc, factor,
 @pytest.mark.parametrize("rows", [3, 6])
 def test_derivatives_of_the_likelihood_agree_with_differences(fanuc, rows, monkeypatch):
     seen = {}
-    real = noise_module.minimize
+    real = optimize.minimize
 
     def spy(function, start, data, *rest, **options):
         seen.update(function=function, start=start, data=data)
         return real(function, start, data, *rest, **options)
 
-    monkeypatch.setattr(noise_module, "minimize", spy)
+    monkeypatch.setattr(optimize, "minimize", spy)
     noise_from_repeats(*drawn(fanuc, 2, poses=8, joint_rad=2e-5, rows=rows))
     at = seen["start"] + np.random.default_rng(3).normal(0, 0.2, len(seen["start"]))
     slope = seen["function"](at, *seen["data"])[1]
     error = check_grad(lambda x: seen["function"](x, *seen["data"])[0], lambda x: seen["function"](x, *seen["data"])[1], at)
     assert error < 1e-4 * np.linalg.norm(slope)
-
-
-@pytest.mark.parametrize("rows", [3, 6])
-def test_repeats_that_do_not_differ_say_nothing(fanuc, rows):
-    """A sensor that stands still has no noise to be found; what is declared is used."""
-    model, estimate, measurements = drawn(fanuc, 1, rows=rows)
-    still = replace(measurements, position=np.ones_like(measurements.position))
-    if rows == 6:
-        still = replace(still, rotation_vector=np.zeros_like(still.rotation_vector))
-    assert noise_from_repeats(model, estimate, still) is None
-    taken, warnings = chosen_noise(campaign(fanuc, position_m=5e-5), model, estimate, still)
-    assert taken.source == "declared" and warnings == []
 
 
 HANDS = tuple(Target(name, "hand", (0.0, 0.0, 0.0)) for name in "AB")
@@ -284,24 +219,6 @@ def test_positions_and_orientations_must_both_differ_by_more_than_a_sensor_can_r
     assert (found is not None) == told
     if told:
         assert (found.position_m, found.orientation_rad) == pytest.approx((position_m, orientation_rad), rel=1e-6)
-
-
-@pytest.mark.parametrize(("poses", "told"), [(2, False), (3, True)])
-def test_nine_contrasts_of_repeats_are_the_fewest_that_say_anything(poses, told):
-    model, estimate = gantry()
-    found = noise_from_repeats(model, estimate, off_by(model, mirrored(SENSOR_M * np.ones((poses, 1, 3)))))
-    assert (found is not None) == told
-    assert not told or found.degrees_of_freedom == 9
-
-
-@pytest.mark.parametrize(("poses", "told"), [(19, False), (20, True)])
-def test_sixty_contrasts_of_repeats_are_the_fewest_that_separate_the_joints_from_the_sensor(poses, told):
-    model, estimate = gantry()
-    parts = SENSOR_M * np.array([20.0, 1.0, 1.0]) * np.ones((poses, 1, 3))
-    found = noise_from_repeats(model, estimate, off_by(model, mirrored(parts)))
-    assert found.degrees_of_freedom == 3 * poses and found.joint_rad.any() == told
-    # Without a part of the joints all directions count alike.
-    assert found.position_m == pytest.approx(SENSOR_M * (1.0 if told else np.sqrt((20**2 + 2) / 3)), rel=1e-3)
 
 
 @pytest.mark.parametrize("rows", [3, 6])
@@ -400,22 +317,6 @@ def test_declared_noise_is_doubted_beyond_the_range_of_chance_in_a_hundred_campa
     for share, warned in ((0.999, end == 0), (1.001, end == 1)):
         declared = campaign(fanuc, position_m=SENSOR_M / (share * limit))
         assert len(chosen_noise(declared, model, estimate, measurements)[1]) == warned
-
-
-def test_nothing_declared_and_repeats_that_tell_is_no_warning(fanuc):
-    model, estimate = gantry()
-    noise, warnings = chosen_noise(campaign(fanuc), model, estimate, off_by(model, mirrored(SENSOR_M * np.ones((3, 1, 3)))))
-    assert noise.source == "repeats" and warnings == []
-
-
-def test_noise_of_single_measurements_is_scaled_and_what_a_pose_has_in_common_is_not():
-    noise = Noise("repeats", 1.0, 2.0, np.array([3.0, 4.0]), 50, 5.0)
-    found = noise.scaled(10.0)
-    assert (found.position_m, found.orientation_rad, found.joint_rad.tolist()) == (10.0, 20.0, [30.0, 40.0])
-    assert (found.source, found.degrees_of_freedom, found.pose_rad) == ("repeats", 50, 5.0)
-    alone = noise.of_measurements
-    assert (alone.position_m, alone.orientation_rad, alone.joint_rad.tolist()) == (1.0, 2.0, [3.0, 4.0])
-    assert alone.pose_rad == 0.0
 
 
 @pytest.mark.parametrize("rows", [3, 6])

@@ -53,11 +53,6 @@ def test_a_residual_finer_than_any_sensor_is_taken_as_what_a_sensor_resolves(fan
         assert found == pytest.approx(max(np.sqrt((part**2).mean()), FINEST), rel=1e-6)
 
 
-def test_declared_noise_is_taken_as_it_is_where_nothing_is_repeated(fanuc):
-    noise, warnings = estimated_noise(case_of(fanuc, errors(1, 70e-6), noise={"position_m": 1e-5, "orientation_rad": 2e-5}))
-    assert (noise.source, noise.position_m, noise.orientation_rad, warnings) == ("declared", 1e-5, 2e-5, [])
-
-
 def test_repeats_come_before_the_residual(fanuc):
     """Measurements a millimetre off the model and repeated to some hundredths."""
     noise, warnings = estimated_noise(case_of(fanuc, 1e-3 + errors(1, 30e-6, 2), 1e-3 + errors(2, 15e-6, 2), repeats=2))

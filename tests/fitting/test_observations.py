@@ -46,16 +46,6 @@ def test_repeats_of_a_pose_are_averaged():
     assert found.rotation is None and found.rows == 3
 
 
-def test_joint_angles_wrench_time_and_temperature_are_averaged_with_their_measurements():
-    time, warm = np.array([0.0, 2.0, 4.0, 8.0]), np.array([20.0, 21.0, 22.0, 25.0])
-    taken = measurements(FOUR, time_s=time, temperature_c=warm)
-    states = averaged(taken).states
-    np.testing.assert_allclose(states.time_s, [1.0, 6.0])
-    np.testing.assert_allclose(states.temperature_c, [20.5, 23.5])
-    np.testing.assert_allclose(states.joint_angles, taken.joint_angles.reshape(2, 2, 2).mean(axis=1))
-    np.testing.assert_allclose(states.wrench, taken.wrench.reshape(2, 2, 6).mean(axis=1))
-
-
 def test_sessions_poses_loads_and_targets_are_kept_apart():
     keys = [(s, p, load, r, t) for s in (0, 3) for p in (2, 7) for load in (0, 1) for r in (0, 1, 2) for t in (0, 1)]
     found = averaged(measurements(keys))
@@ -72,11 +62,6 @@ def test_cluster_is_the_pose_with_all_its_loads_in_its_session():
     found = averaged(measurements(keys))
     np.testing.assert_array_equal(state_clusters(found.states), [0, 0, 1, 1, 2, 2, 3, 3])
     np.testing.assert_array_equal(found.cluster, np.repeat([0, 1, 2, 3], 4))
-
-
-def test_clusters_of_measurements_are_in_the_order_of_the_file():
-    keys = [(1, 4, 0, 0, 0), (0, 9, 1, 0, 0), (0, 4, 0, 0, 0), (1, 4, 1, 2, 1), (0, 9, 0, 1, 0)]
-    np.testing.assert_array_equal(state_clusters(measurements(keys)), [2, 1, 0, 2, 1])
 
 
 def test_approaches_from_different_sides_are_different_states():
@@ -125,11 +110,6 @@ def test_each_approach_is_a_state_and_knows_the_averaged_one():
             np.testing.assert_allclose(together.position[(together.state == state) & (together.target == target)][0], mean)
 
 
-def test_each_approach_does_not_mix_approaches_from_different_sides():
-    approach = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, 1.0]])
-    assert each_approach(measurements(FOUR, approach=approach))[1].tolist() == [0, 1, 2, 2]
-
-
 def full_measurements(seed, loads=2):
     rng = np.random.default_rng(seed)
     keys = [(s, p, load, r, t) for s in (0, 1) for p in range(3) for load in range(loads) for r in (0, 1) for t in (0, 1)]
@@ -176,13 +156,6 @@ def test_selected_states_are_those_of_the_selected_measurements(kept):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-14)
 
 
-def test_covariates_that_are_not_there_stay_absent():
-    taken = replace(full_measurements(0), rotation_vector=None, approach=None, time_s=None, temperature_c=None)
-    for found in (averaged(taken), each_approach(taken)[0], select_states(averaged(taken), np.arange(12) < 5)):
-        states = found.states
-        assert found.rotation is None and states.approach is None and states.time_s is None and states.temperature_c is None
-
-
 def repeated(repeats, poses=30, seed=0, targets=2, single=0):
     """Measurements with unit noise of poses with so many repeats, and of further ones without."""
     keys = [(0, p, 0, r, t) for p in range(poses + single) for r in range(repeats if p < poses else 1) for t in range(targets)]
@@ -206,62 +179,10 @@ def test_a_wild_repeat_leaves_and_all_others_stay(repeats, off):
         assert rows_lost(replace(taken, position=moved)) == [outlying + 1]
 
 
-def test_wild_repeats_of_many_states_leave_together():
-    taken = repeated(4, poses=60, seed=2)
-    outlying = np.random.default_rng(2).permutation(60)[:10] * 8
-    moved = taken.position.copy()
-    moved[outlying] += 40.0
-    assert rows_lost(replace(taken, position=moved)) == sorted(outlying + 1)
-
-
-def test_of_two_repeats_neither_leaves():
-    """Nor where others are repeated often enough to tell what is usual."""
-    pairs, fives = repeated(2, seed=3), repeated(5, seed=3)
-    pairs.position[3] += 1e3
-    assert rows_lost(pairs) == []
-    kept = ~((fives.pose < 10) & (fives.repeat > 1))
-    fives.position[1] += 1e3
-    assert fives.pose[1] == 0 and rows_lost(fives.select(np.flatnonzero(kept))) == []
-
-
 @pytest.mark.parametrize("repeats", [3, 4, 5, 6, 9])
 def test_clean_noise_loses_nothing(repeats):
     """Of 3,600 poses: a rate of 1 in 1,000 is seen with a power of 0.97."""
     assert sum(len(rows_lost(repeated(repeats, poses=60, seed=seed))) for seed in range(60)) == 0
-
-
-def test_three_repeats_read_to_few_digits_lose_nothing():
-    """More than half of them are not off their middle at all."""
-    taken = repeated(3, seed=4)
-    assert rows_lost(replace(taken, position=2 * np.round(taken.position / 2))) == []
-
-
-def test_states_without_repeats_are_left_as_they_are():
-    single = repeated(1, seed=5)
-    single.position[4] += 1e6
-    assert without_outlying_repeats(single) is single
-    mixed = repeated(4, seed=6, single=200)
-    alone = np.flatnonzero(mixed.pose >= 30)
-    mixed.position[alone] += 1e6 * np.random.default_rng(7).standard_normal((len(alone), 3))
-    assert rows_lost(mixed) == []
-
-
-def test_targets_loads_and_approaches_are_no_repeats_of_each_other():
-    """Nobody is outlying for being elsewhere than another state, target or sense of approach."""
-    keys = [(0, p, load, r, t) for p in range(5) for load in (0, 1) for r in range(8) for t in (0, 1)]
-    _, pose, load, repeat, target = np.array(keys).T
-    side = repeat % 2
-    away = 1e3 * np.column_stack([load, target, side]) + 1e4 * pose[:, None]
-    noise = np.random.default_rng(8).standard_normal((len(keys), 3))
-    approach = np.column_stack([2.0 * side - 1, np.ones(len(keys))])
-    assert rows_lost(measurements(keys, away + noise, approach=approach)) == []
-
-
-def test_wild_repeats_leave_in_any_order_of_the_rows():
-    taken = repeated(5, seed=9, single=7)
-    taken.position[[2, 40, 91]] += 50.0
-    shuffled = taken.select(np.random.default_rng(10).permutation(len(taken)))
-    assert rows_lost(shuffled) == rows_lost(taken) == [3, 41, 92]
 
 
 @pytest.mark.parametrize("group", [[0, 0, 1, 3, 3, 4], [3, 0, 4, 3, 0, 1]], ids=["rising", "in any order"])

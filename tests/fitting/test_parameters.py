@@ -55,14 +55,6 @@ def test_step_of_every_parameter_can_be_taken_back_to_second_order(full_case):
     np.testing.assert_array_equal(there.target_offset[1], (0.1, 0.0, -0.2))
 
 
-def test_steps_keep_rotations_orthonormal_and_shapes_in_their_range(full_case):
-    model, estimate, _ = full_case
-    there = stepped(model, estimate, np.full(len(parameters(model, estimate)), 1e4))
-    for turn in (*there.frame_rotation, *there.target_rotation):
-        np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-10)
-    assert there.shapes[1][0] == model.effects[1].shapes[0].highest
-
-
 @pytest.fixture
 def two_laws(fanuc):
     """A model of two laws with a shape of one name, and one without, somewhere."""
@@ -84,13 +76,6 @@ def test_only_shapes_have_limits_each_those_of_its_own_law(two_laws):
     np.testing.assert_array_equal(found, expected)
     np.testing.assert_array_equal(nonlinear_parameters(model, estimate), np.isfinite(expected[:, 0]))
     assert np.isfinite(expected).sum() == 4
-
-
-def test_a_model_without_effects_has_no_limits_and_no_shapes(fanuc):
-    model = model_of(fanuc)
-    estimate = made_estimate(model)
-    assert np.isinf(limits(model, estimate)).all() and limits(model, estimate).shape == (9, 2)
-    assert not nonlinear_parameters(model, estimate).any()
 
 
 @pytest.mark.parametrize(("step", "end"), [(-1e9, "lowest"), (1e9, "highest")])

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from support import OTHER_CHAINS, chain_of
+from support import chain_of
 from synthetic import made_estimate, made_model, made_states, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
-from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.prediction import residuals
 from elastocal.fitting.registration import registered
@@ -44,46 +43,6 @@ def test_frames_and_targets_are_found(fanuc, rows, sessions, targets):
     assert_known(found, true, rows)
 
 
-@pytest.mark.parametrize("name", OTHER_CHAINS)
-def test_frames_and_targets_are_found_on_other_chains(name):
-    chain = chain_of(OTHER_CHAINS[name])
-    model = made_model(chain)
-    states = unloaded(made_states(chain.coordinates, 40, seed=3, span=2.5))
-    true = made_estimate(model, seed=4)
-    found = registered(model, seen_exactly(model, true, states))
-    off = residuals(model, found, seen_exactly(model, true, states), conditions(model, found, states))
-    assert np.abs(off).max() < KNOWN_M
-
-
-def one_joint_at_a_time(joints, steps):
-    """Sweeps from a home pose, as a circle-point measurement makes them."""
-    states = unloaded(made_states(joints, joints * steps, seed=5))
-    states.joint_angles[:] = np.linspace(0.1, 0.6, joints)
-    for joint in range(joints):
-        states.joint_angles[joint * steps : (joint + 1) * steps, joint] += np.linspace(-0.8, 0.8, steps)
-    return states
-
-
-@pytest.mark.parametrize("sessions", [(0,), (0, 1)])
-def test_frames_and_targets_are_found_from_one_joint_at_a_time(fanuc, sessions):
-    model = made_model(fanuc.chain)
-    states = one_joint_at_a_time(6, 12)
-    states.session[:] = np.arange(len(states)) % len(sessions)
-    true = made_estimate(model, sessions, seed=6)
-    assert_known(registered(model, seen_exactly(model, true, states)), true)
-
-
-def test_known_frame_and_known_target_are_kept(fanuc):
-    targets = (Target("A", "6DoF", (0.1, -0.05, 0.2)), Target("B", "4DoF", None))
-    model = made_model(fanuc.chain, targets, fitted_frames=False)
-    states, true = unloaded(made_states(6, 15, seed=7)), made_estimate(model, seed=8)
-    found = registered(model, seen_exactly(model, true, states))
-    np.testing.assert_array_equal(found.frame_rotation, [np.eye(3)])
-    np.testing.assert_array_equal(found.frame_position, [np.zeros(3)])
-    np.testing.assert_array_equal(found.target_offset[0], (0.1, -0.05, 0.2))
-    assert_known(found, true)
-
-
 def test_a_known_mount_keeps_its_turn_and_an_unknown_one_is_found(fanuc):
     targets = (Target("A", "6DoF", None, (0.1, -1.5, 0.2)), Target("B", "4DoF", (0.1, 0.0, 0.2), None))
     for fitted_frames in (False, True):
@@ -115,17 +74,6 @@ def test_noise_moves_the_frame_by_no_more_than_noise(fanuc):
     # seen with a power of 0.98.
     low, high = chi2.ppf([1e-3, 1 - 1e-3], off.size - 9)
     assert low < (off**2).sum() / 1e-4**2 < high
-
-
-def test_effects_start_at_zero_and_compliances_at_their_nominal_values(fanuc):
-    known = candidates_on(made_model(fanuc.chain).sites)
-    effects = known["joint_offset@2"], known["lost_motion@3"]
-    model = made_model(fanuc.chain, effects=effects, identified=True, compliance=fanuc.compliance)
-    states = unloaded(made_states(6, 20, seed=14))
-    found = registered(model, seen_exactly(model, made_estimate(model, seed=15), states))
-    np.testing.assert_array_equal(found.coefficients[0], fanuc.compliance)
-    assert [values.tolist() for values in found.coefficients[1:]] == [[0.0], [0.0]]
-    assert [values.tolist() for values in found.shapes] == [[], [], [effects[1].shapes[0].start]]
 
 
 def test_a_target_without_a_measurement_stays_where_it_was(fanuc):

@@ -67,42 +67,6 @@ def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad, stat
     np.testing.assert_allclose(factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7)
 
 
-def test_without_an_error_of_the_pose_rows_are_those_of_the_cholesky_factor_itself(case):
-    seen, jacobian = case
-    factor = np.linalg.cholesky(dense_covariance(seen, jacobian, NOISE))
-    values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
-    found = whitening(seen, jacobian, NOISE).apply(values)
-    expected = np.linalg.solve(factor, values.reshape(-1, 5)).reshape(values.shape)
-    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
-
-
-def test_noise_of_measurements_is_the_noise_without_what_a_pose_has_in_common(case):
-    seen, jacobian = case
-    values = np.random.default_rng(6).standard_normal((len(seen), seen.rows))
-    noise = replace(NOISE, pose_rad=1e-3)
-    found = [whitening(seen, jacobian, each).apply(values) for each in (noise.of_measurements, NOISE)]
-    np.testing.assert_array_equal(*found)
-    # A factor on the noise of measurements leaves what a pose has in common.
-    assert (noise.scaled(2.0).pose_rad, noise.scaled(2.0).position_m) == (1e-3, 2 * NOISE.position_m)
-
-
-def test_rows_of_one_and_of_many_columns_are_whitened_alike(case):
-    seen, jacobian = case
-    values = np.random.default_rng(3).standard_normal((len(seen), seen.rows, 2, 3))
-    by = whitening(seen, jacobian, NOISE)
-    found = by.apply(values)
-    np.testing.assert_allclose(by.apply(values[:, :, 1, 2]), found[:, :, 1, 2], rtol=1e-12)
-
-
-def test_sensor_alone_only_divides(case):
-    seen, jacobian = case
-    values = np.random.default_rng(5).standard_normal((len(seen), seen.rows))
-    found = whitening(seen, jacobian, replace(NOISE, joint_rad=np.zeros(6))).apply(values)
-    deviation = np.array([60e-6] * 3 + [40e-6] * 3)[: seen.rows]
-    expected = values / deviation * np.sqrt(seen.states.repeats[seen.state])[:, None]
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
-
-
 def test_the_error_of_a_pose_is_not_averaged_by_repeats(case):
     """All of a pose moves together: as many times as it is read, its whitened size is that of one measurement."""
     seen, jacobian = case
@@ -122,16 +86,6 @@ def test_sensitivities_to_what_displaces_a_state_are_whitened_through_the_jacobi
     np.testing.assert_allclose(by.apply(jacobian) @ displaced, by.apply(jacobian @ displaced), rtol=1e-9, atol=1e-6)
 
 
-def test_stated_uncertainties_whiten_where_nothing_is_correlated(case):
-    seen, jacobian = case
-    seen = replace(seen, position_std=np.random.default_rng(3).uniform(2e-5, 3e-4, len(seen)))
-    noise = Noise("declared", 60e-6, 40e-6, np.zeros(6), usual_m=1e-4)
-    values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
-    found = whitening(seen, None, noise).apply(values).reshape(-1, 5)
-    deviation = np.sqrt(np.diag(dense_covariance(seen, jacobian, noise)))
-    np.testing.assert_allclose(found, values.reshape(-1, 5) / deviation[:, None], rtol=1e-12)
-
-
 @pytest.mark.parametrize("noise", [NOISE, replace(NOISE, joint_rad=np.zeros(6)), replace(NOISE, pose_rad=1e-4)])
 def test_a_whitening_after_matrices_is_that_of_what_these_make(case, noise):
     seen, jacobian = case
@@ -140,14 +94,3 @@ def test_a_whitening_after_matrices_is_that_of_what_these_make(case, noise):
     values = rng.standard_normal((len(seen), seen.rows, 3))
     by = whitening(seen, jacobian, noise)
     np.testing.assert_allclose(by.after(maps).apply(values), by.apply(maps @ values), rtol=1e-8, atol=1e-6)
-
-
-def test_observations_that_follow_each_other_are_whitened_as_those_that_are_gathered(case):
-    """Each in a state of its own, in order and backwards."""
-    seen, jacobian = case
-    some = np.flatnonzero(np.diff(seen.state, prepend=-1))
-    alone = Observations(seen.states, seen.state[some], seen.target[some], seen.position[some], None)
-    values = np.random.default_rng(8).standard_normal((len(some), alone.rows, 2))
-    forward = whitening(alone, jacobian[some, : alone.rows], NOISE)
-    backward = replace(forward, blocks=tuple((members[::-1], factor[::-1]) for members, factor in forward.blocks))
-    np.testing.assert_allclose(forward.apply(values), backward.apply(values), rtol=1e-12)

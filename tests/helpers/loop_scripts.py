@@ -5,11 +5,11 @@ import sys
 from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "workflow" / "scripts"
-PARAMS = {"seed": 1, "states": 4}
 CONFIG = {"origin": {"commit": "c0ffee", "configuration_sha256": "d16e57", "seed": 1}}
 ANALYSIS = ("read_campaign", "diagnose_campaign", "judge_campaign")
 FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
-STEPS = (*ANALYSIS, *(f"draw_{figure}" for figure in FIGURES), "compile_loop_report")
+PARAMS = {"seed": 1, "states": 4, "figures": FIGURES}
+STEPS = (*ANALYSIS, "draw_campaign", "compile_loop_report")
 # Names of the rules' files by which others know them; what is not listed is a Parquet table.
 SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")
 SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv") | {"report": ".pdf", "page": ".html"}
@@ -61,9 +61,10 @@ def run_loop(folder, robots, out, steps=STEPS):
             wildcards=_Named(campaign=folder.name),
             log=[(out / f"{script}.log").as_posix()],
         )
-        if script.startswith("draw_"):
-            figure = script.removeprefix("draw_")
-            job.output = _Named({kind: (out / f"{figure}.{kind}").as_posix() for kind in ("pdf", "png")})
+        if script == "draw_campaign":
+            job.output = _Named(
+                {kind: [(out / f"{figure}.{kind}").as_posix() for figure in FIGURES] for kind in ("pdf", "png")}
+            )
         run_script(script, job)
     return out
 

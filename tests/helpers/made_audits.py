@@ -1,11 +1,18 @@
-"""A folder with the few files that a check of an audit reads, made without a run."""
+"""Folders with the few files that a check of an audit reads, made without a run; errors planted into them, checksums forged."""
+
+import contextlib
+import json
 
 import numpy as np
 import pandas as pd
+import pinocchio as pin
+import pyarrow as pa
+import pyarrow.parquet as pq
 
+from elastocal.io.origin import Origin
+from elastocal.io.records import JobRecord, write_records
 from elastocal_proof.audit.arm import Arm
-from elastocal_proof.audit.audited import COMPONENTS, WRENCH, Audited
-from elastocal_proof.audit.streams import numbers
+from elastocal_proof.audit.audited import COMPONENTS, WRENCH, Audited, numbers
 
 ROBOT = {
     "name": "two joints",
@@ -16,68 +23,80 @@ ROBOT = {
 STRATEGY = {"name": "hand alone", "stages": [{"points": ["hand"], "joints": [1, 2]}]}
 CONFIGURATION = {
     "seed": 1,
-    "robots": ["two"],
-    "strategies": ["hand"],
-    "noise_um": [0, 100],
     "data_sets": 4,
     "configurations": 5,
     "test_configurations": 6,
     "loading": {"force_N": 500.0, "offset_m": [0, 0.5, 0]},
     "interpretations": {
         **{"joint_range": "full_turn", "offset_frame": "base", "measured": "pose", "tool_offset_m": [0, 0, 0]},
-        **{"wrench_at": "end_effector", "average": "stiffness", "deviation_of": "averaged_model"},
+        "wrench_at": "end_effector",
     },
-    "identification": {"solver": "equation_11", "start_urad_per_Nm": 1},
-    "evaluation": {"bootstrap_replicates": 10, "lengths": [5]},
-    "tables": {"noise_um": 100, "length": 5},
-    "questions": {},
+    "identification": {"solver": "equation_11"},
 }
 
 
 def made_run(folder):
-    """Experiments, exact and noisy deflections of one robot, by pinocchio."""
-    run = Audited(folder, CONFIGURATION, {"two": ROBOT}, {"hand": STRATEGY}, 4)
-    arm = Arm(ROBOT)
-    for test, sets, count in (("", 4, 5), ("/test", 1, 6)):
-        purpose = "test" if test else "identification"
-        rows, moved = [], []
-        for data_set in range(sets):
-            turns = numbers(1, "two", f"{purpose}/joint angles", data_set).random((count, 2))
-            normal = numbers(1, "two", f"{purpose}/force", data_set).standard_normal((count, 3))
-            for k, (q, f) in enumerate(zip(2 * np.pi * turns - np.pi, normal, strict=True)):
-                force = 500 * f / np.linalg.norm(f)
-                wrench = np.concatenate([force, np.cross([0, 0.5, 0], force)])
-                rows.append([data_set, k, *q, *wrench])
-                moved.append([data_set, k, *arm.deflection(q, wrench, "hand", "end_effector")])
-        place = folder / f"data/simulated/two{test}"
-        place.mkdir(parents=True, exist_ok=True)
-        names = ["data_set", "configuration"]
-        pd.DataFrame(rows, columns=[*names, "q1", "q2", *WRENCH]).to_parquet(place / "experiments.parquet")
-        ideal = pd.DataFrame(moved, columns=[*names, *COMPONENTS]).assign(point="hand")
-        ideal.to_parquet(place / "ideal.parquet")
-    (folder / "data/simulated/two/100um").mkdir()
-    noise = np.concatenate([numbers(1, "two", "noise/hand", k).standard_normal((5, 6)) for k in range(4)])
-    clean = pd.read_parquet(folder / "data/simulated/two/ideal.parquet")
-    clean[list(COMPONENTS)] += 1e-4 * noise
-    clean.to_parquet(folder / "data/simulated/two/100um/measured.parquet")
-    return run
+    """Experiments, exact and noisy deflections and estimates of one robot, by pinocchio."""
+    arm, place, read = Arm(ROBOT), folder / "data/simulated/two", ["data_set", "configuration"]
+    experiments, deflections, noises, found = [], [], [], []
+    for data_set in range(4):
+        turns = numbers(1, "two", "identification/joint angles", data_set).random((5, 2))
+        normal = numbers(1, "two", "identification/force", data_set).standard_normal((5, 3))
+        noise, matrices = numbers(1, "two", "noise/hand", data_set).standard_normal((5, 6)), []
+        for k, (q, f) in enumerate(zip(2 * np.pi * turns - np.pi, normal, strict=True)):
+            force = 500 * f / np.linalg.norm(f)
+            wrench = np.concatenate([force, np.cross([0, 0.5, 0], force)])
+            still, moved = (arm.pose(at, "hand") for at in (q, arm.loaded(arm.springs, q, wrench, 1)[0]))
+            experiments.append([data_set, k, *q, *wrench])
+            deflections.append([*(moved[0] - still[0]), *pin.log3(moved[1] @ still[1].T)])
+            noises.append(1e-4 * noise[k])
+            matrices.append(arm.regressor(q, wrench, "hand"))
+            seen = np.concatenate((np.array(deflections) + noises)[-len(matrices) :])
+            found.append([data_set, k + 1, *np.linalg.lstsq(np.concatenate(matrices), seen, rcond=None)[0]])
+    tables = {"experiments": pd.DataFrame(experiments, columns=[*read, "q1", "q2", *WRENCH])}
+    for name, moved in (("ideal", np.array(deflections)), ("100um/measured", np.array(deflections) + noises)):
+        tables[name] = tables["experiments"][read].assign(point="hand", **dict(zip(COMPONENTS, moved.T, strict=True)))
+    (place / "100um").mkdir(parents=True)
+    for name, table in tables.items():
+        table.to_parquet(place / f"{name}.parquet")
+    (folder / "results/identified/two/100um").mkdir(parents=True)
+    names = ["data_set", "length", "c1", "c2"]
+    pd.DataFrame(found, columns=names).to_parquet(folder / "results/identified/two/100um/hand.parquet")
+    return Audited(folder, CONFIGURATION, {"two": ROBOT}, {"hand": STRATEGY}, 20)
 
 
-def altered(run, file, column, row, by):
-    """Add to one value of a file, and read it again."""
-    frame = pd.read_parquet(run.folder / file)
-    frame.loc[row, column] += by
-    frame.to_parquet(run.folder / file)
-    for kept in (run.table, run.experiments, run.deflections):
-        kept.cache_clear()
+def forge(folder, file):
+    """Record a file's checksum as if a job had written it."""
+    with contextlib.chdir(folder):
+        write_records(JobRecord("forged", {}, "", "", {}, (), (file,), Origin("c0ffee", "d16e57", 1), {}))
 
 
-def failed_table(run, room, name, table):
-    """What of a table of the study does not hold once it is written; `room`: the module that follows it."""
-    file = f"reports/tables/{name}.csv"
-    (run.folder / file).parent.mkdir(parents=True, exist_ok=True)
-    table.to_csv(run.folder / file, index=False)
-    return failed(room.tables(run, file, name))
+@contextlib.contextmanager
+def altered(folder, file, at, change):
+    """The block finds a value of a document (by keys) or table (by column and row) changed, the checksum of the file forged."""
+    paths = [folder / file, folder / f"results/records/{file}.json"]
+    before = [path.read_bytes() if path.is_file() else None for path in paths]
+    if file.endswith(".json"):
+        document = inner = json.loads(before[0])
+        *way, last = at
+        for key in way:
+            inner = inner[key]
+        inner[last] = change(inner[last])
+        paths[0].write_text(json.dumps(document), encoding="utf-8")
+    else:
+        table, (column, row) = pq.ParquetFile(paths[0]).read(), at
+        values = table.column(column).to_numpy().copy()
+        values[row] = change(values[row])
+        field = table.schema.get_field_index(column)
+        pq.write_table(
+            table.set_column(field, table.schema.field(field), pa.array(values, table.schema.types[field])), paths[0]
+        )
+    forge(folder, file)
+    try:
+        yield
+    finally:
+        for path, content in zip(paths, before, strict=True):
+            path.unlink() if content is None else path.write_bytes(content)
 
 
 def failed(findings):

@@ -1,4 +1,4 @@
-"""A folder with a blind proof, a closed loop, a plan and a league, their tables made by the functions of the pipeline."""
+"""A folder with a blind proof, a closed loop and a league, their tables made by the functions of the pipeline."""
 
 import hashlib
 import json
@@ -6,15 +6,14 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
+from made_audits import forge
 from made_blind_documents import effect, oracle, truth, verdict
 from made_leagues import made_entries
-from planted_errors import forge
 
 from elastocal import __version__
 from elastocal.io.data_frames import write_csv
 from elastocal.io.storage import write_table
 from elastocal.random_streams import stream
-from elastocal_proof.audit.audited import Audited
 from elastocal_proof.blind import schemas as of_blind
 from elastocal_proof.blind.bad_rows_summary import judge_cases, summarize
 from elastocal_proof.blind.calibration import reliability, statements
@@ -43,15 +42,9 @@ _ORIGIN = {
 }
 
 
-def audited_proofs(folder):
-    """The folder as an audit has it at hand."""
-    read = {"tool_offset_m": [0, 0, 0], "wrench_at": "end_effector"}
-    return Audited(folder, {"seed": SEED, "league": LEAGUE, "interpretations": read}, {}, {}, 12)
-
-
 def made_proofs(folder):
     """Write all of it, with the checksums that jobs would have kept."""
-    beside = [f"{part}/{name}" for part in ("results", "reports") for name in ("closed_loop", "bad_rows", "planning")]
+    beside = [f"{part}/{name}" for part in ("results", "reports") for name in ("closed_loop", "bad_rows")]
     of_league = ["results/league/one/random", "reports/league/small"]
     for name in ("data/sealed/some_1", "results/blind/oracle", "reports/blind", *beside, *of_league):
         (folder / name).mkdir(parents=True)
@@ -59,9 +52,6 @@ def made_proofs(folder):
     _closed_loop(folder)
     _bad_rows(folder)
     _league(folder)
-    figures = {"poses": 20, "planned_mm": 0.12345678912, "random_mm": 0.2, "random_poses": 28.0}
-    (folder / "results/planning/ur10.json").write_text(json.dumps(figures), encoding="utf-8")
-    write_csv(folder / "reports/planning/gains.csv", pd.DataFrame([{"robot": "ur10"} | figures]))
     files = [path for part in ("data", "results", "reports") for path in sorted((folder / part).rglob("*")) if path.is_file()]
     for path in files:
         forge(folder, path.relative_to(folder).as_posix())

@@ -60,7 +60,7 @@ class Study:
         for name in SOURCES:
             source = REPOSITORY / name
             if source.is_dir():
-                shutil.copytree(source, study.folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
+                shutil.copytree(source, study.folder / name, ignore=shutil.ignore_patterns("*.egg-info"))
             elif source.exists():
                 shutil.copy2(source, study.folder / name)
         if not study.path("README.md").exists():

@@ -31,28 +31,11 @@ def test_a_block_that_fails_leaves_the_old_file_and_no_other(tmp_path, error):
     assert path.read_text(encoding="utf-8") == "old" and list(tmp_path.iterdir()) == [path]
 
 
-def test_a_block_that_fails_before_it_writes_raises_its_own_error(tmp_path):
-    with pytest.raises(ValueError, match="mine"), atomic_write(tmp_path / "one.txt"):
-        raise ValueError("mine")
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_block_that_writes_nothing_is_an_error_and_keeps_the_old_file(tmp_path):
     (tmp_path / "one.txt").write_text("old", encoding="utf-8")
     with pytest.raises(FileNotFoundError), atomic_write(tmp_path / "one.txt"):
         pass
     assert (tmp_path / "one.txt").read_text(encoding="utf-8") == "old"
-
-
-def test_texts_are_written_as_utf_8(tmp_path):
-    write_text(tmp_path / "one.txt", "5 µm\n")
-    assert (tmp_path / "one.txt").read_bytes() == b"5 \xc2\xb5m\n" and len(list(tmp_path.iterdir())) == 1
-
-
-def test_what_was_written_has_the_mode_of_any_new_file(tmp_path):
-    (tmp_path / "usual").touch()
-    write_text(tmp_path / "mine", "x")
-    assert (tmp_path / "mine").stat().st_mode == (tmp_path / "usual").stat().st_mode
 
 
 def test_names_on_the_way_are_random_and_opened_exclusively(tmp_path, monkeypatch):

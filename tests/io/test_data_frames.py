@@ -2,7 +2,6 @@
 
 import numpy as np
 import pandas as pd
-from support import refused
 
 from elastocal.io.data_frames import read_frame, read_long, write_csv, write_latex, write_markdown
 from elastocal.io.origin import Origin
@@ -39,13 +38,6 @@ def test_a_frame_has_the_columns_asked_for_in_the_order_of_the_schema(tmp_path):
     assert list(read_frame(tmp_path / "t.parquet", SCHEMA, ["length"])) == ["length"]
 
 
-def test_a_table_of_another_schema_is_refused(tmp_path):
-    write_table(tmp_path / "t.parquet", SCHEMA, [{"number": np.array([3]), "length": np.array([0.5])}], {})
-    other = TableSchema("others", SCHEMA.columns)
-    with refused(tmp_path / "t.parquet", ""):
-        read_frame(tmp_path / "t.parquet", other)
-
-
 def per_joint(joints):
     return TableSchema("angles", tuple(Column(f"q{joint}", "float64", "rad", "an angle") for joint in range(1, joints + 1)))
 
@@ -64,25 +56,3 @@ def test_tables_of_many_robots_are_headed_by_their_origin_and_empty_where_joints
     assert frame.noise_um.tolist() == [200.0, 200.0, 12.5, 12.5]
     np.testing.assert_allclose(frame.q2, [0.2, 0.4, 0.2, 0.4])
     np.testing.assert_allclose(frame.q3, [0.3, 0.6, np.nan, np.nan])
-
-
-def test_no_tables_make_an_empty_frame_with_its_heads():
-    frame = read_long([], per_joint)
-    assert list(frame) == ["robot", "noise_um", "strategy"] and frame.empty
-
-
-def test_a_csv_has_nine_digits_and_the_same_line_ends_everywhere(tmp_path):
-    write_csv(tmp_path / "t.csv", pd.DataFrame({"name": ["a, b"], "x": [1.0 / 3e6], "n": [7], "none": [np.nan]}))
-    assert (tmp_path / "t.csv").read_bytes() == b'name,x,n,none\n"a, b",3.33333333e-07,7,\n'
-
-
-def test_markdown_keeps_the_digits_of_figures_as_they_are_written(tmp_path):
-    write_markdown(tmp_path / "t.md", pd.DataFrame({"mean": ["1.50", "12"]}))
-    rows = (tmp_path / "t.md").read_text(encoding="utf-8").splitlines()
-    assert [row.strip("| ") for row in rows if row.strip("|:- ")] == ["mean", "1.50", "12"]
-
-
-def test_a_latex_table_has_a_left_column_for_each_of_its_own(tmp_path):
-    write_latex(tmp_path / "t.tex", pd.DataFrame({"a": ["1"], "b": ["2"], "c": ["3"]}))
-    text = (tmp_path / "t.tex").read_text(encoding="utf-8")
-    assert r"\begin{tabular}{lll}" in text and r"1 & 2 & 3 \\" in text

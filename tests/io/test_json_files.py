@@ -15,19 +15,9 @@ def test_written_file_has_one_space_of_indent_and_a_final_newline(tmp_path):
     assert read_json(path) == CONTENTS
 
 
-def test_options_are_those_of_json(tmp_path):
-    write_json(tmp_path / "one.json", [1j], default=str)
-    assert read_json(tmp_path / "one.json") == ["1j"]
-
-
 def test_nothing_is_left_of_contents_that_are_no_json(tmp_path):
     path = tmp_path / "one.json"
     write_json(path, CONTENTS)
     with pytest.raises(ValueError, match="JSON compliant"):
         write_json(path, {"rms": float("nan")}, allow_nan=False)
     assert read_json(path) == CONTENTS and list(tmp_path.iterdir()) == [path]
-
-
-def test_files_are_read_as_utf_8(tmp_path):
-    (tmp_path / "one.json").write_bytes('{"unit": "µm"}'.encode())
-    assert read_json(tmp_path / "one.json") == {"unit": "µm"}

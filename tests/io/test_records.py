@@ -60,12 +60,6 @@ def test_a_file_leads_back_to_every_job_behind_it_and_to_no_other(jobs):
     assert [job.name for job in jobs] == ["measure kuka", "fit kuka", "draw kuka"]
 
 
-def test_what_no_job_made_is_the_users_own_or_a_source(jobs):
-    assert jobs[0].own == (OWN,) and jobs[0].made_inputs == {}
-    assert [set(job.sources) for job in jobs] == [{CODE}] * 3
-    assert set(jobs[1].made_inputs) == {MEASURED} and jobs[1].inputs[CODE] == checksum(CODE)
-
-
 def test_records_stand_beside_what_the_pipeline_makes_and_nowhere_else(tmp_path):
     assert sorted(record_of("").parent.rglob("*.json")) == sorted(
         map(record_of, [MEASURED, FITTED, TABLE, DRAWN, "results/other.csv"])
@@ -90,13 +84,6 @@ def test_any_altered_byte_is_found_by_the_next_job_and_by_all_who_follow(output,
 
 
 @pytest.mark.parametrize("output", ALTERED)
-def test_a_deleted_file_is_found(output):
-    Path(ALTERED[output]).unlink()
-    with refused(ALTERED[output], "", "found nothing"):
-        jobs_behind([DRAWN])
-
-
-@pytest.mark.parametrize("output", ALTERED)
 def test_a_missing_record_is_an_error(output):
     record_of(output).unlink()
     with refused(output, "", f"no record of the job that made it, {record_of(output)}"):
@@ -105,33 +92,11 @@ def test_a_missing_record_is_an_error(output):
         input_digests([output])
 
 
-def test_a_file_that_is_added_to_a_folder_is_found_but_for_the_time_that_snakemake_notes_there():
-    Path(MEASURED, ".snakemake_timestamp").touch()
-    jobs_behind([DRAWN])
-    Path(MEASURED, "3.json").touch()
-    with refused(f"{MEASURED}/3.json", "", "other contents"):
-        jobs_behind([DRAWN])
-
-
 def test_a_file_that_was_made_again_since_another_read_it_is_found(jobs):
     Path(FITTED).write_text("another fit", encoding="utf-8")
     write_records(jobs[1])
     with refused(FITTED, "", "not what draw kuka read"):
         jobs_behind([DRAWN])
-
-
-def test_what_is_not_checked_is_taken_as_it_is():
-    Path(FITTED).write_text("altered", encoding="utf-8")
-    assert input_digests([FITTED, CODE], []) == ({FITTED: checksum(FITTED), CODE: checksum(CODE)}, (CODE,))
-
-
-def test_files_of_another_folder_are_found_too(tmp_path, monkeypatch, jobs):
-    (tmp_path / "elsewhere").mkdir()
-    monkeypatch.chdir(tmp_path / "elsewhere")
-    assert jobs_behind([DRAWN], tmp_path) == jobs
-    (tmp_path / FITTED).write_bytes(b"")
-    with refused(tmp_path / FITTED, "", "other contents than were written"):
-        jobs_behind([DRAWN], tmp_path)
 
 
 def test_other_code_than_made_the_results_is_found(jobs):
@@ -151,11 +116,6 @@ def test_a_module_that_is_new_beside_a_catalogue_is_found(jobs):
     Path("src/sag.py").touch()
     with refused("src/sag.py", "", "a module that measure kuka was made without", "a rerun"):
         check_sources([job], "", "a rerun")
-
-
-def test_modules_that_look_up_those_beside_them_are_called_catalogue():
-    package = Path(sys.modules["elastocal"].__file__).parent
-    assert {file.name for file in package.rglob("*.py") if "io.modules import" in file.read_text("utf-8")} == {"catalogue.py"}
 
 
 def test_any_altered_character_of_a_record_is_found():

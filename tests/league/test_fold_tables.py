@@ -1,7 +1,5 @@
 """What is kept of a fold comes back from its tables: entries, and diagnoses as the fits that they were."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from made_folders import made_folder, made_table
@@ -13,7 +11,7 @@ from elastocal.loop.whole import cases_in
 from elastocal_proof.league.fold_tables import entry_columns, fold_facts, fold_fits, mechanism_columns, physics_of_fold
 from elastocal_proof.league.methods import DIAGNOSIS, GEOMETRY, Method, entered, fitted_physics
 from elastocal_proof.league.rounds import held_out_rounds, training_rounds
-from elastocal_proof.league.schemas import ENTRIES, MECHANISMS
+from elastocal_proof.league.schemas import ENTRIES
 
 
 def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
@@ -54,9 +52,3 @@ def test_mechanisms_have_their_probability_and_the_share_that_they_explain(diagn
     # One milliradian where the noise is 60 um: nearly all of the error.
     assert 0.7 < columns["share"][0] <= 1.0
     assert (np.asarray(columns["share"])[1:] < 0.1).all()
-
-
-def test_a_fold_whose_data_are_at_fault_has_no_mechanisms():
-    columns = mechanism_columns(SimpleNamespace(evidence=None), 1)
-    assert list(columns) == [column.name for column in MECHANISMS.columns]
-    assert all(len(values) == 0 for values in columns.values())

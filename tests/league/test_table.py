@@ -1,12 +1,11 @@
 """Figures of the league: errors with intervals, ratios on the same poses, coverage, cost, mechanisms."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from made_leagues import made_entries, made_results
 
 from elastocal_proof.league.methods import Method
-from elastocal_proof.league.table import Result, cost_table, league_table, mechanism_table
+from elastocal_proof.league.table import cost_table, league_table
 
 ROBOTS = {"A robot": ["one"], "Another": ["two"]}
 
@@ -40,19 +39,6 @@ def test_ratios_count_from_the_reference_and_from_the_best_on_the_same_poses(tab
     assert process["ratio_to_best"] == pytest.approx(1.2) == process["ratio_to_best_low"]
 
 
-def test_coverage_is_the_share_of_coordinates_inside_and_missing_without_intervals(table):
-    # 180 coordinates: a standard error of 1.6 %.
-    assert 0.90 < row(table, method="process")["covered"] < 1.0
-    assert np.isnan(row(table)["covered"])
-
-
-def test_poses_of_two_other_data_sets_are_different_poses():
-    entries = made_entries(1e-4, 20)
-    both = pd.concat([entries, entries.assign(set=2)])
-    found = league_table([Result("one", "session", "geometry", both)], ROBOTS, "geometry", 1)
-    assert found["poses"].iloc[0] == 40
-
-
 def test_a_method_that_builds_on_a_diagnosis_bears_its_cost():
     timings = {("one", "random", name): {"seconds": 10.0, "memory_MB": 300.0} for name in ("geometry", "found")}
     diagnosed = {("one", "random"): {"seconds": 40.0, "memory_MB": 700.0}}
@@ -60,12 +46,3 @@ def test_a_method_that_builds_on_a_diagnosis_bears_its_cost():
     found = cost_table(timings, diagnosed, {("one", "random"): 5}, methods).set_index("method")
     assert found.loc["geometry", ["seconds_per_fold", "memory_MB"]].tolist() == [2.0, 300.0]
     assert found.loc["found", ["seconds_per_fold", "memory_MB"]].tolist() == [10.0, 700.0]
-
-
-def test_a_fold_that_does_not_list_a_mechanism_counts_as_without_it():
-    frame = pd.DataFrame({"fold": [1, 2], "mechanism": ["sag", "sag"], "probability": [1.0, 0.8], "share": [0.5, 0.3]})
-    nothing = frame.iloc[:0]
-    found = mechanism_table({"one": frame, "two": nothing}, ROBOTS, folds=4)
-    assert found[["robot", "data", "mechanism"]].to_numpy().tolist() == [["A robot", "one", "sag"]]
-    assert found["probability"].iloc[0] == pytest.approx(0.45) and found["share_low"].iloc[0] == 0.0
-    assert found["share_high"].iloc[0] == 0.5

@@ -1,7 +1,5 @@
 """Contents of a certificate: those of the report where both state them, and what is wanted of it."""
 
-import hashlib
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -48,15 +46,6 @@ def test_a_certificate_passes_below_and_fails_above_what_is_predicted(found, che
         assert certificate(checkout / "made", ROBOTS, diagnosed, wanted)[0]["conformity"]["decision"] == decision
 
 
-def test_it_states_what_it_is_of(found, checkout, diagnosed):
-    document = found[0]
-    assert (document["serial"], document["date"], document["campaign"]) == ("SN 7", "2026-11-23", "made")
-    assert document["files"]["campaign.yaml"] == hashlib.sha256((checkout / "made" / "campaign.yaml").read_bytes()).hexdigest()
-    assert document["origin"] == diagnosed.origin and document["origin"]["commit"] == "c0ffee"
-    assert set(document["versions"]) == {"elastocal", "numpy", "scipy", "python"}
-    json.dumps(document, allow_nan=False)
-
-
 def test_the_worst_pose_is_the_one_of_the_largest_predicted_error(found):
     document = found[0]
     # The largest of many random errors is larger than what any one pose is expected to have.
@@ -78,11 +67,6 @@ def test_a_campaign_compared_with_itself_has_not_changed(found):
     assert comparison["changes"][0]["before"] == comparison["changes"][0]["after"]
 
 
-def test_the_same_seed_gives_the_same_certificate(found, checkout, diagnosed):
-    again, _ = certificate(checkout / "made", ROBOTS, diagnosed, WANTED, diagnosed)
-    assert again == found[0]
-
-
 @pytest.fixture(scope="module")
 def made(kuka):
     return made_calibrated(kuka, *USUAL)
@@ -102,13 +86,3 @@ def test_poses_within_what_was_fitted_are_corrected_and_not_beyond(kuka, made):
     used = use_at(made, states, path_at(made, angles, np.zeros(6)))
     assert not used.outside.any()
     assert np.abs(kuka.model_angles(used.reported_angles) - angles).max() < 0.02
-
-
-@pytest.mark.parametrize("fault", ["a load beyond", "out of reach"])
-def test_a_load_beyond_and_a_pose_out_of_reach_lie_outside(kuka, made, fault):
-    states = planted(kuka, {}, seed=1, poses=20).observations.states
-    wrench = np.array([0.0, 0.0, -1e5, 0.0, 0.0, 0.0]) if fault == "a load beyond" else np.zeros(6)
-    wanted = path_at(made, states.joint_angles[:2], wrench)
-    if fault == "out of reach":
-        wanted = replace(wanted, position=wanted.position + 50.0)
-    assert use_at(made, states, wanted).outside.all()

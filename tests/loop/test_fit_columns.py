@@ -99,13 +99,6 @@ def made_fit(held, covariance):
     return fit_of(model, made_estimate(model), np.array(held), np.array(covariance))
 
 
-def test_a_correlation_is_the_covariance_over_both_deviations():
-    columns = correlation_columns(made_fit([False, False], [[4e-8, 1e-8], [1e-8, 9e-8]]))
-    assert [len(column) for column in columns.values()] == [1, 1, 1]
-    assert {columns["one"][0].split()[0], columns["other"][0].split()[0]} == {"joint_offset@1", "joint_offset@2"}
-    assert columns["correlation"] == pytest.approx([1 / 6])
-
-
 def test_a_parameter_that_is_held_is_in_no_pair_and_has_no_error():
     fitted = made_fit([False, True], [[4e-8, 0.0], [0.0, 0.0]])
     assert not len(correlation_columns(fitted)["correlation"])

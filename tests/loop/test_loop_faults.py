@@ -156,7 +156,9 @@ def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, tmp_path):
     assert verdict["verdict"] == "not_testable" and verdict["effects"] == []
 
 
-@pytest.mark.parametrize(("factor", "words"), [(-1.0, "negative"), (1 / 9.80665, "times nominal")])
+@pytest.mark.parametrize(
+    ("factor", "words"), [(-1.0, "negative"), pytest.param(1 / 9.80665, "times nominal", marks=pytest.mark.slow)]
+)
 def test_compliances_that_no_robot_has_are_a_warning(factor, words, kuka_extended, tmp_path):
     """Of a robot whose links bend too, which the declared one lacks: no single unit explains its deflections."""
     verdict = verdict_of(folder_of(tmp_path / "made", kuka_extended, lambda t: scaled(t, WRENCH, factor), POSE))

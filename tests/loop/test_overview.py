@@ -46,24 +46,6 @@ def test_a_decisive_fault_is_said_and_the_campaign_is_not_diagnosable(kuka, tmp_
     assert any(fault["decisive"] and "joint 3" in fault["sentence"] for fault in facts["faults"])
 
 
-def test_loads_along_one_line_are_suspicious(kuka, tmp_path):
-    table = made_table(kuka, "made")
-    table |= {name: 0.0 * table[name] for name in ("fx", "fy")}
-    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table))
-    assert any("along one line" in sentence for sentence in facts["suspicious"])
-
-
-def test_held_out_values_change_nothing_that_is_said(kuka, tmp_path, facts):
-    """The wall: their readings may be anything."""
-    document = {"poses": [11, 12, 13]}
-    results = []
-    for number, off in enumerate((0.0, 1e-3)):
-        table = made_table(kuka, "made")
-        table["x"] = table["x"] + off * np.isin(table["pose"], document["poses"])
-        results.append(overview_of(made_folder(tmp_path / f"made{number}", kuka, table=table, holdout=document)))
-    assert results[0] == results[1]
-
-
 @pytest.mark.parametrize(
     ("many", "said"), [(4, "all 4 validation poses repeat"), (2, "2 of 4 validation poses repeat"), (0, "")]
 )

@@ -37,30 +37,11 @@ def test_errors_are_distances_in_millimetres_before_and_after():
     assert (row.after_mean_mm, row.after_rms_mm, row.after_max_mm) == pytest.approx((0.2, np.sqrt(0.06), 0.4))
 
 
-def test_all_three_axes_make_one_distance():
-    table = errors([1.0, 1.0])
-    table["before_dy"], table["before_dz"] = 2e-3, -2e-3
-    assert rows_of(one=table).before_rms_mm[0] == pytest.approx(3.0)
-
-
 def test_repeats_of_a_state_are_averaged_before_their_error_is_taken():
     # Noise that cancels between repeats is gone; the mean of 1.5 and -0.5 is left.
     table = errors([1.5, -0.5, 0.25], pose=[4, 4, 7], repeat=[0, 1, 0])
     row = rows_of(one=table).iloc[0]
     assert row.poses == 2 and row.before_mean_mm == pytest.approx(0.375) and row.before_max_mm == pytest.approx(0.5)
-
-
-def test_loads_and_targets_of_a_pose_are_measurements_of_their_own():
-    table = errors([1.0, 3.0, 5.0, 7.0], pose=[2, 2, 2, 2])
-    table["load"], table["target"] = [0, 0, 1, 1], [0, 1, 0, 1]
-    assert rows_of(one=table).before_mean_mm[0] == pytest.approx(4.0)
-
-
-def test_each_session_has_a_row_of_its_own():
-    both = pd.concat([errors([1.0, 1.0], session=0), errors([3.0, 3.0], session=5)])
-    table = rows_of(one=both, other=errors([2.0, 2.0]))
-    found = list(zip(table.campaign, table.session, table.before_rms_mm.round(9), strict=True))
-    assert found == [("one", 0, 1.0), ("one", 5, 3.0), ("other", 0, 2.0)]
 
 
 def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verdicts():
@@ -93,12 +74,6 @@ def test_with_three_poses_the_interval_of_the_rms_is_students_on_the_logarithm()
     reach = np.exp(0.5 * student.ppf(0.975, 2) * error)
     rms = np.sqrt(14 / 3)
     assert (row.before_rms_low_mm, row.before_rms_high_mm) == pytest.approx((rms / reach, rms * reach))
-
-
-def test_an_error_that_halves_everywhere_is_a_reduction_of_a_half_without_an_interval_around_it():
-    before = np.array([1.0, 2.0, 0.5, 1.5, 3.0, 2.5, 1.0, 0.8])
-    row = rows_of(one=errors(before, 0.5 * before)).iloc[0]
-    assert (row.rms_reduction_low, row.rms_reduction_high) == pytest.approx((0.5, 0.5))
 
 
 def test_intervals_follow_from_the_seed_and_hold_the_figures():

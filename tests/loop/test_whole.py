@@ -83,7 +83,7 @@ def verdict_of(path, robot, kind):
     return diagnosed(folder_of(path, robot, kind), ROBOTS, 1)
 
 
-@pytest.mark.parametrize("kind", slow_but(["adequate", "several"], KINDS))
+@pytest.mark.parametrize("kind", slow_but(["several"], KINDS))
 def test_verdict_is(kind, kuka, tmp_path):
     verdict = verdict_of(tmp_path, kuka, kind)
     json.dumps(verdict, allow_nan=False)
@@ -146,6 +146,7 @@ print("\\n".join(opened))
 """
 
 
+@pytest.mark.slow
 def test_diagnosing_process_opens_no_sealed_file(kuka, tmp_path):
     folder = made_folder(tmp_path / "blind" / "case_1", kuka, name="case_1")
     sealed = tmp_path / "sealed" / "case_1.json"
@@ -169,6 +170,7 @@ def test_a_calibration_by_few_poses_is_no_worse_than_none(tmp_path):
     assert np.exp(np.log(ratios).mean()) < 1.03
 
 
+@pytest.mark.slow
 def test_a_lost_beam_changes_nothing_in_what_is_stated_of_the_accuracy(kuka, tmp_path):
     """One row of the held-out poses and one of the fitted ones 50 mm off: both are left out of every figure."""
     table = made_table(kuka, "made", seed=3, plan=USUAL)

@@ -1,14 +1,13 @@
 """The chain notation: what it means, and that every fault is refused in one line."""
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import chain_of, refused
 
-from elastocal.mechanics.chain import Transform, notation, parse_chain, stretches
+from elastocal.mechanics.chain import Transform, parse_chain, stretches
 
 
 def test_each_token_becomes_one_transform():
@@ -28,10 +27,6 @@ def test_each_token_becomes_one_transform():
     assert [(p.name, p.after) for p in chain.points] == [("EE", 8)]
 
 
-def test_minus_sign_of_a_negative_length_is_plus():
-    assert parse_chain("Rz(q1) Tx(-l) [A]", {"l": -0.041}, "test").transforms[1].constant == 0.041
-
-
 def test_points_stand_where_they_are_written_and_the_last_is_the_end_effector():
     chain = chain_of("[base] Rz(q1) Tx(1) [A] Ry(q2) [B] [C]")
     assert [(p.name, p.after) for p in chain.points] == [("base", 0), ("A", 2), ("B", 3), ("C", 3)]
@@ -42,12 +37,6 @@ def test_points_stand_where_they_are_written_and_the_last_is_the_end_effector():
 def test_unknown_point_names_those_of_the_chain():
     with pytest.raises(KeyError, match=r"'C'.*A, B"):
         chain_of("Rz(q1) [A] Ry(q2) [B]").point("C")
-
-
-def test_both_robots_have_the_points_and_joints_of_the_paper(robot):
-    assert [p.name for p in robot.chain.points] == ["2DoF", "3DoF", "4DoF", "6DoF"]
-    assert [robot.chain.moved_by(p) for p in robot.chain.points] == [(0, 1), (0, 1, 2), (0, 1, 2, 3), (0, 1, 2, 3, 4, 5)]
-    assert robot.joints == 6
 
 
 @st.composite
@@ -73,20 +62,6 @@ def written_chains(draw):
 def test_any_written_chain_is_read_as_written(written):
     text, transforms = written
     assert chain_of(text).transforms == transforms
-
-
-@given(written_chains())
-def test_notation_of_a_chain_is_read_as_that_chain(written):
-    chain = chain_of(written[0])
-    again = chain_of(notation(chain))
-    for ours, theirs in zip(again.transforms, chain.transforms, strict=True):
-        assert replace(ours, constant=0.0) == replace(theirs, constant=0.0)
-        assert ours.constant == pytest.approx(theirs.constant, rel=1e-15)
-    assert again.points == chain.points
-
-
-def test_blanks_and_line_breaks_separate_tokens_alike():
-    assert chain_of("Tz(1)\n  Rz(q1)   Tx(2)\t[EE]") == chain_of("Tz(1) Rz(q1) Tx(2) [EE]")
 
 
 @pytest.mark.parametrize(
@@ -119,18 +94,6 @@ def test_blanks_and_line_breaks_separate_tokens_alike():
 def test_faulty_chain_is_refused_in_one_line(text, words):
     with refused("robots/x.yaml", "chain", *words):
         parse_chain(text, {"l1": 1.0, "l2": 2.0}, "robots/x.yaml")
-
-
-def test_length_that_the_chain_does_not_use_is_refused():
-    with refused("robots/x.yaml", "lengths_m", "l2, l3", "that the chain uses"):
-        parse_chain("Tz(l1) Rz(q1) [A]", {"l1": 1.0, "l3": 2.0, "l2": 2.0}, "robots/x.yaml")
-
-
-def test_joint_in_two_places_is_one_coordinate_and_passive_in_the_second():
-    chain = chain_of("Tx(q1) Tz(0.5) Rz(q2) Tx(1) Ry(q3) Tx(1) Ry(-q3) [hand]")
-    assert [t.coordinate for t in chain.transforms if t.coordinate is not None] == [0, 1, 2, 2]
-    assert [place for place in range(len(chain.transforms)) if chain.is_passive(place)] == [6]
-    assert chain.moved_by(chain.end_effector) == (0, 1, 2)
 
 
 def test_stretches_are_the_rigid_parts_between_the_joints(kuka):

@@ -3,7 +3,7 @@
 import numpy as np
 from support import PinocchioPoint, chain_of
 
-from elastocal.mechanics.components import COMPONENT_NAMES, COMPONENTS, WRENCH, WRENCH_NAMES
+from elastocal.mechanics.components import COMPONENT_NAMES, COMPONENTS, WRENCH
 from elastocal.mechanics.kinematics import poses_and_jacobians
 
 
@@ -11,12 +11,6 @@ def test_a_force_and_the_displacement_that_it_works_along_stand_at_the_same_plac
     for (moved, unit, moves), (load, load_unit, loads) in zip(COMPONENTS, WRENCH, strict=True):
         assert (moved[0], load[0], unit, load_unit) in [("d", "f", "m", "N"), ("r", "m", "rad", "N m")]
         assert moved[1] == load[1] == moves[-1] == loads[-1]
-
-
-def test_names_are_those_of_the_components_in_their_order_each_once():
-    assert COMPONENT_NAMES == ("dx", "dy", "dz", "rx", "ry", "rz")
-    assert WRENCH_NAMES == ("fx", "fy", "fz", "mx", "my", "mz")
-    assert len({*COMPONENT_NAMES, *WRENCH_NAMES}) == 12
 
 
 def test_rows_of_a_jacobian_are_these_components_as_in_pinocchio():

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from support import chain_of, random_loads
+from support import random_loads
 
 from elastocal.mechanics.elastostatics import (
     exact_deflections,
@@ -39,14 +39,6 @@ def test_wrench_at_a_partial_point_gives_the_torques_of_the_end_effector_jacobia
         before = len(robot.chain.moved_by(point))
         np.testing.assert_allclose(found[..., :before], torques[..., :before], rtol=0, atol=1e-9)
         assert (found[..., before:] == 0).all()
-
-
-def test_force_with_an_offset_along_base_axes_is_that_force_transported():
-    rng = np.random.default_rng(3)
-    force, offset = rng.standard_normal((4, 5, 3)), np.array([0.1, 0.5, -0.2])
-    at_point = np.concatenate([force, np.zeros_like(force)], axis=-1)
-    expected = transported(at_point, offset, np.zeros(3))
-    np.testing.assert_allclose(wrench_of_offset_force(force, offset), expected, rtol=0, atol=1e-15)
 
 
 def test_offset_that_turns_with_the_tool_loads_the_joints_as_a_force_at_that_target(robot):
@@ -89,10 +81,3 @@ def test_exact_deflection_departs_from_the_linear_one_in_second_order(robot):
         # Springs turn by some 1e-3 rad: second order is some nanometres to micrometres, third a thousandth of that.
         assert np.abs(beyond[0]).max() > 1e-8
         assert np.linalg.norm(beyond[0] - 4 * beyond[1]) < 0.01 * np.linalg.norm(beyond[0])
-
-
-def test_exact_deflection_of_one_joint_is_a_turn_about_its_axis():
-    chain = chain_of("Rz(q1) Tx(2) [EE]")
-    found = exact_deflections(chain, np.zeros(1), np.array([0.3]), chain.end_effector)
-    expected = [2 * np.cos(0.3) - 2, 2 * np.sin(0.3), 0.0, 0.0, 0.0, 0.3]
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from support import (
     ODD_CHAINS,
     OTHER_CHAINS,
-    PARALLELOGRAM,
     PinocchioPoint,
     chain_of,
     homogeneous,
@@ -22,15 +21,12 @@ from elastocal.mechanics.kinematics import (
     BLOCK,
     blocks,
     corners,
-    cross,
     jacobians,
     joint_axes,
     poses,
     poses_and_jacobians,
     poses_of_points,
-    walk,
 )
-from elastocal.mechanics.links import extended_chain
 from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.robot import with_target_offset
 
@@ -53,12 +49,6 @@ def test_pose_and_jacobian_agree_with_pinocchio(name, chain_called):
     chain = chain_called(name)
     for point in chain.points:
         assert_agrees_with_pinocchio(chain, point, random_angles(np.random.default_rng(2), chain, 20))
-
-
-def test_target_offset_agrees_with_pinocchio(kuka):
-    chain = with_target_offset(kuka.chain, (0.1, -0.2, 0.3))
-    for point in chain.points:
-        assert_agrees_with_pinocchio(chain, point, random_angles(np.random.default_rng(3), chain, 10))
 
 
 @pytest.mark.parametrize("kind", ["R", "T"])
@@ -143,23 +133,6 @@ def test_poses_hold_at_and_around_half_a_turn(kuka, angle):
             assert np.isfinite(jacobian).all()
 
 
-@pytest.mark.parametrize("batch", [(), (1,), (5,), (0,), (2, 3), (2, 1, 4), (3, 0, 2)])
-def test_any_leading_axes_are_kept(kuka, batch):
-    angles = random_angles(np.random.default_rng(6), kuka.chain, *batch)
-    point = kuka.chain.point("3DoF")
-    position, rotation, jacobian = poses_and_jacobians(kuka.chain, angles, point)
-    assert position.shape == (*batch, 3) and rotation.shape == (*batch, 3, 3) and jacobian.shape == (*batch, 6, 6)
-    for index in np.ndindex(batch):
-        for found, alone in zip(
-            (position, rotation, jacobian), poses_and_jacobians(kuka.chain, angles[index], point), strict=True
-        ):
-            # The vectorised tangent may round otherwise than the one for a single number.
-            np.testing.assert_allclose(found[index], alone, rtol=0, atol=ROUNDING)
-    for found, expected in zip(poses(kuka.chain, angles, point), (position, rotation), strict=True):
-        np.testing.assert_array_equal(found, expected)
-    np.testing.assert_array_equal(jacobians(kuka.chain, angles, point), jacobian)
-
-
 @pytest.mark.parametrize("size", [6, 7, 8, 14, 15])
 def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size):
     angles = random_angles(np.random.default_rng(7), fanuc.chain, size)
@@ -170,33 +143,6 @@ def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size)
     for found, expected in zip(poses(fanuc.chain, angles, fanuc.chain.end_effector), whole[:2], strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole[2], rtol=0, atol=ROUNDING)
-
-
-def test_lists_of_whole_numbers_are_angles_too(kuka):
-    expected = poses(kuka.chain, np.array([0.0, 1.0, -1.0, 2.0, 0.0, 3.0]), kuka.chain.end_effector)
-    for found, value in zip(poses(kuka.chain, [0, 1, -1, 2, 0, 3], kuka.chain.end_effector), expected, strict=True):
-        np.testing.assert_array_equal(found, value)
-
-
-@given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6))
-def test_rotation_matrices_are_orthonormal_and_right_handed(angles):
-    chain = chain_of(OTHER_CHAINS["ur10"])
-    _, rotation = poses(chain, np.array(angles), chain.end_effector)
-    np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), rtol=0, atol=ROUNDING)
-    assert np.linalg.det(rotation) == pytest.approx(1.0, abs=ROUNDING)
-
-
-def test_a_point_before_every_joint_does_not_move():
-    chain = chain_of("Tx(0.5) [base] Rz(q1) Ty(1) [EE]")
-    position, rotation, jacobian = poses_and_jacobians(chain, np.ones((3, 1)), chain.point("base"))
-    np.testing.assert_array_equal(position, np.tile([0.5, 0.0, 0.0], (3, 1)))
-    np.testing.assert_array_equal(rotation, np.tile(np.eye(3), (3, 1, 1)))
-    assert not jacobian.any()
-
-
-def test_components_lie_contiguous_along_the_batch(kuka):
-    jacobian = poses_and_jacobians(kuka.chain, np.zeros((4, 5, 6)), kuka.chain.end_effector)[2]
-    assert jacobian[..., 0, 2].flags.c_contiguous
 
 
 def test_results_of_an_earlier_call_are_overwritten_in_place(kuka):
@@ -217,32 +163,6 @@ def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka, batch):
     for number, point in enumerate(points):
         for found, wanted in zip(together, poses(kuka.chain, angles, point), strict=True):
             np.testing.assert_allclose(found[number], wanted, rtol=0, atol=1e-15)
-
-
-def test_coordinates_that_nothing_moves_change_no_digit(kuka_extended):
-    chain = extended_chain(kuka_extended)
-    moved = np.zeros((5, chain.coordinates))
-    moved[:, :6] = random_angles(np.random.default_rng(32), kuka_extended.chain, 5)
-    nearly = np.where(moved == 0.0, 1e-300, moved)
-    for still, walked in zip(
-        poses_and_jacobians(chain, moved, chain.end_effector),
-        poses_and_jacobians(chain, nearly, chain.end_effector),
-        strict=True,
-    ):
-        np.testing.assert_allclose(still, walked, rtol=0, atol=1e-15)
-
-
-def test_parallelogram_keeps_the_forearm_from_turning_with_the_upper_arm():
-    chain = chain_of(PARALLELOGRAM)
-    q = np.random.default_rng(34).uniform(-1.5, 1.5, (6, 4))
-    q[:, 3] = 0.0
-    # The forearm's angle to the horizontal is q3, whatever q2 is, and the hand stays level.
-    reach = 0.3 + 0.8 * np.sin(q[:, 1]) + 0.9 * np.cos(q[:, 2]) + 0.1
-    height = 0.5 + 0.8 * np.cos(q[:, 1]) - 0.9 * np.sin(q[:, 2]) - 0.1
-    expected = np.stack([reach * np.cos(q[:, 0]), reach * np.sin(q[:, 0]), height], axis=1)
-    position, rotation = poses(chain, q, chain.end_effector)
-    np.testing.assert_allclose(position, expected, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(rotation[:, 2], np.broadcast_to([0.0, 0.0, 1.0], (6, 3)), rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("name", ODD_CHAINS)
@@ -270,33 +190,9 @@ def test_joints_stand_at_their_places_along_their_axes():
     np.testing.assert_allclose(axis[:, 0], [[0, 0, 1], [-1, 0, 0]], atol=1e-12)
 
 
-@pytest.mark.parametrize("offset, turns_only", [((0.3, 0.0, 0.0), True), ((0.0, 0.1, 0.0), False), ((0.1, 0.0, -0.1), False)])
-def test_a_target_along_an_axis_is_not_moved_by_it_in_any_digit(offset, turns_only):
-    chain = chain_of("Rz(q1) Tx(0.5) Rx(q2) Tx(0.3) [B]")
-    point = replace(chain.end_effector, offset_m=offset)
-    jacobian = jacobians(chain, random_angles(np.random.default_rng(6), chain, 5), point)
-    assert jacobian[:, :3, 0].any() and bool(jacobian[:, :3, 1].any()) != turns_only
-
-
-def test_frames_that_nothing_has_moved_are_one_for_all_configurations():
-    chain = chain_of("Tz(0.4) Rz(q1) Tx(0.5) Ry(q2) Tz(0.3) [hand]")
-    assert {array.shape for axes, origin in walk(chain, np.zeros((2, 4)), 5) for array in (*axes, origin)} == {(3, 1)}
-    angles = np.array([[0.0] * 4, [0.1, 0.2, 0.3, 0.4]])
-    axes, origin = walk(chain, angles, 5)[-1]
-    assert axes[1].shape == (3, 1) and origin.shape == (3, 4)
-    np.testing.assert_allclose(origin[2], 0.4 + 0.3 * np.cos(angles[1]))
-
-
 @pytest.mark.parametrize("size, lengths", [(0, []), (1, [1]), (BLOCK, [BLOCK]), (2 * BLOCK + 5, [BLOCK, BLOCK, 5])])
 def test_blocks_hold_each_configuration_once_and_in_order(size, lengths):
     numbers = np.arange(size)
     parts = [numbers[block] for block in blocks(size)]
     assert [len(part) for part in parts] == lengths
     np.testing.assert_array_equal(np.concatenate([numbers[:0], *parts]), numbers)
-
-
-def test_vector_products_are_numpys():
-    first, second = np.random.default_rng(10).normal(size=(2, 3, 4, 5))
-    found = np.empty_like(first)
-    cross(first, second, found)
-    np.testing.assert_allclose(found, np.cross(first, second, axis=0), atol=1e-15)

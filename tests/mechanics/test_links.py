@@ -8,8 +8,8 @@ from scipy.integrate import quad
 from support import PinocchioPoint, homogeneous, random_loads
 
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
-from elastocal.mechanics.links import extended_chain, link_compliance, spring_compliance, tube_compliance, with_tube
-from elastocal.mechanics.robot import Link, Tube
+from elastocal.mechanics.links import extended_chain, spring_compliance, tube_compliance, with_tube
+from elastocal.mechanics.robot import Tube
 from elastocal.study.simulation import true_deflections
 
 TUBE = Tube(0.25, 0.02, 70e9, 26e9)
@@ -43,18 +43,6 @@ def integrated_beam(tube, along):
 def test_tube_compliance_is_that_of_an_integrated_beam(tube, length):
     expected = integrated_beam(tube, [length, 0.0, 0.0])
     np.testing.assert_allclose(tube_compliance(tube, length), expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("vector", [(1.2, 0, -0.041), (0, 0, 0.675), (0, -0.3, 0), (-0.5, 0, 0), (0.1, 0.2, 0.3), (1, 1, 1)])
-def test_link_compliance_is_that_of_a_beam_along_the_link(vector):
-    expected = integrated_beam(TUBE, vector)
-    found = link_compliance(Link(0, vector, TUBE))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-
-
-def test_robot_without_links_has_the_diagonal_of_its_joints(robot):
-    np.testing.assert_array_equal(spring_compliance(robot), np.diag(robot.compliance))
-    assert extended_chain(robot) == robot.chain
 
 
 def test_every_link_adds_its_block(kuka_extended):

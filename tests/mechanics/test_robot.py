@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from support import robot_of
 
-from elastocal.mechanics.robot import Mass, with_rigid_joints, with_target_offset
+from elastocal.mechanics.robot import Mass, with_rigid_joints
 
 
 def test_reported_angles_are_converted_both_ways():
@@ -16,14 +16,6 @@ def test_reported_angles_are_converted_both_ways():
     np.testing.assert_allclose(robot.model_angles(reported), angles, rtol=1e-12)
     np.testing.assert_allclose(robot.reported_angles(angles), reported, atol=1e-12)
     np.testing.assert_allclose(robot.model_angles(reported[0]), angles[0], rtol=1e-12)
-
-
-def test_target_offset_reaches_every_point_and_leaves_the_chain_alone(kuka):
-    moved = with_target_offset(kuka, [0.1, 0.2, 0.3])
-    assert {p.offset_m for p in moved.chain.points} == {(0.1, 0.2, 0.3)}
-    assert moved.chain.transforms == kuka.chain.transforms
-    assert {p.offset_m for p in kuka.chain.points} == {(0.0, 0.0, 0.0)}
-    assert with_target_offset(kuka.chain, [0.1, 0.2, 0.3]) == moved.chain
 
 
 def test_rigid_joints_yield_to_nothing():

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from support import refused
 
-from elastocal.io.documents import check_document, read_document
-from elastocal.mechanics.robot import Compensator, Mass
+from elastocal.io.documents import check_document
 from elastocal.mechanics.robot_file import document_of, joint_count, robot_from_document
 from elastocal.mechanics.usual_values import usual_compliance
 
@@ -54,12 +53,6 @@ def test_robot_file_comes_in_si_units():
     np.testing.assert_array_equal(robot.reported_offset, np.zeros(2))
 
 
-def test_reported_joints_come_in_radians():
-    robot = robot_from_document(document(**REPORTED))
-    np.testing.assert_array_equal(robot.reported_matrix, [[1, 0], [1, -1]])
-    np.testing.assert_allclose(robot.reported_offset, [np.pi / 2, -np.pi / 4], rtol=1e-15)
-
-
 def test_without_limits_a_joint_turns_once_either_way():
     robot = robot_from_document(document(joint_limits_deg=None))
     np.testing.assert_allclose(robot.joint_limits, [[-2 * np.pi, 2 * np.pi]] * 2, rtol=1e-15)
@@ -75,13 +68,6 @@ def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_wri
 
 def test_joints_are_counted_without_more_than_the_chain():
     assert joint_count({"chain": TRACKED["chain"]}) == 3
-
-
-def test_names_of_the_joints_come_and_go_with_the_file():
-    robot = robot_from_document(document(joint_names=["shoulder", "elbow"]))
-    assert robot.joint_names == ("shoulder", "elbow")
-    assert document_of(robot)["joint_names"] == ["shoulder", "elbow"]
-    assert "joint_names" not in document_of(robot_from_document(document()))
 
 
 @pytest.mark.parametrize(
@@ -128,40 +114,6 @@ def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):
         robot_from_document(document(**changes), "robots/two.yaml")
 
 
-def test_one_tube_serves_every_link_and_a_list_of_tubes_goes_from_the_base_on():
-    same = robot_from_document(document(links=TUBES))
-    assert len(same.links) == 3 and len({link.tube for link in same.links}) == 1
-    sizes = [{"outer_diameter_m": d, "wall_m": 0.01} for d in (0.3, 0.2, 0.1)]
-    each = robot_from_document(document(links=TUBES | {"tubes": sizes}))
-    assert [link.tube.outer_diameter_m for link in each.links] == [0.3, 0.2, 0.1]
-    assert {(link.tube.youngs_modulus_Pa, link.tube.shear_modulus_Pa) for link in each.links} == {(70e9, 26e9)}
-
-
-def test_a_solid_tube_is_allowed():
-    solid = TUBES | {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.1}]}
-    assert len(robot_from_document(document(links=solid)).links) == 3
-
-
-def test_every_robot_of_the_repository_has_the_compliances_of_table_1(config_folder):
-    table = {"kuka": [0.54, 0.29, 0.42, 2.79, 3.48, 2.07], "fanuc": [1.23, 0.37, 0.46, 2.68, 2.70, 2.72]}
-    for name, compliance in (table | {"kuka_extended": table["kuka"]}).items():
-        robot = robot_from_document(read_document(config_folder / "robots" / f"{name}.yaml"))
-        np.testing.assert_allclose(robot.compliance, 1e-6 * np.array(compliance), rtol=1e-12)
-
-
-def test_what_the_links_weigh_comes_in_their_order():
-    robot = robot_from_document(document(**WEIGHED))
-    assert robot.masses == (Mass(0, 90.5, (0.0, 0.0, 0.2), 0.2), Mass(2, 40, (0.5, 0.0, -0.02), 0.1))
-    assert robot.gravity_m_s2 == (0.0, 9.80665, 0.0) and robot.gear_ratio == (None, 171)
-    assert robot.compensator == Compensator(2, "spring") and robot.payload_kg == 12
-
-
-def test_robot_file_that_says_nothing_of_weights_is_a_weightless_arm_on_a_floor():
-    robot = robot_from_document(document())
-    assert robot.masses == () and robot.gravity_m_s2 == (0.0, 0.0, -9.80665)
-    assert robot.gear_ratio is None and robot.compensator is None and robot.payload_kg is None
-
-
 @pytest.mark.parametrize(
     "more",
     [{}, WEIGHED, TRACKED, REPORTED],
@@ -202,11 +154,3 @@ def test_robot_becomes_a_document_that_gives_it_back(more):
 def test_schema_refuses_weights_that_cannot_be(changes, key):
     with refused("robots/two.yaml", key):
         check_document(document(**changes), "robot", "robots/two.yaml")
-
-
-def test_prismatic_joints_are_in_metres_and_newtons():
-    robot = robot_from_document(TRACKED)
-    assert robot.chain.prismatic == (True, False, False) and robot.joints == 3
-    np.testing.assert_allclose(robot.joint_limits, [[-0.5, 4.0], [-np.pi, np.pi], [-np.pi / 2, np.pi / 2]], rtol=1e-15)
-    np.testing.assert_allclose(robot.reported_offset, [2.5, 0.0, np.pi / 2], rtol=1e-15)
-    np.testing.assert_allclose(robot.compliance, [2e-8, 1e-6, 2e-6], rtol=1e-15)

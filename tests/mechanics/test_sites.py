@@ -35,33 +35,8 @@ def test_sites_at_zero_leave_the_poses_and_jacobians_of_the_robot(chain):
         np.testing.assert_allclose(found[2][..., : sites.joints], expected[2], rtol=0, atol=ROUNDING)
 
 
-def test_target_offsets_stay_on_their_points(fanuc):
-    chain = replace(fanuc.chain, points=tuple(replace(p, offset_m=(0.1, 0.2, -0.3)) for p in fanuc.chain.points))
-    sites, angles = sites_of(chain), random_angles(np.random.default_rng(1), chain, 3)
-    for ours, point in zip(sites.chain.points, chain.points, strict=True):
-        expected, found = poses(chain, angles, point), poses(sites.chain, extended(sites, angles), ours)
-        np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=ROUNDING)
-
-
-def test_every_coordinate_belongs_to_one_site(chain):
-    sites = sites_of(chain)
-    n = chain.coordinates
-    assert (sites.joints, len(sites.tilt), len(sites.link_end), len(sites.joint_axes)) == (n, n, n + 1, n)
-    listed = [*range(n), *sites.base, *np.ravel(sites.tilt), *np.ravel(sites.link_end)]
-    assert sorted(listed) == list(range(sites.chain.coordinates))
-    assert len(sites.base) == 6 and np.shape(sites.tilt) == (n, 3) and np.shape(sites.link_end) == (n + 1, 6)
-
-
 def columns_at(sites, angles, point, coordinates):
     return poses_and_jacobians(sites.chain, extended(sites, angles), sites.chain.point(point))[2][..., list(coordinates)]
-
-
-def test_base_moves_all_points_rigidly_in_base_axes(chain):
-    sites, angles = sites_of(chain), random_angles(np.random.default_rng(3), chain)
-    for point in chain.points:
-        x, y, z = poses(chain, angles, point)[0]
-        expected = np.block([[np.eye(3), np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])], [np.zeros((3, 3)), np.eye(3)]])
-        np.testing.assert_allclose(columns_at(sites, angles, point.name, sites.base), expected, rtol=0, atol=ROUNDING)
 
 
 def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
@@ -75,15 +50,6 @@ def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
             np.testing.assert_allclose(transform.sign * alone, own, rtol=0, atol=ROUNDING)
 
 
-def test_tilt_axes_turn_with_the_joint():
-    sites = sites_of(chain_of("Rz(q1) Tx(1) [end]"))
-    rx, ry, _ = sites.tilt[0]
-    across = columns_at(sites, np.array([np.pi / 2]), "end", [rx, ry])
-    # A quarter turn: the x axis behind the joint lies along y, where the link is too.
-    np.testing.assert_allclose(across[:, 0], [0, 0, 0, 0, 1, 0], atol=1e-15)
-    np.testing.assert_allclose(across[:, 1], [0, 0, -1, -1, 0, 0], atol=1e-15)
-
-
 @pytest.mark.parametrize(("point", "link"), [("2DoF", 2), ("3DoF", 3), ("4DoF", 4), ("6DoF", 6)])
 def test_point_at_the_end_of_a_link_moves_with_it(fanuc, point, link):
     sites, angles = sites_of(fanuc.chain), random_angles(np.random.default_rng(5), fanuc.chain)
@@ -93,14 +59,6 @@ def test_point_at_the_end_of_a_link_moves_with_it(fanuc, point, link):
     np.testing.assert_allclose(columns_at(sites, angles, point, sites.link_end[link]), expected, rtol=0, atol=ROUNDING)
     if link < sites.joints:
         assert not columns_at(sites, angles, point, [*sites.tilt[link], *sites.link_end[link + 1]]).any()
-
-
-def test_point_inside_a_link_or_at_its_near_end_is_not_moved_by_its_far_end():
-    sites = sites_of(chain_of("Rz(q1) [near] Tx(0.3) [middle] Tx(0.3) [far] Ry(q2) Tx(0.1) [end]"))
-    angles = np.array([0.3, -0.4])
-    for point, moved in {"near": False, "middle": False, "far": True, "end": True}.items():
-        assert columns_at(sites, angles, point, sites.link_end[1]).any() == moved
-        assert columns_at(sites, angles, point, sites.tilt[0]).any()
 
 
 def far_end_by_products(chain, link):
@@ -117,11 +75,6 @@ def test_link_vectors_are_those_of_matrix_products(chain):
     found = sites_of(chain).link_vectors_m
     expected = [far_end_by_products(chain, link) for link in range(chain.coordinates + 1)]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)
-
-
-def test_link_vector_is_seen_from_behind_the_fixed_rotations_of_its_link():
-    sites = sites_of(chain_of("Rz(q1) Tx(0.5) Rz(90deg) Ry(q2) Rx(90deg) Tz(0.2) [end]"))
-    np.testing.assert_allclose(sites.link_vectors_m, [(0, 0, 0), (0, -0.5, 0), (0, 0, 0.2)], atol=1e-16)
 
 
 CARRIED = {
@@ -147,10 +100,6 @@ def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_cal
 )
 def test_shoulder_is_the_first_joint_that_carries_weight(name, shoulder, chain_called):
     assert sites_of(chain_called(name)).shoulder == shoulder
-
-
-def test_arm_that_turns_about_the_vertical_only_has_no_shoulder():
-    assert sites_of(chain_of("Tz(0.3) Rz(q1) Tx(0.5) Rz(q2) Tx(0.5) [end]")).shoulder is None
 
 
 def test_sites_of_a_robot_on_a_track_and_of_one_with_a_parallelogram():

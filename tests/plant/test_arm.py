@@ -62,12 +62,6 @@ def test_compliances_and_limits_are_in_radians():
     np.testing.assert_allclose(arm.limits, [[-np.pi / 2, np.pi]] * 2)
 
 
-@pytest.mark.parametrize("word", ["Tw(1)", "Rz", "[A", "Sx(1)", "Tz(1)Rz(q1)"])
-def test_a_word_that_is_none_is_refused_by_name(word):
-    with refused("my.yaml", "chain", repr(word)):
-        arm_from_document(document(f"{word} Rz(q1) Tx(1) [A]", 1), "my.yaml")
-
-
 @pytest.mark.parametrize("chain", ["Rz(q1) Tx(1)", "Rz(q1) Tx(1) [A] Tx(0.1)", "[A] Rz(q1)"])
 def test_a_chain_without_a_measuring_point_at_its_end_is_refused(chain):
     with refused("my.yaml", "chain", "measuring point"):
@@ -110,16 +104,6 @@ def test_only_a_file_with_weights_and_no_compensator_is_of_an_arm_without_one(mo
     assert arm_of(**more).compensated == compensated
 
 
-def test_reach_is_all_that_the_first_joint_carries():
-    assert arm_of().reach_m == pytest.approx(np.hypot(0.2, 0.5) + 0.3)
-    assert one_link(2.0).reach_m == pytest.approx(2.0)
-
-
-def test_an_arm_without_a_rated_load_carries_by_the_cube_of_its_reach():
-    assert one_link(2.0).payload_kg == pytest.approx(64.0)
-    assert one_link(2.0, payload_kg=12).payload_kg == 12
-
-
 @pytest.mark.parametrize("payload, share", [(70, 0.5), (140, 1.0), (500, 1.0)])
 def test_forces_grow_with_the_rated_load_up_to_those_of_a_heavy_arm(payload, share):
     assert one_link(1.0, payload_kg=payload).load_share == pytest.approx(share)
@@ -128,12 +112,6 @@ def test_forces_grow_with_the_rated_load_up_to_those_of_a_heavy_arm(payload, sha
 def test_softness_is_the_median_gear_over_a_heavy_arms_and_never_less_than_one():
     assert one_link(1.0, 3, compliance_urad_per_Nm=[1.0, 8.0, 90.0]).softness == pytest.approx(4.0)
     assert one_link(1.0, 3, compliance_urad_per_Nm=[0.1, 0.5, 90.0]).softness == 1.0
-
-
-def test_gears_have_the_files_ratios_or_one_for_every_joint():
-    assert one_link(1.0, 2, gear_ratio=[101, 50]).gear_ratio == (101, 50)
-    usual = one_link(1.0, 8).gear_ratio
-    assert len(usual) == 8 and usual[7] == usual[0] and min(usual) > 50
 
 
 @pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
@@ -189,10 +167,6 @@ def test_a_file_without_compliances_and_limits_is_of_an_arm_of_usual_ones():
     np.testing.assert_allclose(arm.limits, [[-2 * np.pi, 2 * np.pi]] * 2)
     shortest = arm_from_document(described | {"payload_kg": 50, "chain": "Rz(q1) Tx(1) Rz(q2) Tx(0.1) [A]"})
     np.testing.assert_allclose(shortest.compliance[1], 2e-3 / (50 * 9.80665 * 0.2), rtol=1e-12)
-
-
-def test_names_of_joints_say_nothing_to_the_plant():
-    np.testing.assert_array_equal(arm_of(joint_names=["a", "b"]).axes, arm_of().axes)
 
 
 @pytest.mark.parametrize("chain", ["Tx(q1) Rz(q2) Tx(1) [A]", "Rz(q1) Ry(q2) Tz(1) Ry(-q2) [A]", "Rz(q2) Rz(q1) Tx(1) [A]"])

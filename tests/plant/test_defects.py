@@ -48,10 +48,6 @@ def test_no_kind_outside_of_the_catalogue_bears_a_name_of_it():
     assert not {kind.removeprefix(OUTSIDE) for kind in FOREIGN} & set(effects())
 
 
-def test_at_least_eight_kinds_are_outside_of_the_catalogue():
-    assert len(FOREIGN) >= 8
-
-
 def states_of(schedule):
     """A schedule as the catalogue sees it."""
     return States(
@@ -133,13 +129,6 @@ def test_a_defect_is_refused_where_it_cannot_be_or_is_too_large(fanuc_specimen):
     for wrong in (Defect("joint_offset", (7,), 1e-3), Defect("nonsense", (), 1.0), Defect("stiffening", (1,), 1.5)):
         with pytest.raises(InputError):
             with_defects(fanuc_specimen, [wrong])
-
-
-def test_two_defects_add_up(yardstick, fanuc_specimen):
-    pair = [drawn_defect("joint_offset", fanuc_specimen.arm, 1), drawn_defect("lost_motion", fanuc_specimen.arm, 2)]
-    alone = [yardstick.change(with_defects(fanuc_specimen, [one])) for one in pair]
-    together = yardstick.change(with_defects(fanuc_specimen, pair))
-    np.testing.assert_allclose(together, alone[0] + alone[1], atol=0.01 * np.abs(together).max())
 
 
 @pytest.mark.parametrize("joint", [1, 4])

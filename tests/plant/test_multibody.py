@@ -8,7 +8,6 @@ import pinocchio as pin
 import pytest
 from arms_at_rest import arm_of
 from scipy.integrate import quad
-from support import refused
 
 from elastocal_proof.plant.multibody import machine_of
 from elastocal_proof.plant.structure import Compensator, Mass, Structure, TaperedTube
@@ -90,15 +89,6 @@ def test_a_coordinate_moves_all_that_is_beyond_it_and_nothing_else():
         np.testing.assert_array_equal(changed, machine.beyond[number], err_msg=model.joint(number).name)
 
 
-def test_masses_of_a_link_add_up_at_their_common_centre():
-    masses = (Mass(1, 30.0, 0.2, (0.0, 0.1, 0.0)), Mass(1, 10.0, 1.0, (0.0, 0.0, -0.4)), Mass(0, 5.0, 0.5))
-    model = machine_of(TWO, Structure(masses=masses)).model
-    assert model.body("arm1").mass == pytest.approx(40.0)
-    np.testing.assert_allclose(model.body("arm1").ipos, [(30 * 0.2 + 10) / 40, 30 * 0.1 / 40, -10 * 0.4 / 40], atol=1e-9)
-    assert model.body("foot").mass == pytest.approx(5.0)
-    np.testing.assert_allclose(model.body("foot").ipos, [0.0, 0.0, 0.2], atol=1e-9)
-
-
 @pytest.mark.parametrize("flange", [None, (1e-9,) * 6])
 def test_a_load_counts_from_the_flange_and_turns_with_it(flange):
     machine = machine_of(TWO, Structure(payload=Mass(2, 20.0, 1.0, (0.1, 0.0, 0.3)), flange=flange))
@@ -153,12 +143,6 @@ def test_an_elastic_link_that_is_not_loaded_is_as_long_as_a_rigid_one():
         np.testing.assert_allclose(elastic.site(point).xmat, rigid.site(point).xmat, atol=1e-14)
 
 
-def test_a_measuring_point_inside_an_elastic_link_is_refused_by_name():
-    arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
-    with refused("structure", "tubes[1]", "[inner]"):
-        machine_of(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))
-
-
 @pytest.mark.parametrize("tubes", [{}, {1: TaperedTube(1e6, 1e6)}])
 def test_wrong_dimensions_are_at_the_far_end_of_their_stretch_and_carry_on(tubes):
     structure = Structure(wrong_vectors_m={1: (0.0, 0.02, 0.0)}, wrong_turns={1: (0.0, 0.0, 0.1)}, tubes=tubes)
@@ -184,9 +168,3 @@ def test_the_compensators_ends_are_fixed_before_and_behind_the_shoulders_drive()
         np.testing.assert_allclose(data.site("anchor").xpos, shoulder + column @ [0, 0, -0.3], atol=1e-14)
         crank = column @ pin.exp3(np.array([0, drive2, 0])) @ [0.2, 0, 0]
         np.testing.assert_allclose(data.site("crank").xpos, shoulder + crank, atol=1e-14)
-
-
-def test_points_keep_their_names_and_the_flange_is_the_last():
-    machine = machine_of(TWO, EVERYTHING)
-    assert list(machine.sites) == ["A", "B"] and machine.flange == "B"
-    assert [machine.model.body(int(link)).name for link in machine.links] == ["foot", "arm1", "arm2"]

@@ -62,11 +62,6 @@ def test_weights_of_a_specimen_lie_about_the_declared_ones_within_three_deviatio
         assert 0.7 <= min(shares) < 1.0 < max(shares) <= 1.3
 
 
-def test_the_shown_moment_is_that_of_the_force_at_its_lever(schedule):
-    one = replace(schedule, force=np.array([[0.0, 0.0, -10.0]]), lever=np.array([[0.5, 0.2, 0.0]]))
-    np.testing.assert_allclose(one.shown_wrench, [[0.0, 0.0, -10.0, -2.0, 5.0, 0.0]])
-
-
 def test_errors_of_all_drives_add_to_the_commanded_angles(weightless, schedule):
     robot = replace(weightless, drives=(ZeroOffset(1, 2e-4), ZeroOffset(1, 3e-4), WrongRatio(3, 0, 1e-3)))
     drive, growth, warm, offsets = driven(robot, schedule, machine_of(robot.arm, robot.structure))
@@ -82,17 +77,6 @@ def test_expansion_changes_evenly_from_the_column_to_the_flange(weightless, sche
     late = replace(schedule, time_s=schedule.time_s + 1e6)
     growth = driven(robot, late, machine_of(robot.arm, robot.structure))[1]
     np.testing.assert_allclose(growth, np.tile(10 * np.linspace(1.2e-5, 0.6e-5, 7), (len(late.pose), 1)), rtol=1e-9)
-
-
-def test_offsets_of_one_spring_add_up_and_keep_their_place(weightless, schedule):
-    structure = replace(weightless.structure, base=(0.0, 0.0, 1e-12, 0.0, 0.0, 0.0))
-    laws = tuple(("base_z", lambda visits, size=size: size * visits.pose) for size in (1e-5, 2e-5))
-    robot = replace(weightless, structure=structure, offsets=laws)
-    machine = machine_of(robot.arm, structure)
-    offsets = driven(robot, schedule, machine)[3]
-    assert list(offsets) == [machine.springs["base_z"]]
-    lifted = seen_poses(robot, schedule)[0] - seen_poses(replace(robot, offsets=()), schedule)[0]
-    np.testing.assert_allclose(lifted, (3e-5 * schedule.pose)[:, None, None] * [[[0.0, 0.0, 1.0]] * 4], atol=1e-12)
 
 
 def test_gears_come_to_rest_by_their_linear_springs_and_their_other_laws_together(fanuc_specimen, schedule):

@@ -17,12 +17,6 @@ def test_a_seed_and_a_purpose_give_the_same_numbers_in_every_version():
         assert stream(seed, purpose).bit_generator.random_raw(2).tolist() == raw
 
 
-def test_another_seed_or_purpose_gives_other_numbers():
-    # The second pair would be one text if seed and purpose were only joined.
-    names = [(1, "specimen"), (2, "specimen"), (1, "weights"), (11, "2/x"), (1, "12/x"), (112, "/x")]
-    assert len({stream(*name).random() for name in names}) == len(names)
-
-
 def test_numbers_do_not_depend_on_what_was_drawn_before():
     first = stream(3, "specimen")
     first.random(100)

@@ -46,25 +46,3 @@ def test_public_ci_makes_the_targets_of_ours_in_their_order():
     steps = loaded(".github/workflows/ci.yml")["jobs"]["check"]["steps"]
     public = make_targets("\n".join(step["run"] for step in steps if "run" in step))
     assert public == make_targets((ROOT / ".ci" / "run").read_text(encoding="utf-8")) == TARGETS
-
-
-def test_hooks_are_commands_of_make_lint_in_the_environment_or_check_a_file_against_its_schema():
-    (repo,) = loaded(".pre-commit-config.yaml")["repos"]
-    assert repo["repo"] == "local"
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8").replace("$(BIN)", ".venv/bin")
-    linted = set(re.findall(r"^\t(\.venv/bin/\S+)", makefile.split("\nlint:")[1].split("\n\n")[0], re.MULTILINE))
-    for hook in repo["hooks"]:
-        tool = hook["entry"].split()[0]
-        assert hook["language"] == "system"
-        assert tool in linted or tool == ".venv/bin/check-jsonschema", hook["id"]
-        assert (Path(sys.executable).parent / Path(tool).name).is_file(), hook["id"]
-
-
-def test_the_workflow_catalogue_finds_what_it_looks_for():
-    """Among all workflows: README names Snakemake and the workflow, the Snakefile is at the top, with rules in its folder."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8").lower()
-    assert "snakemake" in readme and "workflow" in readme
-    assert (ROOT / "Snakefile").is_file() and list((ROOT / "workflow" / "rules").glob("*.smk"))
-    usage = loaded(".snakemake-workflow-catalog.yml")["usage"]
-    assert set(usage) == {"mandatory-flags", "software-stack-deployment", "report"}
-    assert (ROOT / "config" / "README.md").is_file()

@@ -37,18 +37,6 @@ def test_the_recipe_has_the_version_and_the_requirements_of_the_wheel():
     assert script.split(" = ") == ["elastocal", PROJECT["scripts"]["elastocal"]]
 
 
-def test_the_conda_environment_asks_for_no_other_versions():
-    found = by_name(loaded("environment.yaml")["dependencies"])
-    assert found.pop("python") == PROJECT["requires-python"]
-    assert found.items() <= asked_for().items()
-
-
-def test_ci_installs_the_lowest_and_the_highest_versions_on_each_python():
-    matrix = loaded(".github/workflows/ci.yml")["jobs"]["installed"]["strategy"]["matrix"]
-    assert matrix["python"] == ["3.11", "3.12", "3.13", "3.14"] and matrix["resolution"] == ["highest"]
-    assert matrix["include"] == [{"python": PROJECT["requires-python"].removeprefix(">="), "resolution": "lowest-direct"}]
-
-
 def test_only_a_tag_publishes_and_only_the_job_without_our_code_may():
     release = loaded(".github/workflows/release.yml")
     # YAML 1.1 reads the key "on" as true.

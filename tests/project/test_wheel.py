@@ -17,7 +17,7 @@ import elastocal
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "Snakefile", "config.yaml", "config", "profiles", "src", "workflow")
-SOURCES += ("paper", "CITATION.cff")
+SOURCES += ("paper", "CITATION.cff", "data/measured")
 # Of the checkout alone: it checks, rehearses and explains.
 LEFT_OUT = (
     "workflow/lint.py",
@@ -81,6 +81,7 @@ def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline(wheel):
     pipeline = (
         {"Snakefile", "config.yaml", "paper/paper.bib", "CITATION.cff"}
         | files_of("config")
+        | files_of("data/measured")
         | files_of("profiles")
         | files_of("workflow")
     )

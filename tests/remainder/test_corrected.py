@@ -1,5 +1,6 @@
 """What a regression is shown, and what it and a model together leave of poses that neither has seen."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -7,15 +8,31 @@ import pytest
 from made_remainders import SMOOTH_M, smoothly_wrong_cases
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
+import elastocal.remainder
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.prediction import target_points
 from elastocal.mechanics.kinematics import poses
-from elastocal.remainder.corrected import Plan, corrected, inputs_of
+from elastocal.remainder import corrected as judged
+from elastocal.remainder.corrected import Plan, inputs_of, regressions, remainder_facts
+from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_errors
 from elastocal.validation.placing import placed
 
 NOISE = Noise("declared", 2e-5, 2e-5, np.zeros(6))
+CONSTANT = """
+import numpy as np
+
+from elastocal.remainder.protocol import Prediction
+
+NAME, WORDS, SETTINGS = "constant", "constant", ({},)
+
+
+def fitted(inputs, residual, settings, seed):
+    mean = residual.mean(axis=0)
+    for _ in settings:
+        yield lambda there: Prediction(np.tile(mean, (len(there), 1)))
+"""
 PLAN = Plan("gaussian_process", blocks=False, within_range=False, seed=1)
 
 
@@ -23,6 +40,10 @@ PLAN = Plan("gaussian_process", blocks=False, within_range=False, seed=1)
 def made(kuka, config_folder, tmp_path_factory):
     case, held_out = smoothly_wrong_cases(tmp_path_factory.mktemp("corrected"), kuka, config_folder / "robots", poses=90)
     return case, held_out, fit(case.model, case.observations, NOISE)
+
+
+def corrected(plan, fitted, case, held_out):
+    return judged.corrected(plan, fitted, case, held_out, outside_poses(fitted, case, held_out))
 
 
 def rms(values):
@@ -108,3 +129,38 @@ def test_time_and_temperature_carry_nothing_over_to_another_campaign(fanuc):
     here, there = (inputs_of(model, estimate, timed, elsewhere) for elsewhere in (False, True))
     assert here.others.shape[1] == there.others.shape[1] + 2
     assert inputs_of(model, estimate, timeless, elsewhere=False).others.shape == there.others.shape
+
+
+@pytest.fixture
+def one_more(tmp_path, monkeypatch):
+    (tmp_path / "constant.py").write_text(CONSTANT, encoding="utf-8")
+    monkeypatch.setattr(elastocal.remainder, "__path__", [*elastocal.remainder.__path__, str(tmp_path)])
+    regressions.cache_clear()
+    yield
+    regressions.cache_clear()
+    sys.modules.pop("elastocal.remainder.constant", None)
+
+
+def test_the_catalogue_has_every_module_with_a_name():
+    assert set(regressions()) == {"extra_trees", "gaussian_process", "ridge_harmonics"}
+
+
+def test_a_file_more_is_a_regression_more(one_more):
+    assert "constant" in regressions()
+
+
+def test_shares_add_up_and_the_reduction_is_that_of_the_errors(kuka, config_folder, tmp_path):
+    case, held_out = smoothly_wrong_cases(tmp_path, kuka, config_folder / "robots", poses=100)
+    declared = fit(case.model, case.observations, NOISE)
+    inside = np.zeros(held_out.observations.cluster.max() + 1, bool)
+    plan = Plan("gaussian_process", blocks=False, within_range=True, seed=1)
+    facts = remainder_facts(plan, declared, declared, case, held_out, inside, np.random.default_rng(1))
+    assert facts["physics"] == 0.0
+    assert facts["regression_share"] + facts["left"] == pytest.approx(1.0)
+    assert facts["regression_share"] > 0.5
+    low, high = facts["reduction_ci95"]
+    assert low < 1.0 - np.sqrt(facts["left"]) < high
+    assert 0.85 < facts["covered"] <= 1.0 and facts["half_width_m"]["within"] > 3e-5
+    assert facts["rms_ci95_m"][0] < facts["errors"]["rms_m"] < facts["rms_ci95_m"][1]
+    trees = Plan("extra_trees", blocks=False, within_range=True, seed=1)
+    assert remainder_facts(trees, declared, declared, case, held_out, inside, np.random.default_rng(1))["covered"] is None

@@ -18,10 +18,3 @@ def test_a_step_is_followed_and_a_seed_repeats_itself():
     np.testing.assert_array_equal(first.mean, second.mean)
     assert first.std is None
     assert np.sqrt(((first.mean - step(there)) ** 2).mean()) < 3e-4
-
-
-def test_each_setting_has_its_own_trees():
-    inputs, residual = made_inputs(60, seed=1)
-    ends = [extra_trees.SETTINGS[0], extra_trees.SETTINGS[-1]]
-    found = [predictor(inputs).mean for predictor in extra_trees.fitted(inputs, residual, ends, 1)]
-    assert not np.allclose(*found)

@@ -29,16 +29,3 @@ def test_intervals_grow_outside_the_data_up_to_the_size_of_the_residuals():
     assert (beyond.std > 5 * within.std).all()
     # There it says the mean of the residuals, and that it may be wrong by all that they vary.
     assert (beyond.std > 0.5 * SMOOTH_M).all() and (np.abs(beyond.mean) < SMOOTH_M).all()
-
-
-def test_inputs_that_stand_still_do_no_harm_and_a_seed_repeats_itself():
-    there, _ = made_inputs(20, seed=5)
-    np.testing.assert_array_equal(fitted()(there).mean, fitted()(there).mean)
-
-
-def test_noise_alone_is_not_followed():
-    inputs, residual = made_inputs(120, seed=7)
-    noise = np.random.default_rng(8).normal(0.0, 1e-4, residual.shape)
-    predictor = next(iter(gaussian_process.fitted(inputs, noise, gaussian_process.SETTINGS, 1)))
-    there, _ = made_inputs(200, seed=9)
-    assert np.sqrt((predictor(there).mean ** 2).mean()) < 4e-5

@@ -86,8 +86,3 @@ def test_intervals_hold_95_percent_and_keep_their_shape(factor):
     inside = np.abs(np.random.default_rng(4).normal(size=(2000, 3)) * spread(there)) < NORMAL_WIDTH * found.std
     assert 0.935 < inside.mean() < 0.965
     np.testing.assert_allclose(found.std / spread(there), (found.std / spread(there))[0, 0])
-
-
-def test_without_standard_deviations_nothing_is_scaled():
-    inputs, _ = made_inputs(30, seed=1)
-    assert calibrated(lambda there: Prediction(np.zeros((len(there), 3))), [])(inputs).std is None

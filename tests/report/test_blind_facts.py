@@ -8,7 +8,6 @@ from made_blind_documents import oracle, silence, truth
 from made_blind_facts import MANIFEST, MEASURED, PROOF, facts_of, tables
 from scipy.stats import beta
 
-from elastocal_proof.blind.confusion import CLASS_WITHOUT
 from elastocal_proof.report.blind_facts import blind_facts
 
 
@@ -51,41 +50,6 @@ def test_shares_of_the_verdicts_on_effects_outside_of_the_catalogue_add_up(facts
     assert row == ["refraction", "200", "1", "100", "0", "0", "0", "0"]
 
 
-def test_each_verdict_on_an_effect_outside_of_the_catalogue_has_its_own_share(given):
-    row = given["confusion"].query("truth == 'outside:refraction'").iloc[0]
-    counts = {
-        CLASS_WITHOUT: 1,
-        "several": 2,
-        "unexplained": 4,
-        "adequate": 2,
-        "not_testable": 1,
-        "payload": 6,
-        "lost_motion": 4,
-    }
-    kept = ["robots", "settings", "truth", "level"]
-    row = {name: row[name] if name in kept else counts.get(name, 0) for name in row.index}
-    changed = given | {"confusion": pd.DataFrame([row])}
-    (found,) = blind_facts(changed, "", "quick", 7)["outside"]
-    # Names of the catalogue, class, several, unexplained and adequate or not testable, of 20 cases.
-    assert found == ["refraction", "200", "20", "50", "5", "10", "20", "15"]
-
-
-def test_what_is_absorbed_is_listed_with_its_reason(facts):
-    (row,) = facts["undetectable"]
-    assert row[0] == "force scale" and row[3] == "absorbed by the joint compliances" and row[4] == "0 of 1"
-
-
-def test_follow_up_rows_are_worded(facts):
-    assert facts["follow_up"] == [["proof", "proposed", "5", "12", "75 %", "43–95 %"]]
-
-
-def test_near_relatives_are_worded_for_all_pairs_together(tmp_path):
-    shares = [0.5, 0.2, 0.8, 0.25, 0.1, 0.4, 0.25, 0.1, 0.4, 0.0, 0.0, 0.2]
-    rows = [("all", 20.0, 4, *shares), ("payload / link_weight", 20.0, 4, *shares)]
-    found = facts_of(tmp_path, *PROOF, sweep=rows)["sweep"]
-    assert found == [["20°", "4", "50 (20–80)", "25 (10–40)", "25 (10–40)", "0 (0–20)"]]
-
-
 def test_cases_are_counted_by_group_and_robot_with_their_sum(facts):
     counts = facts["counts"]
     assert counts["heads"] == ["cases", "kuka", "m900ib700"]
@@ -97,13 +61,6 @@ def test_cases_are_counted_by_group_and_robot_with_their_sum(facts):
     ]
 
 
-def test_the_protocol_names_what_was_sealed_before_the_analysis(facts):
-    # sha256sum of the manifest's one line.
-    digest = "3ae7965672b1e6c5db56e64bfa3e60e5110d2e1190a8e73418f9f5372eb1ee81"
-    counted = {"cases": "8", "size": "quick", "seed": "7", "truths": "1"}
-    assert facts["protocol"] == counted | {"digest": digest, "levels": "50", "outside": "refraction"}
-
-
 def test_effects_have_their_shares_with_intervals_and_their_size(facts):
     rows = {row[0]: row for row in facts["effects"]}
     low, high = (100 * beta.ppf(share, *of) for share, of in ((0.025, (1, 2)), (0.975, (2, 1))))
@@ -111,41 +68,6 @@ def test_effects_have_their_shares_with_intervals_and_their_size(facts):
     assert rows["payload"] == ["payload", "50", "2", half, half, half, "100 (16–100)", "60.0 µm", "0.50"]
     # What is absorbed has no size beyond the joint compliances: it is that of the raw signal.
     assert rows["force scale"][1] == "50 raw"
-
-
-def summary_rows(**values):
-    row = {
-        "robots": "proof",
-        "hits": 3.0,
-        "cases": 1234,
-        "rate": 0.25,
-        "low": 0.125,
-        "high": 0.5,
-        "target": None,
-        "holds": None,
-    }
-    return pd.DataFrame([row | values])
-
-
-@pytest.mark.parametrize(
-    "values, worded",
-    [
-        ({"quantity": "detected at 50"}, ["3 of 1 234", "25.0 %", "12.5–50.0 %"]),
-        (
-            {"quantity": "detected at 50", "rate": None, "low": None, "high": None, "hits": 0.0, "cases": 0},
-            ["0 of 0", "–", "–"],
-        ),
-        (
-            {"quantity": "held-out RMS after, over the oracle's, mean", "hits": None, "rate": 1.02, "low": 1.01, "high": 1.033},
-            ["1 234", "1.020", "1.010–1.033"],
-        ),
-    ],
-    ids=["a share", "no case", "a ratio"],
-)
-def test_figures_without_a_target_are_worded_as_shares_or_ratios(given, values, worded):
-    changed = given | {"summary": summary_rows(**values)}
-    (row,) = blind_facts(changed, "", "quick", 7)["further"]["proof"]
-    assert [cell.replace("\u2009", " ") for cell in row[1:]] == worded
 
 
 def test_hard_settings_have_their_rates_of_detection_and_of_wrong_names(given):

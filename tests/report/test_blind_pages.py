@@ -2,7 +2,6 @@
 
 import pandas as pd
 import pytest
-import typst
 from compiled_pages import assert_within_margins, pages_of
 from drawn_figures import empty_pictures
 from made_blind_documents import effect, frame, oracle, silence, truth, verdict
@@ -28,13 +27,6 @@ def test_the_report_is_a_pdf_within_its_margins(entries, pictures, tmp_path, mon
     write_blind_report(f"{tmp_path}/blind.pdf", facts_of(tmp_path, *entries, follow_up=MEASURED), pictures)
     assert (tmp_path / "blind.pdf").read_bytes().startswith(b"%PDF")
     assert_within_margins(pages)
-
-
-def test_a_report_without_one_of_its_figures_is_not_written(pictures, tmp_path):
-    facts = facts_of(tmp_path, *PROOF[-1:])
-    with pytest.raises(typst.TypstError, match="targets"):
-        write_blind_report(f"{tmp_path}/blind.pdf", facts, pictures[1:])
-    assert not list(tmp_path.glob("blind.pdf*"))
 
 
 def test_the_page_of_targets_has_each_quantity_once_with_its_robots_and_its_limit():

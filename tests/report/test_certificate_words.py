@@ -6,11 +6,9 @@ import pytest
 from made_certificates import made_comparison, made_document
 
 from elastocal.report.certificate_words import (
-    before_and_after,
     certificate_facts,
     comparison_facts,
     decision_sentences,
-    headline,
     iso_rows,
     iso_warning,
     share_name,
@@ -50,30 +48,6 @@ def test_errors_on_validation_poses_are_told_from_the_predicted_one():
     assert "0.120 mm at validation poses is the tracker against the model" in found and "0.120 mm is the robot alone" in found
 
 
-def test_errors_before_and_after_are_of_one_kind():
-    text = before_and_after(made_document())
-    assert "off by 1.500 mm RMS" in text and "by 0.120 mm, both as predicted" in text
-    rows = certificate_facts(made_document())["steps"]
-    assert rows[-1][0] == "with lost motion (backlash)"
-    assert rows[-1][3].endswith("(from 154\u00a0µm)") and "(" not in rows[-1][4]
-
-
-@pytest.mark.parametrize(
-    ("decision", "words"),
-    [("pass", "keep the tolerance"), ("fail", "not good enough"), ("undecided", "measure the robot at them")],
-)
-def test_each_decision_has_its_advice(decision, words):
-    assert words in what_to_do(made_document(decision))
-
-
-def test_advice_follows_a_change_and_a_correction_that_does_not_help():
-    assert "moves differently than in cell_6" in what_to_do(made_document(comparison=made_comparison()))
-    assert "No change since cell_6" in what_to_do(made_document(comparison=made_comparison(0.4)))
-    document = made_document()
-    document["held_out"][-1]["rms_m"] = 2e-3
-    assert "Do not correct" in what_to_do(document)
-
-
 def test_the_tracker_is_named_where_it_hides_the_repeatability():
     document = made_document(measured=True)
     rows = iso_rows(document["iso_9283"], document["measured"])
@@ -81,19 +55,6 @@ def test_the_tracker_is_named_where_it_hides_the_repeatability():
     assert iso_rows(made_document(repeats=False)["iso_9283"], None) == [
         ["pose repeatability RP", "unknown", "no pose was approached again"]
     ]
-
-
-def test_the_headline_has_the_criterion_and_the_worst_pose():
-    stated = headline(made_document())
-    assert (stated["rms"], stated["limit"], stated["tolerance"]) == ("0.120 mm", "0.160 mm", "0.200 mm")
-    assert (stated["worst"], stated["worst_pose"]) == ("0.300 mm", "−28.6°, 250.0 mm")
-
-
-def test_what_the_campaign_does_not_state_is_blank():
-    identity = dict(certificate_facts(made_document())["identity"])
-    assert identity["instrument"] == "Leica AT960, 751234"
-    blank = ["certificate number", "serial number", "measured on", "calibration of the instrument", "temperature", "operator"]
-    assert [name for name, value in identity.items() if not value] == [*blank, "signature"]
 
 
 @pytest.mark.parametrize(("approaches", "poses", "enough"), [(150, 5, True), (149, 5, False), (120, 4, False), (40, 10, False)])
@@ -110,13 +71,6 @@ def test_changes_are_named_by_their_joint_and_counted():
     assert found["rows"][0][3] == "200 ± 50 µrad"
     assert (len(found["rows"]), found["more"]) == (12, 2)
     assert "not compared one by one" in comparison_facts(made_comparison(0.5, 0))["sentence"]
-
-
-def test_a_share_below_every_digit_of_a_tracker_is_said_to_be_below_them():
-    document = made_document()
-    document["budget"].append({"name": "joint_tilt", "rms_m": 4.4e-10, "low_m": 3e-10, "high_m": 5e-10})
-    _, share, limits = certificate_facts(document)["budget"][-1]
-    assert share.replace("\u00a0", " ") == "below 0.1 µm" and limits == "–"
 
 
 def test_facts_are_json_and_every_line_of_the_budget_has_a_name():

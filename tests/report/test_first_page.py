@@ -2,22 +2,18 @@
 
 import pytest
 from made_loop_facts import CAMPAIGNS, plainly
-from made_loop_tables import effect_entry, experiment_rows, probabilities, step_rows, verdict_document
+from made_loop_tables import effect_entry, experiment_rows, verdict_document
 
-from elastocal.application.accuracy import BASE, PREDICTED, ROBOT, Accuracy
-from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
+from elastocal.application.accuracy import BASE, PREDICTED, Accuracy
+from elastocal.diagnosis.verdict import NAMED
 from elastocal.report.first_page import (
-    TITLES,
     cause_rows,
     cost_words,
     headline,
     headline_sentence,
-    held_out_sentence,
-    probability_sentence,
     sentences,
     what_to_do,
     whose_errors,
-    worth_sentence,
 )
 
 WORDS = {
@@ -35,24 +31,9 @@ WORDS = {
 }
 
 
-def test_each_verdict_has_its_words():
-    assert set(TITLES) == {ADEQUATE, NAMED, CLASS, SEVERAL, UNEXPLAINED, NOT_TESTABLE}
-
-
 @pytest.mark.parametrize("campaign", WORDS)
 def test_the_verdict_is_said_in_plain_words(campaign):
     assert WORDS[campaign] in plainly(" ".join(sentences(CAMPAIGNS[campaign])))
-
-
-def test_probabilities_are_said_by_hypothesis_with_the_rest():
-    sets = [({"link_weight": ["joint 2"]}, 0.94), ({"transmission_harmonic": ["joint 2 orders 1-2"]}, 0.05), ({}, 0.0001)]
-    assert plainly(probability_sentence(probabilities(sets))) == (
-        "94 % gravity sag of joint 2, 5 % gear transmission error of joint 2 (orders 1-2), 1 % something else"
-    )
-    sets = [({"link_weight": ["joint 2"], "other": ["base"]}, 0.7), ({"other": ["joint 2"]}, 0.3)]
-    assert plainly(probability_sentence(probabilities(sets))) == (
-        "70 % gravity sag of joint 2 or a related mechanism, 30 % something that the catalogue does not have"
-    )
 
 
 def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
@@ -67,17 +48,6 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
     assert not any("extrapolated" in advice for advice in what_to_do(CAMPAIGNS["named"], []))
     assert "Use the declared model" in what_to_do(CAMPAIGNS["adequate"], [])[0]
     assert "loose target" in what_to_do(CAMPAIGNS["unexplained"], [])[0]
-
-
-def test_the_first_page_says_what_calibration_is_worth_against_doing_nothing():
-    heldout = {"uncalibrated": {"rms_m": 3.87e-3, "reduction_ci95": [0.98, 0.99]}, "after": {"rms_m": 57e-6}}
-    said = worth_sentence(heldout)
-    assert "uncalibrated robot" in said and plainly("falls from 3.87 mm to 57.0 µm, by 99 %") in plainly(said)
-    assert "98 to 99 %" in said
-    assert "grows from" in worth_sentence(heldout | {"after": {"rms_m": 5e-3}})
-    assert "as good uncalibrated" in worth_sentence(heldout | {"after": {"rms_m": 3.87e-3}})
-    verdict = CAMPAIGNS["named"]
-    assert worth_sentence(verdict["heldout"]) in held_out_sentence(verdict, step_rows())
 
 
 def test_the_headline_is_the_robot_as_it_was_and_as_it_is_in_mm_beside_the_noise():
@@ -138,12 +108,3 @@ def test_measured_and_predicted_error_have_their_frame_and_the_predicted_one_its
         "0.058 mm at validation poses is the tracker against the model, its noise included, in the declared base's frame; "
         f"0.174 mm is the robot alone, in the same frame, mostly from {mostly}."
     )
-
-
-def test_where_the_base_is_unknown_the_robot_has_a_frame_of_its_own():
-    stated = Accuracy(ROBOT, PREDICTED, 1.2e-3, 4e-3, None, None, "", 9, "some poses")
-    found = whose_errors(1.5e-3, stated)
-    assert found.startswith(
-        "1.50 mm at validation poses is the tracker against the model, its noise included, in the tracker's frame;"
-    )
-    assert "1.20 mm is the robot alone, in its own frame" in found

@@ -1,6 +1,5 @@
 """What was measured is told apart for the poses that are fitted and those that are held out."""
 
-import pytest
 from made_loop_facts import CAMPAIGNS, facts_of
 from made_loop_tables import campaign_descriptions
 
@@ -22,24 +21,3 @@ def test_a_report_says_of_which_robot_it_is_when_it_was_measured_and_by_which_ve
         f"Serial number 4711, measured on 2026-11-20, report by elastocal {__version__}"
     )
     assert made({}) == f"Report by elastocal {__version__}"
-
-
-@pytest.mark.parametrize(
-    ("target", "measured", "words"),
-    [
-        ({"offset_m": [0, 0, 0]}, "pose", ""),
-        ({"offset_m": "unknown"}, "position", ", place fitted"),
-        ({"offset_m": "unknown"}, "pose", ", place and rotation fitted"),
-        ({"offset_m": [0, 0, 0], "rotation": "unknown"}, "pose", ", rotation fitted"),
-        ({"offset_m": [0, 0, 0], "rotation": "unknown"}, "position", ""),
-        ({"offset_m": "unknown", "rotation": [0, 0, 1.5708]}, "pose", ", turned by 90°, place fitted"),
-        ({"offset_m": [0, 0, 0], "rotation": [0, 0, 0]}, "pose", ""),
-    ],
-)
-def test_what_is_fitted_of_a_target_and_how_it_is_mounted_stands_behind_it(target, measured, words):
-    described = campaign_descriptions()
-    names = described["campaign"]["targets"]
-    described["campaign"] |= {"measured": measured, "targets": {name: {"point": "hand"} | target for name in names}}
-    facts = facts_of(CAMPAIGNS["named"], descriptions=described)
-    listed = next(training for name, training, _ in facts["measured"] if name == "targets")
-    assert listed == " and ".join(f"{name} at the measuring point hand{words}" for name in names)

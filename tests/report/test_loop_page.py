@@ -14,7 +14,6 @@ from made_loop_tables import candidate_table, residual_table
 from elastocal.io.origin import Origin
 from elastocal.loop.residual_tables import angles_of, worst_measurement
 from elastocal.mechanics.kinematics import corners
-from elastocal.report import loop_page as module
 from elastocal.report.loop_page import loop_page, write_loop_page
 
 CHROMIUM = shutil.which("chromium")
@@ -109,21 +108,6 @@ def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at
             np.testing.assert_allclose(outline, corners(kuka.chain, joints[[row]])[:, 0], atol=1e-4)
 
 
-def test_where_nothing_was_added_the_page_says_so(kuka):
-    verdict = CAMPAIGNS["adequate"]
-    for found, said in ((True, ""), (False, "Nothing was added to the declared model: after is the same as before.")):
-        page, data = loop_page(facts_of(verdict), residual_table(found=found), candidate_table(), kuka)
-        assert page["same_sentence"] == said and data["changed"] is found
-
-
-def test_of_many_measurements_some_are_shown_evenly_spread_and_the_page_says_so(kuka, monkeypatch):
-    monkeypatch.setattr(module, "_MOST_SHOWN", 11)
-    page, data = page_of(kuka)
-    count = len(residual_table()["x"])
-    shown = len(data["position"])
-    assert 10 <= shown <= 11 and page["shown_sentence"] == f"{shown} of {count} measurements are shown, evenly spread."
-
-
 def test_the_leading_candidates_stand_by_falling_bayes_factor(kuka):
     table = candidate_table()
     page, _ = page_of(kuka)
@@ -154,18 +138,6 @@ def test_a_candidate_of_several_shapes_has_the_factor_of_the_best_and_the_probab
     assert [row | {"words": ""} for row in once] == [row | {"words": ""} for row in both]
 
 
-def test_the_page_names_its_origin_at_the_foot(written):
-    origin = f"Made from commit {'c0ffee' * 7}, configuration SHA-256 {'d16e57aa' * 8}, seed 7."
-    assert origin in written.read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("campaign", ["not_testable", "fault of the data"])
-def test_where_nothing_could_be_tested_no_probabilities_are_stated(kuka, tmp_path, campaign):
-    page, data = page_of(kuka, campaign)
-    write_loop_page(tmp_path / "report.html", page, data)
-    assert page["causes"] == [] and 'class="bar"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
-
-
 def test_joints_are_drawn_on_the_arm_and_the_page_opens_at_the_worst_pose(kuka):
     table = residual_table()
     _, data = page_of(kuka)
@@ -175,19 +147,6 @@ def test_joints_are_drawn_on_the_arm_and_the_page_opens_at_the_worst_pose(kuka):
     assert data["poses"][data["worst"]].split(",")[0] == str(table["pose"][worst])
     size = np.linalg.norm(data["before"], axis=1)
     assert size.max() == size[data["targets"][data["worst"]]].max() or table["load"][worst]
-
-
-def test_the_worst_pose_is_there_however_few_are_drawn(kuka, monkeypatch):
-    monkeypatch.setattr(module, "_POSES", 2)
-    monkeypatch.setattr(module, "_MOST_SHOWN", 3)
-    table = residual_table()
-    _, data = page_of(kuka)
-    assert data["poses"][data["worst"]].split(",")[0] == str(table["pose"][worst_measurement(table)])
-
-
-def test_the_page_is_light_enough_for_a_phone(written):
-    """Of 4,000 measurements, which are the most shown, it is some 0.8 MB."""
-    assert written.stat().st_size < 300_000
 
 
 def test_texts_of_other_people_stay_texts(kuka, tmp_path):

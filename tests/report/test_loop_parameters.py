@@ -16,11 +16,3 @@ def test_what_only_the_prior_determines_is_listed_as_not_identified():
     facts = facts_of(CAMPAIGNS["named"], parameters=parameter_table(["joint_offset@2 offset", left], by_prior=[left]))
     assert facts["held"] == [["Zero offset of joint 3", "offset"]]
     assert [row[0] for row in facts["others"]["rows"]] == ["Zero offset of joint 2"]
-
-
-def test_the_turn_of_a_fitted_mount_stands_among_the_parameters():
-    named = ["joint_offset@2 offset", "target TMAC rx", "target TMAC rz"]
-    facts = facts_of(CAMPAIGNS["named"], parameters=parameter_table(named))
-    assert ["Target TMAC", "rotation about x", *facts["others"]["rows"][0][2:]] in facts["others"]["rows"]
-    assert [row[0] for row in facts["others"]["rows"]] == ["Zero offset of joint 2", "Target TMAC", "Target TMAC"]
-    assert "2 of targets" in facts["others"]["placement"]

@@ -2,7 +2,7 @@
 
 from made_study_tables import TITLES, score_pairs, strategy_scores
 
-from elastocal.report.metric_answers import METRIC_NAMES, metric_summary, score_rows, staged_rows
+from elastocal.report.metric_answers import METRIC_NAMES, metric_summary, score_rows
 
 
 def test_scores_have_their_rank_in_brackets():
@@ -11,19 +11,8 @@ def test_scores_have_their_rank_in_brackets():
     assert set(METRIC_NAMES) < set(row)
 
 
-def test_a_strategy_that_is_the_classical_one_is_called_the_same():
-    same, staged = staged_rows(strategy_scores(), TITLES)
-    assert same == {"strategy": "6DoF", "kuka": "the same", "fanuc": "the same"}
-    assert staged["kuka"] == "1.200 (1.150 to 1.250)"
-
-
 def test_reversed_pairs_are_counted_by_metric_and_the_widest_is_named():
     found = metric_summary(score_pairs(), TITLES)
     assert found["pairs"] == "2" and found["reversed_by"] == "k_Σ of the fixed joints (1)"
     assert "k_Σ of all joints" in found["never"] and "fixed joints" not in found["never"]
     assert "of 6DoF on Kuka is 2.00 times (1.50 to 2.50) that of staged, its RMS 0.83 times" in found["example"]
-
-
-def test_without_a_reversal_there_is_no_example():
-    found = metric_summary(score_pairs().assign(reversed=False), TITLES)
-    assert found["reversed_by"] == "none" and found["example"] == ""

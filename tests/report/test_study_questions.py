@@ -1,12 +1,11 @@
 """What is stated of claims and questions, and the pages of the study's report that compile from it."""
 
-import json
 from pathlib import Path
 
 import pytest
 import typst
 from drawn_figures import empty_pictures
-from made_study_tables import TITLES, facts, question_facts
+from made_study_tables import facts, question_facts
 
 from elastocal.report.typesetting import compile_document
 
@@ -31,14 +30,6 @@ def pictures(tmp_path_factory):
 def write_report(path, stated, pictures, figures=FIGURES):
     tables = {name: [head, ["1.0 ± 0.1"] * len(head)] for name, head in HEAD.items()} | {"figures": figures}
     compile_document(path, "study.typ", {"facts": stated, "tables": tables}, pictures)
-
-
-def test_facts_can_be_written_as_json():
-    assert json.loads(json.dumps(question_facts(), allow_nan=False)) == question_facts()
-
-
-def test_studies_are_stated_of_each_robot_by_its_title():
-    assert [stated["title"] for stated in question_facts()["over_studies"]] == [*TITLES.values()]
 
 
 def test_the_report_is_a_pdf_that_the_same_facts_give_again(pictures, tmp_path):

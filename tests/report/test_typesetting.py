@@ -43,12 +43,6 @@ def test_a_document_reads_its_data_and_pictures_as_they_were_given(written, pict
     assert [file.name for file in written.iterdir()] == ["made.pdf"]
 
 
-def test_the_same_data_give_the_same_bytes(written, picture):
-    for name in "ab":
-        compile_document(written / f"{name}.pdf", "made.typ", DATA, [picture])
-    assert (written / "a.pdf").read_bytes() == (written / "b.pdf").read_bytes()
-
-
 @pytest.mark.parametrize(
     "document, data, pictures, error, message",
     [

@@ -5,12 +5,6 @@ import numpy as np
 from elastocal.study.bootstrap import bootstrap_weights
 
 
-def test_bootstrap_counts_every_set_once_and_then_any_number_of_times():
-    weights = bootstrap_weights(1, "kuka", range(400), 100)
-    assert weights.shape == (101, 400)
-    assert (weights[0] == 1).all() and (weights[1:] == np.round(weights[1:])).all() and (weights >= 0).all()
-
-
 def test_bootstrap_weights_do_not_depend_on_blocks_or_on_the_number_of_replicates():
     whole = bootstrap_weights(1, "kuka", range(10), 20)
     np.testing.assert_array_equal(

@@ -65,10 +65,3 @@ def test_a_length_counts_where_the_accuracy_is_kept_for_good():
     frame = frame_of(0.0)
     frame.loc[frame.length == 9, "mean_square"] = 1.0
     assert lengths_table({"arm": frame}, {"E": ["E"]}, [40.0]).configurations[0] == 10
-
-
-def test_a_root_has_the_error_of_the_delta_method():
-    rng = np.random.default_rng(4)
-    root, error = root_mean(rng.gamma(50.0, 1.0, (4000, 3)))
-    roots = np.sqrt(rng.gamma(50.0, 1.0, (300, 4000)).mean(axis=1))
-    assert root == pytest.approx(np.full(3, np.sqrt(50)), rel=0.01) and error == pytest.approx(np.full(3, roots.std()), rel=0.2)

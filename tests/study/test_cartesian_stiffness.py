@@ -6,7 +6,7 @@ from made_study_blocks import experiments_of
 
 from elastocal.mechanics.elastostatics import generalized_forces, joint_torques
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.study.cartesian_stiffness import equilibrium, loaded_compliance, torque_gradient
+from elastocal.study.cartesian_stiffness import equilibrium, torque_gradient
 from elastocal.study.steps.columns import to_experiments
 
 
@@ -26,15 +26,6 @@ def test_the_gradient_of_torques_is_that_of_finite_differences(kuka, loaded):
             for sign in (1, -1)
         ]
         np.testing.assert_allclose(found[..., joint], (moved[0] - moved[1]) / (2 * step), atol=1e-5)
-
-
-def test_without_a_gradient_the_stiffness_is_salisburys(kuka, loaded):
-    _, wrench, jacobian = loaded
-    compliance = loaded_compliance(jacobian, kuka.compliance, np.zeros((6, 6)))
-    first_order = (jacobian * generalized_forces(jacobian, wrench)[:, None]) @ kuka.compliance
-    np.testing.assert_allclose((compliance @ wrench[..., None])[..., 0], first_order, rtol=1e-9)
-    stiffness = np.linalg.inv(compliance)
-    np.testing.assert_allclose((stiffness @ first_order[..., None])[..., 0], wrench, rtol=1e-6, atol=1e-4)
 
 
 def test_torques_in_equilibrium_are_those_of_the_loaded_arm(kuka, loaded):

@@ -102,23 +102,6 @@ def test_the_factor_of_comb_is_judged_by_how_studies_scatter(table):
     assert "1.89" in found.ours and found.verdict == FAILS
 
 
-def test_counting_all_joints_comb_and_the_other_are_one_estimator(table):
-    found = claim(table, "Comb is 2.75")
-    assert "1.00" in found.literal and "2.50" in found.ours
-
-
-def test_the_best_by_any_metric_depends_on_which_joints_are_counted(table):
-    found = claim(table, "4-6DoF after 6+3DoF is more accurate")
-    # By the fixed joints 3-6DoF after 2DoF looks better; over all joints none does.
-    assert "in 8 of 8 studies" in found.literal and "in 0 of 8 studies" in found.ours
-    assert found.verdict == PARTLY and found.p == pytest.approx(1 / 9)
-
-
-def test_six_dof_needs_more_than_fifty_configurations_for_two_micrometres(table):
-    found = claim(table, "6DoF reaches 2 µm")
-    assert found.verdict == FAILS and "kuka 86" in found.ours and found.p == pytest.approx(1 / 9)
-
-
 def test_fanuc_is_better_in_all_figures_only_where_it_is(table):
     worse = claim(claims_table(evidence(studies=studies(1.2))).set_index("claim"), "FANUC is more accurate")
     assert "in 100 % of the figures" in claim(table, "FANUC is more accurate").ours

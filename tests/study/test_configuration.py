@@ -5,7 +5,7 @@ from copy import deepcopy
 import pytest
 from support import changed, refused
 
-from elastocal.study.configuration import check_study, override, rows_read
+from elastocal.study.configuration import check_study, override
 
 
 def test_the_repository_passes(config, config_folder):
@@ -14,10 +14,6 @@ def test_the_repository_passes(config, config_folder):
     assert list(study.robots) == config["robots"] and list(study.strategies) == config["strategies"]
     assert study.points["3+6DoF-comb"] == ("3DoF", "6DoF")
     assert config == before
-
-
-def test_rows_read_are_those_of_poses_or_positions():
-    assert (rows_read("pose"), rows_read("position")) == (6, 3)
 
 
 FAULTS = {
@@ -120,10 +116,6 @@ def other_config(config):
     return other
 
 
-def test_robots_with_other_joints_and_points_pass(other_config, other_folder):
-    assert check_study(other_config, other_folder).points == {"plain": ("B",)}
-
-
 FAULTY_FILES = {
     "bad YAML": ("robots/arm.yaml", "name: [arm\n", "line 2", ["YAML"]),
     "empty": ("robots/arm.yaml", "", "", ["found nothing", "keys with values"]),
@@ -177,9 +169,3 @@ def test_what_the_command_line_changes_is_read_as_in_the_file(config, config_fol
     assert changed["switched"] == config["switched"] | {"R4_tool_axes": {"offset_frame": "base"}}
     check_study(changed, config_folder, "config.yaml")
     assert override(config, []) == config
-
-
-def test_what_the_command_line_spoils_is_said_to_come_from_there(config):
-    for text in ("[1", "1_0", "!!int 3"):
-        with refused("--config evaluation", "line"):
-            override(config, [f"evaluation={text}"])

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from elastocal.study.costs import break_even_table, configurations_needed, cost_table, find_needed_by_set
+from elastocal.study.costs import break_even_table, configurations_needed, cost_table
 
 POINT_SETS = {"one": ["A"], "two": ["A", "B"], "useless": ["A", "A"]}
 LENGTHS = np.arange(1, 101)
@@ -33,11 +33,6 @@ def test_the_length_is_where_the_curve_crosses_the_accuracy():
     assert configurations_needed(squares, 1.0) == np.inf and configurations_needed(squares, 400.0) == 1.0
 
 
-def test_an_error_that_grows_again_counts_from_the_last_time_above():
-    squares = np.array([np.nan, 9.0, 1.0, 9.0, 1.0, 0.5])
-    assert 4.0 < configurations_needed(squares, 2.0) < 5.0
-
-
 def test_a_set_pays_from_the_cost_on_at_which_both_cost_the_same(weights):
     table = break_even_table({"arm": frame()}, POINT_SETS, [60.0], weights).set_index("points")
     # 25 configurations of one measurement, 100/9 of two: 25 (r + 1) = 100/9 (r + 2).
@@ -56,9 +51,3 @@ def test_the_cheapest_set_changes_at_its_break_even(weights):
         cheapest[0.0] == "one" and cheapest.iloc[-1] == "two" and table.groupby("configuration_cost").cheapest.sum().eq(1).all()
     )
     assert table[table.points == "one"].ratio.eq(1.0).all()
-
-
-def test_a_set_that_was_not_measured_is_left_out(weights):
-    some = frame()
-    found = find_needed_by_set(some[some.points != "two"], POINT_SETS, 60.0, weights["arm"])
-    assert set(found) == {"one", "useless"} and found["one"].shape == (21,)

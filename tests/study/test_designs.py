@@ -26,8 +26,3 @@ def test_designs_lie_between_the_bound_and_random_ones(found, size):
     # What is optimised is best, as far as an exchange finds it.
     assert worth(found, "I", size).rms <= 1.001 * min(worth(found, "D", size).rms, worth(found, "A", size).rms)
     assert random.low < random.rms < random.high
-
-
-def test_more_configurations_leave_less(found):
-    for kind in (RANDOM, "D", "A", "I", CONTINUOUS):
-        assert worth(found, kind, 8).rms < worth(found, kind, 3).rms

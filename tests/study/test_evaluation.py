@@ -8,7 +8,6 @@ from support import random_loads
 
 from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
 from elastocal.study.evaluation import (
-    LARGEST_TRUSTED_SPREAD,
     accuracy_sums,
     accuracy_table,
     average,
@@ -79,17 +78,6 @@ def test_averages_are_those_written_out_whatever_the_blocks(judge, estimates, we
     assert (found.nonpositive_share == 0).all()
 
 
-def test_mean_stiffness_of_a_spread_compliance_is_biased_as_jensen_says(judge):
-    rng, spread = np.random.default_rng(2), 0.1
-    scatter = np.exp(spread * rng.standard_normal((20_000, 1, 1)) - spread**2 / 2)
-    estimates = judge.reference * scatter
-    found = average([(estimates, np.ones((1, 20_000)))], judge, "stiffness", "averaged_model", np.ones((1, TESTS))).compliance[
-        0, 0
-    ]
-    # Lognormal of mean one: E[1/c] = exp(s^2), with a standard error of s / sqrt(20 000) = 0.0007.
-    np.testing.assert_allclose(found / judge.reference, np.exp(-(spread**2)), atol=5 * 0.0007)
-
-
 def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(judge, estimates, weights, counts):
     spoiled = estimates.copy()
     spoiled[:3, 1, 4] *= -1
@@ -99,15 +87,6 @@ def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
         table = metrics_table(averages, judge.reference, (0, 1))
     np.testing.assert_allclose(averages.nonpositive_share, [0, 3 / SETS, 0])
     np.testing.assert_array_equal(table["trustworthy"], [True, False, True])
-
-
-def test_a_spread_beyond_the_limit_takes_trust_away(judge, weights, counts):
-    scatter = np.linspace(-1, 1, SETS)[:, None, None] * np.array([[0.5], [0.4], [0.1]])
-    averages = average(blocks_of(judge.reference * (1 + scatter), weights), judge, "stiffness", "averaged_model", counts)
-    np.testing.assert_array_equal(
-        metrics_table(averages, judge.reference, (0,))["trustworthy"], averages.relative_spread <= LARGEST_TRUSTED_SPREAD
-    )
-    assert averages.relative_spread[0] > LARGEST_TRUSTED_SPREAD > averages.relative_spread[2]
 
 
 def test_prefixes_without_estimates_stay_not_a_number_and_are_not_trusted(judge, estimates, weights, counts):
@@ -190,22 +169,6 @@ def test_accuracy_is_that_of_single_data_sets_averaged_whatever_the_blocks(judge
             # The error of a root of a mean is that of the mean over twice the root.
             expected = values.std(ddof=1) / np.sqrt(SETS) / (2 * root)
             assert table[f"{name}_std_error"][row] == pytest.approx(expected, rel=1e-9)
-
-
-def test_percentile_is_the_smallest_error_that_ninety_five_of_a_hundred_do_not_exceed(judge, kuka):
-    loads = random_loads(kuka, 1, 100)
-    hundred = make_judge(kuka, loads, true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector"))
-    model = 1.1 * kuka.compliance[None, None]
-    errors = np.sort(position_errors(hundred, model[0])[0])
-    assert accuracy_table(accuracy_sums(model, hundred), [1])["p95"][0] == pytest.approx(errors[94], rel=1e-12)
-
-
-def test_exact_estimates_have_no_error_and_no_standard_error(judge):
-    table = accuracy_table(accuracy_sums(np.tile(judge.reference, (5, 1, 1)), judge), [1])
-    for name, values in table.items():
-        if name != "length":
-            # Roots of rounding.
-            np.testing.assert_allclose(values, 0, atol=1e-9, err_msg=name)
 
 
 @pytest.mark.parametrize(

@@ -37,12 +37,6 @@ def test_the_expected_deviation_is_the_mean_over_normal_models(kuka, bias):
     assert found[0] == pytest.approx(mean_deviation(scores, models[None]).mean(), rel=0.03)
 
 
-def test_without_scatter_the_expected_deviation_is_that_of_the_model_itself(kuka):
-    scores, models = judge(kuka), kuka.compliance * np.array([[1.1], [0.7]])
-    found = expected_deviation(scores, models, np.zeros((2, 6, 6)))
-    np.testing.assert_allclose(found, mean_deviation(scores, models[None])[0], rtol=1e-9)
-
-
 def test_forms_give_the_squared_error_of_each_test_configuration(kuka):
     scores, model = judge(kuka), 1.2 * kuka.compliance
     whole = np.append(model - scores.reference, 1.0)

@@ -13,8 +13,3 @@ def test_the_arrays_of_experiments_cannot_be_exchanged(name):
     experiments = Experiments(np.zeros((2, 3, 7)), np.ones((2, 3, 6)))
     with pytest.raises(FrozenInstanceError):
         setattr(experiments, name, np.zeros((2, 3, 6)))
-
-
-def test_angles_come_before_wrenches():
-    experiments = Experiments(np.zeros((2, 3, 7)), np.ones((2, 3, 6)))
-    assert experiments.joint_angles.shape == (2, 3, 7) and experiments.wrench.shape == (2, 3, 6)

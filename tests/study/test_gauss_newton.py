@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from support import OTHER_CHAINS, random_loads, robot_of, without_tool
+from support import random_loads, without_tool
 
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
@@ -12,10 +12,8 @@ from elastocal.study import gauss_newton
 from elastocal.study.gauss_newton import identify_exactly
 from elastocal.study.identification import Measurements, first_solvable_length, identify
 from elastocal.study.simulation import true_deflections
-from elastocal.study.strategies import Stage, Strategy
 
 SETS, CONFIGURATIONS = 3, 4
-SAME_BUT_FOR_THE_START = ("6DoF", "6DoF-after-3DoF", "6DoF-after-3+3DoF")
 
 
 class Data:
@@ -63,13 +61,6 @@ def test_true_compliances_are_recovered_where_equation_11_is_off(robot, strategi
         assert find_distance(data.linear(strategy), robot) > 1e-5
 
 
-def test_strategies_that_differ_by_their_start_alone_agree_to_rounding(robot, strategies):
-    data = Data(robot, noise=2e-4)
-    one, *others = (data.solved(strategies[name]) for name in SAME_BUT_FOR_THE_START)
-    for other in others:
-        np.testing.assert_allclose(other, one, rtol=0, atol=1e-10 * np.abs(one).max())
-
-
 def test_noisy_estimates_are_those_of_a_general_least_squares_solver(kuka, strategies):
     data = Data(kuka, noise=2e-4)
     found = data.solved(strategies["3+6DoF-comb"])[0]
@@ -101,22 +92,6 @@ def test_one_ill_conditioned_data_set_does_not_take_the_others_along(kuka, strat
     found = data.solved(strategies["6DoF"], (1,))[0]
     errors = np.abs(found / kuka.compliance[:, None] - 1).max(axis=0)
     assert (errors < 1e-5).mean() > 0.95
-
-
-def test_other_robots_than_those_with_six_joints_are_solved():
-    for name in ("three joints", "seven joints", "fixed rotations"):
-        robot = robot_of(OTHER_CHAINS[name])
-        joints = tuple(range(robot.joints))
-        strategy = Strategy("all at the end", (Stage((robot.chain.end_effector.name,), joints),))
-        assert find_distance(Data(robot).solved(strategy)[0], robot) < 1e-8
-
-
-def test_later_stages_hold_what_earlier_ones_found(kuka, strategies):
-    data = Data(kuka, noise=2e-4)
-    alone = data.solved(Strategy("first stage", strategies["4-6DoF-after-3DoF"].stages[:1]))
-    staged = data.solved(strategies["4-6DoF-after-3DoF"])
-    np.testing.assert_array_equal(staged[:, :3], alone[:, :3])
-    assert (alone[:, 3:] == 1e-6).all()
 
 
 def test_steps_that_do_not_settle_leave_no_number(kuka, strategies, monkeypatch):

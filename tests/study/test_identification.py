@@ -18,7 +18,6 @@ from elastocal.study.identification import (
     estimate_compliance,
     first_solvable_length,
     identify,
-    prefix_information,
     prefix_triangles,
     undetermined,
 )
@@ -168,42 +167,12 @@ def test_condition_is_that_of_the_stacked_regressor_of_the_worst_stage(data, str
         assert found[k - 1, s] == pytest.approx(expected, rel=1e-6)
 
 
-def test_strategies_that_differ_by_their_start_alone_agree_exactly(data, strategies):
-    plainly, *others = (
-        identify(strategies[name], data.measurements(), 6) for name in ("6DoF", "6DoF-after-3DoF", "6DoF-after-3+3DoF")
-    )
-    for other in others:
-        np.testing.assert_array_equal(other.compliance, plainly.compliance)
-        np.testing.assert_array_equal(other.covariance, plainly.covariance)
-
-
-def test_comb_and_its_staged_twin_are_one_estimator(data, strategies):
-    comb, twin = (identify(strategies[name], data.measurements(), 6) for name in ("3+6DoF-comb", "4-6DoF-after-6+3DoF"))
-    np.testing.assert_allclose(twin.compliance, comb.compliance, rtol=0, atol=1e-9 * np.abs(comb.compliance).max())
-    np.testing.assert_allclose(twin.covariance, comb.covariance, rtol=0, atol=1e-9 * np.abs(comb.covariance).max())
-
-
-def test_measurements_are_left_as_they_were(data, strategies):
-    measurements = data.measurements()
-    before = {name: (r.regressor.copy(), r.deflection.copy()) for name, r in measurements.items()}
-    identify(strategies["4-6DoF-after-6+3DoF"], measurements, 6)
-    for name, (matrix, deflection) in before.items():
-        np.testing.assert_array_equal(measurements[name].regressor, matrix)
-        np.testing.assert_array_equal(measurements[name].deflection, deflection)
-
-
 @pytest.mark.parametrize(
     ("name", "poses", "positions"), [("6DoF", 1, 2), ("3+6DoF-comb", 1, 1), ("5-6DoF-after-4DoF", 1, 2), ("seven", 2, 3)]
 )
 def test_first_solvable_length_counts_measurements_against_unknowns_of_a_stage(strategy_called, name, poses, positions):
     strategy = strategy_called(name)
     assert (first_solvable_length(strategy, 6), first_solvable_length(strategy, 3)) == (poses, positions)
-
-
-def test_prefixes_that_are_too_short_are_not_a_number(robots, strategies):
-    found = identify(strategies["6DoF"], data_of("kuka", 3, robots).measurements(), 6)
-    for array in (found.compliance, found.covariance, found.condition):
-        assert np.isnan(array[0]).all() and np.isfinite(array[1:]).all()
 
 
 def test_condition_tells_a_prefix_that_has_measurements_enough_but_not_the_right_ones(robots, strategies):
@@ -230,15 +199,6 @@ def test_triangles_carry_the_normal_equations_of_every_prefix(shape):
             np.testing.assert_array_equal(np.tril(triangle, -1), 0)
             expected = stacked[:, :pivots].T @ stacked
             np.testing.assert_allclose(triangle.T @ triangles[k, ..., s], expected, rtol=0, atol=1e-12 * rows * configurations)
-
-
-def test_prefix_information_is_the_sum_over_the_first_configurations():
-    matrix = np.random.default_rng(3).standard_normal((6, 4, 5, 2))
-    found = prefix_information(matrix)
-    for k in range(5):
-        for s in range(2):
-            expected = sum(matrix[:, :, i, s].T @ matrix[:, :, i, s] for i in range(k + 1))
-            np.testing.assert_allclose(found[k, s], expected, rtol=0, atol=1e-13)
 
 
 def test_a_strong_prior_gives_its_values_and_a_weak_one_those_of_least_squares(data, strategies):

@@ -11,7 +11,3 @@ def test_indices_are_those_of_the_singular_values():
     turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
     indices = observability((turn * singular**2) @ turn.T, 4)
     assert [float(indices[name]) for name in ("O1", "O2", "O3", "O4", "O5")] == pytest.approx([1.0, 0.25, 1.0, 0.25, 1 / 1.75])
-
-
-def test_what_is_not_observable_has_no_worth_and_no_error():
-    assert observability(np.diag([1.0, 0.0]), 4)["O3"] < 1e-100

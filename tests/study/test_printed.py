@@ -48,12 +48,6 @@ def test_the_figures_of_tables_3_and_4_are_found_with_their_units():
     assert lengths.std == pytest.approx(1.0, rel=0.02)
 
 
-def test_a_length_beyond_the_longest_is_continued():
-    assert predict_scatter(studies_of(biases=(300.0, 500.0)), "arm", "A", "n_dev_2_um", 20).mean == pytest.approx(
-        (150 * 250) ** 0.5
-    )
-
-
 @pytest.mark.parametrize(("robot", "strategy", "quantity"), [("other", "A", "c1"), ("arm", "B", "c1"), ("arm", "A", "ratio")])
 def test_what_the_studies_do_not_have_is_not_predicted(robot, strategy, quantity):
     assert predict_scatter(studies_of(), robot, strategy, quantity, 20) is None

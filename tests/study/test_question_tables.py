@@ -36,10 +36,6 @@ def test_the_ladder_has_a_row_for_each_number_of_springs_and_one_for_what_was_ch
     assert table.noise_um.tolist() == [200.0] * 3
 
 
-def test_without_a_robot_with_links_the_ladder_is_empty():
-    assert ladder_table({}).empty and "rms_um" in ladder_table({})
-
-
 def test_designs_are_in_micrometres():
     frame = pd.DataFrame({"design": ["D"], "configurations": [4], "rms": [8e-5], "low": [7e-5], "high": [9e-5]})
     found = designs_table({"arm": frame.assign(joint_range="limits")}).iloc[0].tolist()

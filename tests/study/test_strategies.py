@@ -38,17 +38,6 @@ def test_a_stage_that_identifies_every_joint_forgets_those_before_it(strategies)
     assert left == {name: strategies[name].stages for name in left}
 
 
-def test_both_robots_can_carry_out_every_strategy(strategies, robot):
-    for name, strategy in strategies.items():
-        check_strategy(strategy, robot.chain, name)
-
-
-def test_joints_count_from_one_in_the_file_and_from_zero_inside():
-    strategy = strategy_from_document({"name": "x", "stages": [{"points": ["A"], "joints": [2, 3], "held": [1]}]})
-    (stage,) = strategy.stages
-    assert (stage.points, stage.identified, stage.fixed) == (("A",), (1, 2), (0,))
-
-
 CHAIN = chain_of("Rz(q1) Tx(1) Ry(q2) Tx(1) [A] Ry(q3) Tx(1) [B]")
 STAGED = [{"points": ["A"], "joints": [1, 2]}, {"points": ["B"], "joints": [3], "held": [1, 2]}]
 
@@ -78,7 +67,3 @@ def test_faulty_strategy_is_refused_in_one_line(fault):
     strategy = strategy_from_document({"name": fault, "stages": documents})
     with refused("strategies/x.yaml", f"{key}:", *words):
         check_strategy(strategy, CHAIN, "strategies/x.yaml")
-
-
-def test_a_strategy_without_fault_is_accepted():
-    check_strategy(strategy_from_document({"name": "staged", "stages": STAGED}), CHAIN, "x")

@@ -6,23 +6,13 @@ import pytest
 from made_metrics import metrics_of, replicates_of
 
 from elastocal.study.tables import (
-    deviation_ratio,
     merge_errors,
     per_dataset_table,
-    share_compensated,
     solver_summary,
     table2,
     table4,
     word_value,
 )
-
-
-def test_lengths_of_table4_are_those_at_which_a_bias_that_falls_as_one_over_the_length_meets_the_limits():
-    table = table4(metrics_of("A", 40.0), replicates_of("A", 40.0), ["arm"], ["A"], 200.0, 20, 1.0, 2.0).iloc[0]
-    assert table.k_sigma_20_percent == pytest.approx(2.0) and table.k_sigma_20_percent_fixed_joints == pytest.approx(1.0)
-    assert (table.n_k_sigma_1_percent, table.n_k_sigma_1_percent_fixed_joints, table.n_dev_2_um) == (40, 20, 20)
-    assert table.n_k_sigma_1_percent_std_error == pytest.approx(4.0)
-    assert table.dev_20_um == pytest.approx(2.0)
 
 
 def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law_it_follows():
@@ -59,15 +49,6 @@ def test_table2_is_the_statistics_of_all_configurations_together():
     # A standard deviation of 400 replicates is known to 3.5 %: 12 % at 3.4 standard errors; 20 % is seen with a power of 0.97.
     assert row.mean_mm_std_error == pytest.approx(1e3 * data.mean(axis=1).std() / np.sqrt(50), rel=0.12)
     assert row.mean_mm_one_set_std == pytest.approx(1e3 * data.mean(axis=1).std(ddof=1))
-
-
-def test_share_and_ratio_come_with_the_spread_of_paired_replicates():
-    metrics = pd.concat([metrics_of("A", 20.0), metrics_of("B", 10.0)])
-    replicates = pd.concat([replicates_of("A", 20.0), replicates_of("B", 10.0)])
-    assert share_compensated(metrics, replicates, "arm", "A", 200.0, 20) == pytest.approx((99.9, 0.01))
-    # Replicates move both strategies together, so their ratio stands still.
-    assert deviation_ratio(metrics, replicates, "arm", "A", "B", 200.0, 20) == pytest.approx((2.0, 0.0), abs=1e-12)
-    assert all(np.isnan(share_compensated(metrics, replicates, "other", "A", 200.0, 20)))
 
 
 def test_efficiency_is_the_squared_ratio_of_bound_and_error_and_is_empty_without_noise():

@@ -40,7 +40,3 @@ def test_a_milling_path_is_straight_and_level_with_a_force_against_its_feed(robo
     assert np.linalg.norm(force, axis=1) == pytest.approx(500.0) and (force @ steps[0] < 0).all() and (force[:, 2] > 0).all()
     # No jump from one posture to another.
     assert np.abs(np.diff(use.joint_angles[0], axis=0)).max() < 0.05
-
-
-def test_what_is_out_of_reach_is_left_out(kuka):
-    assert iso_9283(kuka, (5.0, 0.0, 1.0), 1.0, 800.0) is None and milling_path(kuka, (2.9, 0.0, 1.0), 0.5, 500.0) is None

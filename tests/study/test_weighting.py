@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from statsmodels.api import WLS
 
-from elastocal.study.weighting import expected_errors, pose_deviation, range_noise
+from elastocal.study.weighting import expected_errors, range_noise
 
 
 @pytest.fixture(scope="module")
@@ -32,17 +32,6 @@ def test_weights_of_the_noise_leave_the_covariance_of_weighted_least_squares(mad
         for A, std in zip(regressor, deviation, strict=True)
     ]
     assert expected_errors(regressor, deviation, moment)[1] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-9)
-
-
-def test_where_all_are_equally_certain_weights_make_no_difference(made):
-    regressor, _, moment = made
-    equal, weighted = expected_errors(regressor, np.full((2, 30), 0.3), moment)
-    assert equal == pytest.approx(weighted, rel=1e-12)
-
-
-def test_poses_have_three_positions_and_three_orientations():
-    found = pose_deviation(np.array([[1.0, 2.0]]), 5.0, (1, 2))
-    assert found.tolist() == [[1, 1, 1, 5, 5, 5, 2, 2, 2, 5, 5, 5]]
 
 
 def test_the_noise_of_a_tracker_grows_with_the_range():

@@ -29,22 +29,6 @@ def test_a_robot_at_its_tolerance_seldom_passes_and_seldom_fails():
     assert found.count(UNDECIDED) > 300
 
 
-@pytest.mark.parametrize(("tolerance", "expected"), [(2e-4, PASS), (0.5e-4, FAIL)])
-def test_clear_cases_are_decided_and_need_no_more_poses(tolerance, expected):
-    found = [decided(drawn(seed), tolerance) for seed in range(20)]
-    assert {each.decision for each in found} == {expected}
-    assert {each.poses_needed for each in found} == {None}
-
-
-def test_the_guard_band_is_what_lies_between_the_largest_that_passes_and_the_tolerance():
-    errors = drawn(1)
-    found = decided(errors, 2e-4)
-    largest = found.tolerance_m - found.guard_band_m
-    scaled = Errors(errors.distance * largest / found.rms_m, errors.cluster)
-    for factor, decision in ((0.995, PASS), (1.005, UNDECIDED)):
-        assert decided(Errors(factor * scaled.distance, scaled.cluster), 2e-4).decision == decision
-
-
 def test_an_undecided_robot_is_mostly_decided_by_the_poses_that_it_needs():
     """The normal approximation gives a power of a half; 10 of 30 or fewer have a probability of 2 % there."""
     found = decided(drawn(3), 1.25e-4)

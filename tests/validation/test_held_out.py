@@ -36,14 +36,6 @@ def test_summary_by_hand():
     assert found["p95_m"] == pytest.approx(4.0 + 0.85 * 1.0)
 
 
-def test_summary_takes_any_leading_axes():
-    many = np.random.default_rng(0).random((2, 3, 10))
-    found = summary(many)
-    for name in METRICS:
-        assert found[name].shape == (2, 3)
-        assert found[name][1, 2] == summary(many[1, 2])[name]
-
-
 def test_errors_are_distances_between_measured_and_predicted_positions(fanuc):
     for rows in (3, 6):
         model = made_model(fanuc.chain, ELBOW_AND_HAND, rows, compliance=fanuc.compliance)
@@ -179,13 +171,6 @@ def test_noise_floor_is_what_the_noise_alone_leaves(rows, repeats, fanuc):
     # Joints of 1,200 states share their errors over two targets: the simulation is sure to 1.5 %, 5 % are 3.3 of that, and a
     # floor that is off by a tenth is seen with a power of 0.99.
     assert noise_floor(fitted, seen, model, estimate) == pytest.approx(simulated, rel=0.05)
-
-
-def test_noise_floor_of_a_sensor_alone_is_root_three_of_it(fanuc):
-    campaign = planted(fanuc, {}, poses=8)
-    fitted = campaign.declared
-    floor = noise_floor(fitted, campaign.observations, fitted.model, fitted.estimate)
-    assert floor == pytest.approx(np.sqrt(3) * fitted.noise.position_m)
 
 
 def test_no_noise_floor_where_the_noise_is_unknown(fanuc):

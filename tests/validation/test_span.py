@@ -34,10 +34,6 @@ def test_loads_and_repeats_of_a_pose_are_one_configuration(states):
     assert count_configurations(replace(states, joint_angles=alike)) == 1
 
 
-def test_poses_over_the_workspace_fall_short_of_nothing(kuka, states):
-    assert shortfalls(FEWEST_CONFIGURATIONS, states, kuka, None) == []
-
-
 def test_fewer_configurations_than_a_judgement_needs_are_too_few(kuka, states):
     (sentence,) = shortfalls(FEWEST_CONFIGURATIONS - 1, states, kuka, None)
     assert sentence == "too few: 7 configurations, where at least 8 must judge"

@@ -1,4 +1,4 @@
-"""README's way from a URDF to a corrected robot is the script that a slow test runs, and the demonstration goes it by itself."""
+"""README's way from a URDF to a corrected robot is a script that runs, and the demonstration goes it by itself."""
 
 import json
 import os

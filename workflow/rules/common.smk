@@ -292,4 +292,4 @@ def audited(wildcards):
     """What is audited; asked for before any job of the run begins, so that nobody waits for results that cannot be audited."""
     if find_spec("pinocchio") is None:
         sys.exit(str(InputError("audit", "pinocchio", "no such package", "the extra audit: make audit, or pip install pin")))
-    return files_behind([*rules.study.input, *rules.loop.input])
+    return files_behind(rules.all.input)

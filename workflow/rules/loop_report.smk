@@ -108,14 +108,16 @@ rule pictures:
         figures=expand("reports/figures/{figure}.png", figure=FIGURES),
         loop=expand("reports/loop/kuka_extended_end_effector/figures/{figure}.png", figure=["arrows", "candidates"]),
         hero="reports/loop/kuka_extended_end_effector/figures/hero.png",
+        measured="reports/loop/ur5_every_seventh/figures/before_after.png",
         page=rules.write_study_page.output.page,
     output:
         figures=expand("docs/{figure}.png", figure=FIGURES),
         loop=expand("docs/loop_{figure}.png", figure=["arrows", "candidates"]),
         hero="docs/hero.png",
+        measured="docs/measured_in_the_box.png",
     log:
         "results/logs/pictures.log",
     benchmark:
         "results/timings/pictures.tsv"
     shell:
-        "(cp {input.figures} {input.hero} docs/; for one in {input.loop}; do cp $one docs/loop_$(basename $one); done) 2> {log}"
+        "(cp {input.figures} {input.hero} docs/; cp {input.measured} {output.measured}; for one in {input.loop}; do cp $one docs/loop_$(basename $one); done) 2> {log}"

@@ -8,26 +8,23 @@ from elastocal import __version__
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import write_csv
 from elastocal_proof.audit.audited import Audited
-from elastocal_proof.audit.page import page
-from elastocal_proof.audit.targets import OTHERS
-from elastocal_proof.audit.whole import as_table, audit
+from elastocal_proof.audit.whole import as_table, audit, page_of
 
 
 def audit_files(job: Job) -> None:
     settings = job.params
     finished = Audited(Path(), settings.configuration, settings.robots, settings.strategies, settings.rows)
     table = as_table(audit(finished))
-    made = settings.others
-    absent = [target for target in OTHERS if target not in made]
+    made = [target for target, digest in settings.others.items() if digest]
     facts = {
         "Seed of the random numbers": str(finished.seed),
         "Rows sampled of a large file": str(settings.rows),
         "Other targets audited": ", ".join(made) or "none has finished",
-        "Absent, so not audited": ", ".join(absent) or "none",
+        "Absent, so not audited": ", ".join(target for target in settings.others if target not in made) or "none",
         "Version of elastocal": __version__,
         "Origin": origin_of(job).words,
     }
-    write_text(job.output.page, page(table, facts))
+    write_text(job.output.page, page_of(table, facts))
     write_csv(job.output.table, table)
 
 

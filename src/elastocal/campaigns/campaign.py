@@ -88,7 +88,7 @@ class Campaign:
     "nominal", "identify". `declared`: effects of the catalogue that the model already has. `noise`: ``position_m``,
     ``orientation_rad``, ``joint_rad``, as far as the campaign declares them. `holdout`: ``fraction`` and ``seed``, ``blocks``
     and ``seed``, ``session``, ``poses`` or ``campaign``. `remainder`: regression on what the final model leaves: a name in
-    `remainder.catalogue`, "auto" for the best of them or none, or "none". `table`: name of the file of measurements; empty
+    `remainder.corrected`, "auto" for the best of them or none, or "none". `table`: name of the file of measurements; empty
     where they come from none. `header_line`: line of the file in which its header stands, where it is a text whose rows are
     lines.
     """

@@ -6,10 +6,13 @@ same design, at the pose error that fits best, with the pose error averaged over
 draws reach the statistic of the measurements. With noise and pose error known that is exact; with a fitted pose error it is a
 parametric bootstrap [2]. No Bonferroni correction and no choice of a test: competitors that the measurements cannot show have
 a Bayes factor of one in every draw. Sizes begin a step below those of the posterior: what lies between may be seen, and its
-probability does not matter to a test.
+probability does not matter to a test. Where nothing is missing a Bayes factor has a mean of one, so that it exceeds b with a
+probability of at most 1/b (Markov's inequality [3]): where b is far beyond the number of draws none of them reaches it, and
+none is made.
 
 [1] Good, I. J., The Bayes/non-Bayes compromise: a brief review, Journal of the American Statistical Association 87, 1992.
 [2] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press, 1997.
+[3] Kass, R. E. and Raftery, A. E., Bayes factors, Journal of the American Statistical Association 90, 1995.
 """
 
 from __future__ import annotations
@@ -28,6 +31,10 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.search import Problem
     from elastocal.diagnosis.statistics import Products, Statistics
+
+# Bayes factor over the number of draws, the measurements' own included, beyond which none is made. The mean of one is that over
+# the prior of the pose error; at the fitted one it is larger by at most the inverse of that one's prior probability.
+_BEYOND_DRAWS = 1e4
 
 
 @dataclass(frozen=True)
@@ -53,12 +60,14 @@ def alarm_of(problem: Problem, products: Products | Sums, pose_error_rad: float,
     # Sizes that draws of the fitted one can make likely: its own, and some to either side.
     chosen = slice(max(place - reach, 0), place + reach + 1)
     statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
-    along, squares = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
-    along = np.concatenate([statistics.along[..., None], along], axis=2)
-    squares = np.concatenate([statistics.squares[:, None], squares], axis=1)
-    found = _average_bayes_factors(problem, statistics, log_pose, along, squares)
-    p_value = (1 + (found[1:] >= found[0]).sum()) / len(found)
-    return Alarm(float(p_value), float(found[0]), bool(p_value <= settings.alarm_level))
+    own = statistics.along[..., None], statistics.squares[:, None]
+    statistic = float(_average_bayes_factors(problem, statistics, log_pose, *own)[0])
+    reached = 0
+    if statistic <= np.log(_BEYOND_DRAWS * (1 + settings.alarm_draws)):
+        drawn = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
+        reached = int((_average_bayes_factors(problem, statistics, log_pose, *drawn) >= statistic).sum())
+    p_value = (1 + reached) / (1 + settings.alarm_draws)
+    return Alarm(p_value, statistic, p_value <= settings.alarm_level)
 
 
 def _average_bayes_factors(

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import solve
 
 from elastocal.diagnosis.evidence import Joint, inverses
 from elastocal.diagnosis.refit import mean_square_left
@@ -138,19 +139,15 @@ def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) 
         made = gram[:, ours] @ coefficients[ours]
         whole = float(coefficients[ours] @ made[ours])
         inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~inside] ** -2.0)
-        found.append((whole, whole - float(made[rest] @ np.linalg.solve(inner, made[rest]))))
+        found.append((whole, whole - float(made[rest] @ solve(inner, made[rest], assume_a="pos", check_finite=False))))
     return found
 
 
 def _predicted(problem: Problem, model: Model) -> np.ndarray:
     """Coefficients of all columns in a model at its most probable sizes, in plausible sizes, ndarray (K,)."""
     coefficients = np.zeros(problem.statistics.gram.shape[1])
-    if model.units:
-        units = [problem.units[number] for number in model.units]
-        place = problem.statistics.nearest(model.pose_error_rad)
-        joint = _joint(problem, units, model, slice(place, place + 1))
-        columns, deviations = problem.columns_of(model.units, joint.scales)
-        coefficients[columns] = deviations * joint.mean[0]
+    columns, mode, _ = problem.mode_of(model)
+    coefficients[columns] = mode
     return coefficients
 
 

@@ -16,7 +16,7 @@ from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, 
 from elastocal.diagnosis.contradictions import contradictions, pose_error_warnings, scatter_warnings
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept, fitted_to
-from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
+from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, SEVERAL, UNEXPLAINED, concluded
@@ -24,6 +24,7 @@ from elastocal.diagnosis.words import hypothesis_words
 from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.observations import sample_of
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.validation.left_out import certain_loss, left_out_squares
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.data_checks.protocol import Fault
+    from elastocal.diagnosis.kept_rows import Kept
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Posterior
     from elastocal.diagnosis.settings import Settings
@@ -122,33 +124,36 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     decisive = [fault for fault in known if fault.decisive]
     if decisive:
         # Where all measurements mean something else, no single row is wrong.
-        part = fitted_to(case, np.ones(len(case.campaign.measurements), bool))
+        part = fitted_to(case, np.ones(len(case.campaign.measurements), bool), settings)
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
-    found, final, near = None, part.declared, None
+    found, about, near = None, part.declared, None
     errors = Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
-        found, final = _explained(part.case, part.declared, settings, seed, tell, near)
-        errors = gross_errors(final, part.noise, case.campaign.measurements, part.kept, settings)
+        found, about = _explained(part, settings, seed, tell, near)
+        errors = gross_errors(about, part.noise, case.campaign.measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
         remaining = ~errors.gross | good
         if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
         # The model found looks at all rows once more, without these, before another search is made.
-        some = case.select(remaining)
-        about = fit(final.model, some.observations, final.noise, final.estimate, True, ON_THE_WAY)
+        some = sample_of(case.select(remaining).observations, settings.searched_observations)
+        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
         errors = gross_errors(about, part.noise, case.campaign.measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
-        last, part = part, fitted_to(case, ~errors.gross | good, part)
+        last, part = part, fitted_to(case, ~errors.gross | good, settings, part)
         if part is last:
             break
         tell(f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without")
         # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
         near = (about, found.conclusion.best.named) if relinearized else None
+        # Its statistics make room for those of the next search.
+        found = None
     errors = replace(errors, gross=~part.kept)
-    case, noise, declared = part.case, part.noise, part.declared
+    case, noise, declared = part.case, part.noise, part.declared_to_all()
+    final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True) if found else declared
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     lost: list[str] = []
@@ -203,8 +208,7 @@ def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settin
 
 
 def _explained(
-    case: Case,
-    declared: Fit,
+    part: Kept,
     settings: Settings,
     seed: int,
     tell: Callable[[str], None],
@@ -212,10 +216,11 @@ def _explained(
 ) -> tuple[Evidence, Fit]:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
 
-    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``.
+    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. With it
+    the fit of the model found to what the search looks at.
     """
-    candidates = list(case.candidates.values())
-    about, searched = searched_part(declared, case.observations, settings)
+    candidates, searched = list(part.case.candidates.values()), part.searched
+    about = declared = part.declared
     before = None
     if start:
         found_before, before = start
@@ -223,12 +228,12 @@ def _explained(
     for round_number in range(1 if start else 0, settings.linearizations):
         problem = linearized(about, searched, candidates, settings)
         nothing, alone = initial_screening(problem.problem)
-        draws = stream(seed, case.campaign.name, "null distribution", round_number)
+        draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
         alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
         # The alarm comes before the measurements choose at which shapes to look more closely: it would no longer be exact.
         closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
         if closer:
-            problem = linearized(about, searched, candidates, settings, closer)
+            problem = linearized(about, searched, candidates, settings, closer, problem)
         found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise
@@ -245,12 +250,10 @@ def _explained(
         if not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit):
             break
         before = named
-    if named:
-        final = fit_with_sizes(declared, case.observations, noise, with_shapes_of(chosen, about), about)
-    else:
-        final = fit(declared.model, case.observations, noise, declared.estimate, reweighted=True)
+    if not named:
+        about = fit(declared.model, searched, noise, declared.estimate, True, ON_THE_WAY)
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
-    return Evidence(problem, found, alarm, conclusion, adopted), final
+    return Evidence(problem, found, alarm, conclusion, adopted), about
 
 
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:

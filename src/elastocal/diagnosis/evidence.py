@@ -158,6 +158,15 @@ class Conditioned:
         return part - mine.transpose(0, 1, 3, 2) @ mine
 
 
+def _with_priors(gram: np.ndarray, columns: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+    """I + D^1/2 G D^1/2 of some columns, ndarray (T, D, D)."""
+    inner = gram[:, columns[:, None], columns]
+    inner *= deviations[:, None]
+    inner *= deviations
+    inner[:, np.arange(len(columns)), np.arange(len(columns))] += 1.0
+    return inner
+
+
 def condition(statistics: Statistics, columns: np.ndarray, deviations: np.ndarray, log_pose: np.ndarray) -> Conditioned:
     """Take columns into the model.
 
@@ -167,8 +176,7 @@ def condition(statistics: Statistics, columns: np.ndarray, deviations: np.ndarra
     gram = statistics.gram
     if not len(columns):
         return Conditioned(gram, gram[:, :0], statistics.along, statistics.squares, start)
-    inner = deviations[:, None] * gram[:, columns[:, None], columns] * deviations + np.eye(len(columns))
-    factor = np.linalg.cholesky(inner)
+    factor = np.linalg.cholesky(_with_priors(gram, columns, deviations))
     right = deviations[:, None] * np.concatenate([gram[:, columns], statistics.along[:, columns, None]], axis=2)
     both = np.array([solve_triangular(*pair, lower=True, check_finite=False) for pair in zip(factor, right, strict=True)])
     cross, fitted = both[..., :-1], both[..., -1]
@@ -291,7 +299,8 @@ def inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             raise np.linalg.LinAlgError("a matrix that is not positive definite")
         log_dets[number] = 2.0 * np.log(np.diag(factor)).sum()
         upper = lapack.dpotri(factor, lower=0, overwrite_c=1)[0]
-        found[number] = np.triu(upper) + np.triu(upper, 1).T
+        np.add(upper, upper.T, out=found[number])
+        np.fill_diagonal(found[number], np.diag(upper))
     return found, log_dets
 
 
@@ -309,8 +318,7 @@ class Joint:
         columns = np.concatenate([unit.columns for unit in units])
         self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units])])
         deviations = np.repeat(self.scales, np.diff(self.starts))
-        inner = deviations[:, None] * statistics.gram[:, columns[:, None], columns] * deviations + np.eye(len(columns))
-        self.covariance, self.log_det = inverses(inner)
+        self.covariance, self.log_det = inverses(_with_priors(statistics.gram, columns, deviations))
         along = deviations * statistics.along[:, columns]
         self.mean = (self.covariance @ along[..., None])[..., 0]
         self.squares = statistics.squares - (along * self.mean).sum(axis=1)

@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import lapack, solve_triangular
-from scipy.stats import chi2
-from scipy.stats import f as f_distribution
+from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
 from elastocal.diagnosis.linearize import prior_deviations
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
@@ -106,26 +106,24 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
         if not negligible:
             information = np.diag((sizes / priors) ** 2)
             for line in lines:
-                seen = line.white(line.sensitivities[..., free] * sizes, pose_rad).reshape(-1, len(sizes))
+                seen = line.white(line.about.sensitivities[..., free] * sizes, pose_rad).reshape(-1, len(sizes))
                 information += seen.T @ seen
             covariance = np.zeros((len(free), len(free)))
             covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
-        distance = np.concatenate([line.distance(pose_rad, covariance, np.ones(len(line.residual), bool)) for line in lines])
+        distance = np.concatenate([line.distance(pose_rad, covariance, np.ones(len(line.own), bool)) for line in lines])
         volume = np.concatenate([line.log_volume(pose_rad) for line in lines]).mean()
         rows = fitted.model.rows
         # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
-        spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(chi2.median(rows)), 1.0))
+        spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0))
         best = min(best, (spread, Yardstick(replace(noise, pose_rad=pose_rad), covariance)), key=lambda each: each[0])
     return best[1]
 
 
 @dataclass(frozen=True)
 class _Line:
-    """Rows about an estimate: residual (M, rows), sensitivities (M, rows, P), own variance (M, rows, rows), and that of a
-    radian in each joint."""
+    """Rows about an estimate: their linearisation, own variance (M, rows, rows), and that of a radian in each joint."""
 
-    residual: np.ndarray
-    sensitivities: np.ndarray
+    about: Linearization
     own: np.ndarray
     common: np.ndarray
 
@@ -134,7 +132,7 @@ class _Line:
         line = linearize(model, estimate, some, conditions(model, estimate, some.states))
         spread, jacobian = noise.spread(some), line.coordinate_jacobian[..., : model.sites.joints]
         own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
-        return cls(line.residual, line.sensitivities, own, jacobian @ jacobian.transpose(0, 2, 1))
+        return cls(line, own, jacobian @ jacobian.transpose(0, 2, 1))
 
     def root(self, pose_rad: float) -> np.ndarray:
         """Cholesky factor of the variance of each row."""
@@ -142,7 +140,7 @@ class _Line:
 
     def white(self, values: np.ndarray, pose_rad: float) -> np.ndarray:
         """Whitened values (M, rows, k)."""
-        return np.linalg.solve(self.root(pose_rad), values)
+        return np.linalg.inv(self.root(pose_rad)) @ values
 
     def log_volume(self, pose_rad: float) -> np.ndarray:
         """Half the logarithm of the determinant of each variance, (M,)."""
@@ -150,11 +148,12 @@ class _Line:
 
     def distance(self, pose_rad: float, covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
         """From the prediction by the other rows, in standard deviations, (M,)."""
-        white = self.white(self.residual[..., None], pose_rad)[..., 0]
+        white = self.white(self.about.residual[..., None], pose_rad)[..., 0]
         if covariance is None:
             return np.linalg.norm(white, axis=1)
-        seen = self.white(self.sensitivities, pose_rad)
-        share, axes = np.linalg.eigh(seen @ covariance @ seen.transpose(0, 2, 1))
+        seen = self.white(self.about.sensitivities, pose_rad)
+        along = (seen.reshape(-1, seen.shape[2]) @ covariance).reshape(seen.shape)
+        share, axes = np.linalg.eigh(along @ seen.transpose(0, 2, 1))
         own = np.where(fitted[:, None], np.maximum(1.0 - share, _LEAST_OWN), 1.0 + share)
         along = (axes.transpose(0, 2, 1) @ white[..., None])[..., 0]
         return np.sqrt((along**2 / own).sum(axis=1))
@@ -199,7 +198,9 @@ def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: S
     """
     ordered = np.sort(np.where(kept, distance, np.inf))
     usual = ordered[(np.array(_SCALE_QUANTILES) * (len(ordered) - 1)).astype(int)]
-    scale = np.max(usual[np.isfinite(usual)] / np.sqrt(chi2.ppf(_SCALE_QUANTILES, rows))[np.isfinite(usual)], initial=1.0)
+    scale = np.max(
+        usual[np.isfinite(usual)] / np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))[np.isfinite(usual)], initial=1.0
+    )
     inside = distance <= scale * _limit(len(distance), rows, settings)
     if inside.mean() < 1.0 - settings.gross_error_share:
         return distance / scale, np.zeros(len(distance), bool)
@@ -214,7 +215,7 @@ def _limit(count: int, rows: int, settings: Settings, freedom: float = np.inf) -
     ``freedom`` is that of the scale: infinite where it is known.
     """
     level = settings.gross_error_level / count
-    return float(np.sqrt(chi2.isf(level, rows) if np.isinf(freedom) else rows * f_distribution.isf(level, rows, freedom)))
+    return float(np.sqrt(chdtri(rows, level) if np.isinf(freedom) else rows * fdtri(rows, freedom, 1.0 - level)))
 
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
@@ -241,7 +242,7 @@ def held_out_gross_errors(
     distance, gross = beyond_chance(distance, model.rows, every, settings)
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
-        least = max(least, float(np.median(distance[outside])) / np.sqrt(chi2.median(model.rows)))
+        least = max(least, float(np.median(distance[outside])) / np.sqrt(2 * gammaincinv(model.rows / 2, 0.5)))
     far = distance > least * _limit(len(distance), model.rows, settings)
     return Deviations(residual, distance, gross & (far | ~outside))
 

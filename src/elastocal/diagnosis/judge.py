@@ -18,8 +18,7 @@ from elastocal.fitting.displacement import conditions
 from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
-from elastocal.remainder.corrected import Plan
-from elastocal.remainder.shares import remainder_facts
+from elastocal.remainder.corrected import Plan, remainder_facts
 from elastocal.validation.fitted_range import outside_poses, repeat_warnings
 from elastocal.validation.held_out import (
     METRICS,
@@ -31,9 +30,9 @@ from elastocal.validation.held_out import (
     share_below_largest,
     summary,
 )
+from elastocal.validation.left_out import error_row, split_rows
 from elastocal.validation.placing import placed
 from elastocal.validation.span import count_configurations, joint_ranges
-from elastocal.validation.splits import error_row, split_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -88,7 +87,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     document = diagnosis.document | {
         "effects": effects,
         "heldout": heldout,
-        "remainder": _remainder(diagnosis, part, seed),
+        "remainder": _remainder(diagnosis, part, outside, seed),
         "gross_errors": [*diagnosis.document["gross_errors"], *left_out],
         "warnings": [*diagnosis.document["warnings"], *warnings_of(left_out), *warnings],
     }
@@ -117,7 +116,7 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
     return errors, part, np.bincount(state_clusters(part.campaign.measurements), outside[~errors.gross]) > 0
 
 
-def _remainder(diagnosis: Diagnosis, held_out: Case, seed: int) -> dict[str, Any] | None:
+def _remainder(diagnosis: Diagnosis, held_out: Case, outside: np.ndarray, seed: int) -> dict[str, Any] | None:
     """What a regression on the remainder of the final model adds on held-out poses, where the campaign asks for one."""
     campaign = diagnosis.case.campaign
     if campaign.remainder == NO_REMAINDER or data_at_fault(diagnosis.document):
@@ -125,7 +124,7 @@ def _remainder(diagnosis: Diagnosis, held_out: Case, seed: int) -> dict[str, Any
     # Poses held out at random have neighbours among those fitted; others have not, and nor may those that set the intervals.
     plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
     draws = stream(seed, campaign.name, "remainder", 0)
-    return remainder_facts(plan, diagnosis.declared, diagnosis.final, diagnosis.case, held_out, draws)
+    return remainder_facts(plan, diagnosis.declared, diagnosis.final, diagnosis.case, held_out, outside, draws)
 
 
 def _gains(rows: Iterable[Mapping[str, Any]]) -> dict[str, float]:

@@ -9,9 +9,9 @@ import numpy as np
 
 from elastocal.diagnosis.gross_errors import gross_errors, improbable
 from elastocal.diagnosis.linearize import linearized
-from elastocal.fitting.least_squares import evaluated
+from elastocal.fitting.least_squares import evaluated, fit
 from elastocal.fitting.noise_estimation import estimated_noise
-from elastocal.fitting.observations import measured_in, select_states, spread_poses, without_outlying_repeats
+from elastocal.fitting.observations import measured_in, sample_of, select_states, spread_poses, without_outlying_repeats
 from elastocal.fitting.tolerances import fit_declared
 
 if TYPE_CHECKING:
@@ -20,26 +20,39 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
 
 
 @dataclass(frozen=True)
 class Kept:
-    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with its noise and declared model."""
+    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with its noise and declared model.
+
+    `searched`: observations that a search looks at, no more than so many; `declared` is the fit to these.
+    """
 
     case: Case
     kept: np.ndarray
     noise: Noise
     warnings: list[str]
     declared: Fit
+    searched: Observations
+
+    def declared_to_all(self) -> Fit:
+        """The declared model fitted to all that is kept."""
+        if self.searched is self.case.observations:
+            return self.declared
+        found = self.declared
+        return fit(found.model, self.case.observations, self.noise, found.estimate, reweighted=True)
 
 
-def fitted_to(case: Case, kept: np.ndarray, last: Kept | None = None) -> Kept:
+def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | None = None) -> Kept:
     """The part of a case that is kept, or the last one where that is the same."""
     if last is not None and (kept == last.kept).all():
         return last
     part = case.select(kept)
     noise, warnings = estimated_noise(part)
-    return Kept(part, kept, noise, warnings, fit_declared(part.model, part.observations, noise))
+    searched = sample_of(part.observations, settings.searched_observations)
+    return Kept(part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched)
 
 
 def first_kept(case: Case, settings: Settings) -> Kept:
@@ -50,10 +63,10 @@ def first_kept(case: Case, settings: Settings) -> Kept:
     """
     measurements, candidates = case.campaign.measurements, list(case.candidates.values())
     pulling = extreme_loads(measurements, settings)
-    whole = part = fitted_to(case, ~pulling)
+    whole = part = fitted_to(case, ~pulling, settings)
     for _ in range(settings.gross_error_rounds):
         errors = gross_errors(part.declared, part.noise, measurements, part.kept, settings)
-        last, part = part, fitted_to(case, ~errors.gross, part)
+        last, part = part, fitted_to(case, ~errors.gross, settings, part)
         if part is last:
             break
     observations, most = case.observations, settings.gross_start_numbers // case.model.rows
@@ -70,7 +83,7 @@ def first_kept(case: Case, settings: Settings) -> Kept:
     # A repeat far from its others is in no average, and stays what the declared model says of it.
     looked_at = measured_in(measurements, some, np.ones(len(some), bool))
     looked_at &= np.isin(measurements.row, without_outlying_repeats(measurements).row)
-    return fitted_to(case, ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept), whole)
+    return fitted_to(case, ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept), settings, whole)
 
 
 def extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from elastocal.counting import counted
 from elastocal.diagnosis import other
@@ -67,7 +67,7 @@ class Linearized:
 
     `products`: of one pass over the measurements. `untestable`: why a candidate is not tested. `around`: of the states looked
     at. `candidates`: keys of all candidates: parameters of the fit that they own are coefficients of units here.
-    `pose_std_error_rad`: with which the measurements of one pose tell a joint angle.
+    `pose_std_error_rad`: with which the measurements of one pose tell a joint angle. `laws`: of the competitors.
     """
 
     problem: Problem
@@ -77,6 +77,7 @@ class Linearized:
     around: Conditions
     candidates: frozenset[str]
     pose_std_error_rad: float
+    laws: list[other.Law]
 
 
 def linearized(
@@ -85,6 +86,7 @@ def linearized(
     candidates: Sequence[Candidate],
     settings: Settings,
     shapes: dict[str, list[tuple[float, ...]]] | None = None,
+    before: Linearized | None = None,
 ) -> Linearized:
     """Gather what the measurements say of a fit and of all candidates.
 
@@ -92,14 +94,14 @@ def linearized(
     given back to the residual, so that their priors mean what they say.
 
     `fitted`: of the declared model, or with effects found already, about which the problem is then linear. `shapes`: values of
-    the shape of some candidates, by their keys, instead of `shapes_tried`.
+    the shape of some candidates, by their keys, instead of `shapes_tried`. `before`: of the same fit and observations.
     """
-    around, sites = fitted.conditions_of(observations.states), fitted.model.sites
+    around, sites = before.around if before else fitted.conditions_of(observations.states), fitted.model.sites
     untestable = {c.key: reason for c in candidates if (reason := lacking(c, fitted.model, observations.states))}
     tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
     tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
     against = other.competitors(around)
-    laws = [other.law_of(each, around, settings.other_features) for each in against]
+    laws = before.laws if before else [other.law_of(each, around, settings.other_features) for each in against]
     units = units_of(tested, [(each, law.features) for each, law in zip(against, laws, strict=True)], settings)
     owners = np.array([owner for owner, _ in fitted.parameters])
     keys = frozenset(candidate.key for candidate in candidates)
@@ -135,7 +137,7 @@ def linearized(
     untestable |= dict.fromkeys(sorted(small), "too small to be seen at any size that such an effect has")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
     problem = Problem(statistics, shown, prior_of(shown, settings), settings)
-    return Linearized(problem, products, untestable, fitted, around, keys, unit_rad)
+    return Linearized(problem, products, untestable, fitted, around, keys, unit_rad, laws)
 
 
 def prior_deviations(parameters: Sequence[Parameter]) -> np.ndarray:
@@ -151,7 +153,7 @@ def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Sett
 
     Returns (number of units,) of int: place among the sizes; their number where even the largest is too small to be seen.
     """
-    critical = chi2.isf(settings.alarm_level / max(len(units), 1), 1)
+    critical = chdtri(1, settings.alarm_level / max(len(units), 1))
     grams = (statistics.gram[0][np.ix_(unit.columns, unit.columns)] for unit in units)
     largest = np.array([np.linalg.eigvalsh(gram)[-1] for gram in grams])
     return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
@@ -254,11 +256,6 @@ class _Line:
 def _flat(values: np.ndarray) -> np.ndarray:
     """Values (M, rows, k) as rows (rows * M, k): those of one component after those of another, as effects make them."""
     return values.swapaxes(0, 1).reshape(values.shape[0] * values.shape[1], values.shape[2])
-
-
-def searched_part(fitted: Fit, observations: Observations, settings: Settings) -> tuple[Fit, Observations]:
-    """What the search looks at of a fit and its observations: no more than so many, at poses spread over the campaign."""
-    return selected(fitted, observations, spread_poses(observations, settings.searched_observations))
 
 
 def selected(fitted: Fit, observations: Observations, chosen: np.ndarray) -> tuple[Fit, Observations]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.proposal import MOST_POSES, WANTED_PROBABILITY
@@ -97,7 +97,7 @@ def separation_resolved(probability: float) -> float:
 
     The log Bayes factor of two normal distributions with one covariance is normal, with mean lambda / 2 and variance lambda.
     """
-    z = norm.ppf(probability)
+    z = ndtri(probability)
     return float((z + np.sqrt(z**2 + 2 * np.log(19.0))) ** 2) if probability > 0 else 0.0
 
 

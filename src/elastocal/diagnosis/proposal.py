@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from scipy.constants import g as standard_gravity
 
 from elastocal.counting import counted
@@ -15,6 +14,8 @@ from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
+
+    import pandas as pd
 
     from elastocal.mechanics.robot import Robot
 
@@ -93,6 +94,8 @@ def table_of(proposal: Proposal, robot: Robot) -> pd.DataFrame:
     promise leaves aside as ``indistinguishable``; ``approach1..n`` where the campaign has them and ``reference_weight_kg``
     where a weight is asked for.
     """
+    import pandas as pd
+
     joints, count = robot.joints, len(proposal)
     columns: dict[str, Any] = {
         "effect": [f"{words(proposal.best)} or {words(proposal.nearest)}"] * count,

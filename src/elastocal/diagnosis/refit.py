@@ -73,10 +73,8 @@ def mean_square_left(problem: Problem, model: Model) -> float:
     Returns 1 where the noise accounts for it.
     """
     statistics = problem.statistics
-    place, (columns, deviations) = statistics.nearest(model.pose_error_rad), problem.columns_of(model.units, model.scales)
-    along = deviations * statistics.along[place, columns]
-    inner = deviations[:, None] * statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
-    return float((statistics.squares[place] - along @ np.linalg.solve(inner, along)) / statistics.freedom)
+    columns, coefficients, place = problem.mode_of(model)
+    return float((statistics.squares[place] - statistics.along[place, columns] @ coefficients) / statistics.freedom)
 
 
 def mean_square(fitted: Fit) -> float:

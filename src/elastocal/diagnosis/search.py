@@ -20,6 +20,7 @@ from heapq import nlargest
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
 from elastocal.diagnosis.evidence import (
     Evaluated,
@@ -77,6 +78,17 @@ class Problem:
         """Columns of some units of given sizes, (D,), and the prior standard deviation of each, in plausible sizes."""
         columns = [self.units[number].columns for number in numbers]
         return np.concatenate([np.zeros(0, int), *columns]), np.repeat(scales, [len(each) for each in columns])
+
+    def mode_of(self, model: Model) -> tuple[np.ndarray, np.ndarray, int]:
+        """Columns of a model (D,), their most probable coefficients at its sizes, and the place of its pose error."""
+        columns, deviations = self.columns_of(model.units, model.scales)
+        place = self.statistics.nearest(model.pose_error_rad)
+        inner = deviations[:, None] * self.statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
+        along = deviations * self.statistics.along[place, columns]
+        solved = (
+            cho_solve(cho_factor(inner, lower=True, check_finite=False), along, check_finite=False) if len(along) else along
+        )
+        return columns, deviations * solved, place
 
 
 @dataclass(frozen=True)

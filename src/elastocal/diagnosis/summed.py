@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.factored import Factored
 
-# Beyond this many values of whitened columns a problem is summed: as many as take 60 MB, of which there are ten copies.
-MOST_HELD = 8_000_000
+# Beyond this many values of whitened columns a problem is summed: as many as take 24 MB, of which there are ten copies; from
+# some thousand columns on, sums by factors cost less than the products of whole rows.
+MOST_HELD = 3_000_000
 # Rows of the sample: several for each declared parameter, and enough to see which sizes of the pose error are out of question.
-SAMPLE_ROWS = 6000
+SAMPLE_ROWS = 3000
 # Values of whitened columns in a block of declared ones, and observations in a block of candidates, which come in factors.
 _BLOCK_VALUES = 1_500_000
 OBSERVATIONS_AT_ONCE = 500

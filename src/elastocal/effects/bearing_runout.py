@@ -64,7 +64,7 @@ def _candidate(sites: Sites, joint: int, motion: str) -> Candidate:
 
     distinct = _SAMPLES_PER_PERIOD * max(_ORDERS)
     return Candidate(
-        NAME, FAMILY, (joint + 1,), motion, parameters, displacement, distinct_angles=distinct, location_name=motion
+        NAME, FAMILY, (joint + 1,), motion, parameters, displacement, distinct_angles=distinct, location_name=motion, fixed=True
     )
 
 

@@ -7,7 +7,7 @@ The load on each coordinate is the generalized force J^T w of a wrench w (N, N m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -56,7 +56,9 @@ class Conditions:
     last measuring point, base axes. `motion`: of `Sites.followed`. `mass_corrections` (4 m,): by how much each of the declared
     masses is off its robot file, kg, and then its first moments along the axes of its frame beyond what goes with the mass, kg
     m. `approach` (S, n). `time_s` (S,): since the first measurement to which the model was fitted. `temperature_c` (S,).
-    `progress` (S,): how far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`.
+    `progress` (S,): how far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`. `of_angles`:
+    laws that go with the joint angles alone, by the keys of their candidates; shared wherever the same states are under other
+    loads: see `Candidate.fixed`.
 
     [1] S.-F. Chen and I. Kao, Conservative congruence transformation for joint and Cartesian stiffness matrices of robotic
         hands and fingers, International Journal of Robotics Research 19, 2000.
@@ -72,6 +74,7 @@ class Conditions:
     time_s: np.ndarray | None = None
     temperature_c: np.ndarray | None = None
     progress: np.ndarray | None = None
+    of_angles: dict[str, dict[int, tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def load(self) -> np.ndarray:
@@ -282,6 +285,7 @@ def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
         time_s=part(conditions.time_s),
         temperature_c=part(conditions.temperature_c),
         progress=part(conditions.progress),
+        of_angles={},
     )
 
 

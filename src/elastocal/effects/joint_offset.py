@@ -34,6 +34,6 @@ def candidates(sites: Sites) -> list[Candidate]:
 
         unit, quantity = ("m", "shift") if sites.prismatic[joint] else ("rad", "turn")
         parameters = sized(NAME, quantity, ["offset"], unit, sites)
-        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement)
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, fixed=True)
 
     return per_joint(sites, at, prismatic=True)

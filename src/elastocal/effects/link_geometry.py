@@ -37,6 +37,6 @@ def candidates(sites: Sites) -> list[Candidate]:
             ones = np.ones(len(conditions.joint_angles))
             return [{coordinate: ones} for coordinate in sites.link_end[joint + 1]]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement)
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, fixed=True)
 
     return per_joint(sites, at, prismatic=True)

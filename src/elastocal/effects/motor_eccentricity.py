@@ -49,4 +49,4 @@ def _candidate(sites: Sites, joint: int, ratio: float) -> Candidate:
         angle = ratio * conditions.joint_angles[:, joint]
         return [{joint: wave(order * angle)} for order in _ORDERS for wave in (np.cos, np.sin)]
 
-    return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, distinct_angles=_DISTINCT_ANGLES)
+    return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, distinct_angles=_DISTINCT_ANGLES, fixed=True)

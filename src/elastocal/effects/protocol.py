@@ -135,7 +135,8 @@ class Candidate:
     distinguishable from a smooth one. `of_setup`: whether it belongs to where tracker and robot stood in one campaign, and
     is not carried over to another. `location_name`: names the location beside the joints where these do not: a column, a
     band of orders. Candidates of one effect at one location are variants of its law, of which only one can hold. `turning`:
-    joints with whose angles the law goes, counted from 1, where it belongs to no joint.
+    joints with whose angles the law goes, counted from 1, where it belongs to no joint. `fixed`: whether the displacement per
+    unit goes with the joint angles alone, not with loads, springs or where the robot yielded to, so that no step changes it.
     """
 
     effect: str
@@ -150,6 +151,7 @@ class Candidate:
     location_name: str = ""
     of_setup: bool = False
     turning: tuple[int, ...] = ()
+    fixed: bool = False
 
     @property
     def location(self) -> tuple[int | str, ...]:

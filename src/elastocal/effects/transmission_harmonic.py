@@ -59,4 +59,5 @@ def _candidate(sites: Sites, joint: int, low: int, high: int) -> Candidate:
         return waves
 
     detail, angles = f"orders {low}-{high}", _SAMPLES_PER_PERIOD * high
-    return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement, distinct_angles=angles, location_name=detail)
+    at = NAME, FAMILY, (joint + 1,), detail
+    return Candidate(*at, parameters, displacement, distinct_angles=angles, location_name=detail, fixed=True)

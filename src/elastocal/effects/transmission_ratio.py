@@ -44,4 +44,4 @@ def _candidate(sites: Sites, joint: int, sources: Sequence[int], detail: str) ->
     def displacement(conditions: Conditions) -> Displacements:
         return [{joint: conditions.joint_angles[:, source]} for source in alike]
 
-    return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement)
+    return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement, fixed=True)

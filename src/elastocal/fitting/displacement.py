@@ -82,6 +82,31 @@ def displace(displaced: np.ndarray, effect: Candidate, values: np.ndarray, shape
 
     `displaced` (S, C). `values` (D,): its linear parameters. `shapes` (F,): its shape parameters. `around`: of the S states.
     """
+    if effect.fixed:
+        for coordinate, (numbers, per_unit) in _fixed(effect, around).items():
+            displaced[:, coordinate] += values[numbers] @ per_unit
+        return
     for value, law in zip(values, effect.displacement(around, *shapes), strict=True):
         for coordinate, per_unit in law.items():
             displaced[:, coordinate] += value * per_unit
+
+
+def laws_of(effect: Candidate, shapes: Iterable[float], around: Conditions) -> list[dict[int, np.ndarray]]:
+    """Displacements per unit of each linear parameter of an effect, those that no step changes as they were found before."""
+    if not effect.fixed:
+        return effect.displacement(around, *shapes)
+    laws: list[dict[int, np.ndarray]] = [{} for _ in effect.parameters]
+    for coordinate, (numbers, per_unit) in _fixed(effect, around).items():
+        for number, each in zip(numbers, per_unit, strict=True):
+            laws[number][coordinate] = each
+    return laws
+
+
+def _fixed(effect: Candidate, around: Conditions) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """By coordinate: which parameters of an effect displace it, (k,) of int, and by how much per unit, (k, S)."""
+    if effect.key not in around.of_angles:
+        laws = effect.displacement(around)
+        numbers = {c: np.array([n for n, law in enumerate(laws) if c in law]) for law in laws for c in law}
+        found = {c: (some, np.array([laws[number][c] for number in some])) for c, some in numbers.items()}
+        around.of_angles[effect.key] = found
+    return around.of_angles[effect.key]

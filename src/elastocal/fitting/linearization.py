@@ -10,7 +10,13 @@ import numpy as np
 
 from elastocal.effects import declared_weight
 from elastocal.effects.conditions import Conditions, with_springs, with_total
-from elastocal.fitting.displacement import displaced_coordinates, joint_compliances, mass_corrections, with_springs_of
+from elastocal.fitting.displacement import (
+    displaced_coordinates,
+    joint_compliances,
+    laws_of,
+    mass_corrections,
+    with_springs_of,
+)
 from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.prediction import differences, measured_in_base, target_points
 from elastocal.mechanics.motion import motion
@@ -92,9 +98,7 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
     of_targets = len(laws) + np.arange(target_columns.shape[2])
     laws += [{} for _ in of_targets]
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
-        laws += (
-            _spring_laws(effect, model, estimate, around) if effect.effect in _SPRINGS else effect.displacement(around, *shapes)
-        )
+        laws += _spring_laws(effect, model, estimate, around) if effect.effect in _SPRINGS else laws_of(effect, shapes, around)
         laws += _shape_laws(effect, values, shapes, around)
     displacements = Displacements.of(laws, np.ones(len(laws)), len(observations.states))
     return Linearization(
@@ -129,8 +133,12 @@ def _target_columns(rotation: np.ndarray, rows: int, seen: np.ndarray) -> np.nda
 def _shape_laws(
     effect: Candidate, values: np.ndarray, shapes: np.ndarray, conditions: Conditions
 ) -> Iterator[dict[int, np.ndarray]]:
-    for number in range(len(shapes)):
-        shape = effect.shapes[number]
+    for number, shape in enumerate(effect.shapes):
+        if shape.tried > 1:
+            # A law that changes in jumps has no slope: a search finds its place, and a fit that took the jump of a row within a
+            # step for one would go to and fro.
+            yield {}
+            continue
         step = _SHAPE_STEP * max(abs(shapes[number]), shape.lowest, 0.1 * shape.highest)
         sides = []
         for sign in (1, -1):

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 _MOST_HELD = 4_000_000
 # Observations of a part: what it makes stays in the processor's cache and is not asked of the system again and again.
 _MOST_AT_ONCE = 4000
-# States beyond which conditions are not kept from step to step but found again: they take some ten kilobytes each.
-_MOST_STATES = 20_000
+# States beyond which conditions are not kept from step to step, and with a fit, but found again: they take some ten kilobytes
+# each, and there is one fit after another.
+_MOST_STATES, _MOST_STATES_OF_A_FIT = 20_000, 2_000
 
 
 def observations_at_once(rows: int, columns: int) -> int:
@@ -28,6 +29,11 @@ def observations_at_once(rows: int, columns: int) -> int:
 def held_at_once(observations: Observations, columns: int) -> bool:
     """Whether the sensitivities of all observations to so many parameters are held at once."""
     return observations.rows * len(observations) * max(columns, 60) <= _MOST_HELD
+
+
+def keeps_conditions(observations: Observations) -> bool:
+    """Whether the conditions of all states stay with a fit."""
+    return len(observations.states) <= min(_MOST_STATES, _MOST_STATES_OF_A_FIT)
 
 
 def kept_conditions(model: Model, estimate: Estimate, observations: Observations) -> Conditions | None:

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy  # Its optimizers load where a campaign has repeats enough for them.
 from scipy.linalg import helmert
-from scipy.optimize import minimize
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
@@ -134,14 +134,14 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     both = [np.log(position), np.log(orientation)][: rows // 3]
     start = np.concatenate([both, np.full(joints, np.log(0.3 * position))])
     bounds = [(value - 7, value + 1) for value in both] + [(np.log(_SMALLEST_RAD), np.log(_LARGEST_RAD))] * joints
-    fitted = minimize(_negative_log_likelihood, start, data, "L-BFGS-B", jac=True, bounds=bounds)
+    fitted = scipy.optimize.minimize(_negative_log_likelihood, start, data, "L-BFGS-B", jac=True, bounds=bounds)
     # Akaike: the joints' part must be worth its parameters.
     if fitted.fun + joints > _negative_log_likelihood(np.concatenate([both, nothing]), *data)[0]:
         return sensor
     values = np.exp(fitted.x)
     # Each approach draws a joint once, however many targets are read.
     per_joint = max(min(total // (joints + 1), sum(len(contrasts) for contrasts, _ in parts)), 1)
-    inflation = np.sqrt(per_joint / chi2.ppf(1 - _UPPER, per_joint))
+    inflation = np.sqrt(per_joint / (2 * gammaincinv(per_joint / 2, 1 - _UPPER)))
     sensors = float(values[0]), float(values[rows // 3 - 1])
     return Noise("repeats", *sensors, values[rows // 3 :] * inflation, total, usual_m=usual)
 
@@ -167,7 +167,9 @@ def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measure
         return total, slope[:sensors]
 
     bounds = [(at - 7, at + 1) for at in start]
-    likelihood = -np.array([minimize(value, start, (joint,), "L-BFGS-B", jac=True, bounds=bounds).fun for joint in deviations])
+    likelihood = -np.array(
+        [scipy.optimize.minimize(value, start, (joint,), "L-BFGS-B", jac=True, bounds=bounds).fun for joint in deviations]
+    )
     # Even steps of the logarithm: each stands for a range as wide as the deviation itself.
     weights = np.exp(likelihood - likelihood.max()) * deviations
     weights /= weights.sum()
@@ -191,7 +193,7 @@ def chosen_noise(
         return repeats, []
     ratio = repeats.position_m / declared.position_m
     of_positions = repeats.degrees_of_freedom * 3 // model.rows
-    low, high = np.sqrt(chi2.ppf([0.005, 0.995], of_positions) / of_positions)
+    low, high = np.sqrt(2 * gammaincinv(of_positions / 2, [0.005, 0.995]) / of_positions)
     if low < ratio < high:
         return repeats, []
     return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]

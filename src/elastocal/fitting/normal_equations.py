@@ -12,7 +12,7 @@ from elastocal.fitting.displacement import conditions, displaced_coordinates, jo
 from elastocal.fitting.factored import Factored
 from elastocal.fitting.fit_result import Fit
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.memory import held_at_once, kept_conditions, observations_at_once
+from elastocal.fitting.memory import held_at_once, keeps_conditions, kept_conditions, observations_at_once
 from elastocal.fitting.observations import part_at, parts_of
 from elastocal.fitting.prediction import residuals
 from elastocal.fitting.whitening import joined, whitening
@@ -139,8 +139,7 @@ class Parts:
 
     def fit(self, estimate: Estimate, held: np.ndarray, covariance: np.ndarray, weights: np.ndarray, converged: bool) -> Fit:
         """The `Fit` of these measurements."""
-        model = self.model
-        around: Conditions | None
+        model, around = self.model, None
         if self.line is not None:
             springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
             around = with_springs(self.line.conditions, *springs)
@@ -148,9 +147,10 @@ class Parts:
         else:
             self.linearize(estimate)
             residual = self.residual
-            around = kept_conditions(model, estimate, self.observations)
+            around = kept_conditions(model, estimate, self.observations) if keeps_conditions(self.observations) else None
         whitener = joined([*self.whiteners.values()], [seen.start for _, seen in self.slices])
         jacobian = None if self.jacobians is None else np.concatenate([*self.jacobians.values()])
+        around = around if keeps_conditions(self.observations) else None
         return Fit(model, estimate, self.noise, held, covariance, weights, whitener, residual, jacobian, around, converged)
 
     def _around(self, number: int, estimate: Estimate | None = None) -> Conditions:

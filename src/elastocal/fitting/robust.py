@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
-from statsmodels.robust.norms import HuberT
+from scipy.special import gammaincinv
 
 from elastocal.fitting.identifiability import solve_normal
 from elastocal.fitting.normal_equations import Parts
@@ -73,7 +72,8 @@ def robustly(
         minimization, arXiv 1201.5885, 2012.
     """
     rows = observations.rows
-    norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
+    # Of chi-squared with as many degrees of freedom as a measurement has rows.
+    corner, typical = np.sqrt(2 * gammaincinv(rows / 2, [_HUBER_QUANTILE, 0.5]) / rows)
     priors = [parameter.prior_std for _, parameter in parameters(model, estimate)]
     nonlinear, bounds = nonlinear_parameters(model, estimate), limits(model, estimate)
     # What has a prior need not be held: where the data do not identify it, the prior does. Nor need what the start has found
@@ -81,7 +81,6 @@ def robustly(
     plausible = np.array([max(p.plausible, p.prior_std or 0.0) for _, p in parameters(model, estimate)])
     plausible = np.maximum(plausible, np.where(nonlinear, 0.0, np.abs(parameter_values(model, estimate))))
     penalty = np.array([0.0 if prior is None else prior**-2 for prior in priors])
-    typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
 
     def objective(estimate: Estimate, squares: float) -> float:
@@ -114,7 +113,7 @@ def robustly(
         if step_number or reweighted:
             distance = measurements.distance()
             scale = max(np.median(distance) / typical, 1.0)
-            weights = norm.weights(distance / scale)
+            weights = corner / np.maximum(distance / scale, corner)
         gram, along = measurements.normal_equations(weights)
         present = parameter_values(model, estimate)
         step, covariance, held = solved(gram, along, present, frozen)

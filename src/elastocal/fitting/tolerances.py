@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.least_squares import ON_THE_WAY, STARTED_FROM, fit
 from elastocal.fitting.observations import sample_of
 from elastocal.fitting.parameters import parameter_values
 
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 SIZES = np.geomspace(0.1, 10.0, 9)
 # Noise that is there over the noise taken, in steps that change no verdict.
 _FACTORS = np.geomspace(1.0, 1e4, 185)
-# So many observations show the size of some fifty parameters as well as any number.
-_MOST = 2_000
 # Shares of a prior's variance that measurements leave below this are rounding.
 _ROUNDING = 1e-14
 
@@ -42,7 +40,7 @@ def fit_declared(model: Model, observations: Observations, noise: Noise) -> Fit:
     """Fit a declared model, its geometry under priors of the most probable size; without geometry as `least_squares.fit`."""
     if not declared_geometry(model):
         return fit(model, observations, noise)
-    wide = fit(with_size(model, SIZES[-1]), sample_of(observations, _MOST), noise, settled=ON_THE_WAY)
+    wide = fit(with_size(model, SIZES[-1]), sample_of(observations, STARTED_FROM), noise, settled=ON_THE_WAY)
     return fit(with_size(model, most_probable(wide)[0]), observations, noise, wide.estimate, reweighted=True)
 
 

@@ -10,7 +10,6 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, ClassVar
 
-import jsonschema
 import yaml
 
 from elastocal.errors import InputError, closest, closest_first, text_fault
@@ -25,7 +24,6 @@ _DECIMAL = re.compile(
 )
 # What some programs write and YAML 1.1 takes for a text.
 _WITHOUT_POINT = re.compile(r"([-+]?\d+)(?:\.(\d*))?[eE]([-+]?)(\d+)", re.ASCII)
-_FORMATS = jsonschema.FormatChecker(["date"])
 # Faults of one document that are looked at: it may hold a fault in each of its entries.
 _MOST_FAULTS = 1000
 
@@ -70,31 +68,32 @@ for _kind in ("int", "float"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.construct_number)
 
 
-def _each_once(_: Any, wanted: bool, instance: Any, __: Any) -> Iterator[jsonschema.ValidationError]:
-    """The rule uniqueItems in linear time: jsonschema compares each pair where numbers and lists are mixed."""
-    if wanted and isinstance(instance, list):
-        entries = [json.dumps(entry, default=str) for entry in instance]
-        if len(set(entries)) < len(entries):
-            yield jsonschema.ValidationError("an entry twice")
+@cache
+def _validator(schema: str) -> Any:
+    """Stricter than JSON, which has no NaN and no infinity and takes 10.0 for an integer."""
+    import jsonschema
 
+    def each_once(_: Any, wanted: bool, instance: Any, __: Any) -> Iterator[Exception]:
+        """The rule uniqueItems in linear time: jsonschema compares each pair where numbers and lists are mixed."""
+        if wanted and isinstance(instance, list):
+            entries = [json.dumps(entry, default=str) for entry in instance]
+            if len(set(entries)) < len(entries):
+                yield jsonschema.ValidationError("an entry twice")
 
-def _of_pattern(_: Any, pattern: str, instance: Any, __: Any) -> Iterator[jsonschema.ValidationError]:
-    """The rule pattern; to Python, as to no other reader of a schema, the sign $ also means before a last line break."""
-    if isinstance(instance, str) and not re.fullmatch(pattern, instance):
-        yield jsonschema.ValidationError("another text")
+    def of_pattern(_: Any, pattern: str, instance: Any, __: Any) -> Iterator[Exception]:
+        """The rule pattern; to Python, as to no other reader of a schema, the sign $ also means before a last line break."""
+        if isinstance(instance, str) and not re.fullmatch(pattern, instance):
+            yield jsonschema.ValidationError("another text")
 
+    types = {
+        "integer": lambda _, value: isinstance(value, int) and not isinstance(value, bool),
+        "number": lambda _, value: isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value),
+    }
+    base = jsonschema.Draft202012Validator
+    rules, checked = {"uniqueItems": each_once, "pattern": of_pattern}, base.TYPE_CHECKER.redefine_many(types)
+    validator = jsonschema.validators.extend(base, rules, type_checker=checked)
+    return validator(read_schema(schema), format_checker=jsonschema.FormatChecker(["date"]))
 
-# Stricter than JSON, which has no NaN and no infinity and takes 10.0 for an integer.
-_Validator = jsonschema.validators.extend(
-    jsonschema.Draft202012Validator,
-    {"uniqueItems": _each_once, "pattern": _of_pattern},
-    type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine_many(
-        {
-            "integer": lambda _, value: isinstance(value, int) and not isinstance(value, bool),
-            "number": lambda _, value: isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value),
-        }
-    ),
-)
 
 _NOT_XML = "YAML; a URDF becomes a robot file by `elastocal import urdf FILE --base LINK --tip LINK --output robot.yaml`"
 
@@ -173,8 +172,7 @@ def read_schema(name: str) -> dict[str, Any]:
 
 def check_document(document: Any, schema: str, source: str) -> None:
     """Check a document of the file `source` against a schema, as `read_schema` names it; the first key at fault is refused."""
-    validator = _Validator(read_schema(schema), format_checker=_FORMATS)
-    errors = islice(validator.iter_errors(document), _MOST_FAULTS)
+    errors = islice(_validator(schema).iter_errors(document), _MOST_FAULTS)
     if error := min(errors, key=lambda error: [str(part) for part in error.absolute_path], default=None):
         key, found, allowed = _explained(error)
         path = [*error.absolute_path]

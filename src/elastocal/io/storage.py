@@ -93,7 +93,7 @@ def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], 
         for block in blocks:
             values = _checked(path, schema, block)
             if len(next(iter(values.values()))):
-                arrays = [pa.array(values[c.name], _arrow_type(c)) for c in schema.columns]
+                arrays = [_array(values[c.name], _arrow_type(c)) for c in schema.columns]
                 writer.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), row_group_size=2**30)
         metadata = {_TABLE: schema.name, _PROVENANCE: provenance}
         writer.add_key_value_metadata({key: json.dumps(value, sort_keys=True) for key, value in metadata.items()})
@@ -126,7 +126,7 @@ def read_blocks(
                 table = file.read_row_group(group, [c.name for c in wanted], use_threads=False)
             except (OSError, pa.ArrowException) as error:
                 raise InputError(path, f"row group {group}", f"unreadable data ({error})", _AS_WRITTEN) from None
-            yield {c.name: table.column(c.name).to_numpy() for c in wanted}
+            yield {c.name: np.concatenate([_values(chunk) for chunk in table.column(c.name).chunks]) for c in wanted}
 
 
 def read_table(
@@ -172,6 +172,29 @@ def _arrow_type(column: Column) -> pa.DataType:
     if column.type == "text":
         return pa.string()
     return pa.dictionary(pa.int32(), pa.string()) if column.type == "string" else pa.type_for_alias(column.type)
+
+
+def _array(values: np.ndarray, kind: pa.DataType) -> pa.Array:
+    """Values of one column; `pyarrow.array` and ``to_numpy`` would import pandas, half of the time of a job of the study."""
+    if pa.types.is_dictionary(kind):
+        codes = {text: code for code, text in enumerate(dict.fromkeys(values))}
+        texts = [text.encode() for text in codes]
+        ends = pa.py_buffer(np.cumsum([0, *map(len, texts)], dtype=np.int32))
+        names = pa.StringArray.from_buffers(len(texts), ends, pa.py_buffer(b"".join(texts)))
+        coded = np.fromiter(map(codes.__getitem__, values), np.int32, len(values))
+        return pa.DictionaryArray.from_arrays(_array(coded, kind.index_type), names)
+    if pa.types.is_string(kind):
+        return pa.array(values, kind)
+    bits = np.packbits(values, bitorder="little") if values.dtype == bool else np.ascontiguousarray(values)
+    return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(bits)])
+
+
+def _values(chunk: pa.Array) -> np.ndarray:
+    if pa.types.is_dictionary(chunk.type):
+        return np.array(chunk.dictionary.to_pylist(), dtype=object)[np.from_dlpack(chunk.indices)]
+    if pa.types.is_string(chunk.type):
+        return chunk.to_numpy(zero_copy_only=False)
+    return np.array(chunk.to_pylist(), bool) if pa.types.is_boolean(chunk.type) else np.from_dlpack(chunk)
 
 
 def _headed(heads: Mapping[str, Column], provenance: Mapping[str, Any], block: Block) -> dict[str, str | np.ndarray]:

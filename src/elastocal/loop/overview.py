@@ -18,7 +18,7 @@ from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.catalogue import faults
 from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept
-from elastocal.diagnosis.linearize import linearized, searched_part
+from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import joint_compliances
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from elastocal.campaigns.campaign import Campaign
+    from elastocal.diagnosis.kept_rows import Kept
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
 
@@ -57,7 +58,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     part = first_kept(whole, settings)
     errors = gross_errors(part.declared, part.noise, whole.campaign.measurements, part.kept, settings)
     left_out = entries_of(replace(errors, gross=~part.kept), whole.campaign, held_out=False)
-    case, noise, warnings, declared = part.case, part.noise, part.warnings, part.declared
+    case, noise, warnings, declared = part.case, part.noise, part.warnings, part.declared_to_all()
     campaign, states = case.campaign, case.observations.states
     found = faults(campaign, campaign.measurements)
     decisive = any(fault.decisive for fault in found)
@@ -87,7 +88,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         fitted = calibrate_on_case(case, declared.model, declared.estimate, declared.covariance, noise)
         facts["accuracy"] = campaign_accuracy(fitted, states).document()
     suspicious = [*warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case, settings)]
-    return facts | _testable(case, declared) | {"suspicious": [*suspicious, *repeat_warnings(training, held_out)]}
+    return facts | _testable(part) | {"suspicious": [*suspicious, *repeat_warnings(training, held_out)]}
 
 
 def _poses(session: np.ndarray, pose: np.ndarray) -> int:
@@ -118,9 +119,9 @@ def _identified(declared: Fit) -> dict[str, Any]:
     return found
 
 
-def _testable(case: Case, declared: Fit) -> dict[str, Any]:
-    about, searched = searched_part(declared, case.observations, Settings())
-    found = linearized(about, searched, list(case.candidates.values()), Settings())
+def _testable(part: Kept) -> dict[str, Any]:
+    case = part.case
+    found = linearized(part.declared, part.searched, list(case.candidates.values()), Settings())
     reasons = Counter(_FEW_ANGLES.sub("too few different angles of a joint", reason) for reason in found.untestable.values())
     return {"testable": len(case.candidates) - len(found.untestable), "untestable": dict(reasons.most_common())}
 

@@ -1,28 +1,30 @@
-"""A regression on what a fitted model leaves, tuned on its training poses, and what it makes of poses that no fit has seen."""
+"""A regression on what a fitted model leaves, tuned on its training poses, and what both make of poses that no fit has seen."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+import elastocal.remainder
 from elastocal.campaigns.campaign import BEST_REMAINDER
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.fitting.prediction import target_points
+from elastocal.io.modules import modules_with
 from elastocal.mechanics.kinematics import poses_and_jacobians
-from elastocal.remainder.catalogue import regressions
 from elastocal.remainder.protocol import Inputs, Part
-from elastocal.remainder.tuning import tuned
-from elastocal.validation.fitted_range import outside_poses
-from elastocal.validation.held_out import position_residuals
+from elastocal.remainder.tuning import CONFIDENCE, NORMAL_WIDTH, tuned
+from elastocal.validation.held_out import Errors, intervals, position_errors, position_residuals, summary
+from elastocal.validation.left_out import refits
 from elastocal.validation.placing import placed, same_campaign
-from elastocal.validation.splits import refits
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from typing import Any
 
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
@@ -36,13 +38,20 @@ _INNER_FOLDS = 5
 # By so many observations at most a regression is chosen and its intervals are scaled: by a quantile, which they fix to two per
 # cent.
 _MOST_TO_CHOOSE = 2_000
+_REPLICATES = 1000
+
+
+@cache
+def regressions() -> dict[str, Regression]:
+    """All regressions by their names: each module of this package that has a NAME."""
+    return {module.NAME: cast("Regression", module) for module in modules_with("NAME", elastocal.remainder).values()}
 
 
 @dataclass(frozen=True)
 class Plan:
     """How a remainder is to be regressed.
 
-    `regression`: name in `catalogue`; `BEST_REMAINDER` for that which cross-validation chooses, or none. `blocks`: whether
+    `regression`: its name; `BEST_REMAINDER` for that which cross-validation chooses, or none. `blocks`: whether
     settings and intervals come from blocks of joint space, as for poses far from those fitted; else from random folds.
     `within_range`: whether nothing is corrected at poses outside the range of those fitted.
     """
@@ -69,20 +78,21 @@ class Corrected:
     setting: Setting | None
 
 
-def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
+def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case, beyond: np.ndarray) -> Corrected:
     """Predict held-out poses by a model and a regression on what it leaves of the training poses.
 
     The regression's setting and the width of its intervals come from cross-validation of the training poses, with the model
     fitted anew to each of its parts: nested cross-validation [1]. Poses of another campaign have their frames and targets
     fitted to what both leave of them.
 
-    `fitted`: to the training poses. `case`: of the training poses.
+    `fitted`: to the training poses. `case`: of the training poses. `beyond` (P,) of bool: held-out poses outside the range of
+    those fitted, as of `fitted_range.outside_poses`.
 
     [1] Varma, S. and Simon, R., Bias in error estimation when using cross-validation for model selection, BMC Bioinformatics 7,
         2006.
     """
     there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
-    outside, elsewhere = outside_poses(fitted, case, held_out)[there.cluster], not same_campaign(case, held_out)
+    outside, elsewhere = beyond[there.cluster], not same_campaign(case, held_out)
     found = _regression(plan, fitted, case, elsewhere)
     prediction = found.predictor(inputs_of(model, estimate, there, elsewhere))
     mean = np.where(outside[:, None], 0.0, prediction.mean) if plan.within_range else prediction.mean
@@ -104,7 +114,7 @@ def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> Tuned:
 
 
 def _inner_parts(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Iterator[Part]:
-    """Training poses in folds, the model fitted anew from nothing without each."""
+    """Training poses in folds, the model fitted anew without each."""
     states, model = observations.states, fitted.model
     pose = state_clusters(states)
     configuration = configurations(states.joint_angles, pose)
@@ -141,3 +151,44 @@ def inputs_of(model: Model, estimate: Estimate, observations: Observations, else
         np.hstack([np.hstack(others)[observations.state], estimate.target_offset[observations.target]]),
         jacobian,
     )
+
+
+def remainder_facts(
+    plan: Plan, declared: Fit, final: Fit, case: Case, held_out: Case, beyond: np.ndarray, draws: np.random.Generator
+) -> dict[str, Any]:
+    """Held-out errors with a regression on what the final model leaves, beside those without.
+
+    `declared`, `final`: to the training poses. `case`: of the training poses. `beyond`: as in `corrected`. `draws`: of the
+    bootstrap over poses. Returns ``regression``, empty where none helps, and its ``words``; ``errors``, the summary of
+    `held_out.summary` with it; ``rms_ci95_m``; of the squared error that the declared model leaves the shares that effects
+    (``physics``) and the regression (``regression_share``) explain and that is ``left``; ``reduction_ci95`` of the RMS by the
+    regression alone; ``covered``, the share of coordinates inside the stated 95 % intervals, and ``half_width_m``, half of
+    their median width within and outside the range; ``outside``, poses outside the range of those fitted, at which nothing is
+    corrected.
+    """
+    before, after = (position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (declared, final))
+    found = corrected(plan, final, case, held_out, beyond)
+    with_it = Errors(np.linalg.norm(found.residual, axis=1), before.cluster)
+    limits, reductions = intervals([after, with_it], _REPLICATES, draws)
+    squares = [float((errors.distance**2).mean()) for errors in (before, after, with_it)]
+    name, words = (found.regression.NAME, found.regression.WORDS) if found.regression else ("", "")
+    facts: dict[str, Any] = {
+        "regression": name,
+        "words": words,
+        "errors": {name: float(value) for name, value in summary(with_it.distance).items()},
+        "rms_ci95_m": [float(end) for end in limits[1]["rms_m"]],
+        "reduction_ci95": [reductions[1].low, reductions[1].high],
+        "physics": 1.0 - squares[1] / squares[0],
+        "regression_share": (squares[1] - squares[2]) / squares[0],
+        "left": squares[2] / squares[0],
+        "outside": len(np.unique(before.cluster[found.outside])),
+        "confidence": CONFIDENCE,
+    }
+    if found.std is None:
+        return facts | {"covered": None, "half_width_m": None}
+    width = NORMAL_WIDTH * found.std
+    each = {"within": width[~found.outside], "outside": width[found.outside]}
+    return facts | {
+        "covered": float((np.abs(found.residual) < width).mean()),
+        "half_width_m": {name: float(np.median(part)) if part.size else None for name, part in each.items()},
+    }

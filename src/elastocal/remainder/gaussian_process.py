@@ -32,12 +32,15 @@ _MOST = 12_000
 # Variance of the process, lengths in standard deviations of each input, from wiggles between neighbours to one trend across all
 # poses, and variance of the noise: where the search starts, and its bounds.
 _VARIANCE, _LENGTH, _NOISE = (1.0, 1e-3, 1e3), (1.0, 0.05, 100.0), (0.5, 1e-4, 10.0)
+# By which share of the likelihood's logarithm the last steps of the search raise it: scipy's own 2e-9 stops on a plateau, whose
+# way out changes of the residuals by 1e-8 decided (the simulated KUKA: a regression or none).
+_LAST_GAIN = 1e-11
 # Of the variances: added to the diagonal, so that rounding leaves it positive definite.
 _JITTER = 1e-10
 # An input that differs by less than this over all poses says nothing: rad, N, m, s, degC.
 _STILL = 1e-10
 # Rows of a covariance matrix that are made at once.
-_AT_ONCE = 2_000
+_AT_ONCE = 500
 
 
 @dataclass(frozen=True)
@@ -86,8 +89,15 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
     for _ in settings:
         of_few = _standardized(residual[few])[0]
         # A length at its bound is an input without influence, not a failure.
-        start, limits = ranges[:, 0], Bounds(*ranges[:, 1:].T)
-        found = minimize(_surprise, start, args=(scaled[few], of_few), method="L-BFGS-B", jac=True, bounds=limits).x
+        found = minimize(
+            _surprise,
+            ranges[:, 0],
+            args=(scaled[few], of_few),
+            method="L-BFGS-B",
+            jac=True,
+            bounds=Bounds(*ranges[:, 1:].T),
+            options={"ftol": _LAST_GAIN},
+        ).x
         variance, lengths, noise = _parted(found)
         places, (standard, mean, size) = scaled[many] / lengths, _standardized(residual[many])
         covariance = np.empty((len(many),) * 2, order="F")

@@ -6,7 +6,7 @@ What it covers for as few poses as a campaign holds out: ``docs/held_out_interva
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtr, stdtrit
 
 # Student's t with the same standard error takes over where few poses make the bootstrap-t erratic (3: it holds 80 %, t 94 %;
 # 6: both hold the same), and where so many make both alike (300: widths differ by 3 %) and drawing costly.
@@ -45,9 +45,9 @@ def log_ratio_interval(
     if error <= _ROUNDING:
         return np.full(2, value), 0.0
     if weights is None:
-        reach = student.ppf(ends, poses - 1)
+        reach = stdtrit(poses - 1, ends)
     else:
-        farthest = student.ppf(ends[1], _DEGREES_AT_LEAST)
+        farthest = stdtrit(_DEGREES_AT_LEAST, ends[1])
         reach = -np.quantile(_pivots(weights, over, under, value), ends[::-1]).clip(-farthest, farthest)
     return value + error * reach, error
 
@@ -67,7 +67,7 @@ def risk_above(over: np.ndarray, under: np.ndarray, weights: np.ndarray | None, 
         return float(value > log_limit)
     reach = (value - log_limit) / error
     if weights is None:
-        return float(student.cdf(reach, poses - 1))
+        return float(stdtr(poses - 1, reach))
     pivots = _pivots(weights, over, under, value)
     # One more than were drawn, so that no finite number of draws gives certainty.
     return float((1.0 + (pivots <= reach).sum()) / (2.0 + len(pivots)))

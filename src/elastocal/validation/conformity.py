@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import beta, norm
+from scipy.special import betaincinv, ndtri
 
 from elastocal.validation.bootstrap_t import drawn_poses, log_ratio_interval, risk_above
 
@@ -87,11 +87,11 @@ def conformity(
     decision = _decision(risk, accepted_risk)
     inside = np.bincount(errors.cluster, errors.distance > tolerance_m) == 0
     kept = int(inside.sum())
-    lowest = float(beta.ppf(0.05, kept, poses - kept + 1)) if kept else 0.0
+    lowest = float(betaincinv(kept, poses - kept + 1, 0.05)) if kept else 0.0
     needed = None
     if decision == UNDECIDED:
         apart = max(abs(np.log(square) - limit), 1e-3)
-        needed = max(int(np.ceil(poses * (norm.ppf(1.0 - accepted_risk) * std_error / apart) ** 2)), poses + 1)
+        needed = max(int(np.ceil(poses * (ndtri(1.0 - accepted_risk) * std_error / apart) ** 2)), poses + 1)
     found = tolerance_m, _without(square, noise), _without(highest, noise), guard, risk, accepted_risk
     return Conformity(decision, *found, poses, kept, lowest, needed)
 

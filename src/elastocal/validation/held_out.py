@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrik
 
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
@@ -189,7 +189,7 @@ def _quantile_interval(errors: Errors) -> np.ndarray:
     off = np.bincount(errors.cluster, below - share)
     inflation = poses / (poses - 1) * (off**2).sum() / (count * max(share * (1.0 - share), _ROUNDING))
     effective = int(count / max(inflation, 1.0))
-    low, high = binom.ppf(_ENDS, effective, _SHARE)
+    low, high = np.ceil(bdtrik(_ENDS, effective, _SHARE))
     bottom = rising[int(low / effective * count) - 1] if low >= 1 else 0.0
     # So many measurements' worth that fewer than 2.5 % of such samples lie below the quantile as a whole.
     top = rising[int(np.ceil((high + 1) / effective * count)) - 1] if high < effective else np.inf

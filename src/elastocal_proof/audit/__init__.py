@@ -1,5 +1,5 @@
-"""An audit of a finished run: samples of every file recomputed by libraries that share no code with the pipeline.
+"""An audit of a finished run: samples of its files worked out again by libraries that share no code with the pipeline.
 
-Poses, Jacobians and deflections come from pinocchio and MuJoCo, least squares from statsmodels, intervals from scipy. Nothing
-here imports the package's own mechanics, identification, metrics or tables.
+Random numbers come from numpy's Philox, poses, Jacobians and deflections from pinocchio, equilibria from MuJoCo, least squares
+from statsmodels. Nothing here imports the package's own mechanics, identification, metrics or tables.
 """

@@ -1,8 +1,8 @@
-"""Fits of a campaign, worked out again: statsmodels on pinocchio's kinematics at the estimates that a file states.
+"""Fits of a campaign: statsmodels' least squares on pinocchio's kinematics at the estimates that a file states, and residuals
+from where the robot stands by MuJoCo.
 
-What is checked of a step is that its estimates are where iteratively reweighted least squares stand still, and that its
-standard errors are those of the regressors there. A step that has effects other than joint springs and bending links, fitted
-frames or targets, or declared masses is left out.
+Estimates must be where iteratively reweighted least squares stand still. Steps with other effects than joint springs and links
+of one section, and campaigns with fitted frames or targets, declared effects or masses, are left out.
 """
 
 from __future__ import annotations
@@ -11,285 +11,262 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import mujoco
 import numpy as np
 import pandas as pd
+import pinocchio as pin
 import statsmodels.api as sm
 from scipy import stats
+from scipy.spatial.transform import Rotation
 from statsmodels.robust.norms import HuberT
 
-from elastocal_proof.audit.audited import COMPONENTS
-from elastocal_proof.audit.elastic import STATE, Averages, Robot, Springs, averages, far_off, good_rows
-from elastocal_proof.audit.findings import Finding, compare, require
+from elastocal_proof.audit.arm import Arm, cantilever
+from elastocal_proof.audit.audited import COMPONENTS, POSITION, WRENCH
+from elastocal_proof.audit.findings import Finding, compare
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     from elastocal_proof.audit.audited import Audited
 
+_STATE, _TURN = ["session", "pose", "load"], ["rx", "ry", "rz"]
+# Steps of a fit end at so many standard errors of the scatter that is there; standard errors belong to the step before.
+SETTLED, _OF_ERRORS = 2e-3, 1e-3
+# So much (m) a fit that is read from a file still moves; the loads of fits are those after two passes.
+_STEP_BACK, _OF_FITS = 2e-8, 3
 # Effects whose formulas are written down here a second time.
 _SPRINGS, _LINKS = "joint_compliance", "link_elasticity"
-_BENDING, _TORSION, _TAPER = "bending_1_over_EI", "torsion_1_over_GJ", "taper"
-# A fit stops at steps of a thousandth of a standard error of the scatter that is there.
-SETTLED = 2e-3
-# Standard errors belong to the estimates one such step before.
-_OF_ERRORS = 1e-3
-# A fit that is read from a file goes on from there: a thousandth of a standard error displaces by less than this (m, rad).
-STEP_BACK = 2e-8
-# Beyond this quantile of the distance from the prediction a measurement loses weight.
-_HUBER = 0.99
-# A link's taper is between none and this.
-_LARGEST_TAPER = 0.6
-# Of a taper; for its slope.
-_DIFFERENCE = 1e-4
+_OF_LINKS = ("bending_1_over_EI", "torsion_1_over_GJ", "taper")
+# Beyond this quantile of the distance from the prediction a measurement loses weight; a link's taper is at most this.
+# Links shorter than this (m) do not bend.
+_HUBER, _LARGEST_TAPER, _SHORTEST_M = 0.99, 0.6, 0.05
+# Each pass leaves some 1/500 of the pass before of the load's change by the deflection.
+_PASSES = 8
+# Measurements so many times as far from the median of their repeats as repeats usually are were not fitted (Hampel).
+_FAR = 12.0
 _BY = "statsmodels on pinocchio"
 
 
 @dataclass(frozen=True)
 class Step:
-    """One model of a campaign: `parameters` are rows of steps.parquet, `noise` is that of diagnosis.json."""
+    """One model: `parameters` are rows of steps.parquet, `springs` (C, C) and what a `unit` (P, C, C) of each adds to them."""
 
     kind: str
     parameters: pd.DataFrame
     noise: Mapping[str, Any]
-    springs: Springs
-
-    @property
-    def free(self) -> np.ndarray:
-        """Which parameters were fitted."""
-        return ~self.parameters["held"].to_numpy(bool)
-
-    @property
-    def inside(self) -> np.ndarray:
-        """Which of these can move: a taper that is as small as it may be, or as large, does not go on beyond it."""
-        ends = self.parameters["value"].isin([0.0, _LARGEST_TAPER]) & (self.parameters["parameter"] == _TAPER)
-        return self.free & ~ends.to_numpy()
+    springs: np.ndarray
+    units: np.ndarray
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign whose models can be worked out again.
+    """A campaign of stated springs: `mounts` are rotations of its targets, none where positions alone are measured.
 
-    `poses`: whether orientations were measured. `steps`: in the order of the files; None where a step has what is not written
-    down here. `training`: what was fitted, `seen` with the repeats averaged.
+    `steps`: in the order of the files; None where a step has what is not written down here.
     """
 
-    robot: Robot
-    poses: bool
+    arm: Arm
+    mounts: list[np.ndarray]
     steps: list[Step | None]
-    training: pd.DataFrame
-    seen: Averages
 
 
 def campaign_of(run: Audited, name: str) -> Campaign | None:
-    """A campaign's robot and models.
-
-    Returns None where frames or targets are fitted, the approach is recorded, or the robot file declares masses or no springs.
-    """
-    described = run.document(f"results/loop/{name}/campaign.json")
+    """A campaign's robot and models; None of one that is left out."""
+    described, facts = (run.document(f"results/loop/{name}/{part}.json") for part in ("campaign", "diagnosis"))
     asked, robot = described["campaign"], described["robot"]
-    targets = list(asked["targets"].values())
+    targets, table = list(asked["targets"].values()), run.table(f"results/loop/{name}/steps.parquet")
     known = all(target[key] != "unknown" for target in targets for key in ("offset_m", "rotation") if key in target)
-    weightless = "masses" not in robot and "compliance_urad_per_Nm" in robot
-    placed = asked["frame"] == "base" and known and not asked["declared"] and described.get("held_out") is None
-    if not placed or not weightless or run.table(f"results/loop/{name}/training.parquet")["approach1"].notna().any():
+    fitted = table["owner"].str.contains("frame|session", regex=True).any()
+    placed = asked["frame"] == "base" and described.get("held_out") is None and not fitted
+    if not known or not placed or asked["declared"] or "masses" in robot:
         return None
-    compliant, facts = Robot(robot, targets), run.document(f"results/loop/{name}/diagnosis.json")
-    table = run.table(f"results/loop/{name}/steps.parquet")
-    nominal = 1e-6 * np.array(robot["compliance_urad_per_Nm"], float)
-    # Where a fixed rotation or a coupled joint parts a link, its ends are not those of a stretch of translations.
-    plain = "deg)" not in robot["chain"] and len(re.findall(r"q\d+", robot["chain"])) == compliant.joints
-    steps = [_step(stated, table[table["step"] == number], nominal, plain) for number, stated in enumerate(facts["steps"])]
-    poses, training = asked["measured"] == "pose", good_rows(run, name, "training")
-    return Campaign(compliant, poses, steps, training, averages(training, poses))
+    arm = Arm({**robot, "links": {}}, {number: (each["point"], each["offset_m"]) for number, each in enumerate(targets)})
+    steps = [_step(arm, stated, table[table["step"] == number]) for number, stated in enumerate(facts["steps"])]
+    mounts = [pin.exp3(np.array(target.get("rotation", (0.0, 0.0, 0.0)), float)) for target in targets]
+    return Campaign(arm, mounts if asked["measured"] == "pose" else [], steps)
 
 
-def _step(stated: Mapping[str, Any], parameters: pd.DataFrame, nominal: np.ndarray, plain: bool) -> Step | None:
+def _step(arm: Arm, stated: Mapping[str, Any], parameters: pd.DataFrame) -> Step | None:
     links = [key for key in stated["effects"] if key.startswith(_LINKS)]
-    # One section of all links; links of their own sections are not written down here.
-    if {*stated["effects"]} - {_SPRINGS, *links} or len(links) > 1 or (links and not (plain and "one section" in links[0])):
+    # Where a fixed rotation or a coupled joint parts a link, its ends are not those of a stretch of translations.
+    chain = arm.document["chain"]
+    plain = "deg)" not in chain and len(re.findall(r"q\d+", chain)) == arm.joints and "one section" in "".join(links)
+    if {*stated["effects"]} - {_SPRINGS, *links} or len(links) > 1 or (links and not plain):
         return None
     values = dict(zip(parameters["parameter"], parameters["value"], strict=True))
-    joints = np.array([values.get(f"c{j}", c) for j, c in enumerate(nominal, 1)])
-    springs = Springs(joints, *(values.get(name, 0.0) for name in (_BENDING, _TORSION, _TAPER)))
-    return Step(stated["kind"], parameters, stated["noise"], springs)
+    bending, torsion, taper = (values.get(name, 0.0) for name in _OF_LINKS)
+    long = {number: vector for number, vector in enumerate(arm.links) if np.linalg.norm(vector) > _SHORTEST_M}
+
+    def springs(joints: np.ndarray, *link: float) -> np.ndarray:
+        return arm.spring_matrix(joints, {number: cantilever(vector, *link) for number, vector in long.items()})
+
+    still, small = np.zeros(arm.joints), 1e-4
+    slope = (springs(still, bending, torsion, taper + small) - springs(still, bending, torsion, taper - small)) / (2 * small)
+    units = dict(zip(_OF_LINKS, (springs(still, 1, 0, taper), springs(still, 0, 1, taper), slope), strict=True))
+    units |= {f"c{joint}": springs(unit, 0, 0, 0) for joint, unit in enumerate(np.eye(arm.joints), 1)}
+    joints = np.array([values.get(f"c{j}", nominal) for j, nominal in enumerate(arm.compliance, 1)])
+    each = np.array([units[name] for name in parameters["parameter"]]).reshape(-1, *slope.shape)
+    return Step(stated["kind"], parameters, stated["noise"], springs(joints, bending, torsion, taper), each)
 
 
-def fits(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
-    """Noise, estimates and standard errors of every step."""
-    known = campaign_of(run, campaign)
-    stated = run.document(f"results/loop/{campaign}/diagnosis.json")["document"].get("noise") or {}
-    for number, step in enumerate(known.steps if known else ()):
-        if step is None or known is None:
-            continue
-        # Most steps go by the noise of the one before.
-        earlier = known.steps[number - 1] if number else None
-        if earlier is None or earlier.noise != step.noise:
-            yield from _noise(number, step, known, stated.get("factor", 1.0))
-        if not len(step.parameters):
-            continue
-        error, inside = step.parameters["std_error"].to_numpy(), step.inside
-        columns, residual, scale = _whiten(step, known.seen, known.robot)
-        moved = _least_squares(columns[:, inside], residual).params / (scale * error[inside])
-        checked = f"estimates of step {number} ({step.kind}) stand still, in standard errors"
-        yield compare(checked, _BY, moved, np.zeros(len(moved)), absolute=SETTLED)
-        expected = _least_squares(columns[:, step.free], residual).bse
-        yield compare(
-            f"standard errors of step {number} ({step.kind})", _BY, error[step.free], expected, _OF_ERRORS, scale=expected
-        )
+def _far_off(frame: pd.DataFrame) -> np.ndarray:
+    """Which measurements (N,) are far from the median of at least three repeats, by the median distance of all."""
+    group = frame.groupby([*_STATE, "target"])[list(POSITION)]
+    off = (frame[list(POSITION)] - group.transform("median")).abs().to_numpy()
+    apart = off[repeated := group.transform("size").to_numpy() > 2]
+    return repeated & (off > _FAR * (np.median(apart[apart > 0]) if apart.any() else np.inf)).any(axis=1)
 
 
-def _noise(number: int, step: Step, known: Campaign, factor: float) -> Iterator[Finding]:
-    """Noise of a measurement from the repeats about their means, where the joints have no part in it.
+def averaged(known: Campaign, kept: pd.DataFrame) -> pd.DataFrame:
+    """Measurements with the repeats of a state averaged; `repeats`: how many, of the target that has the fewest."""
+    loads = [*(f"q{j}" for j in range(1, known.arm.joints + 1)), *WRENCH]
+    kept = kept.assign(**kept.groupby(_STATE)[loads].transform("mean"))
+    grouped = kept.groupby([*_STATE, "target"])
+    found = grouped[[*loads, *POSITION]].mean().assign(repeats=grouped.size().groupby(_STATE).transform("min"))
+    if known.mounts:
+        turned = [Rotation.from_rotvec(some[_TURN].to_numpy(copy=True)).mean().as_rotvec() for _, some in grouped]
+        found = found.join(pd.DataFrame(turned, found.index, _TURN))
+    return found.reset_index()
 
-    Where measurements scatter more about the model than about each other, it may be larger by the factor that is stated.
+
+def predicted(known: Campaign, springs: np.ndarray, rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Measured less predicted (M, 3 or 6), m and rad, Jacobians (M, 3 or 6, C) and loads (M, C) where the robot has yielded."""
+    arm, found = known.arm, []
+    angles, wrenches = rows[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(), rows[list(WRENCH)].to_numpy()
+    seen = rows[[*POSITION, *_TURN] if known.mounts else list(POSITION)].to_numpy()
+    for q, wrench, measured, target in zip(angles, wrenches, seen, rows["target"], strict=True):
+        coordinates, forces = arm.loaded(springs, q, wrench, _PASSES)
+        position, rotation = arm.pose(coordinates, target)
+        off = [measured[:3] - position]
+        if known.mounts:
+            off.append(pin.log3(pin.exp3(measured[3:]) @ (rotation @ known.mounts[target]).T))
+        found.append((np.concatenate(off), arm.jacobian(coordinates, target)[: len(measured)], forces))
+    return tuple(np.array(each) for each in zip(*found, strict=True))  # type: ignore[return-value]
+
+
+def least_squares(known: Campaign, step: Step, training: pd.DataFrame) -> tuple[Any, np.ndarray]:
+    """One robust least-squares step (Huber) of a model from its estimates, rows of variance one and priors below.
+
+    Returns the fit of all free parameters, and how far those that can move still do, in standard errors of the scatter.
     """
-    noise = step.noise
-    if noise["source"] != "repeats" or any(noise["joint_rad"]) or noise["pose_rad"] or noise["usual_m"]:
-        return
-    near = known.training[~far_off(known.training)]
-    repeated = near[near.groupby([*STATE, "target"])["row"].transform("size") > 1]
-    residual, groups = residuals_of(known, step, repeated), repeated.groupby([*STATE, "target"]).ngroup().to_numpy()
-    off = residual - pd.DataFrame(residual).groupby(groups).transform("mean").to_numpy()
-    free, squares = len(groups) - len(np.unique(groups)), (off**2).sum(axis=0)
-    expected = np.sqrt(squares.reshape(-1, 3).sum(axis=1) / (3 * free))
-    stated = np.array([noise["position_m"], noise["orientation_rad"]])[: len(expected)]
-    if abs(stated[0] / factor - expected[0]) < abs(stated[0] - expected[0]):
-        stated = stated / factor
-    yield compare(f"noise of step {number}, from repeats", "pandas on pinocchio", stated, expected, 1e-4)
-    yield compare(f"repeats of step {number}", "counting", noise["degrees_of_freedom"], len(squares) * free, 0.0)
-
-
-def correlations(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
-    """Correlations of the estimates of the last step."""
-    known = campaign_of(run, campaign)
-    step = known.steps[-1] if known else None
-    if known is None or step is None or not step.free.any():
-        return
-    table, names = run.table(file), (step.parameters["owner"] + " " + step.parameters["parameter"]).to_numpy()[step.free]
-    columns, residual, _ = _whiten(step, known.seen, known.robot)
-    covariance = np.asarray(_least_squares(columns[:, step.free], residual).cov_params())
-    deviation, place = np.sqrt(np.diag(covariance)), {name: number for number, name in enumerate(names)}
-    one, other = (np.array([place[name] for name in table[end]], int) for end in ("one", "other"))
-    every = len({*map(frozenset, zip(one, other, strict=True))}) == len(names) * (len(names) - 1) // 2 == len(table)
-    note = f"{len(table)} of {len(names)} parameters"
-    yield require("every pair of parameters once", "counting", every, note, len(table))
-    expected = (covariance / np.outer(deviation, deviation))[one, other]
-    yield compare("correlations of the estimates", _BY, table["correlation"], expected, absolute=_OF_ERRORS)
-
-
-def predictions(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
-    """Residuals of all measurements, fitted and held out, by the declared and by the final model."""
-    known = campaign_of(run, campaign)
-    if known is None:
-        return
-    table, names = run.table(file), COMPONENTS if known.poses else COMPONENTS[:3]
-    declared = next(step for step in known.steps if step is None or step.kind == "declared")
-    for state, step in (("before", declared), ("after", known.steps[-1])):
-        if step is None:
-            continue
-        stored, expected = [], []
-        for part in ("training", "held_out"):
-            mine = table[table["held_out"] == (part == "held_out")].sort_values("row")
-            stored.append(mine[[f"{state}_{name}" for name in names]].to_numpy())
-            measured = run.table(f"results/loop/{campaign}/{part}.parquet").sort_values("row")
-            expected.append(residuals_of(known, step, measured))
-        pair = np.concatenate(stored), np.concatenate(expected)
-        checked = f"residuals {state}, fitted and held out, all rows"
-        yield compare(checked, "pinocchio", *pair, 0.0, unsettled(step, known))
-
-
-def _least_squares(columns: np.ndarray, residual: np.ndarray) -> Any:
-    """Ordinary least squares of whitened rows, whose variance is one."""
-    return sm.OLS(residual, columns).fit(cov_type="fixed scale", cov_kwds={"scale": 1.0})
-
-
-def _whiten(step: Step, seen: Averages, robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
-    """Weighted, whitened regressors and residual with rows for the priors below them, and the scale of the scatter."""
-    loaded = robot.all_loaded(step.springs, seen)
-    residual, jacobian = robot.residuals(loaded, seen), robot.jacobians(loaded, seen)
-    units = _units(step, robot)
-    moved = np.stack([units @ forces for _, forces in loaded])
-    rows = np.concatenate([jacobian @ moved[seen.state].transpose(0, 2, 1), residual[:, :, None]], axis=2)
-    blocks = _whitener(step.noise, seen, jacobian[:, :, : robot.joints])
-    distance = np.sqrt((_apply(blocks, rows[..., -1:]) ** 2).mean(axis=(1, 2)))
+    seen = averaged(known, training)
+    residual, jacobian, forces = predicted(known, step.springs, seen)
+    slopes = np.einsum("mrc,pcd,md->mrp", jacobian, step.units, forces, optimize=True)
+    rows = np.concatenate([slopes, residual[:, :, None]], axis=2)
+    of_noise = step.noise, seen, jacobian[:, :, : known.arm.joints]
+    distance = np.sqrt((_whitened(*of_noise, rows)[..., -1] ** 2).mean(axis=1))
     # Where scatter is larger than the noise, distances count by that of the middle one.
     count = residual.shape[1]
     scale = max(float(np.median(distance) / np.sqrt(stats.chi2.median(count) / count)), 1.0)
     weights = HuberT(np.sqrt(stats.chi2.ppf(_HUBER, count) / count)).weights(distance / scale)
-    white = _apply(blocks, np.sqrt(weights)[:, None, None] * rows).reshape(-1, rows.shape[2])
-    prior = step.parameters["prior_std"].to_numpy()
-    known = np.isfinite(prior)
-    below = (np.eye(len(prior)) / np.where(known, prior, 1.0)[:, None])[known]
-    value = (step.parameters["value"].to_numpy() / prior)[known]
-    return np.vstack([white[:, :-1], below]), np.concatenate([white[:, -1], -value]), scale
+    white = _whitened(*of_noise, np.sqrt(weights)[:, None, None] * rows).reshape(-1, rows.shape[2])
+    prior, value, error = (step.parameters[name].to_numpy() for name in ("prior_std", "value", "std_error"))
+    below = np.column_stack([np.eye(len(prior)), -value]) / prior[:, None]
+    white = np.concatenate([white, below[np.isfinite(prior)]])
+    # A taper that is as small as it may be, or as large, does not go on beyond it.
+    free = ~step.parameters["held"].to_numpy(bool)
+    inside = free & ~(np.isin(value, [0.0, _LARGEST_TAPER]) & (step.parameters["parameter"] == "taper").to_numpy())
+    fit, still = (
+        sm.OLS(white[:, -1], white[:, :-1][:, some]).fit(cov_type="fixed scale", cov_kwds={"scale": 1.0})
+        for some in (free, inside)
+    )
+    return fit, still.params / (scale * error[inside])
 
 
-def unsettled(step: Step, known: Campaign) -> float:
-    """By how much (m, rad) a prediction moves, at most, where a fit goes on from its estimates to where it stands still."""
-    inside, robot, seen = step.inside, known.robot, known.seen
-    if not inside.any():
-        return STEP_BACK
-    columns, residual, _ = _whiten(step, seen, robot)
-    left = np.abs(_least_squares(columns[:, inside], residual).params)
-    loaded = robot.all_loaded(step.springs, seen)
-    moved = np.stack([_units(step, robot)[inside] @ forces for _, forces in loaded])
-    return STEP_BACK + float((np.abs(robot.jacobians(loaded, seen) @ moved[seen.state].transpose(0, 2, 1)) @ left).max())
-
-
-def _units(step: Step, robot: Robot) -> np.ndarray:
-    """What a unit of each parameter makes of the loads on the coordinates, (P, C, C)."""
-    springs, still, found = step.springs, np.zeros(robot.joints), []
-    for name in step.parameters["parameter"]:
-        if name == _TAPER:
-            ends = (springs.taper + _DIFFERENCE, springs.taper - _DIFFERENCE)
-            more, less = (robot.compliance(Springs(still, springs.bending, springs.torsion, taper)) for taper in ends)
-            found.append((more - less) / (2 * _DIFFERENCE))
-        elif name in (_BENDING, _TORSION):
-            found.append(robot.compliance(Springs(still, float(name == _BENDING), float(name == _TORSION), springs.taper)))
-        else:
-            found.append(robot.compliance(Springs(np.eye(robot.joints)[int(name[1:]) - 1])))
-    return np.array(found)
-
-
-def _whitener(noise: Mapping[str, Any], seen: Averages, jacobian: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For each pose its measurements and the inverse Cholesky factor of their covariance.
+def _whitened(noise: Mapping[str, Any], seen: pd.DataFrame, jacobian: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (M, rows, K) over the Cholesky factor of each pose's covariance.
 
     The sensor's part is of each measurement, that of the joints common to a state, another one to a pose.
     """
-    rows, joints = jacobian.shape[1], np.array(noise["joint_rad"])
-    sensor = np.repeat([noise["position_m"], noise["orientation_rad"]], 3)[:rows] ** 2
-    poses, repeats, found = seen.pose, seen.repeats, []
-    for pose in np.unique(poses):
-        members = np.flatnonzero(poses == pose)
-        stacked = jacobian[members].reshape(len(members) * rows, -1)
-        alike = np.kron(seen.state[members][:, None] == seen.state[members], np.ones((rows, rows)))
-        single = np.diag(np.tile(sensor, len(members))) + alike * ((stacked * joints**2) @ stacked.T)
+    rows, found = jacobian.shape[1], np.empty(values.shape)
+    sensor, joints = np.repeat([noise["position_m"], noise["orientation_rad"]], 3)[:rows] ** 2, np.array(noise["joint_rad"])
+    load, repeats, pose = seen["load"].to_numpy(), seen["repeats"].to_numpy(), seen.groupby(_STATE[:2]).ngroup().to_numpy()
+    for members in (pose == number for number in np.unique(pose)):
+        stacked = jacobian[members].reshape(-1, len(joints))
+        alike = np.kron(load[members][:, None] == load[members], np.ones((rows, rows)))
+        single = np.diag(np.tile(sensor, members.sum())) + alike * ((stacked * joints**2) @ stacked.T)
         covariance = single / np.repeat(repeats[members], rows) + noise["pose_rad"] ** 2 * stacked @ stacked.T
-        found.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
+        block = values[members].reshape(len(stacked), -1)
+        found[members] = np.linalg.solve(np.linalg.cholesky(covariance), block).reshape(values[members].shape)
     return found
 
 
-def _apply(blocks: Sequence[tuple[np.ndarray, np.ndarray]], values: np.ndarray) -> np.ndarray:
-    """Whitened rows (M, rows, K)."""
-    found = np.empty(values.shape)
-    for members, factor in blocks:
-        some = values[members]
-        found[members] = (factor @ some.reshape(len(factor), -1)).reshape(some.shape)
-    return found
+def fits(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
+    """Estimates and standard errors of every step; correlations of the last. None where approaches are recorded."""
+    known, training = campaign_of(run, campaign), run.table(f"results/loop/{campaign}/training.parquet")
+    if known is None or training["approach1"].notna().any():
+        return
+    stated = run.document(f"results/loop/{campaign}/diagnosis.json")["document"]["gross_errors"]
+    out = training["row"].isin([row for entry in stated for row in entry["rows"]]) | _far_off(training)
+    for number, step in enumerate(known.steps):
+        if step is None or step.parameters["held"].all():
+            continue
+        (fit, moved), words = least_squares(known, step, training[~out]), f"of step {number} ({step.kind})"
+        yield compare(f"estimates {words} stand still, in standard errors", _BY, moved, 0 * moved, absolute=SETTLED)
+        free = step.parameters[~step.parameters["held"]]
+        yield compare(f"standard errors {words}", _BY, free["std_error"] / fit.bse, np.ones(len(free)), _OF_ERRORS)
+        if number == len(known.steps) - 1:
+            names = free["owner"] + " " + free["parameter"]
+            expected = pd.DataFrame(np.asarray(fit.cov_params()) / np.outer(fit.bse, fit.bse), names, names)
+            stored = run.table(f"results/loop/{campaign}/correlations.parquet")
+            pairs = [expected.loc[pair] for pair in zip(stored["one"], stored["other"], strict=True)]
+            yield compare("correlations of the estimates", _BY, stored["correlation"], pairs, absolute=_OF_ERRORS)
 
 
-def residuals_of(known: Campaign, step: Step, measured: pd.DataFrame) -> np.ndarray:
-    """Residual (N, 3 or 6) of every single measurement, in the order of the rows of a table."""
-    approach = [*STATE, "repeat"]
-    order = measured.reset_index(drop=True).sort_values([*approach, "target"])
-    seen = averages(order.assign(load=order.groupby(approach).ngroup()), known.poses)
-    found = np.empty((len(measured), 6 if known.poses else 3))
-    found[order.index] = known.robot.residuals(known.robot.all_loaded(step.springs, seen), seen)
-    return found
+def model_of(arm: Arm) -> mujoco.MjModel:
+    """The arm by MuJoCo, its joints and springs as bodies."""
+    words, opened = ['<mujoco><compiler angle="radian"/><worldbody>'], 0
+    for step in arm.steps:
+        if step.kind == "point":
+            places = ((name, offset) for name, (point, offset) in arm.frames.items() if point == step.point)
+            words += [f'<site name="{name}" pos="{" ".join(map(str, offset))}"/>' for name, offset in places]
+            continue
+        opened, axis = opened + 1, ["1 0 0", "0 1 0", "0 0 1"][step.axis]
+        if step.coordinate is None:
+            moved = axis.replace("1", str(step.amount)) if step.kind == "T" else "0 0 0"
+            words.append(f'<body pos="{moved}" axisangle="{axis} {step.amount if step.kind == "R" else 0}">')
+            continue
+        words.append('<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>')
+        words.append(f'<joint type="{"hinge" if step.kind == "R" else "slide"}" axis="{axis}"/>')
+    return mujoco.MjModel.from_xml_string("".join(words) + opened * "</body>" + "</worldbody></mujoco>")
 
 
-CHECKS = {
-    "results/loop/{campaign}/steps.parquet": fits,
-    "results/loop/{campaign}/correlations.parquet": correlations,
-    "reports/loop/{campaign}/residuals.parquet": predictions,
-}
+def stand(arm: Arm, model: mujoco.MjModel, springs: np.ndarray, angles: np.ndarray, wrench: np.ndarray, target: Any) -> Any:
+    """Position of a target (passes, 3), m, after each pass towards the equilibrium with springs (C, C)."""
+    data, commanded, found, rows = mujoco.MjData(model), arm.extend(angles), [], np.zeros((6, model.nv))
+    coordinates = commanded
+    for _ in range(_PASSES + 1):
+        data.qpos[:] = arm.ordered(coordinates)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        found.append(data.site(f"target {target}").xpos.copy())
+        mujoco.mj_jacSite(model, data, rows[:3], rows[3:], model.site("wrench").id)
+        coordinates = commanded + springs @ arm.collected(wrench @ rows)
+    return np.array(found[1:])
+
+
+def residuals(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
+    """Residuals of positions of sampled rows, by the declared model and with the effects found: measured less MuJoCo's."""
+    known, frame = campaign_of(run, campaign), run.table(file).query("not gross_error")
+    if known is None:
+        return
+    arm, model, rows = known.arm, model_of(known.arm), frame.iloc[run.pick(file, len(frame))]
+    angles = rows[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(float)
+    loads = list(zip(angles, rows[list(WRENCH)].to_numpy(float), rows["target"], strict=True))
+    declared = next(step for step in known.steps if step is None or step.kind == "declared")
+    for state, step in (("before", declared), ("after", known.steps[-1])):
+        if step is None:
+            continue
+        stands = np.array([stand(arm, model, step.springs, *load) for load in loads])
+        # The fit may go on by thousandths of a standard error of the scatter that is there.
+        names, error = [f"{state}_{name}" for name in COMPONENTS[:3]], step.parameters["std_error"].fillna(0.0).to_numpy()
+        usual = np.sqrt((frame.loc[~frame["held_out"], names].to_numpy() ** 2).mean())
+        allowed = _STEP_BACK + np.abs(stands[:, -1] - stands[:, _OF_FITS - 1]).max()
+        for more in SETTLED * max(usual / step.noise["position_m"], 1.0) * error[:, None, None] * step.units:
+            softer = [stand(arm, model, step.springs + more, *load)[-1] for load in loads]
+            allowed += np.abs(softer - stands[:, -1]).max()
+        expected = rows[list(POSITION)].to_numpy(float) - stands[:, -1]
+        yield compare(f"residuals {state}, {len(rows)} rows", "MuJoCo", rows[names], expected, 0.0, allowed)
+
+
+CHECKS = {"results/loop/{campaign}/steps.parquet": fits, "reports/loop/{campaign}/residuals.parquet": residuals}

@@ -10,8 +10,7 @@ import numpy as np
 from elastocal.errors import InputError
 from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.fitting.tolerances import fit_declared
-from elastocal.remainder.catalogue import regressions
-from elastocal.remainder.corrected import Plan, corrected
+from elastocal.remainder.corrected import Plan, corrected, regressions
 from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
@@ -34,7 +33,7 @@ class Method:
     """A method of the league.
 
     `physics`: what is fitted first: frames and targets alone; what the campaign declares too, such as geometry; or what a
-    diagnosis of the training poses finds. `regression`: name in `remainder.catalogue`: fitted to what the physical model
+    diagnosis of the training poses finds. `regression`: name of a regression of `remainder`: fitted to what the physical model
     leaves. `within_range`: whether the regression is left out where a pose lies outside the range of those fitted. `words`:
     what tables and pictures call it.
     """
@@ -91,12 +90,12 @@ def entered(method: Method, fitted: Fit, case: Case, held_out: Case, split: str,
 
     `fitted`: its physical model, fitted to the training poses. `case`: of the training poses. `split`: one of `folds.SPLITS`.
     """
+    beyond = outside_poses(fitted, case, held_out)
     if method.regression is not None:
         plan = Plan(method.regression, blocks=split != RANDOM, within_range=method.within_range, seed=seed)
-        found = corrected(plan, fitted, case, held_out)
+        found = corrected(plan, fitted, case, held_out, beyond)
         std = np.full_like(found.residual, np.nan) if found.std is None else found.std
         return Entry(held_out.observations, found.residual, std, found.outside, found.setting)
     there = held_out.observations
     residual = position_residuals(*placed(fitted, case, held_out), there)
-    outside = outside_poses(fitted, case, held_out)[there.cluster]
-    return Entry(there, residual, np.full_like(residual, np.nan), outside, None)
+    return Entry(there, residual, np.full_like(residual, np.nan), beyond[there.cluster], None)

@@ -55,16 +55,3 @@ def test_a_parameter_known_to_a_tenth_has_a_line_known_to_a_tenth():
     assert line.rms_m == pytest.approx(0.5 * abs(value), rel=1e-3)
     assert line.low_m / line.rms_m == pytest.approx(1 - 0.196, abs=0.01)
     assert line.high_m / line.rms_m == pytest.approx(1 + 0.196, abs=0.01)
-
-
-def test_springs_as_declared_are_a_line_without_an_interval(fanuc):
-    found = budget(made_calibrated(fanuc, "joint_offset@2", identified=False))
-    assert found["joint_compliance"].rms_m > 0 and found["joint_compliance"].low_m is None
-    assert "joint_compliance" not in budget(made_calibrated(fanuc, "joint_offset@2", identified=False), force=0.0)
-
-
-def test_repeatability_of_the_joints_is_the_last_line(fanuc):
-    calibrated = made_calibrated(fanuc, "joint_offset@2")
-    still = budget(calibrated)[REPEATABILITY].rms_m
-    moved = replace(calibrated, noise=replace(calibrated.noise, joint_rad=np.full(6, 2e-5)))
-    assert still == 0.0 and 1e-5 < budget(moved)[REPEATABILITY].rms_m < 2e-4

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi
 from synthetic import made_measurements, made_model
 
@@ -56,9 +55,3 @@ def test_only_targets_of_the_end_effector_count_unless_there_is_none(fanuc):
 def test_without_repeats_nothing_is_known(fanuc):
     assert repeatability(measure(fanuc, 5, 1), TARGETS, "6DoF") is None
     assert repeatability(measure(fanuc, 1, 5), TARGETS, "6DoF") is None
-
-
-def test_where_the_robot_stands_and_how_it_is_turned_does_not_matter(fanuc):
-    data = measure(fanuc, 10, 4)
-    turned = replace(data, position=Rotation.from_rotvec([0.3, 0.2, 0.1]).apply(data.position) + 7.0)
-    assert repeatability(turned, TARGETS, "6DoF").position_m == pytest.approx(repeatability(data, TARGETS, "6DoF").position_m)

@@ -8,7 +8,7 @@ from made_calibrated import USUAL, made_calibrated
 from scipy.stats import chi, norm
 
 from elastocal.application.accuracy import quantile_of_length
-from elastocal.application.calibrated import NEUTRAL, forward, nominal_forward
+from elastocal.application.calibrated import forward
 from elastocal.application.certificate.workspace import draw_angles, workspace_errors
 from elastocal.fitting.parameters import stepped
 
@@ -22,14 +22,6 @@ def calibrated(fanuc):
 def found_for(calibrated, count=300):
     angles = draw_angles(calibrated, count, np.random.default_rng(0))
     return workspace_errors(calibrated, angles, np.zeros(6), calibrated.robot.model_angles(angles[: count // 2]))
-
-
-def test_the_uncorrected_error_is_the_distance_from_where_the_file_has_it(calibrated):
-    found = found_for(calibrated)
-    position, _ = forward(calibrated, found.joint_angles, NEUTRAL)
-    nominal, _ = nominal_forward(calibrated.robot, found.joint_angles)
-    np.testing.assert_allclose(found.uncorrected_m, np.linalg.norm(position - nominal, axis=1))
-    assert 0.0 < found.outside.mean() < 0.2
 
 
 def test_quantiles_are_those_of_one_and_of_three_directions_and_hold_between():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from made_surveys import made_rows
 
-from elastocal.application.planning.bound import best_value, efficiency
+from elastocal.application.planning.bound import best_value
 from elastocal.application.planning.criteria import CRITERIA, criterion
 from elastocal.application.planning.exchange import choose_greedily, exchange_candidates, matrix_of
 
@@ -34,12 +34,3 @@ def test_the_bound_is_the_optimum_of_the_continuous_design(kind):
     assert value <= best + 1e-6
     assert bound >= best - 1e-4 * abs(best)
     assert bound - best < 0.1 * max(best - value, 1e-3)
-
-
-def test_the_best_design_is_efficient_and_a_poor_one_is_not():
-    rows, rule = made_rows(20, 3, 5, 4), criterion("D", PLACES)
-    chosen = exchange_candidates(rows, choose_greedily(rows, 4, rule), rule)
-    bound = best_value(rows, 4, rule, chosen)
-    assert 0.7 < efficiency(rule, matrix_of(rows, chosen), bound) <= 1.0
-    poor = np.argsort(rule.gains(rows, np.eye(5)))[:4]
-    assert efficiency(rule, matrix_of(rows, poor), bound) < 0.5

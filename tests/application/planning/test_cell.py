@@ -21,23 +21,9 @@ def angles(survey):
     return low + (high - low) * np.random.default_rng(1).random((300, 6))
 
 
-def test_the_links_end_where_the_chain_ends(survey, angles):
-    points = link_points(survey.robot, survey.robot.model_angles(angles))
-    end, _ = poses(survey.robot.chain, survey.robot.model_angles(angles), survey.robot.chain.end_effector)
-    np.testing.assert_allclose(points[-1], end, atol=1e-12)
-
-
 def test_nothing_is_allowed_in_a_box_around_everything_and_all_far_from_it(survey, angles):
     assert not find_allowed(Cell((EVERYWHERE,), None, 0.05), survey.robot, survey.targets, angles)["boxes"].any()
     assert find_allowed(Cell((EVERYWHERE + 20.0,), None, 0.05), survey.robot, survey.targets, angles)["boxes"].all()
-
-
-def test_below_a_floor_no_link_comes(survey, angles):
-    floor = np.array([[-9.0, 9.0], [-9.0, 9.0], [-9.0, 0.0]])
-    fine = find_allowed(Cell((floor,), None, 0.05), survey.robot, survey.targets, angles)["boxes"]
-    lowest = link_points(survey.robot, survey.robot.model_angles(angles))[..., 2].min(axis=0)
-    assert 0.02 < fine.mean() < 0.98
-    np.testing.assert_array_equal(fine, lowest >= 0.05)
 
 
 def test_a_target_behind_the_arm_is_hidden_and_one_before_it_is_seen(survey, angles):

@@ -7,6 +7,7 @@ from elastocal.application.planning import gains as module
 from elastocal.application.planning.gains import gains
 
 
+@pytest.mark.slow
 def test_it_takes_more_random_poses_and_fits_agree_with_the_prediction(monkeypatch):
     monkeypatch.setattr(module, "_ROBOTS", 4)
     monkeypatch.setattr(module, "_ORDERS", 20)

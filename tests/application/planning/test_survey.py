@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_surveys import PULL, made_candidates, made_survey
+from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.plan import Loads
 from elastocal.application.planning.survey import accuracy_rows, information, model_of, observe
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
@@ -42,14 +41,6 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
     np.testing.assert_allclose(std, np.sqrt(np.diag(expected)), rtol=0.02)
 
 
-@pytest.mark.parametrize(("loads", "named"), [(Loads(0.0, False), False), (PULL, True)])
-def test_a_survey_without_loads_says_nothing_of_compliances(loads, named):
-    survey = made_survey(loads=loads)
-    some = made_candidates(survey, 3)
-    names = information(survey, some.joint_angles, some.force).names
-    assert any(owner == "joint_compliance" for owner, _ in names) == named
-
-
 def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_known():
     for unknown in (True, False):
         survey = replace(made_survey(), unknown_base=unknown)
@@ -64,11 +55,3 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
         # But for the load, which does not turn with it.
         assert (size[first] < 1e-2 * second) if unknown else (size[first] > 0.3 * second)
         assert not size[[number for number, (owner, _) in enumerate(names) if owner.startswith(("frame", "target"))]].any()
-
-
-def test_every_target_is_seen_under_every_share_in_the_order_of_the_rows():
-    survey = made_survey()
-    some = made_candidates(survey, 2)
-    seen = observe(survey, some.joint_angles, some.force)
-    assert seen.state.tolist() == [0, 1, 2, 3, 4, 5]
-    np.testing.assert_allclose(seen.states.wrench[[1, 2], :3], [some.force[0], -some.force[0]])

@@ -24,15 +24,6 @@ def test_cells_come_by_the_names_of_the_header(file):
     assert found == {"b": ("1", "2"), "a": ("x", "y z")}
 
 
-def test_a_byte_order_mark_blank_lines_and_line_ends_of_windows_are_no_data(file):
-    found = read_columns(file(b"\xef\xbb\xbfa,b\r\n\r\n1,2\r\n\r\n3,4\r\n"), ",", ("a", "b"), "a table")
-    assert found == {"a": ("1", "3"), "b": ("2", "4")}
-
-
-def test_a_separator_in_quotes_is_part_of_the_cell(file):
-    assert read_columns(file(b'a,b\n"1,5",2\n'), ",", (), "a table")["a"] == ("1,5",)
-
-
 @pytest.mark.parametrize(
     ("contents", "key", "words"),
     [
@@ -51,11 +42,6 @@ def test_text_that_is_no_such_table_is_refused(file, contents, key, words):
         read_columns(path, ",", ("a", "b"), "the made source")
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path):
-    with refused(tmp_path / "nowhere.csv", "", "readable file"):
-        read_columns(tmp_path / "nowhere.csv", ",", (), "a table")
-
-
 @pytest.mark.parametrize(("decimal", "cells"), [(".", ("1", "-2.5", " 3e-3 ", "+4.")), (",", ("1", "-2,5", " 3e-3 ", "+4,"))])
 def test_numbers_are_read_with_the_decimal_sign_of_the_source(decimal, cells):
     found = numbers("table.csv", "x", cells, decimal)
@@ -68,8 +54,3 @@ def test_numbers_are_read_with_the_decimal_sign_of_the_source(decimal, cells):
 def test_a_cell_that_is_no_finite_number_is_named_by_row_and_column(cell, decimal, word):
     with refused("table.csv", "row 3, column q 1", repr(cell), word):
         numbers("table.csv", "q 1", ("1", "2", cell, "4"), decimal)
-
-
-def test_a_decimal_comma_is_no_number_where_points_are_used():
-    with refused("table.csv", "row 1, column x", "'1,5'", "a number"):
-        numbers("table.csv", "x", ("1,5",))

@@ -2,7 +2,6 @@
 
 import numpy as np
 from made_fanuc_sources import POSES, REPEATS, assert_holds
-from support import refused
 
 from elastocal.campaigns.importers import fanuc_joint
 from elastocal.campaigns.reading import read_campaign
@@ -17,16 +16,6 @@ def test_joint_campaign_holds_both_as_sessions_of_one_robot(static, cpa, config_
         assert {campaign.targets[index].name for index in measurements.target} == set(("ABC", "DEF")[session])
 
 
-def test_the_campaign_holds_the_angles_of_the_chain_in_a_frame_that_nobody_knows(static, cpa, config_folder, tmp_path):
-    fanuc_joint.write_campaign(static[0], cpa[0], tmp_path / "campaign", config_folder / "robots", "mine", {"session": 1})
-    campaign = read_campaign(tmp_path / "campaign", config_folder / "robots")
-    assert (campaign.name, campaign.frame, campaign.measured) == ("mine", "tracker", "position")
-    assert campaign.holdout == {"session": 1}
-    np.testing.assert_array_equal(campaign.robot.reported_matrix, np.eye(6))
-    assert not campaign.robot.reported_offset.any()
-    assert [(target.name, target.offset_m) for target in campaign.targets] == [(name, None) for name in "ABCDEF"]
-
-
 def test_poses_and_repeats_are_counted_session_by_session(static, cpa, config_folder, tmp_path):
     fanuc_joint.write_campaign(static[0], cpa[0], tmp_path / "campaign", config_folder / "robots")
     measurements = read_campaign(tmp_path / "campaign", config_folder / "robots").measurements
@@ -34,9 +23,3 @@ def test_poses_and_repeats_are_counted_session_by_session(static, cpa, config_fo
     assert measurements.session.tolist() == [0] * len(poses[0]) + [1] * len(poses[1])
     np.testing.assert_array_equal(measurements.pose, np.concatenate(poses))
     assert measurements.repeat.max() == REPEATS - 1 and not measurements.repeat[measurements.session == 1].any()
-
-
-def test_a_robot_file_that_is_not_there_is_refused(static, cpa, tmp_path):
-    with refused((tmp_path / "fanuc_static.yaml").as_posix(), ""):
-        fanuc_joint.write_campaign(static[0], cpa[0], tmp_path / "campaign", tmp_path)
-    assert not (tmp_path / "campaign").exists()

@@ -39,28 +39,3 @@ def test_mat_file_of_other_variables_is_refused(static, tmp_path, changes, key, 
     with refused(path, key, *words):
         fanuc_static.write_campaign(path, tmp_path / "campaign")
     assert not (tmp_path / "campaign").exists()
-
-
-def test_the_file_holds_rad_and_metres_already(static):
-    path, _, positions = static
-    angles, found = fanuc_static.read(path)
-    contents = scipy.io.loadmat(path)
-    np.testing.assert_array_equal(angles, contents["q"])
-    assert list(found) == ["A", "B", "C"]
-    for index, name in enumerate("ABC"):
-        np.testing.assert_array_equal(found[name], positions[:, index])
-
-
-def test_the_hold_out_is_written_as_asked_and_no_noise_is_declared(static, config_folder, tmp_path):
-    fanuc_static.write_campaign(static[0], tmp_path / "campaign", "mine", {"fraction": 0.25, "seed": 3})
-    campaign = read_campaign(tmp_path / "campaign", config_folder / "robots")
-    assert (campaign.name, campaign.holdout, campaign.noise) == ("mine", {"fraction": 0.25, "seed": 3}, None)
-
-
-@pytest.mark.parametrize("kind", ["int32", "complex128"])
-def test_angles_that_are_no_real_numbers_are_refused(static, tmp_path, kind):
-    contents = {name: value for name, value in scipy.io.loadmat(static[0]).items() if not name.startswith("__")}
-    path = tmp_path / "other.mat"
-    scipy.io.savemat(path, contents | {"q": contents["q"].astype(kind)})
-    with refused(path, "q", "numbers"):
-        fanuc_static.read(path)

@@ -5,7 +5,7 @@ import pytest
 from support import refused
 
 from elastocal.campaigns.importers import jacobi
-from elastocal.campaigns.reading import held_out_campaign, read_campaign, read_robot
+from elastocal.campaigns.reading import read_campaign, read_robot
 
 POSES = 9
 
@@ -54,14 +54,6 @@ def test_file_becomes_a_campaign_of_measured_positions(tmp_path, config_folder, 
     np.testing.assert_array_equal(campaign.measurements.pose, np.arange(POSES))
 
 
-def test_random_poses_test_the_grid(tmp_path, config_folder):
-    for seed, name in ((1, "grid"), (2, "random")):
-        File(tmp_path, seed=seed).write_campaign(name, {"campaign": f"../campaign{3 - seed}"})
-    robots = config_folder / "robots"
-    campaign = read_campaign(tmp_path / "campaign1", robots)
-    assert held_out_campaign(campaign, tmp_path / "campaign1", robots).name == "random"
-
-
 @pytest.mark.parametrize("name", ["x_t", "z_dif"])
 def test_missing_column_is_refused(file, name):
     del file.columns[name]
@@ -75,11 +67,4 @@ def test_another_number_of_joints_is_refused(tmp_path, joints):
     file = File(tmp_path, joints)
     file.write()
     with refused(file.path, "header", "joint_1 to joint_6 or joint_7"):
-        jacobi.read(file.path)
-
-
-def test_joints_that_are_not_counted_from_one_are_refused(file):
-    file.columns["joint_7"] = file.columns.pop("joint_1")
-    file.write()
-    with refused(file.path, "header", "joint_7"):
         jacobi.read(file.path)

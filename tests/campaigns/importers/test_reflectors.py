@@ -1,7 +1,6 @@
 """Public campaigns: a row for each reflector of each measurement, on an unloaded flange in a frame that nobody knows."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.cluster.hierarchy import fcluster, linkage
@@ -30,12 +29,6 @@ def test_the_reflectors_of_a_measurement_follow_each_other():
         "y": [2.0, -2.0, 5.0, -5.0],
         "z": [3.0, -3.0, 6.0, -6.0],
     }
-
-
-@pytest.mark.parametrize("session", [0, 3])
-def test_a_session_is_written_where_one_is_given(session):
-    table = reflector_table(np.array([0, 1]), np.array([0, 0]), ANGLES, POSITIONS, session)
-    assert table["session"].tolist() == [session] * 4
 
 
 def test_a_folder_of_reflectors_is_a_campaign_whose_equal_angles_are_repeats(config_folder, tmp_path):
@@ -76,42 +69,12 @@ def test_targets_are_unknown_offsets_from_the_last_point_and_declared_effects_ar
     assert set(document["declared"]) <= set(effects())
 
 
-def test_noise_and_hold_out_are_copies_of_what_was_handed_in():
-    noise, holdout = {"position_m": 5e-5}, {"fraction": 0.3, "seed": 1}
-    document = unloaded_document("c", "kuka", "position", "A", holdout, noise)
-    noise["position_m"] = 1.0
-    document["declared"].append("hysteresis")
-    assert (document["noise"], document["holdout"]) == ({"position_m": 5e-5}, holdout)
-    assert unloaded_document("c", "kuka", "position", "A")["declared"] == ["joint_offset", "link_geometry"]
-
-
 def test_poses_are_numbered_as_they_first_come_and_repeats_as_they_follow():
     a, b, c = [0.1, 0.2], [0.3, -0.2], [-1.0, 2.0]
     pose, repeat = pose_and_repeat(np.array([c, a, c, b, a, c]))
     assert pose.tolist() == [0, 1, 0, 2, 1, 0]
     assert repeat.tolist() == [0, 0, 1, 0, 1, 2]
     assert pose.dtype == repeat.dtype == np.int32
-
-
-def test_without_a_tolerance_only_the_very_same_angles_are_a_repeat():
-    angles = np.array([[1.0, 2.0], [1.0, np.nextafter(2.0, 3.0)], [1.0, 2.0]])
-    assert pose_and_repeat(angles)[0].tolist() == [0, 1, 0]
-
-
-@pytest.mark.parametrize(("difference", "poses"), [([0.9, 0.9, 0.9], [0, 0]), ([0.0, 0.0, 1.1], [0, 1])])
-def test_every_angle_must_lie_within_the_tolerance_by_itself(difference, poses):
-    angles = np.array([[0.0, 0.0, 0.0], difference]) * 1e-3
-    assert pose_and_repeat(angles, 1e-3)[0].tolist() == poses
-
-
-def test_a_chain_of_near_rows_is_one_pose():
-    angles = np.array([[0.0], [3.0], [0.9], [1.8]])
-    pose, repeat = pose_and_repeat(angles, 1.0)
-    assert pose.tolist() == [0, 1, 0, 0] and repeat.tolist() == [0, 0, 1, 2]
-
-
-def test_one_row_is_one_pose():
-    assert [part.tolist() for part in pose_and_repeat(np.zeros((1, 6)))] == [[0], [0]]
 
 
 @given(st.lists(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), min_size=2, max_size=25))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import homogeneous, refused
+from support import refused
 
 from elastocal.campaigns.importers import ur10_ipa
 from elastocal.campaigns.reading import read_campaign
@@ -59,17 +59,6 @@ def test_series_becomes_a_campaign_of_poses(series, config_folder):
     np.testing.assert_array_equal(measurements.wrench, 0)
 
 
-def test_orientation_turns_about_x_then_the_new_y_then_the_new_z(series, config_folder):
-    measurements = series.campaign(config_folder).measurements
-    for vector, degrees in zip(measurements.rotation_vector, series.degrees, strict=True):
-        angle = np.linalg.norm(vector)
-        x, y, z = vector / angle
-        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        rotation = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-        turns = [homogeneous("R", axis, np.radians(amount))[:3, :3] for axis, amount in enumerate(degrees)]
-        np.testing.assert_allclose(rotation, turns[0] @ turns[1] @ turns[2], rtol=0, atol=1e-12)
-
-
 def test_the_same_joint_angles_again_are_repeats_of_their_pose(series, config_folder):
     measurements = series.campaign(config_folder).measurements
     assert measurements.pose.tolist() == [*range(POSES), 2, 5]
@@ -79,11 +68,6 @@ def test_the_same_joint_angles_again_are_repeats_of_their_pose(series, config_fo
 def test_stamps_that_a_spreadsheet_cut_down_leave_time_out(series, config_folder):
     series.columns["Timestamp"] = len(series.angles) * ["2,02011E+13"]
     assert series.campaign(config_folder).measurements.time_s is None
-
-
-def test_series_without_temperature_is_read_as_well(series, config_folder):
-    del series.columns["measurement_temperature"]
-    assert series.campaign(config_folder).measurements.temperature_c is None
 
 
 @pytest.mark.parametrize("name", ["elbow_joint", "measurement_y", "measurement_rz"])

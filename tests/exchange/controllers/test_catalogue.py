@@ -2,7 +2,6 @@
 
 import sys
 
-import pytest
 from support import refused
 
 import elastocal.exchange.controllers
@@ -39,8 +38,3 @@ def test_another_file_in_the_package_is_another_language_and_nothing_else_change
             controller_of("karel", "")
     finally:
         sys.modules.pop("elastocal.exchange.controllers.mine", None)
-
-
-@pytest.mark.parametrize("suffix", [".csv", "", ".txt"])
-def test_a_suffix_that_is_none_of_theirs_is_no_program(suffix):
-    assert controller_of("", suffix) is None and controller_of("", ".SRC").NAME == "krl"

@@ -3,13 +3,12 @@
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 from made_targets import made_targets
 from support import refused
 
 from elastocal.exchange.controllers.catalogue import controllers
-from elastocal.exchange.controllers.protocol import axes_of, check_name, targets_of
+from elastocal.exchange.controllers.protocol import axes_of, check_name
 
 ALL = controllers()
 SIX = (False,) * 6
@@ -68,12 +67,6 @@ def test_axes_are_as_stated_and_each_once():
     for wrong in ("A1,A2", "A1,A1,A2,A3,A4,A5,A6", "J1,A2,E1,A3,A4,A5,A6"):
         with refused("--axes", wrong, "7 different names"):
             axes_of(ALL["krl"], (False,) * 7, wrong)
-
-
-def test_targets_are_degrees_and_millimetres_and_no_minus_zero():
-    targets = targets_of(np.array([[0.5, np.pi / 6, -1e-12]]), (True, False, False), ("E1", "A2", "A1"))
-    assert targets.units == ("mm", "deg", "deg")
-    assert targets.rows(("A1", "A2", "A3", "E1")) == [["0.000000", "30.000000", None, "500.000000"]]
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -2,7 +2,6 @@ import numpy as np
 from made_targets import ANGLES, made_targets, numbers
 
 from elastocal.exchange.controllers import rapid
-from elastocal.exchange.controllers.protocol import targets_of
 
 
 def test_every_target_is_a_jointtarget_and_a_move():
@@ -17,8 +16,3 @@ def test_every_target_is_a_jointtarget_and_a_move():
 def test_a_rail_is_the_first_external_axis_in_millimetres():
     text = rapid.program("go", made_targets(rapid, rail=True))
     assert "],[250.000000,9E9,9E9,9E9,9E9,9E9]];" in text and "],[-1500.000000,9E9," in text
-
-
-def test_an_axis_that_the_robot_lacks_stands_still():
-    four = targets_of(np.full((1, 4), 0.5), (False,) * 4, ("rax_1", "rax_2", "rax_3", "rax_6"))
-    assert "[[28.647890,28.647890,28.647890,0,0,28.647890],[9E9" in rapid.program("go", four)

@@ -22,10 +22,5 @@ def test_a_target_on_the_flange_is_the_end_effector_measured_twice(kuka, table):
     np.testing.assert_allclose(table[table.side == "flange"].bound, expected, rtol=1e-6)
 
 
-def test_the_nearer_to_the_base_the_less_a_target_tells(table):
-    ratio = np.sqrt(table.groupby("joints").bound.mean() / table.bound_end_effector.mean())
-    assert ratio.is_monotonic_decreasing and (ratio > 1).all()
-
-
 def test_a_reflector_that_stays_as_it_is_is_seen_less_often_than_one_that_is_turned(table):
     assert (table.fixed <= table.turned).all() and 0 < table.fixed.mean() < table.turned.mean() < 0.7

@@ -41,17 +41,3 @@ def test_positions_on_the_last_axis_never_bound_its_joint(kuka):
     """The flange lies on the axis of joint 6, so that no position of it shows that joint's compliance."""
     (found,) = bound_blocks(experiments_of(kuka), kuka.chain, [("6DoF",)], 3, "end_effector", judge(kuka))
     assert np.isinf(found["rms_per_noise"]).all()
-
-
-def test_every_set_of_points_is_bounded_once_whatever_the_order_of_its_names(kuka):
-    sets = [("6DoF", "2DoF"), ("3DoF", "6DoF"), ("2DoF", "6DoF"), ("6DoF",)]
-    blocks = bound_blocks(experiments_of(kuka), kuka.chain, sets, 6, "end_effector", judge(kuka))
-    assert [block["points"] for block in blocks] == ["2DoF+6DoF", "3DoF+6DoF", "6DoF"]
-
-
-def test_a_longer_data_set_and_a_further_point_never_raise_the_bound(kuka):
-    sets = [("6DoF",), ("3DoF", "6DoF"), ("2DoF", "3DoF", "6DoF")]
-    blocks = bound_blocks(experiments_of(kuka), kuka.chain, sets, 6, "end_effector", judge(kuka))
-    bounds = [block["rms_per_noise"] for block in blocks]
-    assert all((np.diff(bound) < 0).all() for bound in bounds)
-    assert (np.diff(bounds, axis=0) < 0).all()

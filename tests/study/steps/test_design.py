@@ -7,7 +7,7 @@ from support import OTHER_CHAINS, robot_of
 
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.steps.columns import to_experiments
-from elastocal.study.steps.design import Design, configuration_first, design_blocks
+from elastocal.study.steps.design import Design, design_blocks
 
 
 def test_design_table_names_the_right_set_length_and_joint_pair(kuka, strategies):
@@ -69,18 +69,3 @@ def test_too_few_measurements_leave_covariance_and_condition_empty(kuka, strateg
     short = table["length"] == 1
     for name in ("cov_1_1", "cov_6_2", "condition"):
         assert np.isnan(table[name][short]).all() and np.isfinite(table[name][table["length"] >= 3]).all(), name
-
-
-def test_positions_on_the_last_axis_leave_the_design_empty(kuka, strategies):
-    """The flange lies on the axis of joint 6, so that no position of it shows that joint's compliance."""
-    (table,) = design_blocks(experiments_of(kuka, sets=3), kuka.chain, strategies["6DoF"], 3, "end_effector")
-    for name in ("cov_1_1", "cov_6_6", "condition"):
-        assert np.isnan(table[name]).all(), name
-
-
-def test_configurations_come_first_and_memory_runs_along_the_data_sets():
-    array = np.arange(24.0).reshape(2, 3, 4)
-    found = configuration_first(array)
-    assert found.shape == (3, 2, 4) and found[2, 1, 3] == array[1, 2, 3]
-    np.testing.assert_array_equal(found, array.transpose(1, 0, 2))
-    assert found.strides == (16, 8, 48)

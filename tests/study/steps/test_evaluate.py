@@ -1,20 +1,10 @@
 """Metrics, replicates and accuracy of one strategy from its identified compliances."""
 
-from itertools import pairwise
-
 import numpy as np
-import pytest
 from made_study_blocks import (
-    CONFIGURATIONS_OF_THE_TEST,
-    deflections_of,
     evaluated_in_one_block,
-    experiments_of,
-    identified,
     judge,
 )
-
-from elastocal.study.steps.evaluate import evaluate_strategy
-from elastocal.study.steps.weights import weight_blocks
 
 
 def make_same_estimates(robot, factors, sets=12):
@@ -22,26 +12,6 @@ def make_same_estimates(robot, factors, sets=12):
     lengths = len(factors)
     table = {"data_set": np.repeat(np.arange(sets), lengths), "length": np.tile(np.arange(1, lengths + 1), sets)}
     return table | {f"c{j + 1}": np.tile(c * np.array(factors), sets) for j, c in enumerate(robot.compliance)}
-
-
-def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
-    experiments = experiments_of(kuka, sets=12)
-    table = identified(kuka, strategies["3+6DoF-comb"], experiments, deflections_of(kuka, experiments, 5e-5))
-
-    counts, tests = weight_blocks("kuka", 1, 12, CONFIGURATIONS_OF_THE_TEST, 10)
-
-    def cut(columns, rows, edges):
-        return [{n: columns[n][rows * a : rows * b] for n in columns if n != "members"} for a, b in pairwise(edges)]
-
-    scores = judge(kuka)
-    whole, parts = (
-        evaluate_strategy(cut(table, 4, c), cut(counts, 10, c), tests, scores, (0,), "stiffness", "averaged_model", [2, 4])
-        for c in ((0, 12), (0, 1, 7, 12))
-    )
-    for one, other in zip(whole, parts, strict=True):
-        assert set(one) == set(other)
-        for name in one:
-            np.testing.assert_allclose(other[name], one[name], rtol=1e-8, atol=1e-12, err_msg=name)
 
 
 def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
@@ -62,25 +32,3 @@ def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
     assert metrics["trustworthy"].all() and not metrics["nonpositive_share"].any()
     assert replicates["replicate"].tolist() == np.repeat(range(1, 11), 2).tolist()
     np.testing.assert_allclose(replicates["k_sigma"], np.tile([-300.0, -120.0], 10), rtol=1e-12)
-
-
-def test_a_quarter_too_large_leaves_about_a_quarter_of_the_deflection_and_twice_as_large_all_of_it(kuka):
-    scores = judge(kuka)
-    metrics, _, accuracy = evaluated_in_one_block(make_same_estimates(kuka, (2.0, 1.25)), scores, (0,), "stiffness", 10, [1, 2])
-    # The deflection is linear in the compliances to second order in turns of some milliradians.
-    np.testing.assert_allclose(metrics["deviation"] / metrics["initial_deviation"], [1.0, 0.25], rtol=0.01)
-    np.testing.assert_allclose(accuracy["mean"], metrics["deviation"], rtol=1e-9)
-    np.testing.assert_allclose(accuracy["max"] / scores.initial_errors.max(), [1.0, 0.25], rtol=0.02)
-
-
-def test_accuracy_is_of_the_lengths_asked_for_and_of_no_others(kuka):
-    table = make_same_estimates(kuka, (2.0, 1.5, 1.25, 1.1))
-    accuracy = evaluated_in_one_block(table, judge(kuka), (0,), "compliance", 10, [4, 2])[2]
-    assert accuracy["length"].tolist() == [4, 2]
-    np.testing.assert_allclose(accuracy["relative_error_3"], [10.0, 50.0], rtol=1e-9)
-
-
-def test_weights_with_another_number_of_blocks_are_not_used(kuka):
-    *counts, tests = weight_blocks("kuka", 1, 12, CONFIGURATIONS_OF_THE_TEST, 10)
-    with pytest.raises(ValueError, match="zip"):
-        evaluate_strategy([], counts, tests, judge(kuka), (0,), "stiffness", "averaged_model", [1])

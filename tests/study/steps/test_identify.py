@@ -14,7 +14,6 @@ from made_study_blocks import (
 
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.steps.columns import to_deflections
-from elastocal.study.steps.identify import paired_blocks
 
 
 @pytest.mark.parametrize("at", AT)
@@ -46,13 +45,6 @@ def test_exact_data_of_a_target_off_the_flange_give_the_true_compliances(kuka, s
     np.testing.assert_allclose(compliances(table, 4), np.tile(kuka.compliance, (5, 1)), rtol=tolerance)
 
 
-def test_identified_table_names_the_right_set_length_and_joint_pair(kuka, strategies):
-    experiments = experiments_of(kuka)
-    table = identified(kuka, strategies["6DoF"], experiments, deflections_of(kuka, experiments, 2e-4))
-    assert table["data_set"].tolist() == np.repeat(range(5), 4).tolist()
-    assert table["length"].tolist() == [1, 2, 3, 4] * 5
-
-
 @pytest.mark.parametrize("rows", [3, 6])
 def test_estimates_of_every_prefix_are_numpy_least_squares_of_its_measurements(kuka, strategies, rows):
     moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka, sets=3)
@@ -78,21 +70,3 @@ def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_af
     table = identified(kuka, strategies["6DoF"], [experiments], deflections_of(kuka, [experiments]), start=start)
     for joint in range(1, 7):
         np.testing.assert_array_equal(np.isnan(table[f"c{joint}"]), empty)
-
-
-def test_the_deflections_of_each_point_stand_beside_the_experiments_of_their_block():
-    experiments = [{"data_set": np.array([n])} for n in (0, 1)]
-    deflections = {name: [{"dx": np.array([10.0 * n + k])} for n in (0, 1)] for k, name in enumerate(("A", "B"))}
-    found = list(paired_blocks(experiments, deflections))
-    assert [block["data_set"][0] for block, _ in found] == [0, 1]
-    assert [{name: part["dx"][0] for name, part in seen.items()} for _, seen in found] == [
-        {"A": 0.0, "B": 1.0},
-        {"A": 10.0, "B": 11.0},
-    ]
-
-
-def test_tables_with_another_number_of_blocks_are_not_paired():
-    one, two = [{}], [{}, {}]
-    for experiments, seen in ((one, {"A": two}), (two, {"A": two, "B": one})):
-        with pytest.raises(ValueError, match="zip"):
-            list(paired_blocks(experiments, seen))

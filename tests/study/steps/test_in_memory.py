@@ -1,6 +1,6 @@
 """Data sets in memory are those of the pipeline, by number."""
 
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +8,6 @@ from made_studies import SIZE, USUAL
 from made_study_blocks import deflections_of, experiments_of, judge
 
 from elastocal.mechanics.robot import with_target_offset
-from elastocal.study.experiments import Experiments
 from elastocal.study.metrics import position_errors
 from elastocal.study.steps.columns import to_deflections
 from elastocal.study.steps.in_memory import StudyInMemory
@@ -32,14 +31,6 @@ def test_measurements_are_those_of_the_pipelines_steps(kuka):
     np.testing.assert_allclose(np.moveaxis(found.deflection, (0, 1), (2, 1)), to_deflections(block), rtol=1e-12)
 
 
-def test_another_measurement_of_the_same_configurations_has_noise_of_its_own(kuka):
-    study, given = study_of(kuka), (np.arange(4), ("6DoF",))
-    once, again = study.measure(*given)["6DoF"], study.measure(*given, "/again")["6DoF"]
-    np.testing.assert_array_equal(once.regressor, again.regressor)
-    # Of two independent ones: 120 numbers, whose standard deviation has an error of 7 %.
-    assert 1.6e-5 > (once.deflection - again.deflection).std() > 1.2e-5
-
-
 def test_the_score_sheet_of_the_study_of_the_tables_is_the_pipelines(kuka):
     found, models = study_of(kuka).judge(), 1.1 * kuka.compliance[None]
     np.testing.assert_allclose(position_errors(found, models), position_errors(judge(kuka), models), rtol=1e-9)
@@ -55,19 +46,3 @@ def test_a_reflector_is_a_target_that_the_point_carries(kuka, point):
     np.testing.assert_allclose(found.deflection[:3], expected.deflection, atol=1e-12)
     np.testing.assert_allclose(found.regressor[:3], expected.regressor, rtol=1e-9, atol=1e-9)
     assert found.deflection.shape[0] == 6 and carried.independent_rows == 6
-
-
-def test_one_estimator_under_two_names_is_worked_out_once(kuka, strategies):
-    found = study_of(kuka).estimates([strategies[name] for name in ("6DoF", "6DoF-after-3DoF", "4-6DoF-after-3DoF")])
-    assert found["6DoF"] is found["6DoF after 3DoF"] and found["6DoF"] is not found["4-6DoF after 3DoF"]
-    (block,) = found["6DoF"]
-    assert block.shape == (4, 5, 6) and np.isfinite(block[:, -1]).all()
-
-
-DRAWN = Experiments(np.zeros((2, 3, 7)), np.ones((2, 3, 6)))
-
-
-@pytest.mark.parametrize(("what", "name"), [(USUAL, "average"), (SIZE, "noise"), (DRAWN, "joint_angles"), (DRAWN, "wrench")])
-def test_how_the_paper_is_read_how_large_a_study_is_and_what_was_drawn_are_frozen(what, name):
-    with pytest.raises(FrozenInstanceError):
-        setattr(what, name, None)

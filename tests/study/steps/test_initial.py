@@ -1,7 +1,6 @@
 """How far each robot bends before any calibration, against numbers written out."""
 
 import numpy as np
-import pytest
 
 from elastocal.study.steps.columns import deflection_columns
 from elastocal.study.steps.initial import initial_blocks
@@ -27,16 +26,3 @@ def test_statistics_are_of_the_lengths_of_the_displacements_set_by_set():
         "mean_square": [13.0, 109.0],
         "maximum": [5.0, 13.0],
     }
-
-
-def test_rotations_are_no_displacement():
-    plain, turned = (next(initial_blocks([block_of([0, 1], TWO_SETS, rotation)])) for rotation in (0.0, 100.0))
-    for name, values in plain.items():
-        np.testing.assert_array_equal(turned[name], values)
-
-
-def test_every_block_has_its_own_data_sets_and_configurations():
-    blocks = [block_of([0, 1], TWO_SETS), block_of([7], [[[1, 2, 2], [0, 3, 4], [2, 3, 6]]])]
-    _, last = initial_blocks(blocks)
-    assert (last["data_set"].tolist(), last["configurations"].tolist()) == ([7], [3])
-    assert last["mean"][0] == pytest.approx(5.0) and last["mean_square"][0] == pytest.approx((9 + 25 + 49) / 3)

@@ -32,11 +32,3 @@ def test_noise_of_a_data_set_is_the_same_in_whatever_block_it_stands():
     parts = list(measured_blocks([make_zeros([0], 3), make_zeros([1, 2, 3], 3)], "kuka", 1, 1e-4))
     for name in COMPONENTS:
         np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), whole[name])
-
-
-def test_rows_keep_their_numbers_and_the_point_is_written_once():
-    ideal = make_zeros([3, 8], 2, "3DoF")
-    (block,) = measured_blocks([ideal], "kuka", 1, 1e-4)
-    assert block["point"] == "3DoF" and set(block) == set(ideal)
-    assert block["data_set"].tolist() == [3, 3, 8, 8] and block["configuration"].tolist() == [0, 1, 0, 1]
-    assert not ideal["dx"].any()

@@ -20,13 +20,6 @@ def test_each_study_has_a_block_for_each_strategy(kuka, some):
     assert (blocks[0]["length"] == np.arange(1, 6)).all()
 
 
-def test_studies_differ_and_a_study_does_not_depend_on_how_many_there_are(kuka, some):
-    few, many = blocks_of(kuka, some, studies=[1]), blocks_of(kuka, some, studies=[1, 2])
-    for one, same, other in zip(few, many[:3], many[3:], strict=True):
-        np.testing.assert_array_equal(one["deviation"], same["deviation"])
-        assert (same["deviation"] != other["deviation"]).all()
-
-
 @pytest.mark.parametrize("average", ["stiffness", "compliance", "median"])
 def test_scores_are_those_of_the_pipeline_for_the_same_data_sets(kuka, some, average):
     """Study number 0, which is that of the pipeline."""
@@ -38,13 +31,6 @@ def test_scores_are_those_of_the_pipeline_for_the_same_data_sets(kuka, some, ave
         metrics = evaluated_in_one_block(table, scores, strategy.fixed_joints, average, 10, [5])[0]
         for name in ("compliance_1", "compliance_6", "k_sigma", "k_sigma_fixed_joints", "deviation"):
             np.testing.assert_allclose(block[name][1:], metrics[name][1:], rtol=1e-6, err_msg=name)
-
-
-def test_lengths_that_do_not_determine_the_compliances_have_no_scores(kuka, some):
-    offsets = ((0.1, 0.0, 0.1), (0.1, 0.1, 0.0), (0.1, -0.1, 0.0))
-    for reflectors, determined in ((offsets[:1], False), (offsets, True)):
-        (block,) = blocks_of(kuka, some[:1], replace(USUAL, rows=3, reflectors_m=reflectors), studies=[1])
-        assert np.isfinite(block["deviation"][0]) == determined and np.isfinite(block["deviation"][-1])
 
 
 def test_averages_of_compliances_and_errors_of_single_data_sets_stand_beside_the_scores(kuka, some):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from made_study_blocks import deflections_of, experiments_of, pinocchio_regressors
 
-from elastocal.study.steps import blocks
 from elastocal.study.steps.columns import to_deflections
 from elastocal.study.steps.identify import paired_blocks
 from elastocal.study.steps.solvers import solver_table
@@ -29,32 +28,6 @@ def test_gauss_newton_finds_the_compliances_of_exact_data_and_equation_11_those_
     seen = to_deflections(deflections["6DoF"][0])[:, :3].reshape(3, 18)
     expected = [np.linalg.lstsq(matrix, right, rcond=None)[0] for matrix, right in zip(regressors, seen, strict=True)]
     np.testing.assert_allclose(estimates(found, "equation_11"), expected, rtol=1e-8)
-
-
-def test_configurations_beyond_the_length_change_nothing(kuka, strategies):
-    experiments = experiments_of(kuka, sets=2)
-    deflections = deflections_of(kuka, experiments, noise=1e-4)
-    names = ("3DoF", "6DoF")
-    spoiled = {n: [b | {"dx": np.where(b["configuration"] < 2, b["dx"], 1.0)} for b in deflections[n]] for n in names}
-    strategy = strategies["4-6DoF-after-3DoF"]
-    (found,), (other,) = (solve(kuka, experiments, {n: by[n] for n in names}, [strategy], 2) for by in (deflections, spoiled))
-    for name in set(found) - {"strategy"}:
-        np.testing.assert_array_equal(other[name], found[name])
-    (longer,) = solve(kuka, experiments, spoiled, [strategy], 3)
-    assert (np.abs(estimates(longer, "equation_11") / estimates(found, "equation_11") - 1) > 1).any()
-
-
-def test_every_strategy_of_every_block_has_its_rows(kuka, strategies, monkeypatch):
-    monkeypatch.setattr(blocks, "SETS_PER_BLOCK", 2)
-    chosen = [strategies[name] for name in ("6DoF", "3+6DoF-comb")]
-    experiments = experiments_of(kuka, sets=3)
-    deflections = deflections_of(kuka, experiments, noise=1e-4)
-    found = solve(kuka, experiments, {name: deflections[name] for name in ("3DoF", "6DoF")}, chosen, 4)
-    names = [strategy.name for strategy in chosen]
-    assert [block["strategy"] for block in found] == names * 2
-    assert [block["data_set"].tolist() for block in found] == [[0, 1], [0, 1], [2], [2]]
-    # Two points together estimate something else than one of them.
-    assert (estimates(found[0], "equation_11") != estimates(found[1], "equation_11")).all()
 
 
 def test_a_stage_that_identifies_every_joint_leaves_equation_11_nothing_of_those_before_it(kuka, strategies):

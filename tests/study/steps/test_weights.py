@@ -1,7 +1,6 @@
 """The weights table: how often each data set and each test configuration counts in each bootstrap replicate."""
 
 import numpy as np
-import pytest
 
 from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
 from elastocal.study.steps import blocks
@@ -17,12 +16,6 @@ def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatc
         np.testing.assert_array_equal(to_weights(tests), bootstrap_test_weights(1, "kuka", 7, 4))
 
 
-def test_the_weights_table_names_the_right_member_and_replicate():
-    (sets, tests) = weight_blocks("kuka", 1, 5, 7, 4)
-    for block, drawn in ((sets, bootstrap_weights(1, "kuka", range(5), 4)), (tests, bootstrap_test_weights(1, "kuka", 7, 4))):
-        np.testing.assert_array_equal(block["count"], drawn[block["replicate"], block["number"]])
-
-
 def test_weights_of_a_table_written_by_hand():
     columns = {
         "number": np.array([4, 4, 4, 5, 5, 5]),
@@ -31,16 +24,6 @@ def test_weights_of_a_table_written_by_hand():
     }
     # Replicate 0 has every member once, the others their counts.
     assert to_weights(columns).tolist() == [[1, 1], [0, 3], [2, 0], [1, 1]]
-
-
-@pytest.mark.parametrize("size", [500, 3])
-def test_every_member_has_a_row_in_every_replicate(monkeypatch, size):
-    monkeypatch.setattr(blocks, "SETS_PER_BLOCK", size)
-    found = list(weight_blocks("kuka", 1, 7, 4, 2))
-    sets, tests = ([block for block in found if block["members"] == members] for members in (DATA_SETS, TESTS))
-    for found, count in ((sets, 7), (tests, 4)):
-        assert np.concatenate([block["number"] for block in found]).tolist() == np.repeat(range(count), 2).tolist()
-        assert np.concatenate([block["replicate"] for block in found]).tolist() == [1, 2] * count
 
 
 def test_data_sets_count_once_on_average_and_independently_of_the_tests():

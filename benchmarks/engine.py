@@ -1,0 +1,152 @@
+"""The diagnosing engine: a fit against one dense least-squares problem of its size, a case of the blind proof, growth with
+rows, and campaigns of thousands and a million measurements.
+
+A case and a large campaign are diagnosed and judged by a process of their own, from folder to verdict, which notes its peak
+memory at the end (Linux).
+"""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from common import ROOT, Row, beside_yardstick, interleaved
+
+from elastocal.campaigns.importers import ur10_ipa
+from elastocal.campaigns.public_data import FOLDER_VARIABLE
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.noise_estimation import estimated_noise
+from elastocal.fitting.parameters import parameters
+from elastocal.fitting.registration import registered
+from elastocal.loop.whole import cases_in
+from elastocal_proof.blind.cases import SIZES, cases_of, make_case
+from elastocal_proof.blind.folders import write_dynamic_campaign
+from elastocal_proof.plant.arm import arm_from_file
+from elastocal_proof.plant.defects import Defect, with_defects
+from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.weights import declared_masses
+
+ROBOTS = ROOT / "config" / "robots"
+SEED = 2026
+# Laws that do not depend on the estimate, as most of a measured robot's, of which a fit has many.
+FITTED = ("joint_offset", "transmission_harmonic", "bearing_runout", "link_weight")
+FIT_TARGET, GROWTH_TARGET = 8.0, 1.2
+CASE_S, SERIES_A_S, SERIES_A_GB, MILLION_S, MILLION_GB = 0.85, 45.0, 0.7, 120.0, 2.0
+SCRIPT = """
+import json, resource, sys, time
+from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.judge import judge
+from elastocal.diagnosis.settings import Settings
+from elastocal.loop.whole import cases_in
+
+robots, *folders = sys.argv[1:]
+seconds = []
+for folder in folders:
+    start = time.process_time()
+    training, held_out = cases_in(folder, robots)
+    judge(diagnose(training, Settings(), 1), held_out, 1)
+    seconds.append(time.process_time() - start)
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
+print(json.dumps({"seconds": seconds, "peak_gb": peak, "measurements": len(training.observations)}))
+"""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Measurements of a fit, repetitions, cases, rows of UR10 Series A (None: all), of two campaigns and of a large one."""
+
+    fitted: int
+    repetitions: int
+    cases: int
+    series_a: int | None
+    growth: tuple[int, int]
+    million: int
+
+
+# The median of a dozen cases lies between two groups of them and jumps by a tenth from run to run. The small setting measures
+# one campaign for all.
+FULL, SMALL = Setting(6000, 3, 48, None, (20_000, 80_000), 1_000_000), Setting(200, 1, 1, 60, (1000, 1000), 1000)
+
+
+def rows(work: Path, setting: Setting) -> Iterator[Row]:
+    """Rows of the report.
+
+    `work`: temporary folder.
+    """
+    yield _fit(work, setting.fitted, setting.repetitions)
+    yield _case(work, setting.cases)
+    few, many = (_run([_dynamic(work, measurements)]) for measurements in setting.growth)
+    (small,), (large,) = few["seconds"], many["seconds"]
+    grown = max(many["measurements"] / few["measurements"], 1.1)
+    exponent = float(np.log(large / small) / np.log(grown))
+    how = f"exponent of the CPU time in the rows: {many['measurements']} against {few['measurements']}, from file to verdict"
+    yield Row("engine growth", large, small, exponent, f"<= {GROWTH_TARGET}", exponent <= GROWTH_TARGET, how)
+    if os.environ.get(FOLDER_VARIABLE):
+        source = Path(os.environ[FOLDER_VARIABLE], ur10_ipa.FILES["ur10_ipa_a"].local)
+        header, *lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
+        kept = lines[: setting.series_a]
+        (work / "series_a.csv").write_text("".join([header, *kept]), encoding="utf-8")
+        ur10_ipa.write_campaign(work / "series_a.csv", work / "series_a", "ur10_series_a")
+        how = f"UR10 Series A, {len(kept):,} poses, from its folder to its verdict, one thread as in a job of the workflow"
+        yield from _limits("engine ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how)
+    how = f"{setting.million:,} measurements of a tracker's dynamic mode, from file to verdict, one thread as in a job"
+    yield from _limits("engine million", _dynamic(work, setting.million), MILLION_S, MILLION_GB, how)
+
+
+def _fit(work: Path, measurements: int, repetitions: int) -> Row:
+    """A robust fit of many effects, to its end, against one dense least-squares problem of as many rows and columns."""
+    case, _ = cases_in(_dynamic(work, measurements), ROBOTS)
+    effects = tuple(each for each in case.candidates.values() if each.effect in FITTED and not each.shapes)
+    model = replace(case.model, effects=(*case.model.effects, *effects))
+    noise, start = estimated_noise(case)[0], registered(model, case.observations)
+    size = case.observations.rows * len(case.observations), len(parameters(model, start))
+    matrix = np.random.default_rng(1).standard_normal(size)
+    functions: dict[str, Callable[[], Any]] = {
+        "fit": lambda: fit(model, case.observations, noise, start),
+        "numpy.linalg.lstsq": lambda: np.linalg.lstsq(matrix, matrix[:, 0]),
+    }
+    ours, theirs = map(min, interleaved(functions, repetitions))
+    how = f"a robust fit against one numpy.linalg.lstsq of {size[0]} rows and {size[1]} parameters, least of {repetitions}"
+    return Row("engine fit", ours, theirs, ours / theirs, f"<= {FIT_TARGET:g}", ours / theirs <= FIT_TARGET, how)
+
+
+def _case(work: Path, cases: int) -> Row:
+    # Development cases: those of the proof stay unseen.
+    some = cases_of(SIZES["development"], SEED)[:cases]
+    for case in some:
+        make_case(case, work / "blind", work / "sealed", ROBOTS)
+    # The first pays for the imports.
+    run, slower = beside_yardstick(lambda: _run([work / "blind" / case.name for case in (some[0], *some)]))
+    how = f"median of {cases} cases of the development set, diagnosed and judged in one process, one thread"
+    return Row.of_limit("engine case", median(run["seconds"][1:]), CASE_S * slower, how)
+
+
+def _limits(name: str, folder: Path, allowed_s: float, allowed_gb: float, how: str) -> Iterator[Row]:
+    run, slower = beside_yardstick(lambda: _run([folder]))
+    (seconds,), peak = run["seconds"], run["peak_gb"]
+    yield Row.of_limit(f"{name} time", seconds, allowed_s * slower, how)
+    memory = f"peak of {peak:.2f} GB against {allowed_gb:g} GB: {how}"
+    yield Row(f"{name} memory", None, None, peak / allowed_gb, "<= 1", peak <= allowed_gb, memory)
+
+
+def _dynamic(work: Path, measurements: int) -> Path:
+    folder = work / f"dynamic{measurements}"
+    if not folder.is_dir():
+        arm = arm_from_file(ROBOTS / "fanuc.yaml")
+        robot = with_defects(specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)])
+        write_dynamic_campaign(folder, "dynamic", ROBOTS / "fanuc.yaml", robot, measurements, 4, declared_masses(arm))
+    return folder
+
+
+def _run(folders: Sequence[Path]) -> dict[str, Any]:
+    """What a process of its own prints last."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    command = [sys.executable, "-c", SCRIPT, str(ROBOTS), *map(str, folders)]
+    done = subprocess.run(command, env=os.environ | dict.fromkeys(names, "1"), check=True, capture_output=True, text=True)
+    return json.loads(done.stdout.splitlines()[-1])

@@ -1,0 +1,71 @@
+"""What jobs and commands may load before they need it: imports are a third of a job of the study, and all of a help text."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from elastocal.command.main import COMMANDS
+
+TOP = Path(__file__).resolve().parents[2]
+_NEVER = {"matplotlib", "mujoco", "scipy.optimize", "scipy.stats", "sklearn", "snakemake", "statsmodels"}
+_BY_DOCUMENTS = {"jsonschema", "rich", "typer"}
+_OF_STUDY = _NEVER | _BY_DOCUMENTS | {"pandas", "scipy.spatial", "scipy.linalg", "yaml"}
+# Scripts of the rules, and the packages that none of them loads.
+SCRIPTS = {
+    "study": (
+        "bound draw_experiments draw_weights identify judge_design measure simulate summarize_initial",
+        _OF_STUDY | {"scipy"},
+    ),
+    "expectations": ("expect", _OF_STUDY),
+    "reading": ("read_campaign", _NEVER | {"jsonschema", "pandas", "rich", "typer", "scipy"}),
+    "loop": ("diagnose_campaign judge_campaign", _NEVER | _BY_DOCUMENTS),
+    "blind": ("diagnose_cases", _NEVER | _BY_DOCUMENTS | {"pandas"}),
+}
+_HELP = """
+from contextlib import redirect_stdout, suppress
+from elastocal.command.main import app
+for words in {commands}:
+    with redirect_stdout(None), suppress(SystemExit):
+        app([*words, "--help"])
+"""
+
+
+def loaded(code):
+    """Modules that a fresh process has once it has run some code."""
+    code += "\nimport sys\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+@pytest.mark.parametrize(("scripts", "never"), SCRIPTS.values(), ids=SCRIPTS)
+def test_a_job_starts_without_what_it_does_not_need(scripts, never):
+    sources = [ast.parse((TOP / "workflow/scripts" / f"{script}.py").read_text(encoding="utf-8")) for script in scripts.split()]
+    lines = [ast.unparse(node) for tree in sources for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    found = loaded("\n".join(["import sys", "sys.path.insert(0, 'workflow/scripts')", *lines]))
+    assert {"elastocal", "numpy", "pyarrow"} <= found
+    assert not found & never
+
+
+def test_help_is_given_without_anything_that_computes():
+    commands = [[], ["import"], *(["import", name] for name in ("urdf", "dh", "csv")), *([c.__name__] for c in COMMANDS)]
+    found = loaded(_HELP.format(commands=commands))
+    assert "elastocal.command.main" in found
+    assert not found & (_OF_STUDY - {"typer"} | {"numpy", "pyarrow", "scipy"})
+
+
+def test_a_table_is_written_and_read_without_pandas(tmp_path):
+    """PyArrow would import it for the first array, and where it turns one into numpy's."""
+    found = loaded(f"""
+import numpy as np
+from elastocal.io.storage import Column, TableSchema, read_table, write_table
+kinds = {{"int32": [1, 2], "float64": [0.5, 2.0], "float32": [0.5, 2.0], "bool": [True, False], "string": ["µ", "b"]}}
+schema = TableSchema("made", tuple(Column(name, name, "", "made") for name in kinds))
+write_table({str(tmp_path / "made.parquet")!r}, schema, [kinds], {{"robot": "kuka"}})
+read = read_table({str(tmp_path / "made.parquet")!r}, schema)
+assert {{name: values.tolist() for name, values in read.items()}} == kinds
+""")
+    assert "elastocal.io.storage" in found
+    assert not found & _OF_STUDY
