@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from analysed_robots import analysed
 from made_calibrated import USUAL, made_calibrated
+from made_targets import numbers
 
 from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import (
@@ -15,7 +16,17 @@ from elastocal.application.calibrated import (
     end_effector,
     nominal_forward,
 )
-from elastocal.application.compensation import OK, OUTSIDE_LIMITS, SINGULAR, UNREACHABLE, find_joint_targets
+from elastocal.application.compensation import (
+    OK,
+    OTHER_POSTURE,
+    OUTSIDE_LIMITS,
+    SINGULAR,
+    UNREACHABLE,
+    find_joint_targets,
+    large_steps,
+)
+from elastocal.exchange.controllers.catalogue import controllers
+from elastocal.exchange.controllers.protocol import axes_of, targets_of
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
 
@@ -96,3 +107,84 @@ def test_a_path_without_a_start_is_corrected_in_one_posture():
     assert (found.status == OK).all()
     assert np.abs(np.diff(found.joint_angles, axis=0)).max() < 0.05
     assert done == [30]
+
+
+def turned_about_the_base(robot, first, last):
+    """Reported angles of seven postures, the first axis going from one angle to another, degrees."""
+    angles = np.tile(robot.joint_limits.mean(axis=1) + BENT, (7, 1))
+    angles[:, 0] = np.radians(np.linspace(first, last, 7))
+    return robot.reported_angles(angles)
+
+
+@pytest.mark.parametrize("name", ["kuka", "gp180", "abb"])
+def test_a_swing_that_limits_do_not_spare_is_named_by_its_row_and_joint(name):
+    robot = make_robot(name)
+    limits = robot.robot.joint_limits.copy()
+    limits[0] = np.radians([-180.0, 180.0])
+    robot = replace(robot, robot=replace(robot.robot, joint_limits=limits))
+    position, rotation = nominal_forward(robot.robot, turned_about_the_base(robot.robot, -184.0, -172.0))
+    found = find_joint_targets(robot, position, rotation, NEUTRAL)
+    # The third target lies at -180 degrees, from which a correction may go either way.
+    inside = [0, 1, 3, 4, 5, 6]
+    large = large_steps(robot.robot, position[inside], rotation[inside], found.joint_angles[inside])
+    assert len(large) >= 1 and all(row == 2 for row, *_ in large)
+    assert all(step > allowed == pytest.approx(np.radians(30.0)) for _, _, step, allowed in large)
+    assert not large_steps(robot.robot, position[3:], rotation[3:], found.joint_angles[3:])
+
+
+@pytest.mark.parametrize("name", ["kuka", "gp180", "abb"])
+def test_a_stated_posture_and_its_turn_are_kept_or_refused(name):
+    robot = make_robot(name, *EFFECTS)
+    limits = robot.robot.joint_limits.copy()
+    limits[0] = np.radians([-185.0, 185.0])
+    robot = replace(robot, robot=replace(robot.robot, joint_limits=limits))
+    angles = turned_about_the_base(robot.robot, -180.6, -168.6)
+    position, rotation = nominal_forward(robot.robot, angles)
+    found = find_joint_targets(robot, position, rotation, NEUTRAL, np.repeat(angles[:1], 7, axis=0))
+    assert (found.status == OK).all() and np.abs(found.joint_angles - angles).max() < 0.02
+    turned, straight = angles.copy(), np.zeros_like(angles)
+    turned[:, 0] += 2 * np.pi
+    found = find_joint_targets(robot, position, rotation, NEUTRAL, turned)
+    kept = found.status == OK
+    assert kept.any() and np.abs(found.joint_angles - turned)[kept].max() < 0.02
+    assert set(found.status[~kept]) <= {OUTSIDE_LIMITS}
+    found = find_joint_targets(robot, position, rotation, NEUTRAL, straight)
+    assert set(found.status) <= {OTHER_POSTURE, UNREACHABLE, OUTSIDE_LIMITS} and OTHER_POSTURE in found.status
+
+
+def test_a_posture_behind_a_singular_one_is_another_however_near():
+    """The wrist bends by as little to the one side as to the other."""
+    robot = make_robot("gp180")
+    angles = np.tile(robot.robot.joint_limits.mean(axis=1) + BENT, (2, 1))
+    angles[:, 4] = np.radians([5.0, 15.0])
+    reported = robot.robot.reported_angles(angles)
+    stated = angles.copy()
+    stated[:, 4] = np.radians([15.0, -1.0])
+    found = find_joint_targets(robot, *nominal_forward(robot.robot, reported), NEUTRAL, robot.robot.reported_angles(stated))
+    assert found.status.tolist() == [OK, OTHER_POSTURE]
+
+
+STATED = {"krl": "A1,A2,A3,A4,A5,A6,E1", "rapid": "rax_1,rax_2,rax_3,rax_4,rax_5,rax_6,eax_a", "tp": "J1,J2,J3,J4,J5,J6,E1"}
+
+
+@pytest.mark.parametrize("name", ["kuka", "gp180", "ur10", "abb", "iiwa14"])
+def test_random_paths_never_swing_and_their_programs_are_the_targets(name):
+    """Limits of 170 to 350 degrees either way, three languages: no step above the rule, numbers read back are the targets."""
+    draws, whole = np.random.default_rng(5), 0
+    for _ in range(5):
+        robot = make_robot(name)
+        half = np.radians(draws.uniform(170.0, 350.0, robot.robot.joints))
+        robot = replace(robot, robot=replace(robot.robot, joint_limits=np.stack([-half, half], axis=1)))
+        walk = draws.uniform(-half, half) + np.cumsum(draws.normal(0.0, 0.06, (10, len(half))), axis=0)
+        position, rotation = nominal_forward(robot.robot, robot.robot.reported_angles(walk.clip(-half, half)))
+        found = find_joint_targets(robot, position, rotation, NEUTRAL)
+        good = found.status == OK
+        whole += good.all()
+        assert not large_steps(robot.robot, position[good], rotation[good], found.joint_angles[good])
+        prismatic = robot.robot.chain.prismatic
+        for language, stated in STATED.items():
+            axes = axes_of(controllers()[language], prismatic, stated if robot.robot.joints == 7 else "")
+            text = controllers()[language].program("go", targets_of(found.joint_angles[good], prismatic, axes), ["robot: x"])
+            read = np.array(numbers(text)).reshape(-1, robot.robot.joints)
+            np.testing.assert_allclose(np.radians(read), found.joint_angles[good], atol=1e-8)
+    assert whole >= 4

@@ -1,11 +1,24 @@
 """Joint angles for wanted poses: found again, within limits, without jumps, or known to be out of reach."""
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from analysed_robots import analysed
 
-from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits, refine, remove_turns
+from elastocal.application.inverse_kinematics import (
+    SOLVED_M,
+    _least_motion,
+    allowed_steps,
+    along_path,
+    find_beyond_limits,
+    refine,
+)
 from elastocal.mechanics.kinematics import poses
+
+# From the middle of the limits to a posture that is not singular.
+BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 
 
 def find_poses(robot, angles):
@@ -31,17 +44,47 @@ def test_refined_angles_reach_the_poses_from_nearby(name):
 def test_a_smooth_path_stays_smooth_and_within_limits():
     robot = analysed("gp180")
     share = np.linspace(0.0, 1.0, 80)[:, None]
-    bent = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
-    angles = robot.joint_limits.mean(axis=1) + bent + 0.3 * np.sin(3.0 * share * np.arange(1, 7))
+    angles = robot.joint_limits.mean(axis=1) + BENT + 0.3 * np.sin(3.0 * share * np.arange(1, 7))
     found, left = along_path(robot, *find_poses(robot, angles))
     assert left.max() < SOLVED_M
     assert not find_beyond_limits(robot, found).any()
     assert np.abs(np.diff(found, axis=0)).max() < 3.0 * np.abs(np.diff(angles, axis=0)).max()
 
 
-def test_whole_turns_bring_angles_near_the_middle_or_a_start():
-    robot = analysed("ur10")
-    middle = robot.joint_limits.mean(axis=1)
-    turned = remove_turns(robot, middle + 0.3 + 4 * np.pi)
-    np.testing.assert_allclose(turned, middle + 0.3)
-    np.testing.assert_allclose(remove_turns(robot, turned, turned + 2 * np.pi), turned + 2 * np.pi)
+@pytest.mark.parametrize("name", ["kuka", "gp180", "abb"])
+def test_a_path_about_the_base_does_not_swing_where_a_turn_lies_within_the_limits(name):
+    """Seven targets 2 degrees apart about the base's vertical, the first axis limited to 185 degrees either way."""
+    robot = analysed(name)
+    limits = robot.joint_limits.copy()
+    limits[0] = np.radians([-185.0, 185.0])
+    robot = replace(robot, joint_limits=limits)
+    angles = np.tile(limits.mean(axis=1) + BENT, (7, 1))
+    angles[:, 0] = np.radians(np.linspace(-180.6, -168.6, 7))
+    found, left = along_path(robot, *find_poses(robot, angles))
+    assert left.max() < SOLVED_M and not find_beyond_limits(robot, found).any()
+    np.testing.assert_allclose(np.degrees(found[:, 0]), np.degrees(angles[:, 0]), atol=1e-4)
+    assert np.degrees(np.abs(np.diff(found, axis=0)).sum()) == pytest.approx(12.0, abs=1e-3)
+
+
+def test_the_least_motion_is_the_best_of_all_ways_through_all_postures_and_turns():
+    draws = np.random.default_rng(2)
+    counts, limits, weight = (1, 2, 3), np.array([[-4.0, 4.0], [-4.0, 7.0], [-4.0, 14.0]]), 1e4
+    for _ in range(10):
+        lowest, allowed = draws.uniform(-3, 3, (2, 4, 3)), draws.uniform(0.5, 3, (3, 3))
+        copies = [lowest[..., j, None] + 2 * np.pi * np.arange(count) for j, count in enumerate(counts)]
+        turns = 2 * np.pi * np.array(list(itertools.product(*map(range, counts))))
+        ways = np.stack([(lowest[:, row, None] + turns).reshape(-1, 3) for row in range(4)], axis=1)
+        shortest = np.where((ways[:, 0] > limits[:, 1]).any(axis=1), np.inf, 0.0)
+        for row in range(1, 4):
+            step = np.abs(ways[:, None, row] - ways[None, :, row - 1])
+            cost = (step + weight * np.maximum(step - allowed[row - 1], 0.0)).sum(axis=2)
+            shortest = (cost + shortest).min(axis=1) + np.where((ways[:, row] > limits[:, 1]).any(axis=1), np.inf, 0.0)
+        step = np.abs(np.diff(_least_motion(copies, limits, np.zeros((2, 4)), allowed), axis=0))
+        assert (step + weight * np.maximum(step - allowed, 0.0)).sum() == pytest.approx(shortest.min(), abs=1e-2)
+
+
+def test_a_step_may_be_five_times_what_the_path_turns_and_ten_degrees():
+    robot = analysed("gp180")
+    angles = np.tile(robot.joint_limits.mean(axis=1) + BENT, (2, 1))
+    angles[1, 0] += np.radians(3.0)
+    np.testing.assert_allclose(np.degrees(allowed_steps(robot, *find_poses(robot, angles))), 25.0)

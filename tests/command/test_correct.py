@@ -1,5 +1,7 @@
 """Wanted poses in, joint targets out; nothing is written where a pose cannot be reached."""
 
+import re
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ from analysed_robots import ROBOTS, analysed
 from scipy.spatial.transform import Rotation
 
 from elastocal.application.calibrated import forward, nominal_forward
+from elastocal.exchange.target_path import read_corrected_targets
 from elastocal.loop.calibrated_files import load_diagnosed
 
 BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
@@ -107,3 +110,86 @@ def test_targets_that_are_not_reached_are_in_no_program(elastocal, refusal, word
 def test_what_is_no_program_is_refused_before_any_work(refusal, words, tmp_path, more, message):
     assert message in refusal(*words, *more)
     assert [file.name for file in tmp_path.iterdir()] == ["path.csv"] and not Path("x.mod").exists()
+
+
+def stating(path, **columns):
+    """The path with more columns."""
+    pd.read_csv(path).assign(**columns).to_csv(path, index=False)
+
+
+def stated_angles(angles):
+    return {f"q{joint}": column for joint, column in enumerate(analysed("kuka").reported_angles(angles).T, 1)}
+
+
+def test_a_swing_is_named_by_its_line_and_no_program_is_written_unless_it_is_allowed(
+    elastocal, refusal, words, path, output, angles
+):
+    turned = angles.copy()
+    turned[:4, 0], turned[4:, 0] = np.radians(178.0), np.radians(-178.0)
+    position, rotation = nominal_forward(analysed("kuka"), analysed("kuka").reported_angles(turned))
+    pose = dict(zip(["x", "y", "z"], position.T, strict=True))
+    turn = dict(zip(["rx", "ry", "rz"], Rotation.from_matrix(rotation).as_rotvec().T, strict=True))
+    stating(path, **pose, **turn, **stated_angles(turned))
+    line = refusal(*words, "--format", "krl")
+    assert "line 6: joint 1 turns by 356.0 degrees" in line and "--allow-large-steps" in line
+    assert not output.exists() and not output.with_suffix(".src").exists()
+    result = elastocal(*words, "--format", "krl", "--allow-large-steps")
+    assert result.exit_code == 0 and output.with_suffix(".src").exists()
+    assert "! line 6: joint 1 turns by 356.0 degrees" in " ".join(result.stderr.split())
+    pd.read_csv(path).drop(columns=[f"q{joint}" for joint in range(1, 7)]).to_csv(path, index=False)
+    assert elastocal(*words).exit_code == 0
+    assert np.abs(np.diff(pd.read_csv(output)["q1"])).max() < 0.1
+
+
+def test_a_posture_that_is_stated_is_not_exchanged_for_another(refusal, words, path, output):
+    stating(path, **{f"q{joint}": 0.0 for joint in range(1, 7)})
+    assert "line 2 is not in the stated posture" in refusal(*words) and not output.exists()
+
+
+def test_degrees_are_refused_as_such(refusal, words, path, angles):
+    stating(path, **stated_angles(np.degrees(angles)))
+    assert "looks like degrees" in refusal(*words)
+
+
+def test_targets_keep_their_loads_and_beyond_twice_the_measured_ones_have_no_bound(elastocal, words, checkout, path, output):
+    measured = load_diagnosed(checkout / "made", ROBOTS, checkout).case.observations.states.wrench
+    largest = np.linalg.norm(measured[:, :3], axis=1).max()
+    stating(path, fx=0.0, fy=0.0, fz=-largest * np.array([0.0, 1.0, 1.9, 1.99, 2.1, 3.0, 10.0, 100.0]))
+    result = elastocal(*words)
+    assert result.exit_code == 0 and "no bound is stated for 4 of 8 targets" in " ".join(result.stderr.split())
+    targets = pd.read_csv(output)
+    assert targets["predicted_bound_m"].isna().tolist() == [False] * 4 + [True] * 4
+    assert (targets["status"][:4] == "ok").all()
+    assert (targets["status"][4:] == "no bound: loads beyond 2 times the measured ones").all()
+    np.testing.assert_allclose(targets["fz"], pd.read_csv(path)["fz"])
+    assert (targets[["fx", "mx", "my", "mz"]] == 0).all(axis=None)
+
+
+def test_joints_outside_the_fitted_range_have_no_bound(elastocal, words, output, monkeypatch):
+    """Few poses leave a margin beyond them that the limits of this robot do not exceed: the range is taken as smaller."""
+    monkeypatch.setattr("elastocal.validation.fitted_range.beyond_range", lambda _, angles: np.arange(len(angles)) >= 5)
+    result = elastocal(*words)
+    assert result.exit_code == 0 and "over the targets with a bound (5)" in " ".join(result.stderr.split())
+    targets = pd.read_csv(output)
+    assert targets["status"].tolist() == ["ok"] * 5 + ["no bound: joints outside the fitted range"] * 3
+    assert targets["predicted_bound_m"].isna().tolist() == targets["outside_range"].tolist() == [False] * 5 + [True] * 3
+    assert read_corrected_targets(output, 6).status.tolist() == ["ok"] * 8
+    monkeypatch.setattr("elastocal.validation.fitted_range.beyond_range", lambda _, angles: np.ones(len(angles), bool))
+    result = elastocal(*words)
+    assert result.exit_code == 0 and "over the targets" not in result.stderr and "8 of 8 targets corrected" in result.stderr
+
+
+@pytest.mark.parametrize("language", ["krl", "rapid", "tp", "urscript"])
+def test_a_program_says_for_what_it_holds(elastocal, words, path, output, language):
+    stating(path, fx=0.0, fy=0.0, fz=-100.0)
+    assert elastocal(*words, "--format", language).exit_code == 0
+    (program,) = [file for file in output.parent.iterdir() if file.suffix not in (".csv",)]
+    text = " ".join(re.sub(r"\s*;?\n *\d*:?\s*[;!#]?( -)?", " ", program.read_text()).split())
+    for words_of_it in (
+        "robot: KUKA KR 270 R2700 ultra",
+        "campaign: made",
+        f"date: {date.today()}",
+        "force up to 100 N",
+        "tool: ",
+    ):
+        assert words_of_it in text

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from analysed_robots import analysed
 from scipy.spatial.transform import Rotation
 from support import refused
 
-from elastocal.exchange.target_path import read_target_path
+from elastocal.exchange.target_path import read_target_path, read_target_path_of
 
 HEADER = "x,y,z,rx,ry,rz"
 ROWS = ["1.0,0.2,0.5,0.1,0.2,0.3", "1.1,0.2,0.5,0.0,0.0,0.0"]
@@ -55,3 +56,21 @@ def test_loads_starts_and_covariates_are_read_where_they_are(tmp_path):
 def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
     with refused((tmp_path / "path.csv").as_posix(), key, *words):
         read_target_path(write_path(tmp_path, header, [row]), 2)
+
+
+def test_forces_without_moments_have_moments_of_zero(tmp_path):
+    found = read_target_path(write_path(tmp_path, HEADER + ",fx,fy,fz", [row + ",1,2,3" for row in ROWS]), 2)
+    np.testing.assert_array_equal(found.wrench, [[1, 2, 3, 0, 0, 0]] * 2)
+    with refused(tmp_path, "line 1", "mx without my, mz"):
+        read_target_path(write_path(tmp_path, HEADER + ",fx,fy,fz,mx", [row + ",1,2,3,4" for row in ROWS]), 2)
+
+
+def test_joint_angles_in_degrees_are_refused_as_such(tmp_path):
+    header = HEADER + "".join(f",q{joint}" for joint in range(1, 7))
+    path = write_path(tmp_path, header, [ROWS[0] + ",0.5,-1.2,1.4,0,0.6,0", ROWS[1] + ",45,-60,90,0,30,0"])
+    with refused(path, "line 3", "q1 looks like degrees: 45; allowed: rad"):
+        read_target_path_of(path, analysed("kuka"))
+    assert (
+        read_target_path_of(write_path(tmp_path, header, [ROWS[0] + ",3.3,-1.2,1.4,0,0.6,0"]), analysed("kuka")).start[0, 0]
+        == 3.3
+    )

@@ -5,10 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS
+from made_calibrated import USUAL, made_calibrated
+from planted import planted
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
+from elastocal.application.calibrated import nominal_forward
+from elastocal.exchange.target_path import TargetPath
 from elastocal.loop.calibrated_files import load_diagnosed
-from elastocal.loop.certificate import Wanted, certificate
+from elastocal.loop.certificate import Wanted, certificate, use_at
 
 WANTED = Wanted(2e-4, 0.05, "SN 7", "2026-11-23", 1)
 
@@ -61,3 +65,24 @@ def test_a_campaign_compared_with_itself_has_not_changed(found):
     comparison = found[0]["comparison"]
     assert comparison["campaign"] == "made" and comparison["rms_m"] == 0.0 and comparison["p_value"] == 1.0
     assert comparison["changes"][0]["before"] == comparison["changes"][0]["after"]
+
+
+@pytest.fixture(scope="module")
+def made(kuka):
+    return made_calibrated(kuka, *USUAL)
+
+
+def path_at(calibrated, angles, wrench):
+    position, rotation = nominal_forward(calibrated.robot, calibrated.robot.reported_angles(angles))
+    count = len(angles)
+    start = calibrated.robot.reported_angles(angles)
+    lines = tuple(range(2, count + 2))
+    return TargetPath(position, rotation, start, np.tile(wrench, (count, 1)), None, None, None, lines)
+
+
+def test_poses_within_what_was_fitted_are_corrected_and_not_beyond(kuka, made):
+    states = planted(kuka, {}, seed=1, poses=20).observations.states
+    angles = np.array([0.0, -0.6, 0.5, 0.3, 0.6, 0.1]) + 0.1 * np.eye(6)[:3]
+    used = use_at(made, states, path_at(made, angles, np.zeros(6)))
+    assert not used.outside.any()
+    assert np.abs(kuka.model_angles(used.reported_angles) - angles).max() < 0.02

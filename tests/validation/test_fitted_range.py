@@ -12,7 +12,7 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
-from elastocal.validation.fitted_range import beyond_campaign, outside_fitted_range, predictive_variances
+from elastocal.validation.fitted_range import beyond_campaign, beyond_loads, outside_fitted_range, predictive_variances
 
 FOUND = ("joint_offset@2", "joint_offset@3", "payload", "base_compliance")
 
@@ -108,3 +108,10 @@ def test_a_model_without_parameters_is_as_sure_everywhere(fanuc):
     assert not fitted.parameters
     own, other = predictive_variances(fitted, seen, model, fitted.estimate, seen)
     assert not own.any() and not other.any() and len(other) == len(seen.states)
+
+
+def test_loads_are_beyond_by_force_or_moment_and_so_many_times():
+    states = replace(made_states(6, 2), wrench=np.array([[0.0, 0.0, -100.0, 0.0, 0.0, 0.0], [30.0, 0.0, 0.0, 0.0, 20.0, 0.0]]))
+    wrench = np.array([[0, 150, 0, 0, 0, 0], [0, 0, 201, 0, 0, 0], [0, 0, 0, 39, 0, 0], [0, 0, 0, 0, 0, 41]], float)
+    assert beyond_loads(states, wrench).all()
+    assert beyond_loads(states, wrench, 2.0).tolist() == [False, True, False, True]

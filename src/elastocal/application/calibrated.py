@@ -81,26 +81,12 @@ NEUTRAL = OperatingConditions()
 
 
 def calibrate_by_fit(fit: Fit, robot: Robot) -> CalibratedRobot:
-    """A calibrated robot from the final fit of a diagnosis.
-
-    Parameters
-    ----------
-    fit : Fit
-    robot : Robot
-        Of the campaign.
-
-    Returns
-    -------
-    CalibratedRobot
-    """
+    """A calibrated robot from the final fit of a diagnosis of that robot's campaign."""
     return calibrate_by_model(robot, fit.model, fit.estimate, fit.covariance, fit.noise)
 
 
 def calibrate_by_model(robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
-    """A calibrated robot from a fitted model.
-
-    `covariance` (P, P): of all `parameters` of the model.
-    """
+    """A calibrated robot from a fitted model; `covariance` (P, P): of all its `parameters`."""
     kept = [number for number, effect in enumerate(model.effects) if moves_robot(effect)]
     keys = {model.effects[number].key for number in kept}
     rows = np.flatnonzero([owner in keys for owner, _ in parameters(model, estimate)])
@@ -158,18 +144,8 @@ def forward(
 
     Loads act where the robot has yielded to them, by the fixed-point iteration of `displacement.conditions`.
 
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
-    reported_angles : ndarray (N, n)
-        As the controller reports them, rad (m for prismatic joints).
-    operating : OperatingConditions, optional
-
-    Returns
-    -------
-    position : ndarray (N, 3)
-        m, base axes.
-    rotation : ndarray (N, 3, 3)
+    `reported_angles` (N, n): as the controller reports them, rad (m for prismatic joints). Returns position (N, 3), m, and
+    rotation (N, 3, 3), base axes.
     """
     position, rotation = np.empty((len(reported_angles), 3)), np.empty((len(reported_angles), 3, 3))
     for part in parts(len(reported_angles)):
@@ -181,10 +157,9 @@ def forward(
 def coordinates_at_rest(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions, near: np.ndarray | None = None
 ) -> np.ndarray:
-    """Where the robot yields to, as coordinates of its sites.
+    """Where the robot yields to, as coordinates (N, C) of its sites.
 
-    `calibrated`, `reported_angles`, `operating`: as in `forward`. `near` (N, C): coordinates at which the loads are taken, of
-    states that differ little; by fixed-point iteration without. Returns (N, C).
+    `near` (N, C): coordinates at which the loads are taken, of states that differ little; by fixed-point iteration without.
     """
     fitted, states = (calibrated.model, calibrated.estimate), states_of(calibrated, reported_angles, operating)
     return displaced_coordinates(*fitted, conditions(*fitted, states, near))
@@ -209,17 +184,7 @@ def prediction_covariance(
 ) -> np.ndarray:
     """Covariance of the poses of `forward` by that of the parameters, to first order: G S G^T.
 
-    Parameters
-    ----------
-    calibrated, reported_angles, operating
-        As in `forward`.
-    at_rest : ndarray (N, C), optional
-        As by `coordinates_at_rest`, where they are known.
-
-    Returns
-    -------
-    ndarray (N, 6, 6)
-        m and rad, base axes: displacement and rotation vector.
+    `at_rest` (N, C): as by `coordinates_at_rest`, where they are known. Returns (N, 6, 6): m and rad, base axes.
     """
     moved = pose_sensitivities(calibrated, reported_angles, operating, at_rest) @ square_root(calibrated.covariance)
     return moved @ moved.transpose(0, 2, 1)
@@ -242,10 +207,7 @@ def pose_sensitivities(
 
 
 def states_of(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> States:
-    """Reported joint angles and operating conditions as states of the model, with the neutral ones for what is not given.
-
-    `calibrated`, `reported_angles`, `operating`: as in `forward`.
-    """
+    """Reported joint angles and operating conditions as states of the model, with the neutral ones for what is not given."""
     robot, count = calibrated.robot, len(reported_angles)
 
     def rows(values: np.ndarray | None, neutral: float, *shape: int) -> np.ndarray:
@@ -277,11 +239,9 @@ def parts(count: int) -> list[slice]:
 
 
 def square_root(covariance: np.ndarray) -> np.ndarray:
-    """A factor L with L L' a covariance, singular where parameters are held.
+    """A factor L (P, P) with L L' a covariance, singular where parameters are held.
 
     By the eigenvectors of the correlations: parameters in kilograms would drown those in radians per newton metre.
-
-    `covariance` (P, P). Returns (P, P).
     """
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0, deviation, 1.0)

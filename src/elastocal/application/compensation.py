@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.application.calibrated import coordinates_at_rest, end_effector, parts
-from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits, reach_m, refine, remove_turns
+from elastocal.application.inverse_kinematics import SOLVED_M, allowed_steps, along_path, find_beyond_limits, reach_m, refine
 from elastocal.exchange.target_path import OK
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.mechanics.robot import Robot
 
 OUTSIDE_LIMITS, UNREACHABLE, SINGULAR = "outside limits", "unreachable", "singular"
+OTHER_POSTURE = "not in the stated posture"
 # Newton's steps: each leaves a five-hundredth, and more near singular postures.
 _STEPS = 8
 # What may be left of a corrected target: far below any robot's repeatability.
@@ -35,6 +37,11 @@ _CORRECTED_M = 1e-9
 # A correction turns joints by milliradians. Where one must turn by this much (rad, or m) the robot stands so near a singular
 # posture that the correction is another posture.
 _LARGEST_CORRECTION = 0.1
+# A posture is kept where every joint stays within this of where it is stated (rad), or within so much of the reach: enough for
+# one posture to stand for a stretch of a path, while other postures differ by more or lie behind a singular one.
+_NEAR_RAD = np.radians(45.0)
+# Determinants of the Jacobian, angles at the reach and over it, below which a posture is singular and on neither side.
+_SINGULAR_DETERMINANT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,7 @@ class Correction:
     `joint_angles` (N, n): to command, as the controller counts them. `uncorrected` (N, n): what the rigid robot of the file
     would be commanded. `error_before`, `error_after` (N, 6): wanted less predicted pose, displacement and rotation vector in
     base axes: uncorrected, and with the correction. How far both are from the truth `accuracy` says. `status` (N,) of str:
-    "ok", "outside limits", "unreachable" or "singular".
+    "ok", "outside limits", "unreachable", "singular" or "not in the stated posture".
     """
 
     joint_angles: np.ndarray
@@ -66,17 +73,19 @@ def find_joint_targets(
 
     `calibrated`: of six joints or more; of more, joints move as little as possible from where the rigid robot would have them.
     `position`, `rotation` (N, 3), (N, 3, 3): wanted pose of the last measuring point, m, base axes. `operating`: under which
-    each target is reached. `start` (N, n): joint angles near which each target lies, as the controller reports them, rad: they
-    choose the posture. Without, the posture is chosen for the path as a whole, see `along_path`. `progress`: called with the
-    number of targets that are done.
+    each target is reached. `start` (N, n): joint angles near which each target lies, as the controller reports them, rad:
+    posture and turns are kept, or the target refused. Without, both are chosen for the path as a whole, see `along_path`.
+    `progress`: called with the number of targets that are done.
     """
     robot = calibrated.robot
     if start is None:
         nominal, left = along_path(robot, position, rotation)
+        other = np.zeros(len(position), bool)
     else:
         near = robot.model_angles(start)
         nominal, left = refine(robot, position, rotation, near)
-        nominal = remove_turns(robot, nominal, near)
+        nominal -= np.where(robot.chain.prismatic, 0.0, 2 * np.pi * np.round((nominal - near) / (2 * np.pi)))
+        other = _find_other_postures(robot, near, nominal)
 
     def of(part: slice) -> Correction:
         return _find_chunk_targets(calibrated, position[part], rotation[part], operating.part(part), nominal[part], left[part])
@@ -86,7 +95,32 @@ def find_joint_targets(
         for found in pool.map(of, parts(len(position))):
             done.append(found)
             progress(sum(len(each.status) for each in done))
-    return Correction(*(np.concatenate([getattr(each, name) for each in done]) for name in vars(done[0])))
+    found = Correction(*(np.concatenate([getattr(each, name) for each in done]) for name in vars(done[0])))
+    found.status[other & (found.status != UNREACHABLE)] = OTHER_POSTURE
+    return found
+
+
+def _find_other_postures(robot: Robot, stated: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Which postures (N, n) are others than stated: far from them or, of six joints, behind a singular one; bool (N,)."""
+    far = np.abs(found - stated) > np.where(robot.chain.prismatic, reach_m(robot), 1.0) * _NEAR_RAD
+    if robot.joints != 6:
+        return np.asarray(far.any(axis=1))
+    scale = np.array([1.0, 1.0, 1.0, *[reach_m(robot)] * 3])[:, None] / reach_m(robot)
+    sides = [np.linalg.det(jacobians(robot.chain, each, robot.chain.end_effector) * scale) for each in (stated, found)]
+    sides = [np.where(np.abs(side) < _SINGULAR_DETERMINANT, 0.0, np.sign(side)) for side in sides]
+    return np.asarray(far.any(axis=1) | (sides[0] * sides[1] < 0))
+
+
+def large_steps(
+    robot: Robot, position: np.ndarray, rotation: np.ndarray, joint_angles: np.ndarray
+) -> list[tuple[int, int, float, float]]:
+    """Steps from pose to pose that are larger than `allowed_steps`: row to which, joint (from 0), its step and what is allowed.
+
+    `joint_angles` (N, n): commands, as the controller reports them.
+    """
+    steps = np.abs(np.diff(robot.model_angles(joint_angles), axis=0))
+    allowed = allowed_steps(robot, position, rotation)
+    return [(row + 1, joint, steps[row, joint], allowed[row, joint]) for row, joint in np.argwhere(steps > allowed).tolist()]
 
 
 def _find_chunk_targets(
@@ -124,7 +158,7 @@ def _find_chunk_targets(
         if not len(moving):
             break
     singular[moving] = True
-    status = np.full(len(angles), OK, dtype="U14")
+    status = np.full(len(angles), OK, dtype=f"U{len(OTHER_POSTURE)}")
     status[singular] = SINGULAR
     status[find_beyond_limits(robot, angles).any(axis=1)] = OUTSIDE_LIMITS
     status[~reached] = UNREACHABLE

@@ -39,10 +39,6 @@ class ForwardModel:
     >>> position, rotation = model.pose([[0.0, -1.2, 1.4, 0.0, 0.6, 0.0]])          # doctest: +SKIP
 
     Angles are the controller's, rad (m for prismatic joints); poses those of the last measuring point in base axes, m.
-
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
     """
 
     def __init__(self, calibrated: CalibratedRobot) -> None:
@@ -63,19 +59,7 @@ class ForwardModel:
     def pose(
         self, joint_angles: Sequence[Sequence[float]] | np.ndarray, operating: OperatingConditions = NEUTRAL
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Poses at which the robot comes to rest.
-
-        Parameters
-        ----------
-        joint_angles : array_like (N, n)
-        operating : OperatingConditions, optional
-            Loads and what else the effects need.
-
-        Returns
-        -------
-        position : ndarray (N, 3)
-        rotation : ndarray (N, 3, 3)
-        """
+        """Positions (N, 3) and rotations (N, 3, 3) at which the robot comes to rest, of joint angles (N, n)."""
         return forward(self.calibrated, np.asarray(joint_angles, float), operating)
 
     def joint_targets(
@@ -106,23 +90,9 @@ def model_document(calibrated: CalibratedRobot) -> dict[str, Any]:
 
 
 def read_calibrated(document: Mapping[str, Any], source: str) -> CalibratedRobot:
-    """A calibrated robot from its document.
+    """A calibrated robot from the document of `model_document`; `source` is named in errors.
 
-    Parameters
-    ----------
-    document : dict
-        Of `model_document`.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    CalibratedRobot
-
-    Raises
-    ------
-    InputError
-        An effect that the catalogue does not have on this robot, or has with other parameters.
+    An InputError refuses an effect that the catalogue does not have on this robot, or has with other parameters.
     """
     robot = robot_from_document(document["robot"], source)
     robot = with_rigid_joints(robot) if document["rigid_joints"] else robot

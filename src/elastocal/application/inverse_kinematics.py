@@ -1,8 +1,9 @@
 """Joint angles of the rigid robot for wanted poses: damped least squares from several starts, and a path without jumps.
 
 Each step is that of Levenberg and Marquardt [1] on the pose error, whose rotations count at the reach of the arm as lengths;
-batched over targets and starts. Of the solutions of all rows those are taken that move the joints least from row to row, by
-dynamic programming (Viterbi's algorithm [2]).
+batched over targets and starts. All solutions of all rows, and their copies whole turns away, are candidates of one path: that
+without large steps where there is one, and of these that along which the joints move least, by dynamic programming (Viterbi's
+algorithm [2]).
 
 [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, section 3.7, Springer,
     2009.
@@ -11,6 +12,7 @@ dynamic programming (Viterbi's algorithm [2]).
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,12 +27,24 @@ if TYPE_CHECKING:
 _STEPS = 60
 # Of the pose error, m and as length at the reach; rounding of poses of some metres is a thousandth of it.
 _CONVERGED_M = 1e-10
+# Of joint limits, rad or m.
+_ROUNDING = 1e-9
 # Of a solution: beyond it the pose is out of reach.
 SOLVED_M = 1e-7
 # Damping in parts of the largest squared singular value, and by how much a step that fails or succeeds changes it.
 _DAMPING, _GROWS, _SHRINKS, _LEAST = 1e-2, 8.0, 0.15, 1e-14
 # Solutions of a row are sought from so many starts: an arm of six joints has eight postures as a rule.
 _STARTS = 12
+# A joint may turn so many times as far from target to target as the path itself, and by so much (rad) beside: wrists turn a few
+# times as far as what they hold unless they are near a singular posture, and targets that are shifted alone need some turn too.
+# A change of posture or of turns is far beyond both.
+STEP_PER_TURN, STEP_BESIDE = 5.0, np.radians(10.0)
+# Copies of a solution whole turns away, nearest the middle of the limits: all that fit into two turns either way.
+_MOST_TURNS = 4
+# Solutions nearer than this are one, rad or m.
+_SAME = 1e-6
+# What steps are too large by comes first, then the way, then how far from the middle of the limits it lies.
+_TOO_LARGE, _OFF_MIDDLE = 1e4, 1e-5
 # No joint turns farther in a step, rad or m: beyond it the linearization means nothing.
 _LONGEST_STEP = 0.5
 
@@ -79,20 +93,22 @@ def _step_damped(jacobian: np.ndarray, off: np.ndarray, damping: np.ndarray) -> 
     return step * np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-300))
 
 
-def remove_turns(robot: Robot, angles: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
-    """The same postures with each joint that turns as near as whole turns bring it to somewhere.
-
-    `angles` (..., n): of the chain, rad. `near` (..., n): the middle of the limits without. Returns (..., n).
-    """
-    middle = robot.joint_limits.mean(axis=1) if near is None else near
-    turns = np.round((angles - middle) / (2 * np.pi)) * ~np.array(robot.chain.prismatic)
-    return angles - 2 * np.pi * turns
-
-
 def find_beyond_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
     """Whether each joint is outside of its limits, by more than rounding, ndarray of bool (..., n)."""
     low, high = robot.joint_limits.T
-    return (angles < low - 1e-9) | (angles > high + 1e-9)
+    return (angles < low - _ROUNDING) | (angles > high + _ROUNDING)
+
+
+def allowed_steps(robot: Robot, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """How far each joint may move from each of N poses to the next, ndarray (N - 1, n), rad or m.
+
+    Joints that turn by the rotation between the poses, see `STEP_PER_TURN`; that shift by their distance, angles at the reach.
+    """
+    apart = pose_differences(position[1:], rotation[1:], position[:-1], rotation[:-1])
+    shift, turn = (np.linalg.norm(part, axis=1)[:, None] for part in (apart[:, :3], apart[:, 3:]))
+    return np.where(
+        robot.chain.prismatic, STEP_PER_TURN * shift + STEP_BESIDE * reach_m(robot), STEP_PER_TURN * turn + STEP_BESIDE
+    )
 
 
 def along_path(robot: Robot, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,42 +116,106 @@ def along_path(robot: Robot, position: np.ndarray, rotation: np.ndarray) -> tupl
 
     `robot`, `position`, `rotation`: as in `refine`. Returns `angles`, `error_m` (N, n), (N,): as by `refine`.
     """
-    count, joints = len(position), robot.joints
     low, high = robot.joint_limits.T
-    drawn = low + (high - low) * np.random.default_rng(0).random((_STARTS, joints))
+    drawn = low + (high - low) * np.random.default_rng(0).random((_STARTS, robot.joints))
     drawn[0] = 0.5 * (low + high)
-    first = _solutions(robot, position, rotation, np.repeat(drawn[:, None], count, axis=1))
-    picked = first[0][_least_motion(robot, *first), np.arange(count)]
-    # Postures that the starts of a row missed, from those of its neighbours.
-    beside = np.stack([np.roll(picked, shift, axis=0) for shift in (1, -1)])
-    second = _solutions(robot, position, rotation, beside)
-    angles, error = (np.concatenate(pair) for pair in zip(first, second, strict=True))
-    chosen = _least_motion(robot, angles, error), np.arange(count)
-    return angles[chosen], error[chosen]
+    starts = np.repeat(drawn, len(position), axis=0)
+    found, left = refine(robot, np.tile(position, (_STARTS, 1)), np.tile(rotation, (_STARTS, 1, 1)), starts)
+    first = found.reshape(_STARTS, -1, robot.joints), left.reshape(_STARTS, -1)
+    angles, error = _shortest_path(robot, position, rotation, *first)
+    large = np.abs(np.diff(angles, axis=0)) > allowed_steps(robot, position, rotation)
+    if large.any() or (error > SOLVED_M).any() or find_beyond_limits(robot, angles).any():
+        # Postures that the starts of a row missed, from its neighbours; and the ways of an arm with more joints than it needs.
+        ways = [first, *(_continued(robot, position, rotation, *first, way) for way in (1, -1))]
+        return _shortest_path(robot, position, rotation, *(np.concatenate(each) for each in zip(*ways, strict=True)))
+    return angles, error
 
 
-def _solutions(robot: Robot, position: np.ndarray, rotation: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Angles (K, N, n) and what is left (K, N) from starts (K, N, n)."""
-    many = len(starts)
-    angles, error = refine(
-        robot, np.tile(position, (many, 1)), np.tile(rotation, (many, 1, 1)), starts.reshape(-1, robot.joints)
-    )
-    return remove_turns(robot, angles).reshape(starts.shape), error.reshape(starts.shape[:2])
+def _continued(
+    robot: Robot, position: np.ndarray, rotation: np.ndarray, angles: np.ndarray, error: np.ndarray, way: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solutions (K, N, n) and what is left (K, N), each from that of the row before; of the row behind where `way` is -1."""
+    angles, error = angles.copy(), error.copy()
+    rows = np.arange(len(position))[::way]
+    for before, row in pairwise(rows):
+        good = np.flatnonzero(error[:, before] <= SOLVED_M)
+        wanted = np.repeat(position[[row]], len(good), axis=0), np.repeat(rotation[[row]], len(good), axis=0)
+        found, left = refine(robot, *wanted, angles[good, before])
+        kept = good[left <= SOLVED_M]
+        angles[kept, row], error[kept, row] = found[left <= SOLVED_M], left[left <= SOLVED_M]
+    return angles, error
 
 
-def _least_motion(robot: Robot, angles: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Which solution of each row, ndarray (N,): those that leave least, within the limits, and then move the joints least."""
-    solved = error <= SOLVED_M
-    outside = find_beyond_limits(robot, angles).any(axis=-1)
-    # Far more than a path can be long: first of all the wanted pose, then the limits, then the way.
-    cost = np.where(solved, 0.0, 1e6 * (1.0 + error)) + 1e4 * outside
-    total, came_from = cost[:, 0], np.zeros(error.shape[::-1], int)
-    for row in range(1, error.shape[1]):
-        way = np.abs(angles[:, None, row] - angles[None, :, row - 1]).max(axis=-1) + total
-        came_from[row] = np.argmin(way, axis=1)
-        total = way[np.arange(len(way)), came_from[row]] + cost[:, row]
-    chosen = np.empty(error.shape[1], int)
-    chosen[-1] = np.argmin(total)
-    for row in range(error.shape[1] - 1, 0, -1):
-        chosen[row - 1] = came_from[row, chosen[row]]
-    return chosen
+def _shortest_path(
+    robot: Robot, position: np.ndarray, rotation: np.ndarray, angles: np.ndarray, error: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The path through one of K solutions of each row, or a copy of it whole turns away: `angles` (N, n), `error_m` (N,).
+
+    Rows that no solution reaches within the limits are no part of it, and get what leaves least.
+    """
+    low, high = robot.joint_limits.T
+    period = np.where(robot.chain.prismatic, np.inf, 2 * np.pi)
+    low = np.maximum(low, 0.5 * (low + high - _MOST_TURNS * period))
+    high = np.minimum(high, low + _MOST_TURNS * period)
+    turns = np.floor((angles - low + _ROUNDING) / period)
+    lowest = angles - np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
+    usable = (error <= SOLVED_M) & ~find_beyond_limits(robot, lowest).any(axis=-1)
+    for number in range(1, len(usable)):
+        same = np.abs(lowest[:number] - lowest[number]).max(axis=-1) < _SAME
+        usable[number] &= ~(same & usable[:number]).any(axis=0)
+    best = np.argmin(error, axis=0), np.arange(error.shape[1])
+    path, rows = lowest[best], np.flatnonzero(usable.any(axis=0))
+    if len(rows):
+        order = np.argsort(~usable[:, rows], axis=0, kind="stable")[: usable.sum(axis=0).max()]
+        postures, never = lowest[order, rows], np.where(usable[order, rows], 0.0, np.inf)
+        counts = np.maximum(1, np.ceil((high - low) / period - _ROUNDING)).astype(int)
+        copies = [postures[..., j, None] + 2 * np.pi * np.arange(count) for j, count in enumerate(counts)]
+        path[rows] = _least_motion(
+            copies, np.stack([low, high], axis=1), never, allowed_steps(robot, position[rows], rotation[rows])
+        )
+    return path, np.where(usable.any(axis=0), np.where(usable, error, 0.0).max(axis=0), error[best])
+
+
+def _least_motion(copies: list[np.ndarray], limits: np.ndarray, never: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+    """Angles (N, n) along which steps exceed what is allowed (N - 1, n) by least, and then the sum of all steps is least.
+
+    `copies`: of each joint its angle and those whole turns above (K, N, turns), none above its `limits` (n, 2).
+    `never` (K, N): infinite where there is no such posture. A sum, so that the best turns of each joint are found apart: of two
+    turns each, 2^n copies cost 2 n.
+    """
+    counts, joints = [each.shape[-1] for each in copies], len(copies)
+
+    def along(values: np.ndarray, joint: int) -> np.ndarray:
+        """Values (K, turns) of a joint as (K, turns of all joints)."""
+        return values.reshape(len(values), *(counts[joint] if axis == joint else 1 for axis in range(joints)))
+
+    def steps(row: int, joint: int) -> np.ndarray:
+        """What the steps of a joint to a row cost, (K, turns) of the row before by (K, turns) of this one."""
+        step = np.abs(copies[joint][:, row - 1, :, None, None] - copies[joint][:, row])
+        return step + _TOO_LARGE * np.maximum(step - allowed[row - 1, joint], 0.0)
+
+    def standing(row: int) -> np.ndarray:
+        """What it costs to stand at each copy of a row, (K, turns of all joints)."""
+        found = never[:, row].reshape(-1, *[1] * joints)
+        for joint, (low, high) in enumerate(limits):
+            angle = copies[joint][:, row]
+            off = _OFF_MIDDLE * np.abs(angle - 0.5 * (low + high))
+            found = found + along(np.where(angle > high + _ROUNDING, np.inf, off), joint)
+        return found
+
+    totals = [standing(0)]
+    for row in range(1, never.shape[1]):
+        # (K before, K, turns of all joints): those before go from the front, joint by joint, and those of the row to the end.
+        way = np.broadcast_to(totals[-1][:, None], (len(never), len(never), *counts))
+        for joint in range(joints):
+            cost = steps(row, joint).transpose(0, 2, 1, 3)
+            way = (way[..., None] + np.expand_dims(cost, tuple(range(3, joints + 2)))).min(axis=2)
+        totals.append(way.min(axis=0) + standing(row))
+    found, way = np.empty((never.shape[1], joints)), totals[-1]
+    for row in range(len(found) - 1, -1, -1):
+        posture, *turn = np.unravel_index(np.argmin(way), way.shape)
+        found[row] = [each[posture, row, chosen] for each, chosen in zip(copies, turn, strict=True)]
+        if row:
+            costs = [steps(row, joint)[:, :, posture, turn[joint]] for joint in range(joints)]
+            way = sum((along(cost, joint) for joint, cost in enumerate(costs)), totals[row - 1])
+    return found

@@ -31,10 +31,7 @@ _CONVENTIONS = {
 
 
 def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accuracy) -> dict[str, Any]:
-    """Contents of the sidecar.
-
-    `name`: of the campaign. `date`: of the export, ISO 8601. `accuracy`: of the corrected robot.
-    """
+    """Contents of the sidecar. `name`: of the campaign. `date`: of the export, ISO 8601. `accuracy`: of the corrected robot."""
     deviations = np.sqrt(np.diag(calibrated.covariance))
     kept = fold_effects(calibrated).left_out
     entries, springs, start = [], [], 0

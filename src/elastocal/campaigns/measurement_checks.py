@@ -27,10 +27,10 @@ _FARTHEST_REACHES = 10.0
 _LONGEST_TOOL_M = 1.0
 
 
-def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> None:
-    """Refuse degrees: more turns than a joint has, or far beyond limits that a 57th of the angle keeps.
+def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
+    """Angles that look like degrees: more turns than a joint has, or far beyond limits that a 57th of the angle keeps.
 
-    `reported` (N, n): joint angles as the controller reports them. Raises `InputError`: the first such angle.
+    `reported` (N, n): joint angles as the controller reports them. Returns (N, n) of bool.
     """
     low, high = robot.joint_limits.T
     farthest = max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
@@ -41,7 +41,16 @@ def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> 
 
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
     beyond = ~inside(reported, _BEYOND_LIMITS_RAD) & ~inside(-reported, _BEYOND_LIMITS_RAD)
-    wrong = (np.abs(reported) > farthest) | (beyond & inside(np.radians(reported)))
+    return np.asarray((np.abs(reported) > farthest) | (beyond & inside(np.radians(reported))))
+
+
+def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> None:
+    """Refuse degrees in more than single rows.
+
+    `reported` (N, n): joint angles as the controller reports them. Raises `InputError`: the first such angle.
+    """
+    low, high = robot.joint_limits.T
+    wrong = find_degrees(reported, robot)
     if wrong.any(axis=1).mean() > _SINGLE_ROWS:
         index, joint = np.argwhere(wrong)[0]
         allowed = (

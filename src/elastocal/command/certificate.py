@@ -51,15 +51,14 @@ def certificate(
 
     from rich.console import Console
 
-    from elastocal.application.certificate.use import use_at
     from elastocal.campaigns.reading import read_descriptions
     from elastocal.data_checks.protocol import data_at_fault
-    from elastocal.exchange.target_path import read_target_path
+    from elastocal.exchange.target_path import read_target_path_of
     from elastocal.figures.certificate import budget_bars, workspace_map
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
-    from elastocal.loop.certificate import Wanted
+    from elastocal.loop.certificate import Wanted, use_at
     from elastocal.loop.certificate import certificate as certified
     from elastocal.loop.measured import measured_errors
     from elastocal.report.certificate_pages import write_certificate
@@ -79,7 +78,7 @@ def certificate(
     after = None if measured is None else measured_errors(measured, robots, found)
     used = None
     if use is not None:
-        used = use_at(found.calibrated, found.case.observations.states, read_target_path(use, found.calibrated.robot.joints))
+        used = use_at(found.calibrated, found.case.observations.states, read_target_path_of(use, found.calibrated.robot))
     if data_at_fault(found.verdict):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
     wanted = Wanted(limit, risk, number, day, seed, stated)

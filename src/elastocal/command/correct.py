@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +14,8 @@ from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
+    from datetime import date
+
     import numpy as np
     import pandas as pd
 
@@ -20,14 +23,17 @@ if TYPE_CHECKING:
     from elastocal.application.compensation import Correction
     from elastocal.exchange.controllers.protocol import Controller
     from elastocal.exchange.target_path import TargetPath
+    from elastocal.loop.calibrated_files import Diagnosed
 
 # Lines that a message names.
 _NAMED = 5
+# Loads beyond so many times the measured ones have no bound: stiffness that is fitted as a constant need not be one there.
+_LOADS_BOUNDED = 2.0
 
 
 def correct(
     folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
-    path: Annotated[Path, Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..mz, q1..qn.")],
+    path: Annotated[Path, Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..fz or fx..mz, q1..qn.")],
     output: Annotated[
         Path,
         Option(
@@ -40,28 +46,36 @@ def correct(
     axes: Annotated[
         str, Option(help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6; needed where it is ambiguous.")
     ] = "",
+    allow_large_steps: Annotated[
+        bool,
+        Option("--allow-large-steps", help="Accept joints that turn by more than 5 times what the path turns, and 10 degrees."),
+    ] = False,
     partial: Annotated[bool, Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.
 
-    Loads, weight and every effect found are compensated, and each target states by how much the robot will miss it.
+    Loads, weight and every effect found are compensated, and each target states by how much the robot will miss it. Posture and
+    turns of the joints are those that move the robot least; where q1..qn state them they are kept. A joint that swings from
+    target to target, or a stated posture that does not reach its target, is refused with its line.
     Predicted errors are stated as `elastocal certificate` states them: in the frame of the declared base, or, where the base is
     unknown, in the robot's own frame after its best placement over the campaign's poses.
     """
+    from datetime import date
+
     import numpy as np
     from rich.console import Console
     from rich.progress import Progress
 
     from elastocal.application.accuracy import accuracy_sentence, before_m, millimetres, predict_errors
     from elastocal.application.calibrated import OperatingConditions, assumptions
-    from elastocal.application.compensation import find_joint_targets
+    from elastocal.application.compensation import find_joint_targets, large_steps
     from elastocal.application.scope import campaign_accuracy
     from elastocal.exchange.controllers.protocol import axes_of, check_name, targets_of
-    from elastocal.exchange.target_path import OK, read_target_path
+    from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.data_frames import write_csv
-    from elastocal.validation.fitted_range import beyond_campaign
+    from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
 
     console = Console(stderr=True)
     controller, table, program = _places_of(output, language)
@@ -75,7 +89,7 @@ def correct(
     calibrated = campaign.calibrated
     prismatic = calibrated.robot.chain.prismatic
     named = axes_of(controller, prismatic, axes) if controller else ()
-    wanted = read_target_path(path, calibrated.robot.joints)
+    wanted = read_target_path_of(path, calibrated.robot)
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
     print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
@@ -91,33 +105,66 @@ def correct(
     bad = (found.status != OK).nonzero()[0]
     if len(bad) and not partial:
         rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in bad], _NAMED)
-        raise InputError(path, "", rows, "poses that the robot reaches within its limits, or --partial")
+        raise InputError(
+            path,
+            "",
+            rows,
+            "poses that the robot reaches within its limits, in the posture that q1..qn state if any, or --partial",
+        )
     good = found.status == OK
     if controller and not good.any():
         raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")
-    beyond = beyond_campaign(
-        campaign.case.observations.states, calibrated.robot.model_angles(found.joint_angles), wanted.wrench
-    )
+    large = large_steps(calibrated.robot, wanted.position[good], wanted.rotation[good], found.joint_angles[good])
+    lines_of = [wanted.lines[row] for row in good.nonzero()[0]]
+    swings = [
+        f"line {lines_of[row]}: joint {joint + 1} "
+        + (f"shifts by {1e3 * step:.0f} mm" if prismatic[joint] else f"turns by {math.degrees(step):.1f} degrees")
+        + (f", {1e3 * most:.0f} allowed" if prismatic[joint] else f", {math.degrees(most):.1f} allowed")
+        for row, joint, step, most in large
+    ]
+    if swings and not allow_large_steps:
+        print_lines([f"! {line}" for line in swings[:_NAMED]], console)
+        more = f" and {counted(len(swings) - 1, 'more large step')}" if len(swings) > 1 else ""
+        raise InputError(path, "", swings[0] + more, "targets between, another posture, or --allow-large-steps")
+    fitted, angles = campaign.case.observations.states, calibrated.robot.model_angles(found.joint_angles)
+    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
+    beyond, outside = beyond_campaign(fitted, angles, wrench), beyond_campaign(fitted, angles, None)
+    heavy = beyond_loads(fitted, wrench, _LOADS_BOUNDED)
+    bounded = good & ~outside & ~heavy
+    status = found.status.astype(object)
+    status[good & outside] = f"{NO_BOUND}joints outside the fitted range"
+    status[good & heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
     errors = predict_errors(calibrated, found.joint_angles, operating)
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
     files = [table, program] if controller else [table]
     with write_together(output.parent, [file.name for file in files]) as folder_of_all:
-        write_csv(folder_of_all / table.name, _joint_targets(wanted, found, before, errors, beyond))
+        write_csv(folder_of_all / table.name, _joint_targets(wanted, found, before, errors, beyond, status))
         if controller:
             targets = targets_of(found.joint_angles[good], prismatic, named)
-            write_text(folder_of_all / program.name, controller.program(name, targets))
+            write_text(
+                folder_of_all / program.name, controller.program(name, targets, _notes(campaign, wrench[good], date.today()))
+            )
     lines, answer = [], f"{grouped(good.sum())} of {counted(len(good), 'target')} corrected"
     if good.any():
         rms = np.sqrt((before[good] ** 2).mean())
-        reachable = predict_errors(calibrated, found.joint_angles[good], operating.part(good)) if len(bad) else errors
         lines.append(f"Predicted position error without correction, in the same frame: {millimetres(rms)} RMS.")
-        lines.append(accuracy_sentence(reachable.accuracy("the targets")))
+    if bounded.any():
+        known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
+        lines.append(accuracy_sentence(known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")))
+    if good.any():
         lines.append(accuracy_sentence(campaign_accuracy(calibrated, campaign.case.observations.states)))
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
         lines.append(
             f"{program.name} goes to {grouped(good.sum())} of {counted(len(good), 'target')}: {controller.WORDS}, {called}"
         )
+    lines += [f"! {line}" for line in swings[:_NAMED]]
+    if len(swings) > _NAMED:
+        lines.append(f"! and {counted(len(swings) - _NAMED, 'more large step')}")
+    if unbounded := int((good & ~bounded).sum()):
+        share = f"{grouped(unbounded)} of {counted(int(good.sum()), 'target')}"
+        what = f"{_LOADS_BOUNDED:g} times the measured loads or outside the fitted range of joints"
+        lines.append(f"! no bound is stated for {share}: beyond {what}")
     if beyond.any():
         share = f"{grouped(beyond.sum())} of {counted(len(beyond), 'target')}"
         lines.append(f"! {share} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
@@ -140,16 +187,37 @@ def _places_of(output: Path, language: str) -> tuple[Controller | None, Path, Pa
     return controller, output.with_suffix(".csv") if by_suffix else output, output.with_suffix(controller.SUFFIX)
 
 
+def _notes(campaign: Diagnosed, wrench: np.ndarray, day: date) -> list[str]:
+    """For what a program holds: robot, campaign, day, loads (N, 6) and tool, one line each."""
+    end = campaign.calibrated.robot.chain.end_effector
+    sizes = [math.sqrt((part**2).sum(axis=1).max()) for part in (wrench[:, :3], wrench[:, 3:])]
+    load = (
+        f"force up to {sizes[0]:.4g} N, moment up to {sizes[1]:.4g} N m"
+        if any(sizes)
+        else "none beside what the robot file states"
+    )
+    return [
+        f"robot: {campaign.calibrated.robot.name}",
+        f"campaign: {campaign.name}",
+        f"date: {day.isoformat()}",
+        f"load: {load}",
+        f"tool: {end.name}, target offset {', '.join(f'{1e3 * value:.4g}' for value in end.offset_m)} mm",
+    ]
+
+
 def _joint_targets(
-    wanted: TargetPath, found: Correction, before: np.ndarray, errors: Prediction, beyond: np.ndarray
+    wanted: TargetPath, found: Correction, before: np.ndarray, errors: Prediction, beyond: np.ndarray, status: np.ndarray
 ) -> pd.DataFrame:
-    """The file of joint targets: wanted poses, commands q1..qn (rad, as the controller reports them), predicted errors, status.
+    """The file of joint targets: wanted poses, loads, commands q1..qn (rad, as the controller reports them), errors, status.
 
     `before` (N,) is what uncorrected targets would be missed by, m; `beyond` whether each lies beyond what was measured.
     """
     import numpy as np
     import pandas as pd
     from scipy.spatial.transform import Rotation
+
+    from elastocal.exchange.target_path import NO_BOUND
+    from elastocal.mechanics.components import WRENCH_NAMES
 
     pose = np.column_stack([wanted.position, Rotation.from_matrix(wanted.rotation).as_rotvec()])
     columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), pose.T, strict=True))
@@ -158,11 +226,13 @@ def _joint_targets(
     stated = {
         "predicted_error_before_m": before,
         "predicted_error_after_m": errors.error_m,
-        "predicted_bound_m": errors.bound_m,
+        "predicted_bound_m": np.where([each.startswith(NO_BOUND) for each in status], np.nan, errors.bound_m),
         "predicted_std_m": np.hypot(errors.parameters_m, errors.repeated_m),
         "predicted_rotation_before_rad": np.linalg.norm(found.error_before[:, 3:], axis=1),
         "predicted_rotation_std_rad": errors.std_rad,
         "repeatability_m": errors.repeated_m,
         "outside_range": beyond,
     }
-    return pd.DataFrame(angles | stated | {"status": found.status} | columns | nominal)
+    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
+    loads = dict(zip(WRENCH_NAMES, wrench.T, strict=True))
+    return pd.DataFrame(angles | stated | {"status": status} | columns | loads | nominal)

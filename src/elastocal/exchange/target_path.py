@@ -1,8 +1,8 @@
 """A file of wanted poses of the end effector: position and rotation vector in base axes, and what the robot works under.
 
 Columns ``x, y, z`` (m) and ``rx, ry, rz`` (rotation vector, rad) of the last measuring point; ``fx .. mz`` (N, N m) where it is
-loaded; ``q1 .. qn`` (rad, as the controller reports them) near which the robot shall stand; ``approach1 .. approachn``,
-``time_s`` and ``temperature_c`` as in a campaign.
+loaded, forces alone with moments of zero; ``q1 .. qn`` (rad, as the controller reports them) near which the robot shall stand;
+``approach1 .. approachn``, ``time_s`` and ``temperature_c`` as in a campaign.
 """
 
 from dataclasses import dataclass
@@ -12,15 +12,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.column_bounds import FARTHEST_RAD
+from elastocal.campaigns.measurement_checks import find_degrees
 from elastocal.errors import InputError, closest_first
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.exchange.measurement_cells import CellReader
 from elastocal.mechanics.components import WRENCH
+from elastocal.mechanics.robot import Robot
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
 _WRENCH = tuple(name for name, _, _ in WRENCH)
 # Of a corrected target, and where it is.
 OK, _STATUS = "ok", "status"
+# Of a corrected target whose error nothing bounds, before the reason.
+NO_BOUND = "no bound: "
 # A position farther from the base than any arm reaches is in other units.
 _FARTHEST_M = 10.0
 
@@ -75,7 +79,22 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     single = [group((name,)) for name in ("time_s", "temperature_c")]
     time, temperature = (None if column is None else column[:, 0] for column in single)
     position, rotation = _poses(read)
-    return TargetPath(position, rotation, group(angles), group(_WRENCH), group(approach), time, temperature, read.text.lines)
+    wrench = group(_WRENCH if set(_WRENCH[3:]) & set(cells) else _WRENCH[:3])
+    if wrench is not None:
+        wrench = np.pad(wrench, ((0, 0), (0, 6 - wrench.shape[1])))
+    return TargetPath(position, rotation, group(angles), wrench, group(approach), time, temperature, read.text.lines)
+
+
+def read_target_path_of(path: str | Path, robot: Robot) -> TargetPath:
+    """As `read_target_path`; an InputError refuses joint angles in degrees too."""
+    wanted = read_target_path(path, robot.joints)
+    if wanted.start is not None and (wrong := find_degrees(wanted.start, robot)).any():
+        row, joint = np.argwhere(wrong)[0]
+        low, high = robot.joint_limits[joint]
+        found = f"q{joint + 1} looks like degrees: {wanted.start[row, joint]:g}"
+        allowed = f"rad, of a joint that goes from {low:.2f} to {high:.2f} rad"
+        raise InputError(path, f"line {wanted.lines[row]}", found, allowed)
+    return wanted
 
 
 @dataclass(frozen=True)
@@ -96,7 +115,8 @@ def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
         if name not in read.columns:
             raise InputError(path, f"line {read.text.dialect.header}", f"no column {name!r}", "a file of elastocal correct")
     commands = np.column_stack([read.numbers(name) for name in angles])
-    return CorrectedTargets(*_poses(read), commands, np.array(read.cells(_STATUS)))
+    status = [OK if cell.startswith(NO_BOUND) else cell for cell in read.cells(_STATUS)]
+    return CorrectedTargets(*_poses(read), commands, np.array(status))
 
 
 def _cells(path: str | Path) -> CellReader:

@@ -11,15 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.application.accuracy import predict_errors
+from elastocal.application.calibrated import OperatingConditions
 from elastocal.application.certificate.comparison import compare_campaigns
 from elastocal.application.certificate.error_budget import error_budget
 from elastocal.application.certificate.repeatability import of_sensor, repeatability
 from elastocal.application.certificate.workspace import draw_angles, workspace_errors
+from elastocal.application.compensation import find_joint_targets
 from elastocal.application.scope import REGION, campaign_poses
 from elastocal.campaigns.reading import campaign_files
+from elastocal.exchange.target_path import OK
 from elastocal.io.records import checksum
 from elastocal.random_streams import stream
 from elastocal.validation.conformity import PASS, UNDECIDED, conformity, predicted_conformity
+from elastocal.validation.fitted_range import beyond_campaign
 from elastocal.validation.span import joint_ranges, shortfalls
 
 if TYPE_CHECKING:
@@ -27,8 +31,10 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from elastocal.application.certificate.use import Use
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.application.certificate.workspace import WorkspaceErrors
+    from elastocal.exchange.target_path import TargetPath
+    from elastocal.fitting.observations import States
     from elastocal.loop.calibrated_files import Diagnosed
     from elastocal.loop.measured import MeasuredErrors
     from elastocal.mechanics.robot import Robot
@@ -56,6 +62,23 @@ class Wanted:
     date: str
     seed: int
     stated: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Use:
+    """Commands (N, n) with their conditions, and which of them lie beyond what was fitted (N,)."""
+
+    reported_angles: np.ndarray
+    operating: OperatingConditions
+    outside: np.ndarray
+
+
+def use_at(calibrated: CalibratedRobot, fitted: States, wanted: TargetPath) -> Use:
+    """The use of a robot at wanted poses, each corrected; a pose that it cannot reach lies beyond."""
+    operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
+    found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+    angles = calibrated.robot.model_angles(found.joint_angles)
+    return Use(found.joint_angles, operating, beyond_campaign(fitted, angles, wanted.wrench) | (found.status != OK))
 
 
 def certificate(

@@ -80,15 +80,19 @@ def beyond_campaign(fitted_states: States, joint_angles: np.ndarray, wrench: np.
     """Poses and loads beyond those that a campaign measured, before any fit is at hand.
 
     `joint_angles` (N, n): of the chain, rad. `wrench` (N, 6): N, N m; none where nothing loads the robot. Returns (N,) of bool:
-    by the joint angles as in `outside_fitted_range`, or by a force or moment larger than any of the campaign.
+    by the joint angles as in `outside_fitted_range`, or by its loads.
     """
     outside = beyond_range(_angles_of_poses(fitted_states), joint_angles)
-    if wrench is None:
-        return outside
+    return outside if wrench is None else outside | beyond_loads(fitted_states, wrench)
+
+
+def beyond_loads(fitted_states: States, wrench: np.ndarray, times: float = 1.0) -> np.ndarray:
+    """Forces or moments, of wrenches (N, 6), that are larger than so many times any of the campaign: bool (N,)."""
+    outside = np.zeros(len(wrench), bool)
     for part in (slice(0, 3), slice(3, 6)):
         largest = np.linalg.norm(fitted_states.wrench[:, part], axis=1).max()
         # Forces of one cell are stated to a few digits.
-        outside = outside | (np.linalg.norm(wrench[:, part], axis=1) > (1.0 + _ROUNDING) * largest + _ROUNDING)
+        outside = outside | (np.linalg.norm(wrench[:, part], axis=1) > (1.0 + _ROUNDING) * times * largest + _ROUNDING)
     return outside
 
 

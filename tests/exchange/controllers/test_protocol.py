@@ -1,8 +1,10 @@
 """Names of programs and of axes: what a language does not have is refused, and what is not plain is asked for."""
 
+import re
 from pathlib import Path
 
 import pytest
+from made_targets import made_targets
 from support import refused
 
 from elastocal.exchange.controllers.catalogue import controllers
@@ -65,3 +67,22 @@ def test_axes_are_as_stated_and_each_once():
     for wrong in ("A1,A2", "A1,A1,A2,A3,A4,A5,A6", "J1,A2,E1,A3,A4,A5,A6"):
         with refused("--axes", wrong, "7 different names"):
             axes_of(ALL["krl"], (False,) * 7, wrong)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_no_note_adds_a_statement_to_a_program(name):
+    """Quotes, ends of lines and of statements, and signs of comments: the program without its remarks is that without notes."""
+    evil = [
+        "robot: x\nPTP {A1 0}\rMoveAbsJ target_1; 99:J P[1] 100% FINE ;",
+        'tool: "\u2028END\x85ENDFOLD" */ movej([0,0]) \x1b[2J; /END',
+        "größe ! # ; " + "long " * 60,
+    ]
+    with_notes, without = (ALL[name].program("go", made_targets(ALL[name]), notes) for notes in (evil, ()))
+    remark = {"krl": r" +; - .*", "rapid": r" +! .*", "tp": r" *\d+:  !.{1,32} ;", "urscript": r" +# .*"}[name]
+    kept = [line for line in with_notes.split("\n") if not re.fullmatch(remark, line, re.ASCII)]
+    plain = [line for line in without.split("\n") if not re.fullmatch(remark, line, re.ASCII)]
+    numbers = r"^ *\d+:"
+    assert [re.sub(numbers, "", line) for line in kept] == [re.sub(numbers, "", line) for line in plain]
+    assert with_notes.isascii() and len(with_notes.splitlines()) == len(with_notes.split("\n")) - 1
+    for line in set(with_notes.split("\n")) - set(kept):
+        assert not set(line.split(":  !")[-1].removesuffix(" ;").replace(";", "", 1)) & set("\"'[]{};*=\\")

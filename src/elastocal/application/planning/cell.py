@@ -60,10 +60,7 @@ def find_allowed(cell: Cell, robot: Robot, targets: tuple[Target, ...], reported
 
 
 def link_points(robot: Robot, angles: np.ndarray) -> np.ndarray:
-    """Points along the moving links.
-
-    `angles` (N, n): of the chain, rad. Returns (K, N, 3): m, base axes.
-    """
+    """Points along the moving links. `angles` (N, n): of the chain, rad. Returns (K, N, 3): m, base axes."""
     transforms = robot.chain.transforms
     first = next(place for place, transform in enumerate(transforms) if transform.coordinate is not None)
     ends = [first, *(place + 1 for place in range(first, len(transforms)) if transforms[place].kind == "T")]

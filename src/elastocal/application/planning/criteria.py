@@ -25,10 +25,7 @@ _AT_ONCE = 1000
 
 @dataclass(frozen=True)
 class Criterion:
-    """What makes a design good.
-
-    `weight` (P, P): C of A and I; None for D.
-    """
+    """What makes a design good. `weight` (P, P): C of A and I; None for D."""
 
     weight: np.ndarray | None
 
@@ -39,10 +36,7 @@ class Criterion:
         return -float(np.trace(np.linalg.solve(matrix, self.weight)))
 
     def gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        """By how much the value grows with each candidate.
-
-        `rows` (N, k, P), `matrix` (P, P). Returns (N,).
-        """
+        """By how much the value grows with each candidate. `rows` (N, k, P), `matrix` (P, P). Returns (N,)."""
         return np.concatenate([self._gains(part, matrix) for part in np.split(rows, range(_AT_ONCE, len(rows), _AT_ONCE))])
 
     def _gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:

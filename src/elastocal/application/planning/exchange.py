@@ -39,10 +39,7 @@ def matrix_of(rows: np.ndarray, chosen: np.ndarray | list[int]) -> np.ndarray:
 
 
 def choose_greedily(rows: np.ndarray, count: int, criterion: Criterion) -> list[int]:
-    """Candidates, each that which adds most to those before it.
-
-    `rows` (N, k, P).
-    """
+    """Candidates, each that which adds most to those before it. `rows` (N, k, P)."""
     chosen: list[int] = []
     for _ in range(count):
         gains = criterion.gains(rows, matrix_of(rows, chosen))

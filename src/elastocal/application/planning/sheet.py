@@ -47,10 +47,7 @@ def sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
 
 
 def campaign_document(name: str, robot_file: str, survey: Survey, plan: Plan) -> dict[str, Any]:
-    """Contents of the campaign.yaml that goes with a sheet.
-
-    `name`: of the campaign. `robot_file`: beside it.
-    """
+    """Contents of the campaign.yaml that goes with a sheet. `name`: of the campaign. `robot_file`: beside it."""
     fitted, judged = len(plan.fitted.joint_angles), len(plan.held_out.joint_angles)
     targets = {
         target.name: {"point": target.point, "offset_m": "unknown" if target.offset_m is None else list(target.offset_m)}

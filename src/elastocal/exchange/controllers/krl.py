@@ -3,7 +3,9 @@
 After KUKA System Software 8.3, Operating and Programming Instructions for System Integrators, KUKA Roboter GmbH.
 """
 
-from elastocal.exchange.controllers.protocol import JointTargets
+from collections.abc import Sequence
+
+from elastocal.exchange.controllers.protocol import JointTargets, remarks
 
 NAME, WORDS, SUFFIX = "krl", "KUKA KRL", ".src"
 AXES, EXTERNAL = tuple(f"A{axis}" for axis in range(1, 7)), tuple(f"E{axis}" for axis in range(1, 7))
@@ -17,10 +19,18 @@ RESERVED = (
 )
 
 
-def program(name: str, targets: JointTargets) -> str:
+def program(name: str, targets: JointTargets, notes: Sequence[str] = ()) -> str:
     """A module whose only routine goes to all targets, slowly."""
-    lines = ["&ACCESS RVP", f"DEF {name}()", "  ; joint targets corrected by elastocal, degrees and mm", "  INT i"]
-    lines += ["  BAS(#INITMOV, 0)", "  FOR i = 1 TO 6", "    $VEL_AXIS[i] = 10", "  ENDFOR"]
+    lines = ["&ACCESS RVP", f"DEF {name}()", "  ; joint targets corrected by elastocal, degrees and mm"]
+    # A comment that began with FOLD would fold the lines behind it.
+    lines += [
+        *remarks(notes, "  ; - "),
+        "  INT i",
+        "  BAS(#INITMOV, 0)",
+        "  FOR i = 1 TO 6",
+        "    $VEL_AXIS[i] = 10",
+        "  ENDFOR",
+    ]
     for row in targets.rows(targets.axes):
         lines.append(f"  PTP {{E6AXIS: {', '.join(f'{axis} {value}' for axis, value in zip(targets.axes, row, strict=True))}}}")
     return "\n".join([*lines, "END", ""])

@@ -3,10 +3,11 @@
 It has ``NAME``, as ``--format`` takes it; ``WORDS``, as a person calls it; ``SUFFIX`` of its files; ``AXES`` and
 ``EXTERNAL``, what it calls the axes of the robot and those beside them; ``PROGRAM``, a regular expression that a name of a
 program matches, and what that is in words; ``RESERVED``, names in lower case that the language has already, between blanks;
-``program(name, targets)``, the text of the file.
+``program(name, targets, notes)``, the text of the file, notes being `remarks` in it.
 """
 
 import re
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from elastocal.counting import counted
-from elastocal.errors import InputError
+from elastocal.errors import InputError, printable
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,19 @@ class Controller(Protocol):
     PROGRAM: tuple[str, str]
     RESERVED: str
 
-    def program(self, name: str, targets: JointTargets) -> str:
+    def program(self, name: str, targets: JointTargets, notes: Sequence[str] = ()) -> str:
         """The text of the file; the name is one that the language allows."""
+
+
+def remarks(notes: Sequence[str], mark: str, longest: int = 100, end: str = "") -> list[str]:
+    """Lines of comments with notes of any text, each behind the language's mark: no note is more than a comment.
+
+    What no controller takes for a sign of its language is kept: letters and digits of ASCII, blanks and ``. , : _ + - / ( )``.
+    """
+    plain = [
+        "".join(c if c.isascii() and (c.isalnum() or c in " .,:_+-/()") else "?" for c in printable(note)) for note in notes
+    ]
+    return [f"{mark}{piece}{end}" for note in plain for piece in textwrap.wrap(note, longest)]
 
 
 def check_name(controller: Controller, path: Path) -> str:

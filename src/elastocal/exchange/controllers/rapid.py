@@ -4,7 +4,9 @@ After ABB, Technical reference manual: RAPID Instructions, Functions and Data ty
 RAPID Overview, 3HAC050947 (identifiers, reserved words).
 """
 
-from elastocal.exchange.controllers.protocol import JointTargets
+from collections.abc import Sequence
+
+from elastocal.exchange.controllers.protocol import JointTargets, remarks
 
 NAME, WORDS, SUFFIX = "rapid", "ABB RAPID", ".mod"
 AXES, EXTERNAL = tuple(f"rax_{axis}" for axis in range(1, 7)), tuple(f"eax_{axis}" for axis in "abcdef")
@@ -22,10 +24,10 @@ RESERVED = (
 _NONE, _STILL = "9E9", "0"
 
 
-def program(name: str, targets: JointTargets) -> str:
+def program(name: str, targets: JointTargets, notes: Sequence[str] = ()) -> str:
     """A module with the targets, and a procedure that goes to all of them with a tool of the caller's."""
     rows = targets.rows((*AXES, *EXTERNAL))
-    lines = [f"MODULE {name}", "  ! joint targets corrected by elastocal, degrees and mm"]
+    lines = [f"MODULE {name}", "  ! joint targets corrected by elastocal, degrees and mm", *remarks(notes, "  ! ")]
     for number, row in enumerate(rows, 1):
         own = ",".join(value or _STILL for value in row[: len(AXES)])
         beside = ",".join(value or _NONE for value in row[len(AXES) :])

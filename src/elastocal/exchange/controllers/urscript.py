@@ -3,9 +3,11 @@
 After Universal Robots, The URScript Programming Language for e-Series (movej; identifiers, keywords).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from elastocal.exchange.controllers.protocol import JointTargets
+from elastocal.exchange.controllers.protocol import JointTargets, remarks
 
 NAME, WORDS, SUFFIX = "urscript", "URScript", ".script"
 AXES, EXTERNAL = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3"), ()
@@ -16,10 +18,10 @@ RESERVED = (
 )
 
 
-def program(name: str, targets: JointTargets) -> str:
+def program(name: str, targets: JointTargets, notes: Sequence[str] = ()) -> str:
     """A program that goes to all targets, slowly."""
     order = [targets.axes.index(axis) for axis in AXES]
-    lines = [f"def {name}():", "  # joint targets corrected by elastocal, rad"]
+    lines = [f"def {name}():", "  # joint targets corrected by elastocal, rad", *remarks(notes, "  # ")]
     for row in np.radians(targets.values[:, order]):
         lines.append(f"  movej([{', '.join(f'{round(value, 9) + 0.0:.9f}' for value in row)}], a=0.5, v=0.2)")
     return "\n".join([*lines, "end", ""])
