@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.factored import Factored
 
-# Beyond this many values of whitened columns a problem is summed: as many as take 24 MB, of which there are ten copies; from
-# some thousand columns on, sums by factors cost less than the products of whole rows.
-MOST_HELD = 3_000_000
+# Beyond this many values of whitened columns a problem is summed: as many as take 48 MB, of which there are ten copies. Of 5.2
+# million (210 states) a diagnosis takes half the time held, of 6.6 (867 states) three quarters summed.
+MOST_HELD = 6_000_000
 # Rows of the sample: several for each declared parameter, and enough to see which sizes of the pose error are out of question.
 SAMPLE_ROWS = 3000
 # Values of whitened columns in a block of declared ones, and observations in a block of candidates, which come in factors.
