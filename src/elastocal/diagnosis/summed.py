@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.factored import Factored
 
 # Beyond this many values of whitened columns a problem is summed: as many as take 48 MB, of which there are ten copies. Of 5.2
-# million (210 states) a diagnosis takes half the time held, of 6.6 (867 states) three quarters summed.
+# million (210 states) a diagnosis takes half the time held, of 6.6 (867 states) nine tenths summed.
 MOST_HELD = 6_000_000
 # Rows of the sample: several for each declared parameter, and enough to see which sizes of the pose error are out of question.
 SAMPLE_ROWS = 3000
