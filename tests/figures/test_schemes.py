@@ -81,7 +81,7 @@ def test_every_joint_is_drawn_once_on_the_arm_and_apart_from_the_others(robot):
     assert [number for number, _, _ in layout.joints] == list(range(1, robot.joints + 1))
     ends = [end for start, end, _ in layout.links for end in (start, end)]
     for _, place, axis in layout.joints:
-        reach = 0 if axis is None else np.linalg.norm(axis)
+        reach = 0 if axis is None else np.linalg.norm(axis) / 2
         assert min(np.linalg.norm(place - end) for end in ends) == pytest.approx(reach, abs=1e-9)
     for (_, one, _), (_, other, _) in combinations(layout.joints, 2):
         assert np.linalg.norm(one - other) > 7
