@@ -191,7 +191,7 @@ def test_the_axis_is_logarithmic_where_the_smallest_would_be_lost_beside_the_lar
 
 TABLE = pd.DataFrame(
     {
-        "campaign": ["first_one", "second"],
+        "campaign": ["ur10_a_on_b", "wam_grid"],
         "poses": [24, 1],
         **{f"before_rms{end}_mm": values for end, values in (("", [0.4, 2.0]), ("_low", [0.3, 1.8]), ("_high", [0.5, np.inf]))},
         **{f"after_rms{end}_mm": values for end, values in (("", [0.2, 1.9]), ("_low", [0.1, 1.7]), ("_high", [0.3, 2.2]))},
@@ -201,7 +201,7 @@ TABLE = pd.DataFrame(
 
 def test_each_campaign_has_both_errors_at_their_values():
     (axis,) = campaign_errors(TABLE).axes
-    assert row_labels(axis) == ["first one", "second"]
+    assert row_labels(axis) == ["UR10 A on B", "WAM grid"]
     before, after = (container.lines[0].get_xydata() for container in axis.containers)
     np.testing.assert_allclose(before, [[0.4, 1], [2.0, 0]])
     np.testing.assert_allclose(after, [[0.2, 1], [1.9, 0]])
@@ -209,5 +209,5 @@ def test_each_campaign_has_both_errors_at_their_values():
 
 
 def test_sessions_of_one_campaign_stand_by_their_poses():
-    (axis,) = campaign_errors(TABLE.assign(campaign="folds")).axes
-    assert row_labels(axis) == ["folds, 24 poses", "folds, 1 pose"]
+    (axis,) = campaign_errors(TABLE.assign(campaign="fanuc_joint")).axes
+    assert row_labels(axis) == ["FANUC joint, 24 poses", "FANUC joint, 1 pose"]

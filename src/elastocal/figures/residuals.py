@@ -358,7 +358,8 @@ def campaign_errors(table: pd.DataFrame) -> Figure:
         # An interval that is open above is drawn to the value alone.
         span = [rms - low, np.where(np.isfinite(high), high - rms, 0.0)]
         axis.errorbar(rms, rows, xerr=span, fmt="o", color=color, ms=4, lw=1.2, capsize=2, label=words, zorder=2)
-    names = table["campaign"].str.replace("_", " ")
+    # Robots and series in capitals, as people write them.
+    names = table["campaign"].str.replace("_", " ").str.replace(r"^\w+|\b\w\b", lambda word: word[0].upper(), regex=True)
     # A campaign with two sessions has two lines.
     names = names.where(~names.duplicated(keep=False), names + ", " + table["poses"].map(lambda count: counted(count, "pose")))
     axis.set_yticks(rows, names)
