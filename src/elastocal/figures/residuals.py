@@ -1,7 +1,7 @@
 """Errors of a campaign, before and after: against what the robot did, as arrows where it stood, and model by model."""
 
 import textwrap
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from matplotlib.patheffects import withStroke
 from elastocal.counting import counted, first_names
 from elastocal.diagnosis.words import in_words
 from elastocal.figures.arms import draw_links
-from elastocal.figures.style import MICRO, MILLI, PALETTE, STAGES, label_decades, legend_below, note, panels, styled
+from elastocal.figures.style import MICRO, MILLI, STAGES, label_decades, legend_below, note, panels, styled
 
 # About the vertical of the base, since what turns with the first joint then stays one component; and along the force, since
 # what gives way does so in its direction.
@@ -38,13 +38,13 @@ _ARROW = 0.13
 METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
 LOOKS = {
     "frames": ("#b9b9b9", "frames and targets only"),
-    "declared": (PALETTE[1], "declared model"),
-    "effect": (PALETTE[0], "with the effects found"),
+    "declared": STAGES["before"][::-1],
+    "effect": STAGES["after"][::-1],
     "kept": ("#777777", "frames and targets only, kept"),
 }
 # Beyond this ratio the smallest bars would be lost on a linear axis.
 _LARGEST_RATIO = 25
-_LINE = 26
+_LINE, _NAMES = 26, 3
 _DIAMOND: dict[str, Any] = {"linestyle": "", "marker": "D", "color": "white", "markeredgecolor": "black", "markersize": 3.4}
 
 
@@ -83,7 +83,12 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
     for axis in axes[:, 0]:
         axis.set_ylabel(f"residual ({unit})")
     above = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
-    handles = _legend(stages, bool(held_out.any()))
+    drawn = [STAGES[stage] for stage in stages]
+    handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
+    look: dict[str, Any] = {"color": "#666666", "linestyle": ""}
+    handles.append(Line2D([], [], marker="o", markersize=2.5, label="fitted measurement", **look))
+    if held_out.any():
+        handles.append(Line2D([], [], marker="x", markersize=4, label="validation measurement", **look))
     figure.legend(handles=handles, title=above, loc="outside lower center", ncols=4, columnspacing=1.4)
     figure.set_dpi(_PIXELS_PER_INCH)
     return figure
@@ -100,7 +105,9 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
     size = np.linalg.norm(off["before"], axis=1)
     largest = max(np.quantile(size, 0.95), 1e-9)
     extent = np.maximum(np.ptp(place, axis=0), 1e-3)
-    cell_m = _cell_side(extent) if len(place) > _MOST_ARROWS else None
+    # One digit: the side of a cell is a number that can be quoted.
+    digit = 10.0 ** np.floor(np.log10(extent.max() / _CELLS))
+    cell_m = float(np.ceil(extent.max() / _CELLS / digit) * digit) if len(place) > _MOST_ARROWS else None
     views = {"from the side": (0, 2), "from above": (0, 1)}
     figure, axes = panels(1, 2, 26 + float(np.clip(66 * extent[1:].max() / extent[0], 40, 56)))
     length = _ARROW * extent.max()
@@ -246,15 +253,6 @@ def _stages(table: Mapping[str, np.ndarray]) -> tuple[str, ...]:
     return tuple(STAGES)[: 1 if same else 2]
 
 
-def _legend(stages: Iterable[str], with_held_out: bool) -> list[Line2D]:
-    drawn = [STAGES[stage] for stage in stages]
-    handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
-    handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="fitted measurement"))
-    if with_held_out:
-        handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="validation measurement"))
-    return handles
-
-
 def _states(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Mean place and residuals of each state and target."""
     keys = ["held_out", "session", "pose", "load", "target"]
@@ -262,13 +260,6 @@ def _states(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.n
     means = pd.DataFrame({name: table[name] for name in keys + seen}).groupby(keys, dropna=False, observed=True).mean()
     off = {stage: means[[f"{stage}_d{axis}" for axis in "xyz"]].to_numpy() for stage in STAGES}
     return means[[*"xyz"]].to_numpy(), off
-
-
-def _cell_side(extent: np.ndarray) -> float:
-    # One digit: the side of a cell is a number that can be quoted.
-    side = extent.max() / _CELLS
-    digit = 10.0 ** np.floor(np.log10(side))
-    return float(np.ceil(side / digit) * digit)
 
 
 def _scale_arrow(axis: Axes, largest: float, length: float) -> None:
@@ -288,7 +279,8 @@ def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
 
     `steps`: rows of before_after.csv. `noise_floor_m`: RMS error that the noise alone leaves.
     """
-    labels = [step_name(step["step"]) for step in steps]
+    # Words, with the ends of long lists left out, in lines that fit beside the bars.
+    labels = [textwrap.fill(first_names(in_words(step["step"]).split(", "), _NAMES), _LINE) for step in steps]
     lines = [label.count("\n") + 1 for label in labels]
     figure, axes = panels(1, len(METRICS), 30 + 4.0 * sum(lines) + 4.5 * len(steps), sharey=True)
     # Rows as high as their names are long.
@@ -303,7 +295,10 @@ def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
         for row, step in zip(rows, steps, strict=True):
             value, low, high = (scale * step[f"heldout_{metric}_m{end}"] for end in ("", "_low", "_high"))
             axis.barh(row, value, height=0.42, color=LOOKS[step["kind"]][0])
-            _interval(axis, value, low, high, row)
+            # An arrow where the interval is open above; nothing where there is none.
+            axis.plot([low, value if np.isinf(high) else high], [row, row], color="black", linewidth=1.1, gid="interval")
+            if np.isinf(high):
+                axis.plot(value, row, ">", color="black", markersize=4, gid="open interval")
             axis.plot(scale * step[f"train_{metric}_m"], row, **_DIAMOND)
         if noise_floor_m:
             axis.axvline(scale * noise_floor_m, color="black", linestyle=":", linewidth=1.2, gid="noise floor")
@@ -317,29 +312,14 @@ def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
         axis.set_axisbelow(True)
     axes[0, 0].set(yticks=rows, ylim=(heights.sum(), 0))
     axes[0, 0].set_yticklabels(labels, fontsize=7.5)
-    figure.legend(handles=_step_legend({step["kind"] for step in steps}, noise_floor_m), loc="outside lower center", ncols=3)
-    return figure
-
-
-def _interval(axis: Axes, value: float, low: float, high: float, row: float) -> None:
-    """A line from end to end; an arrow where it is open above; nothing where there is none."""
-    axis.plot([low, value if np.isinf(high) else high], [row, row], color="black", linewidth=1.1, gid="interval")
-    if np.isinf(high):
-        axis.plot(value, row, ">", color="black", markersize=4, gid="open interval")
-
-
-def step_name(name: str, most: int = 3) -> str:
-    """Name of a model for people: words, with the ends of long lists left out, in lines that fit beside the bars."""
-    return textwrap.fill(first_names(in_words(name).split(", "), most), _LINE)
-
-
-def _step_legend(kinds: Collection[str], noise_floor_m: float | None) -> list[Artist]:
+    kinds = {step["kind"] for step in steps}
     handles: list[Artist] = [Patch(color=color, label=label) for kind, (color, label) in LOOKS.items() if kind in kinds]
     handles.append(Line2D([], [], color="black", linewidth=1.1, label="95 % interval over poses"))
     handles.append(Line2D([], [], **_DIAMOND, label="on fitted poses"))
     if noise_floor_m:
         handles.append(Line2D([], [], color="black", linestyle=":", linewidth=1.2, label="RMS that noise alone leaves"))
-    return handles
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
 
 
 @styled
