@@ -21,7 +21,7 @@ ROOMS = {
     "src/elastocal/diagnosis": 5470,
     "src/elastocal/effects": 2700,
     "src/elastocal/exchange": 3760,
-    "src/elastocal/figures": 2650,
+    "src/elastocal/figures": 2020,
     "src/elastocal/fitting": 2600,
     "src/elastocal/io": 1200,
     "src/elastocal/loop": 1300,

@@ -27,6 +27,8 @@ def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
     ]
     assert [bar.get_width() for bar in axis.patches] == pytest.approx([94, 5, 0.4, 0.6])
     assert [text.get_text() for text in axis.texts] == ["94 %", "5 %", "<1 %", "1 %"]
+    certain = probabilities(stated([({"lost_motion": ["joint 3"]}, 0.9961), ({}, 0.0039)]), candidate_table(count=3)).axes[0]
+    assert [text.get_text() for text in certain.texts] == [">99 %", "<1 %"]
 
 
 def test_of_many_hypotheses_the_leading_have_bars_and_the_rest_has_one():
@@ -70,8 +72,3 @@ def test_angles_between_candidates_are_symmetric_and_unknown_where_a_pair_is_mis
     pairs = {"one": ["b", "c", "x"], "other": ["a", "b", "a"], "angle_deg": [30.0, 80.0, 5.0]}
     expected = [[0, 30, np.nan], [30, 0, 80], [np.nan, 80, 0]]
     np.testing.assert_array_equal(angle_matrix(["a", "b", "c"], pairs), expected)
-
-
-def test_a_probability_next_to_one_or_zero_is_not_rounded_to_it():
-    axis = probabilities(stated([({"lost_motion": ["joint 3"]}, 0.9961), ({}, 0.0039)]), candidate_table(count=3)).axes[0]
-    assert [text.get_text() for text in axis.texts] == [">99 %", "<1 %"]

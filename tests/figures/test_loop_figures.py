@@ -6,9 +6,8 @@ from made_loop_tables import candidate_table, confounding_table, residual_table,
 from made_loop_tables import probabilities as stated
 from selected import slow_but
 
-from elastocal.figures.before_after import before_after
 from elastocal.figures.candidates import confounding, probabilities
-from elastocal.figures.residuals import arrows, residuals
+from elastocal.figures.residuals import arrows, before_after, residuals
 from elastocal.figures.style import save
 
 LONG = ("link_elasticity@1+2+3+6[one section]", "force_misalignment[flange axes]", "transmission_harmonic@1[orders 31-36]")

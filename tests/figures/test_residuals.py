@@ -1,16 +1,20 @@
-"""Residuals against what the robot did, and as arrows where it stood: what is drawn is what the table holds."""
+"""Errors of campaigns, as clouds, arrows and bars: what is drawn is what the table holds."""
 
 import numpy as np
+import pandas as pd
 import pytest
-from drawn_figures import texts
-from made_loop_tables import residual_table
+from drawn_figures import row_labels, texts
+from made_loop_tables import residual_table, step_rows
 from matplotlib.collections import PathCollection
 from matplotlib.quiver import Quiver, QuiverKey
 from statsmodels.api import OLS
 
 from elastocal.figures.residuals import (
+    METRICS,
     arrows,
+    before_after,
     bins_of,
+    campaign_errors,
     components,
     length_unit,
     quantities,
@@ -24,21 +28,14 @@ def quivers(axis):
     return [artist for artist in axis.get_children() if isinstance(artist, Quiver)]
 
 
-def labels_of(figure):
-    return [axis.get_xlabel() for axis in figure.axes if axis.get_xlabel()]
-
-
-def test_residuals_have_a_panel_for_each_quantity_that_varies():
-    figure = residuals(residual_table())
-    assert labels_of(figure) == [f"angle of joint {joint} (°)" for joint in range(1, 7)] + ["force (N)", "time (min)"]
-    assert figure.axes[0].get_ylabel() == "residual (µm)"
-
-
-def test_held_out_measurements_are_marked_apart():
+def test_residuals_have_a_panel_for_each_quantity_that_varies_with_held_out_measurements_marked_apart():
     table = residual_table()
-    clouds = [artist for artist in residuals(table).axes[0].collections if isinstance(artist, PathCollection)]
-    sizes = [len(cloud.get_offsets()) for cloud in clouds]
-    assert sizes == 2 * [(~table["held_out"]).sum(), table["held_out"].sum()]
+    figure = residuals(table)
+    labels = [axis.get_xlabel() for axis in figure.axes if axis.get_xlabel()]
+    assert labels == [f"angle of joint {joint} (°)" for joint in range(1, 7)] + ["force (N)", "time (min)"]
+    assert figure.axes[0].get_ylabel() == "residual (µm)"
+    clouds = [artist for artist in figure.axes[0].collections if isinstance(artist, PathCollection)]
+    assert [len(cloud.get_offsets()) for cloud in clouds] == 2 * [(~table["held_out"]).sum(), table["held_out"].sum()]
 
 
 def test_components_are_those_about_the_vertical_and_along_the_force():
@@ -87,15 +84,6 @@ def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_a
         np.testing.assert_allclose(drawn, off[:, axes] * key.U / 200e-6, rtol=1e-9, atol=1e-12)
 
 
-def test_the_horizontal_components_are_turned_and_keep_their_length():
-    table = residual_table()
-    found = components(table, "before")
-    np.testing.assert_allclose(np.hypot(*found[:, :2].T), np.hypot(table["before_dx"], table["before_dy"]))
-    # Along the radius from the axis of the base.
-    radius = np.hypot(table["x"], table["y"])
-    np.testing.assert_allclose(found[:, 0], (table["x"] * table["before_dx"] + table["y"] * table["before_dy"]) / radius)
-
-
 def test_the_share_explained_is_the_adjusted_coefficient_of_determination_about_zero():
     rng = np.random.default_rng(3)
     bins = rng.integers(0, 5, 60)
@@ -132,3 +120,69 @@ def test_time_begins_at_zero_and_is_in_hours_beyond_two(last_s, label, end):
 def test_the_unit_follows_the_residuals_and_not_a_few_outliers(largest_m, unit):
     lengths = np.append(np.full(99, largest_m), 0.5)
     assert length_unit(lengths) == unit
+
+
+def lines_of(axis, gid):
+    return [line.get_xydata().tolist() for line in axis.lines if line.get_gid() == gid]
+
+
+def test_bars_for_every_model_and_measure_from_top_to_bottom_with_diamonds_for_fitted_poses():
+    steps = step_rows()
+    figure = before_after(steps, 5e-5)
+    assert [axis.get_title() for axis in figure.axes] == ["mean", "RMS", "95th percentile", "maximum"]
+    assert {axis.get_xlabel() for axis in figure.axes} == {"error (µm)"}
+    first = figure.axes[0]
+    assert row_labels(first) == ["frames and targets", "declared model", "with lost motion\n(backlash)"]
+    assert first.get_yticks().tolist() == sorted(first.get_yticks()) and first.get_ylim()[0] > first.get_ylim()[1]
+    for axis, metric in zip(figure.axes, METRICS, strict=True):
+        assert [bar.get_width() for bar in axis.patches] == pytest.approx([1e6 * step[f"heldout_{metric}_m"] for step in steps])
+        drawn = [len(lines_of(axis, gid)) for gid in ("interval", "open interval", "noise floor")]
+        assert drawn == [len(steps), len(steps) if metric == "p95" else 0, 1]
+        diamonds = [line.get_xydata()[0].tolist() for line in axis.lines if line.get_marker() == "D"]
+        rows = [bar.get_y() + bar.get_height() / 2 for bar in axis.patches]
+        expected = [[1e6 * step[f"train_{metric}_m"], row] for step, row in zip(steps, rows, strict=True)]
+        assert diamonds == [pytest.approx(point) for point in expected]
+
+
+def test_an_interval_reaches_from_end_to_end_is_open_above_or_is_not_drawn():
+    steps = step_rows(effects=())
+    mean, _, p95, largest = before_after(steps).axes
+    for step, (one, other) in zip(steps, lines_of(mean, "interval"), strict=True):
+        assert [one[0], other[0]] == pytest.approx([1e6 * step["heldout_mean_m_low"], 1e6 * step["heldout_mean_m_high"]])
+    # Of few poses the 95th percentile has no upper end: its line ends at the value, where an arrow points on.
+    for step, (_, end), (arrow,) in zip(steps, lines_of(p95, "interval"), lines_of(p95, "open interval"), strict=True):
+        assert end[0] == arrow[0] == pytest.approx(1e6 * step["heldout_p95_m"])
+    assert np.isnan([x for line in lines_of(largest, "interval") for x, _ in line]).all()
+
+
+@pytest.mark.parametrize("floor_m, scale", [(1.3e-5, "linear"), (None, "linear"), (1.1e-5, "log")])
+def test_the_axis_is_logarithmic_where_the_smallest_would_be_lost_beside_the_largest(floor_m, scale):
+    for axis in before_after(step_rows(effects=()), floor_m).axes:
+        assert axis.get_xscale() == scale
+        low, high = axis.get_xlim()
+        drawn = [bar.get_width() for bar in axis.patches] + ([1e6 * floor_m] if floor_m else [])
+        assert low < min(drawn) and high > max(drawn)
+
+
+TABLE = pd.DataFrame(
+    {
+        "campaign": ["ur10_a_on_b", "wam_grid"],
+        "poses": [24, 1],
+        **{f"before_rms{end}_mm": values for end, values in (("", [0.4, 2.0]), ("_low", [0.3, 1.8]), ("_high", [0.5, np.inf]))},
+        **{f"after_rms{end}_mm": values for end, values in (("", [0.2, 1.9]), ("_low", [0.1, 1.7]), ("_high", [0.3, 2.2]))},
+    }
+)
+
+
+def test_each_campaign_has_both_errors_at_their_values():
+    (axis,) = campaign_errors(TABLE).axes
+    assert row_labels(axis) == ["UR10 A on B", "WAM grid"]
+    before, after = (container.lines[0].get_xydata() for container in axis.containers)
+    np.testing.assert_allclose(before, [[0.4, 1], [2.0, 0]])
+    np.testing.assert_allclose(after, [[0.2, 1], [1.9, 0]])
+    assert all(np.isfinite(line.get_segments()).all() for container in axis.containers for line in container.lines[2])
+    # Sessions of one campaign stand by their poses.
+    assert row_labels(campaign_errors(TABLE.assign(campaign="fanuc_joint")).axes[0]) == [
+        "FANUC joint, 24 poses",
+        "FANUC joint, 1 pose",
+    ]

@@ -19,7 +19,7 @@ from selected import slow_but
 
 from elastocal.diagnosis.verdict import CLASS
 from elastocal.effects.catalogue import effects
-from elastocal.figures.before_after import before_after
+from elastocal.figures.residuals import before_after
 from elastocal.figures.style import save
 from elastocal.report.first_page import AT_FAULT, what_to_do
 from elastocal.report.loop_facts import write_loop_report

@@ -91,7 +91,7 @@ EDITS = {
         {"draw_scheme", "draw_weights"},
     ),
     "figures, and a script that seems older than its results": (
-        lambda study: (study.edit("src/elastocal/figures/strategies.py"), _dated_back(study)),
+        lambda study: (study.edit("src/elastocal/figures/study.py"), _dated_back(study)),
         set(),
         {"draw_noise_impact", "draw_stiffness_errors", "draw_deviations", "typeset_table"},
         {"tabulate_strategies", "tabulate_initial", "draw_scheme"},

@@ -186,7 +186,7 @@ def test_another_seed_of_the_held_out_poses_reruns_the_campaign_and_nothing_of_t
 
 # Modules edited at once, the rules that run again, and those that do not.
 EDITS = {
-    "figures of the study and style of all figures": (["figures/strategies", "figures/style"], set(), set(STEPS)),
+    "figures of the study and style of all figures": (["figures/study", "figures/style"], set(), set(STEPS)),
     "the judgement": (["diagnosis/judge"], set(STEPS[2:]), set(STEPS[:2])),
     "an effect": (["effects/payload"], set(STEPS[1:]), {"simulate", "measure"}),
     "a fault": (["data_checks/loads"], set(STEPS[1:]), set(STEPS[:1])),

@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.strategies import accuracy_of_one_data_set
+from elastocal.figures.study import accuracy_of_one_data_set
 from elastocal.figures.style import save
 
 

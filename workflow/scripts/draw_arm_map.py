@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.arm_map import arm_map
+from elastocal.figures.arms import arm_map
 from elastocal.figures.style import save
 from elastocal.mechanics.kinematics import corners
 from elastocal.mechanics.robot_file import robot_from_document

@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.questions import budget
+from elastocal.figures.study import budget
 from elastocal.figures.style import save
 
 

@@ -4,9 +4,8 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.before_after import before_after
 from elastocal.figures.candidates import confounding, probabilities
-from elastocal.figures.residuals import arrows, residuals
+from elastocal.figures.residuals import arrows, before_after, residuals
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table

@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.questions import costs
+from elastocal.figures.study import costs
 from elastocal.figures.style import save
 
 

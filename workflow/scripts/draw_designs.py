@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.questions import designs
+from elastocal.figures.study import designs
 from elastocal.figures.style import save
 
 

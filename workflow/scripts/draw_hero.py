@@ -2,7 +2,7 @@
 
 from job import Job, origin_of, run
 
-from elastocal.figures.hero import arm_with_errors
+from elastocal.figures.arms import arm_with_errors
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.loop.residual_tables import read_residuals

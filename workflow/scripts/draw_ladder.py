@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.questions import ladder
+from elastocal.figures.study import ladder
 from elastocal.figures.style import save
 
 

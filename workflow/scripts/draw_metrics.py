@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.questions import metrics
+from elastocal.figures.study import metrics
 from elastocal.figures.style import save
 from elastocal.report.metric_answers import METRIC_NAMES
 

@@ -2,7 +2,7 @@
 
 from job import Job, origin_of, run
 
-from elastocal.figures.strategies import noise_impact
+from elastocal.figures.study import noise_impact
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
 from elastocal.study.table_schemas import metrics

@@ -2,8 +2,7 @@
 
 from job import Job, origin_of, run
 
-from elastocal.figures.kinematic_scheme import kinematic_scheme
-from elastocal.figures.spring_scheme import spring_scheme
+from elastocal.figures.schemes import kinematic_scheme, spring_scheme
 from elastocal.figures.style import save
 from elastocal.mechanics.robot_file import robot_from_document
 

@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.against_paper import scores
+from elastocal.figures.study import scores
 from elastocal.figures.style import save
 
 

@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.strategies import over_studies
+from elastocal.figures.study import over_studies
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_studies
 from elastocal.study.table_schemas import repeated

@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.against_paper import table2_samples
+from elastocal.figures.study import table2_samples
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_frame
 from elastocal.study.table_schemas import INITIAL

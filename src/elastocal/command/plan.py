@@ -201,7 +201,7 @@ def _write_files(task: _Task, options: _Options, names: list[str], found: Plan, 
     """The campaign's folder, if one is wanted, and the table, the sheet and the picture there or beside the output."""
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
-    from elastocal.figures.plan import plan_picture, pose_pictures
+    from elastocal.figures.arms import plan_picture, pose_pictures
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import write_together
     from elastocal.io.data_frames import write_csv

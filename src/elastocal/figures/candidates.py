@@ -1,7 +1,7 @@
 """What may be missing in a model: probabilities of hypotheses, candidates one by one, and which of them contribute alike."""
 
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,7 +46,13 @@ def probabilities(stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarr
     figure, axes = panels(2, 1, sum(height_mm), height_ratios=height_mm)
     _bars(axes[0, 0], np.cumsum(heights) - heights / 2, heights.sum(), labels, values)
     _factors(axes[1, 0], table, named)
-    _families_legend(figure, table, order, named)
+    present = [family for family in FAMILIES if family in set(table["family"][named])]
+    handles = [Patch(color=FAMILIES[family], label=family) for family in present]
+    if table["chosen"].any():
+        handles.append(Patch(facecolor="none", edgecolor="black", linewidth=1.3, label="in the most probable model"))
+    untestable = len(set(table["candidate"])) - len(order)
+    words = f"{len(order)} candidate causes tested; {untestable} more cannot be tested with these measurements"
+    figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4)
     return figure
 
 
@@ -66,7 +72,9 @@ def _bars(axis: Axes, rows: np.ndarray, end: float, labels: Sequence[str], value
 def _factors(axis: Axes, table: Mapping[str, np.ndarray], named: np.ndarray) -> None:
     """Bayes factors of single candidates, coloured by family."""
     factors, rows = table["log_bayes_factor"][named], np.arange(len(named))
-    axis.barh(rows, factors, color=_colours(table, named), height=0.62, zorder=2)
+    axis.barh(
+        rows, factors, color=[FAMILIES.get(family, PALETTE[-1]) for family in table["family"][named]], height=0.62, zorder=2
+    )
     chosen = table["chosen"][named].astype(bool)
     if chosen.any():
         style: dict[str, Any] = {"facecolor": "none", "edgecolor": "black", "linewidth": 1.3, "zorder": 3, "gid": "chosen"}
@@ -114,12 +122,11 @@ def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]
     axis.tick_params(length=0)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)
-    for label, name in zip(axis.get_yticklabels(), names, strict=True):
-        if name in chosen:
-            label.set(fontweight="bold", color=PALETTE[1])
     for number, name in enumerate(names):
         if name in chosen:
-            axis.add_patch(_frame(number, count))
+            axis.get_yticklabels()[number].set(fontweight="bold", color=PALETTE[1])
+            frame = Rectangle((-0.5, number - 0.5), count, 1, fill=False, edgecolor=PALETTE[1], linewidth=1.4, zorder=4)
+            axis.add_patch(frame)
     bar = figure.colorbar(image, ax=axis, ticks=[0, 20, 45, 70, 90])
     bar.set_label("angle between the contributions (°)")
     if chosen & set(names):
@@ -184,10 +191,6 @@ def _note_nothing_tested(table: Mapping[str, np.ndarray]) -> Figure:
     return note(f"None of {count} candidate causes can be tested with these measurements.")
 
 
-def _colours(table: Mapping[str, np.ndarray], indices: Iterable[int]) -> list[str]:
-    return [FAMILIES.get(table["family"][index], PALETTE[-1]) for index in indices]
-
-
 def _root(value: np.ndarray | float) -> np.ndarray:
     """Root that keeps the sign."""
     return np.sign(value) * np.sqrt(np.abs(value))
@@ -206,17 +209,3 @@ def _ticks(low: float, high: float) -> list[int]:
         if low <= step <= high and all(abs(_root(step) - _root(other)) > apart for other in kept):
             kept.append(step)
     return sorted(kept)
-
-
-def _families_legend(figure: Figure, table: Mapping[str, np.ndarray], order: np.ndarray, named: np.ndarray) -> None:
-    present = [family for family in FAMILIES if family in set(table["family"][named])]
-    handles = [Patch(color=FAMILIES[family], label=family) for family in present]
-    if table["chosen"].any():
-        handles.append(Patch(facecolor="none", edgecolor="black", linewidth=1.3, label="in the most probable model"))
-    untestable = len(set(table["candidate"])) - len(order)
-    words = f"{len(order)} candidate causes tested; {untestable} more cannot be tested with these measurements"
-    figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4)
-
-
-def _frame(number: int, count: int) -> Rectangle:
-    return Rectangle((-0.5, number - 0.5), count, 1, fill=False, edgecolor=PALETTE[1], linewidth=1.4, zorder=4)

@@ -1,29 +1,21 @@
 """Figures of a certificate: errors over the workspace, and what each effect costs."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
-from elastocal.figures.style import PALETTE, panels, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from typing import Any
-
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from elastocal.application.certificate.workspace import WorkspaceErrors
+from elastocal.application.certificate.workspace import WorkspaceErrors
+from elastocal.figures.style import MILLI, PALETTE, panels, styled
 
 _BINS = 24
 _FEWEST = 3
-_MILLI = 1e3
 # Light to dark: the larger error is the darker one, in grey too.
 _COLOURS = "viridis_r"
 # What is left however well the robot is corrected.
@@ -46,7 +38,7 @@ def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], to
     figure, axes = panels(len(maps), 2, 62 * len(maps) + 16, sharex=True, sharey=True)
     grids = [[_bin(errors, values) for values in (errors.uncorrected_m, errors.corrected_m)] for errors in maps]
     known = np.concatenate([found[np.isfinite(found)] for pair in grids for found in pair] + [[tolerance_m]])
-    scale = LogNorm(_MILLI * known[known > 0].min(), _MILLI * known.max())
+    scale = LogNorm(MILLI * known[known > 0].min(), MILLI * known.max())
     for row, errors, pair, force in zip(axes, maps, grids, forces_N, strict=True):
         load = f"{force:.0f} N hanging" if force else "no load"
         for axis, found, title in zip(row, pair, ("uncorrected", "corrected"), strict=True):
@@ -57,40 +49,37 @@ def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], to
         axis.set_xlabel("distance from the base's vertical axis (m)")
     bar = figure.colorbar(image, ax=axes.ravel().tolist(), label="predicted RMS position error (mm)")
     bar.ax.yaxis.set_major_formatter("{x:g}")
-    bar.ax.axhline(_MILLI * tolerance_m, color="black", lw=1.6)
+    bar.ax.axhline(MILLI * tolerance_m, color="black", lw=1.6)
     handles = [
-        Line2D([], [], color="black", lw=1.6, label=f"tolerance {_MILLI * tolerance_m:g} mm"),
+        Line2D([], [], color="black", lw=1.6, label=f"tolerance {MILLI * tolerance_m:g} mm"),
         Patch(facecolor="none", edgecolor="#555555", hatch="////", lw=0.0, label="mostly beyond the range of the fitted poses"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 
 
-def _edges(errors: WorkspaceErrors) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    radius, height = np.hypot(errors.position[:, 0], errors.position[:, 1]), errors.position[:, 2]
-    return radius, height, [np.linspace(values.min(), values.max(), _BINS + 1) for values in (radius, height)]
-
-
-def _statistic(errors: WorkspaceErrors, values: np.ndarray, how: Any) -> np.ndarray:
+def _statistic(errors: WorkspaceErrors, values: np.ndarray, how: Any) -> tuple[np.ndarray, list[np.ndarray]]:
+    """A statistic of values (N,) in each cell, (bins, bins), and the edges of the cells in m."""
     from scipy.stats import binned_statistic_2d
 
-    radius, height, edges = _edges(errors)
-    return np.asarray(binned_statistic_2d(radius, height, values, how, bins=edges).statistic)
+    radius, height = np.hypot(errors.position[:, 0], errors.position[:, 1]), errors.position[:, 2]
+    edges = [np.linspace(values.min(), values.max(), _BINS + 1) for values in (radius, height)]
+    return np.asarray(binned_statistic_2d(radius, height, values, how, bins=edges).statistic), edges
 
 
 def _bin(errors: WorkspaceErrors, values: np.ndarray) -> np.ndarray:
     """RMS of values (N,) in each cell with enough poses, (bins, bins); elsewhere not a number."""
-    enough = _statistic(errors, values, "count") >= _FEWEST
-    return np.where(enough, np.sqrt(_statistic(errors, values**2, "mean")), np.nan)
+    enough = _statistic(errors, values, "count")[0] >= _FEWEST
+    return np.where(enough, np.sqrt(_statistic(errors, values**2, "mean")[0]), np.nan)
 
 
 def _panel(axis: Axes, errors: WorkspaceErrors, found: np.ndarray, scale: LogNorm, tolerance_m: float) -> Any:
-    _, _, edges = _edges(errors)
-    image = axis.pcolormesh(edges[0], edges[1], _MILLI * found.T, cmap=_COLOURS, norm=scale, rasterized=True)
+    outside, edges = _statistic(errors, errors.outside.astype(float), "mean")
+    image = axis.pcolormesh(edges[0], edges[1], MILLI * found.T, cmap=_COLOURS, norm=scale, rasterized=True)
     middles = [(ends[1:] + ends[:-1]) / 2 for ends in edges]
     if np.nanmin(found) < tolerance_m < np.nanmax(found):
         axis.contour(*middles, found.T, levels=[tolerance_m], colors="black", linewidths=1.6)
-    beyond = np.isfinite(found) & (_statistic(errors, errors.outside.astype(float), "mean") > 0.5)
+    beyond = np.isfinite(found) & (outside > 0.5)
     size = edges[0][1] - edges[0][0], edges[1][1] - edges[1][0]
     for across, up in np.argwhere(beyond):
         corner = edges[0][across], edges[1][up]
@@ -115,14 +104,14 @@ def budget_bars(budget: Sequence[Mapping[str, Any]], names: Sequence[str], toler
     for row, (_, line) in enumerate(shown):
         kind = line["name"] if line["name"] in _KINDS else "rest" if line["name"] in _REST else "effect"
         kinds.append(kind)
-        size, end = _MILLI * line["rms_m"], _MILLI * (line["high_m"] or line["rms_m"])
+        size, end = MILLI * line["rms_m"], MILLI * (line["high_m"] or line["rms_m"])
         axis.barh(row, size, height=0.6, color=_KINDS[kind][0], edgecolor="black" if kind == TRACKER else None, linewidth=0.6)
         if line["low_m"] is not None:
-            axis.plot([_MILLI * line["low_m"], end], [row, row], color="black", lw=1.2)
+            axis.plot([MILLI * line["low_m"], end], [row, row], color="black", lw=1.2)
         style: dict[str, Any] = {"fontsize": 7, "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.6}}
         axis.annotate(f"{size:.3f}", (max(size, end), row), (4, 0), textcoords="offset points", va="center", **style)
-    axis.axvline(_MILLI * tolerance_m, color=PALETTE[1], ls="--", zorder=0, label=f"tolerance {_MILLI * tolerance_m:g} mm")
-    axis.set(xlim=(0, 1.1 * max(axis.get_xlim()[1], _MILLI * tolerance_m)), xlabel="predicted RMS position error (mm)")
+    axis.axvline(MILLI * tolerance_m, color=PALETTE[1], ls="--", zorder=0, label=f"tolerance {MILLI * tolerance_m:g} mm")
+    axis.set(xlim=(0, 1.1 * max(axis.get_xlim()[1], MILLI * tolerance_m)), xlabel="predicted RMS position error (mm)")
     axis.set_yticks(range(len(shown)), [name for name, _ in shown])
     axis.invert_yaxis()
     axis.grid(visible=False, axis="y")

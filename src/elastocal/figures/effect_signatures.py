@@ -3,29 +3,21 @@
 Effects are distinguishable by these dependences, so that all are shown by the same three experiments on one arm.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from elastocal.effects.catalogue import effects
 from elastocal.effects.conditions import conditions_of
+from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import PALETTE, panels, styled
 from elastocal.fitting.displacement import displace
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.sites import sites_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from elastocal.effects.protocol import Candidate
-    from elastocal.mechanics.robot import Robot
-    from elastocal.mechanics.sites import Sites
+from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.sites import Sites, sites_of
 
 # The joint that bears the arm shows most effects; one that can act at several joints is shown there.
 _SHOWN_AT = 2
@@ -73,32 +65,26 @@ def signature(name: str, robot: Robot) -> Signature:
     `name`: of an effect of the catalogue. `robot`: with compliances, and with a compensator for the effects of one. What its
     links weigh is left aside, since the weight of links is an effect only where it is not declared.
     """
-    sites = _weightless(robot)
     offered = list_candidates(name, robot)
     candidate = next((each for each in offered if each.joints[:1] == (_SHOWN_AT,)), offered[0])
     joint = (*candidate.joints, *candidate.turning, _SHOWN_AT)[0]
-    limits = np.degrees(robot.joint_limits[joint - 1])
-    first, last = np.clip(limits, -_WIDEST_SWEEP_DEG, _WIDEST_SWEEP_DEG)
-    angle = np.linspace(first, last, _SAMPLES)
+    limits = np.clip(np.degrees(robot.joint_limits[joint - 1]), -_WIDEST_SWEEP_DEG, _WIDEST_SWEEP_DEG)
+    angle = np.linspace(limits[0], limits[1], _SAMPLES)
     force, time = np.linspace(-_PULL_N, _PULL_N, _SAMPLES), np.linspace(0, _HOURS, _SAMPLES)
-    turned = np.tile(np.radians(_POSE_DEG[: robot.joints]), (_SAMPLES, 1))
+    still = np.tile(np.radians(_POSE_DEG[: robot.joints]), (_SAMPLES, 1))
+    turned = still.copy()
     turned[:, joint - 1] = np.radians(angle)
-
-    def displace(angles: np.ndarray | None = None, newtons: np.ndarray | float = 0.0, **more: Any) -> np.ndarray:
-        return _displacement_mm(candidate, sites, robot.compliance, _states(robot.joints, angles, newtons, **more))
-
-    return Signature(
-        candidate,
-        joint,
-        angle,
-        force,
-        time,
-        displace(turned),
-        displace(turned, _PULL_N),
-        displace(None, force),
-        displace(None, force, approach=-1.0),
-        displace(None, time_h=time),
+    # Angles, pull, approach and time of each experiment; what one does not vary is as in the middle of the campaign.
+    middle, pulled = np.full(_SAMPLES, _HOURS / 2), np.full(_SAMPLES, _PULL_N)
+    experiments = (
+        (turned, 0 * force, 1.0, middle),
+        (turned, pulled, 1.0, middle),
+        (still, force, 1.0, middle),
+        (still, force, -1.0, middle),
+        (still, 0 * force, 1.0, time),
     )
+    moved = [_displacement_mm(candidate, _weightless(robot), robot.compliance, *each) for each in experiments]
+    return Signature(candidate, joint, angle, force, time, *moved)
 
 
 def list_candidates(name: str, robot: Robot) -> list[Candidate]:
@@ -110,33 +96,30 @@ def _weightless(robot: Robot) -> Sites:
     return replace(sites_of(robot), masses=(), gear_ratio=(_GEAR_RATIO,) * robot.joints)
 
 
-def _states(
-    joints: int,
-    angles: np.ndarray | None,
-    newtons: np.ndarray | float,
-    approach: float = 1.0,
-    time_h: np.ndarray | float = _HOURS / 2,
-) -> States:
-    """States that differ in what is given alone; the rest is as in the middle of the campaign."""
-    every = np.ones(_SAMPLES)
-    share = every * time_h / _HOURS
-    pose = np.tile(np.radians(_POSE_DEG[:joints]), (_SAMPLES, 1)) if angles is None else angles
-    return States(
-        session=np.zeros(_SAMPLES, int),
+def _displacement_mm(
+    candidate: Candidate,
+    sites: Sites,
+    compliance: np.ndarray,
+    angles: np.ndarray,
+    newtons: np.ndarray,
+    approach: float,
+    time_h: np.ndarray,
+) -> np.ndarray:
+    """Displacement of the reflector, ndarray (S, 3)."""
+    once, share = np.ones(_SAMPLES, int), time_h / _HOURS
+    wrench = np.column_stack([np.outer(newtons, _PULL), np.zeros((_SAMPLES, 3))])
+    states = States(
+        session=0 * once,
         pose=np.arange(_SAMPLES),
-        load=np.ones(_SAMPLES, int),
-        joint_angles=pose,
-        wrench=np.column_stack([np.outer(every * newtons, _PULL), np.zeros((_SAMPLES, 3))]),
-        repeats=np.ones(_SAMPLES, int),
-        approach=np.full((_SAMPLES, joints), approach),
-        time_s=_HOUR_S * _HOURS * share,
+        load=once,
+        joint_angles=angles,
+        wrench=wrench,
+        repeats=once,
+        approach=np.full(angles.shape, approach),
+        time_s=_HOUR_S * time_h,
         temperature_c=_LOWEST_C + _RISE_K * share,
         row=share,
     )
-
-
-def _displacement_mm(candidate: Candidate, sites: Sites, compliance: np.ndarray, states: States) -> np.ndarray:
-    """Displacement of the reflector, ndarray (S, 3)."""
     around = conditions_of(sites, compliance, states, row_span=(0, 1))
     point = replace(sites.chain.end_effector, offset_m=_REFLECTOR_M)
     commanded = sites.chain.at(states.joint_angles)
@@ -157,29 +140,25 @@ def signature_figure(shown: Signature) -> Figure:
     figure.set_layout_engine(None)
     figure.subplots_adjust(left=0.085, right=0.99, bottom=0.18, top=0.96, wspace=0.08)
     angle, force, time = axes[0]
-    _lines(angle, shown.angle_deg, shown.by_angle, "-", "unloaded")
-    _lines(angle, shown.angle_deg, shown.by_angle_loaded, "--", f"pulled by {_PULL_N:.0f} N")
-    _lines(force, shown.force_N, shown.by_force, "-", "approached upwards")
-    _lines(force, shown.force_N, shown.by_force_falling, ":", "approached downwards")
-    _lines(time, shown.time_h, shown.by_time, "-", "")
+    for panel, along, moved, dashes, label in (
+        (angle, shown.angle_deg, shown.by_angle, "-", "unloaded"),
+        (angle, shown.angle_deg, shown.by_angle_loaded, "--", f"pulled by {_PULL_N:.0f} N"),
+        (force, shown.force_N, shown.by_force, "-", "approached upwards"),
+        (force, shown.force_N, shown.by_force_falling, ":", "approached downwards"),
+        (time, shown.time_h, shown.by_time, "-", ""),
+    ):
+        for axis, colour in enumerate(PALETTE[:3]):
+            panel.plot(along, moved[:, axis], dashes, color=colour, label=label)
     angle.set(xlabel=f"angle of joint {shown.joint} (°)", ylabel="displacement (mm)")
     force.set(xlabel="force on the end-effector (N)", xticks=(-_PULL_N, 0, _PULL_N))
     time.set(xlabel=f"time (h), warming by {_RISE_K:.0f} K")
+    # One grey line for each kind of dashes; the colours are those of the last panel.
     for panel in (angle, force):
-        panel.legend(handles=_dashes(panel), loc="upper left")
+        kinds = {line.get_linestyle(): line.get_label() for line in panel.lines}
+        handles = [Line2D([], [], color="#4D4D4D", linestyle=dashes, label=label) for dashes, label in kinds.items()]
+        panel.legend(handles=handles, loc="upper left")
     time.legend(handles=time.lines[:3], labels=["along x", "along y", "along z"], loc="upper left")
     largest = max(np.abs(line.get_ydata()).max() for panel in axes[0] for line in panel.lines)
     # Above the lines is room for the legends.
     angle.set_ylim(-1.1 * largest, 2.1 * largest)
     return figure
-
-
-def _lines(axes: Axes, along: np.ndarray, moved: np.ndarray, dashes: str, label: str) -> None:
-    for axis, colour in enumerate(PALETTE[:3]):
-        axes.plot(along, moved[:, axis], dashes, color=colour, label=label if axis == 0 else "")
-
-
-def _dashes(axes: Axes) -> list:
-    """One grey line for each kind of dashes; the colours are those of the last panel."""
-    kinds = {line.get_linestyle(): line.get_label() for line in axes.lines[::3]}
-    return [Line2D([], [], color="#4D4D4D", linestyle=dashes, label=label) for dashes, label in kinds.items()]

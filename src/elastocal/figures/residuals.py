@@ -1,20 +1,23 @@
-"""Residuals of a campaign, before and after: against what the robot did, and as arrows where it stood."""
+"""Errors of a campaign, before and after: against what the robot did, as arrows where it stood, and model by model."""
 
-from collections.abc import Iterable, Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
-from elastocal.figures.arm_map import draw_links
-from elastocal.figures.style import PALETTE, note, panels, styled
+from elastocal.counting import counted, first_names
+from elastocal.diagnosis.words import in_words
+from elastocal.figures.arms import draw_links
+from elastocal.figures.style import MICRO, MILLI, STAGES, label_decades, legend_below, note, panels, styled
 
-MICRO, MILLI = 1e6, 1e3
-_STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
 # About the vertical of the base, since what turns with the first joint then stays one component; and along the force, since
 # what gives way does so in its direction.
 COMPONENTS = ("radial", "tangential", "vertical", "along force")
@@ -31,6 +34,18 @@ _MOST_ARROWS = 320
 _CELLS = 18
 # Length of the arrow of a large residual, as a share of the workspace.
 _ARROW = 0.13
+
+METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
+LOOKS = {
+    "frames": ("#b9b9b9", "frames and targets only"),
+    "declared": STAGES["before"][::-1],
+    "effect": STAGES["after"][::-1],
+    "kept": ("#777777", "frames and targets only, kept"),
+}
+# Beyond this ratio the smallest bars would be lost on a linear axis.
+_LARGEST_RATIO = 25
+_LINE, _NAMES = 26, 3
+_DIAMOND: dict[str, Any] = {"linestyle": "", "marker": "D", "color": "white", "markeredgecolor": "black", "markersize": 3.4}
 
 
 @styled
@@ -58,7 +73,7 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
         shares = {stage: [share_explained(bins, part) for part in parts[stage].T] for stage in stages}
         shown = int(np.argmax(shares["before"]))
         for stage in stages:
-            _cloud(axis, values, scale * parts[stage][:, shown], held_out, _STAGES[stage][1], bins)
+            _cloud(axis, values, scale * parts[stage][:, shown], held_out, STAGES[stage][1], bins)
         percent = " → ".join(f"{100 * shares[stage][shown]:.0f}" for stage in stages)
         axis.set_title(f"{COMPONENTS[shown]}: {percent} %", fontsize=7.5, loc="left")
         axis.set(xlabel=label, ylim=limits)
@@ -68,7 +83,12 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
     for axis in axes[:, 0]:
         axis.set_ylabel(f"residual ({unit})")
     above = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
-    handles = _legend(stages, bool(held_out.any()))
+    drawn = [STAGES[stage] for stage in stages]
+    handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
+    look: dict[str, Any] = {"color": "#666666", "linestyle": ""}
+    handles.append(Line2D([], [], marker="o", markersize=2.5, label="fitted measurement", **look))
+    if held_out.any():
+        handles.append(Line2D([], [], marker="x", markersize=4, label="validation measurement", **look))
     figure.legend(handles=handles, title=above, loc="outside lower center", ncols=4, columnspacing=1.4)
     figure.set_dpi(_PIXELS_PER_INCH)
     return figure
@@ -85,7 +105,9 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
     size = np.linalg.norm(off["before"], axis=1)
     largest = max(np.quantile(size, 0.95), 1e-9)
     extent = np.maximum(np.ptp(place, axis=0), 1e-3)
-    cell_m = _cell_side(extent) if len(place) > _MOST_ARROWS else None
+    # One digit: the side of a cell is a number that can be quoted.
+    digit = 10.0 ** np.floor(np.log10(extent.max() / _CELLS))
+    cell_m = float(np.ceil(extent.max() / _CELLS / digit) * digit) if len(place) > _MOST_ARROWS else None
     views = {"from the side": (0, 2), "from above": (0, 1)}
     figure, axes = panels(1, 2, 26 + float(np.clip(66 * extent[1:].max() / extent[0], 40, 56)))
     length = _ARROW * extent.max()
@@ -95,7 +117,7 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
         for order, stage in enumerate(stages):
             tips = at + off[stage][shown][:, seen] * length / largest
             head = {"width": 0.006 - 0.0025 * order, "headwidth": 3.2, "headlength": 4, "headaxislength": 3.6, "minlength": 0.3}
-            arrow = axis.quiver(*at.T, *(tips - at).T, angles="xy", scale_units="xy", scale=1, color=_STAGES[stage][1], **head)
+            arrow = axis.quiver(*at.T, *(tips - at).T, angles="xy", scale_units="xy", scale=1, color=STAGES[stage][1], **head)
             arrow.set(zorder=3 + order, gid=stage)
             axis.update_datalim(tips)
         if arm is not None:
@@ -110,7 +132,7 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
     _scale_arrow(axes[0, 1], largest, length)
     of_cells = f"one state of each cell of {1e3 * (cell_m or 0.0):g} mm, that of the middle residual"
     which = of_cells if cell_m else "each arrow: mean of the repeats"
-    handles = [Line2D([], [], color=_STAGES[stage][1], linewidth=2, label=_STAGES[stage][0]) for stage in stages]
+    handles = [Line2D([], [], color=STAGES[stage][1], linewidth=2, label=STAGES[stage][0]) for stage in stages]
     figure.legend(handles=handles, title=which, loc="outside lower center", ncols=2)
     return figure
 
@@ -228,32 +250,16 @@ def middle_of_cells(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray
 def _stages(table: Mapping[str, np.ndarray]) -> tuple[str, ...]:
     """Both stages, or the first alone where nothing was found that changes a residual."""
     same = all(np.allclose(table[f"before_d{axis}"], table[f"after_d{axis}"], rtol=0, atol=1e-9) for axis in "xyz")
-    return tuple(_STAGES)[: 1 if same else 2]
-
-
-def _legend(stages: Iterable[str], with_held_out: bool) -> list[Line2D]:
-    drawn = [_STAGES[stage] for stage in stages]
-    handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
-    handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="fitted measurement"))
-    if with_held_out:
-        handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="validation measurement"))
-    return handles
+    return tuple(STAGES)[: 1 if same else 2]
 
 
 def _states(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Mean place and residuals of each state and target."""
     keys = ["held_out", "session", "pose", "load", "target"]
-    seen = [*"xyz", *(f"{stage}_d{axis}" for stage in _STAGES for axis in "xyz")]
+    seen = [*"xyz", *(f"{stage}_d{axis}" for stage in STAGES for axis in "xyz")]
     means = pd.DataFrame({name: table[name] for name in keys + seen}).groupby(keys, dropna=False, observed=True).mean()
-    off = {stage: means[[f"{stage}_d{axis}" for axis in "xyz"]].to_numpy() for stage in _STAGES}
+    off = {stage: means[[f"{stage}_d{axis}" for axis in "xyz"]].to_numpy() for stage in STAGES}
     return means[[*"xyz"]].to_numpy(), off
-
-
-def _cell_side(extent: np.ndarray) -> float:
-    # One digit: the side of a cell is a number that can be quoted.
-    side = extent.max() / _CELLS
-    digit = 10.0 ** np.floor(np.log10(side))
-    return float(np.ceil(side / digit) * digit)
 
 
 def _scale_arrow(axis: Axes, largest: float, length: float) -> None:
@@ -265,3 +271,80 @@ def _scale_arrow(axis: Axes, largest: float, length: float) -> None:
     place = {"labelpos": "W", "coordinates": "axes", "fontproperties": {"size": 8}}
     axis.quiverkey(key, 0.88, 1.035, shown * length / largest, f"{scale * shown:g} {unit}", **place)
     key.set_visible(False)
+
+
+@styled
+def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None = None) -> Figure:
+    """Bars of the errors on held-out poses, one for each model.
+
+    `steps`: rows of before_after.csv. `noise_floor_m`: RMS error that the noise alone leaves.
+    """
+    # Words, with the ends of long lists left out, in lines that fit beside the bars.
+    labels = [textwrap.fill(first_names(in_words(step["step"]).split(", "), _NAMES), _LINE) for step in steps]
+    lines = [label.count("\n") + 1 for label in labels]
+    figure, axes = panels(1, len(METRICS), 30 + 4.0 * sum(lines) + 4.5 * len(steps), sharey=True)
+    # Rows as high as their names are long.
+    heights = np.array([0.55 + 0.45 * count for count in lines])
+    rows = np.cumsum(heights) - heights / 2
+    values = np.array([[step[f"heldout_{metric}_m"] for metric in METRICS] for step in steps])
+    scale, unit = (MILLI, "mm") if values.max() >= 1e-3 else (MICRO, "µm")
+    trained = np.array([[step[f"train_{metric}_m"] for metric in METRICS] for step in steps])
+    known = [*values[values > 0], *([noise_floor_m] if noise_floor_m else [])]
+    logarithmic = max(known) > _LARGEST_RATIO * min(known)
+    for axis, (metric, title) in zip(axes[0], METRICS.items(), strict=True):
+        for row, step in zip(rows, steps, strict=True):
+            value, low, high = (scale * step[f"heldout_{metric}_m{end}"] for end in ("", "_low", "_high"))
+            axis.barh(row, value, height=0.42, color=LOOKS[step["kind"]][0])
+            # An arrow where the interval is open above; nothing where there is none.
+            axis.plot([low, value if np.isinf(high) else high], [row, row], color="black", linewidth=1.1, gid="interval")
+            if np.isinf(high):
+                axis.plot(value, row, ">", color="black", markersize=4, gid="open interval")
+            axis.plot(scale * step[f"train_{metric}_m"], row, **_DIAMOND)
+        if noise_floor_m:
+            axis.axvline(scale * noise_floor_m, color="black", linestyle=":", linewidth=1.2, gid="noise floor")
+        axis.set(title=title, xlabel=f"error ({unit})")
+        if logarithmic:
+            axis.set(xscale="log", xlim=(0.5 * scale * min(known), 1.6 * scale * max(values.max(), trained.max())))
+            axis.xaxis.set_major_formatter("{x:g}")
+        else:
+            axis.set_xlim(0, None)
+        axis.grid(visible=False, axis="y")
+        axis.set_axisbelow(True)
+    axes[0, 0].set(yticks=rows, ylim=(heights.sum(), 0))
+    axes[0, 0].set_yticklabels(labels, fontsize=7.5)
+    kinds = {step["kind"] for step in steps}
+    handles: list[Artist] = [Patch(color=color, label=label) for kind, (color, label) in LOOKS.items() if kind in kinds]
+    handles.append(Line2D([], [], color="black", linewidth=1.1, label="95 % interval over poses"))
+    handles.append(Line2D([], [], **_DIAMOND, label="on fitted poses"))
+    if noise_floor_m:
+        handles.append(Line2D([], [], color="black", linestyle=":", linewidth=1.2, label="RMS that noise alone leaves"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+@styled
+def campaign_errors(table: pd.DataFrame) -> Figure:
+    """Root mean square errors with their intervals, a line for each campaign.
+
+    `table`: ``campaign``, ``poses``, and ``before_rms_mm``, ``before_rms_low_mm``, ``before_rms_high_mm``, the same for after:
+    mm.
+    """
+    rows = np.arange(len(table))[::-1]
+    figure, axes = panels(1, 1, 24 + 6 * len(table))
+    axis = axes[0, 0]
+    axis.hlines(rows, table["after_rms_mm"], table["before_rms_mm"], color="#c8c8c8", lw=2.5, zorder=1)
+    for stage, (words, color) in STAGES.items():
+        rms, low, high = (table[f"{stage}_rms{end}_mm"].to_numpy(float) for end in ("", "_low", "_high"))
+        # An interval that is open above is drawn to the value alone.
+        span = [rms - low, np.where(np.isfinite(high), high - rms, 0.0)]
+        axis.errorbar(rms, rows, xerr=span, fmt="o", color=color, ms=4, lw=1.2, capsize=2, label=words, zorder=2)
+    # Robots and series in capitals, as people write them.
+    names = table["campaign"].str.replace("_", " ").str.replace(r"^\w+|\b\w\b", lambda word: word[0].upper(), regex=True)
+    # A campaign with two sessions has two lines.
+    names = names.where(~names.duplicated(keep=False), names + ", " + table["poses"].map(lambda count: counted(count, "pose")))
+    axis.set_yticks(rows, names)
+    axis.set(xscale="log", xlabel="RMS position error of held-out poses (mm), with 95 % intervals")
+    label_decades(axis.xaxis)
+    axis.grid(visible=False, axis="y")
+    legend_below(figure, 2)
+    return figure

@@ -14,14 +14,18 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import numpy as np
+    from matplotlib.artist import Artist
     from matplotlib.axis import Axis
     from matplotlib.typing import RcKeyType
 
     from elastocal.io.origin import Origin
 
 WIDTH_MM = 165
+MICRO, MILLI = 1e6, 1e3
 # Okabe and Ito's, without black and the yellow that is too pale for lines; then two more.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F3C8D", "#4D4D4D")
+# Errors of a campaign, before and after.
+STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
 DASHES = ("-", (0, (1, 2)), "--", (0, (4, 4)), "-", (0, (2, 3)), "-.", (0, (6, 1.5, 1, 1.5)))
 SETTINGS: dict[RcKeyType, Any] = {
     "font.size": 8,
@@ -50,6 +54,13 @@ def panels(rows: int, columns: int, height_mm: float, width_mm: float = WIDTH_MM
     """
     figure = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def legend_below(figure: Figure, columns: int, title: str | None = None, more: Mapping[str, Artist] | None = None) -> None:
+    """One legend of all panels below them, each entry once, and of `more` artists by their labels."""
+    entries = {label: one for axis in figure.axes for one, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    entries |= more or {}
+    figure.legend([*entries.values()], [*entries], title=title, loc="outside lower center", ncols=columns)
 
 
 def note(text: str, height_mm: float = 25) -> Figure:

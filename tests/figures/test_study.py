@@ -1,23 +1,31 @@
-"""Strategies over the data set length: lines, bands and bars are the tables' figures in micrometres and per cent."""
+"""Figures of the study: lines, bands, bars and marks are where the tables have them, in their units."""
 
+import made_study_tables as made
 import numpy as np
 import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
-from matplotlib.colors import same_color
+from made_study_tables import TITLES, comparison, expectations, strategy_scores
+from matplotlib.colors import same_color, to_hex
 
-from elastocal.figures.strategies import (
+from elastocal.figures.study import (
     accuracy_of_one_data_set,
     bias_and_accuracy,
+    budget,
+    costs,
+    designs,
+    ladder,
+    metrics,
     noise_impact,
     over_studies,
+    scores,
     stiffness_errors,
+    table2_samples,
 )
 from elastocal.figures.style import PALETTE
 
 LENGTHS = np.arange(1, 6)
 ORDER = ["6DoF", "2DoF+6DoF"]
-TITLES = {"kuka": "Kuka KR 270", "fanuc": "Fanuc R-2000"}
 
 
 def metrics_of(robot, strategy, size, noise_um=200.0, untrusted=0):
@@ -61,7 +69,7 @@ def band(collection):
 def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_are_trustworthy():
     frame = pd.concat([metrics_of("kuka", "6DoF", size, noise, 2) for size, noise in ((100.0, 50.0), (200.0, 100.0))])
     frame = pd.concat([frame, metrics_of("kuka", "2DoF+6DoF", 7.0), metrics_of("fanuc", "6DoF", 7.0)])
-    figure = noise_impact(frame, "6DoF", {"kuka": "Kuka KR 270"})
+    figure = noise_impact(frame, "6DoF", {"kuka": "Kuka"})
     axis, linear = figure.axes
     assert (axis.get_yscale(), linear.get_yscale()) == ("log", "linear") and len(linear.lines) == 4
     for index, size in enumerate((100.0, 200.0)):
@@ -71,14 +79,14 @@ def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_ar
         assert thin.get_linewidth() < thick.get_linewidth() and thin.get_color() == thick.get_color() == PALETTE[index]
         # A tenth either way, as a factor.
         assert band(axis.collections[index])[4] == pytest.approx((np.exp(-0.1) * size / 4, np.exp(0.1) * size / 4))
-    assert len(axis.lines) == 4 and axis.get_title() == "Kuka KR 270"
+    assert len(axis.lines) == 4 and axis.get_title() == "Kuka"
     assert (linear.get_xlabel(), axis.get_ylabel()) == ("configurations in the data set", "dev, equation 15 (µm)")
     assert legend_entries(figure) == ["50", "100"]
     assert_nothing_cut_off(figure)
 
 
 def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
-    figure = stiffness_errors(METRICS, PRINTED, "Kuka KR 270", "kuka", ORDER, 3.0)
+    figure = stiffness_errors(METRICS, PRINTED, "Kuka", "kuka", ORDER, 3.0)
     whole, first = figure.axes
     for axis, scale in ((whole, 1.0), (first, 0.5)):
         one, other, limit = axis.lines[:3]
@@ -106,7 +114,6 @@ def test_bias_and_accuracy_puts_the_averaged_model_below_the_error_of_one_data_s
             assert bound.get_xydata().tolist() == [[5, 16], [20, 4]]
             np.testing.assert_allclose(averaged.get_xydata(), np.column_stack([LENGTHS[1:], 10 * (index + 1) / LENGTHS[1:]]))
             assert band(axis.collections[index])[5] == pytest.approx((18 * (index + 1), 30 * (index + 1)))
-    assert figure.axes[0].get_ylabel() == "end-effector error (µm)"
     ends = ("one data set, RMS", "Cramér-Rao bound, RMS", "dev of the paper")
     assert legend_entries(figure) == [f"{name}: {end}" for name in ORDER for end in ends]
 
@@ -140,4 +147,103 @@ def test_studies_are_drawn_as_their_mean_and_one_estimator_once():
     lines = [line for line in deviation.lines if line.get_marker() != "D"]
     assert len(lines) == 2 and "6DoF again" not in legend_entries(figure)
     np.testing.assert_allclose(lines[0].get_ydata(), 22.0 / LENGTHS, rtol=1e-9)
+    assert_nothing_cut_off(figure)
+
+
+INITIAL = pd.DataFrame({"mean": np.linspace(1e-3, 2e-3, 101), "maximum": np.linspace(5e-3, 7e-3, 101)})
+INITIAL["mean_square"] = INITIAL["mean"] ** 2 + np.linspace(1e-4, 3e-4, 101) ** 2
+TABLE_2 = pd.DataFrame(
+    [("2", "kuka", "deviation_mean", 1.7), ("2", "kuka", "deviation_max", 6.5), ("3", "kuka", "deviation_std", 0.9)],
+    columns=["table", "robot", "quantity", "value"],
+)
+
+
+def find_points(axis, marker):
+    """Points with a marker: x, row, and whether they are filled with the colour of a difference."""
+    return [
+        (float(x), float(y), to_hex(line.get_markerfacecolor()).upper() == PALETTE[1])
+        for line in axis.lines
+        if line.get_marker() == marker
+        for x, y in line.get_xydata()
+    ]
+
+
+def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
+    figure = scores(comparison(), expectations(), TITLES)
+    heads = [axis.get_title() for axis in figure.axes[:3]]
+    assert heads == ["$k_\\Sigma$ at 20 (%)", "dev at 20 (µm)", "length until 2 µm"]
+    assert row_labels(figure.axes[0]) == ["6DoF"]
+    k_sigma, dev, _ = figure.axes[:3]
+    # After Holm's correction the first differs and the second does not.
+    assert find_points(k_sigma, "D") == [(1.5, 0.0, True)] and find_points(dev, "D") == [(1.0, 0.0, False)]
+    assert [x for x, *_ in find_points(dev, "o")] == [1.2] and [x for x, *_ in find_points(dev, "|")] == [1.22]
+    assert find_points(figure.axes[5], "D") == [(30.0, 0.0, False)]
+
+
+def test_samples_show_quartiles_and_nearly_the_whole_range_of_single_data_sets_in_millimetres():
+    figure = table2_samples({"fanuc": INITIAL, "kuka": INITIAL}, TABLE_2, {"fanuc": "Fanuc", "kuka": "Kuka"})
+    expected = {"mean": (1.0, 2.0), "std": (0.1, 0.3), "max": (5.0, 7.0)}
+    assert [axis.get_title() for axis in figure.axes] == [*expected]
+    for axis, (low, high) in zip(figure.axes, expected.values(), strict=True):
+        assert axis.get_xlabel() == "mm"
+        whole, half, middle = axis.lines[:3]
+        for line, shares in ((whole, (0.01, 0.99)), (half, (0.25, 0.75)), (middle, (0.5,))):
+            assert list(line.get_xdata()) == pytest.approx([low + share * (high - low) for share in shares])
+            assert set(line.get_ydata()) == {0}
+    # The paper's figure stands in the row of its robot, and nowhere where none is printed.
+    assert [[point[:2] for point in find_points(axis, "D")] for axis in figure.axes] == [[(1.7, 1.0)], [], [(6.5, 1.0)]]
+    assert [row_labels(axis) for axis in figure.axes] == [["Fanuc", "Kuka"], ["", ""], ["", ""]]
+    assert legend_entries(figure) == ["paper, Table 2"]
+    assert_nothing_cut_off(figure)
+
+
+def test_the_ladder_has_a_line_for_each_length_in_the_panel_of_its_noise():
+    table = pd.concat([made.ladder(), made.ladder().assign(length=40), made.ladder().assign(noise_um=50.0)])
+    figure = ladder(table)
+    assert [axis.get_title() for axis in figure.axes] == ["noise 200 µm and µrad", "noise 50 µm and µrad"]
+    first, second = figure.axes
+    assert len(first.lines) == 2 and len(second.lines) == 1
+    np.testing.assert_array_equal(first.lines[0].get_xydata(), [[0, 40], [1, 20]])
+    assert legend_entries(figure) == ["20", "40"]
+    assert_nothing_cut_off(figure)
+
+
+def test_points_stand_in_their_row_with_both_budgets():
+    figure = budget(made.budget(), TITLES, 20)
+    kuka = figure.axes[0]
+    assert row_labels(kuka) == ["6DoF", "3+6DoF"] and kuka.get_title() == "Kuka"
+    same, equal = [line for line in kuka.lines if line.get_marker() == "o"]
+    np.testing.assert_allclose(same.get_xydata(), [[79, -0.16], [57, 0.84]])
+    np.testing.assert_allclose(equal.get_xydata(), [[52, 0.16], [57, 1.16]])
+    assert set(legend_entries(figure)) == {"20 configurations each", "40 measurements each", "Cramér-Rao bound"}
+    assert_nothing_cut_off(figure)
+
+
+@pytest.mark.parametrize("robot", [0, 1])
+def test_designs_have_a_line_each_and_the_wanted_accuracy(robot):
+    figure = designs(made.designs(), TITLES, 60.0, "limits")
+    axis = figure.axes[robot]
+    by = {line.get_label(): line.get_ydata() for line in axis.lines}
+    assert list(by["random"]) == [200.0, 80.0] and list(by["I-optimal"]) == [88.0, 40.0]
+    assert [line.get_ydata()[0] for line in axis.lines if line.get_label().startswith("_")] == [60.0]
+    assert legend_entries(figure) == ["random", "A-optimal", "D-optimal", "I-optimal", "bound of all designs"]
+    assert_nothing_cut_off(figure)
+
+
+def test_metrics_have_a_row_each_and_strategies_stand_where_their_ratio_is():
+    figure = metrics(strategy_scores(), TITLES, {"rms_um": "RMS", "k_sigma_percent_fixed_joints": "fixed joints"})
+    kuka = figure.axes[0]
+    assert row_labels(kuka) == ["RMS", "fixed joints"]
+    one, other = [line for line in kuka.lines if line.get_marker() == "o"]
+    assert one.get_xdata().tolist() == [1.0, 1.0] and other.get_xdata().tolist() == [1.2, 0.5]
+    assert legend_entries(figure) == ["6DoF", "staged"]
+    assert_nothing_cut_off(figure)
+
+
+def test_costs_have_a_line_for_each_set_of_points_over_the_first():
+    figure = costs(made.costs(), TITLES, 60.0)
+    kuka = figure.axes[0]
+    assert kuka.get_title() == "Kuka" and "60 µm over that of 6DoF" in kuka.get_ylabel()
+    np.testing.assert_allclose(kuka.lines[0].get_xydata(), [[0.1, 1.0], [1.0, 1.0]])
+    assert legend_entries(figure) == ["6DoF", "3+6DoF"]
     assert_nothing_cut_off(figure)

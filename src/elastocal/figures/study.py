@@ -1,0 +1,424 @@
+"""Figures of the study: strategies over the data set length, the study against the paper, and the research questions."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from elastocal.figures.style import MICRO, MILLI, PALETTE, label_decades, legend_below, line_style, note, panels, styled
+from elastocal.study.budget_tables import QUANTILE
+from elastocal.study.printed import LEVEL
+from elastocal.study.tables import find_statistics
+
+# Of the linear panels of the noise impact: what a reader compares with the wanted accuracy.
+_LINEAR_UM = 20.0
+_LENGTH = "configurations in the data set"
+_BANDS = "bands: ± one Monte Carlo standard error; one estimator under several names is drawn once"
+_HEADS = {
+    "k_sigma_20": "$k_\\Sigma$ at 20 (%)",
+    "n_k_sigma_1_percent": "length until 1 %",
+    "dev_20": "dev at 20 (µm)",
+    "n_dev_2_um": "length until 2 µm",
+}
+_DESIGNS = {"random": "random", "A": "A-optimal", "D": "D-optimal", "I": "I-optimal", "bound": "bound of all designs"}
+
+
+@styled
+def noise_impact(metrics: pd.DataFrame, strategy: str, titles: Mapping[str, str]) -> Figure:
+    """Figure 4: deviation of one strategy against the data set length, for each noise level.
+
+    `metrics`: long. `titles`: name of each robot to draw, by its key.
+    """
+    figure, axes = panels(2, len(titles), 118, sharex=True, sharey="row")
+    for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
+        cells = metrics[(metrics.robot == robot) & (metrics.strategy == strategy)]
+        for axis in column:
+            for index, (noise, cell) in enumerate(cells.groupby("noise_um")):
+                trusted = cell[cell.trustworthy]
+                axis.plot(cell.length, MICRO * cell.deviation, color=PALETTE[index], linewidth=0.5, alpha=0.5)
+                axis.plot(trusted.length, MICRO * trusted.deviation, color=PALETTE[index], label=f"{noise:g}")
+                # By factors, which keeps a band on a logarithmic axis where the error is as large as the value.
+                spread = np.exp(trusted.deviation_std_error / trusted.deviation)
+                value = MICRO * trusted.deviation
+                axis.fill_between(trusted.length, value / spread, value * spread, color=PALETTE[index], alpha=0.12, linewidth=0)
+        column[0].set(title=title, yscale="log", ylim=(1e-4, 3000))
+        column[0].yaxis.set_major_formatter("{x:g}")
+        column[1].set(xlabel=_LENGTH, xlim=(1, cells.length.max()), ylim=(0, _LINEAR_UM))
+    axes[0, 0].set_ylabel("dev, equation 15 (µm)")
+    axes[1, 0].set_ylabel("the same, linear (µm)")
+    title = "noise (µm and µrad); bands: a standard error as a factor; thin: some ĉ ≤ 0, or ĉ scatters by over a quarter"
+    legend_below(figure, 5, title)
+    return figure
+
+
+@styled
+def stiffness_errors(
+    metrics: pd.DataFrame, printed: pd.DataFrame, title: str, robot: str, order: Sequence[str], limit_percent: float
+) -> Figure:
+    """Figures 5a and 5b: summed stiffness error of all strategies against the data set length, under both counts of joints.
+
+    `metrics`: long, of one noise level. `printed`: the printed figures; those of k_sigma are taken to count the
+    joints fixed in the last stage. `order`: strategies. `limit_percent`: marked by a line.
+    """
+    figure, axes = panels(1, 2, 96, sharey=True)
+    counts = {"k_sigma": "all joints (equation 14)", "k_sigma_fixed_joints": "joints fixed in the last stage"}
+    for axis, (quantity, count) in zip(axes[0], counts.items(), strict=True):
+        _strategy_lines(axis, metrics, robot, quantity, 1.0, order)
+        _limit(axis, limit_percent, "%")
+        axis.set(title=count, xlabel=_LENGTH)
+    _printed_marks(axes[0, 1], printed, robot, "k_sigma", order)
+    figure.suptitle(title, fontsize=9)
+    axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", yscale="log", ylim=(0.3, 40))
+    label_decades(axes[0, 0].yaxis)
+    legend_below(figure, 4, _BANDS)
+    return figure
+
+
+@styled
+def deviations(
+    metrics: pd.DataFrame, printed: pd.DataFrame, title: str, robot: str, order: Sequence[str], limit_um: float
+) -> Figure:
+    """Figures 5c and 5d: deviation of all strategies against the data set length.
+
+    `metrics`: long, of one noise level. `printed`: the printed figures. `order`: strategies. `limit_um`: marked by a line.
+    """
+    figure, axes = panels(1, 1, 92)
+    axis = axes[0, 0]
+    _strategy_lines(axis, metrics, robot, "deviation", MICRO, order)
+    _limit(axis, limit_um, "µm")
+    _printed_marks(axis, printed, robot, "dev", order)
+    axis.set(title=title, xlabel=_LENGTH, ylabel="dev, equation 15 (µm)", yscale="log", ylim=(0.5, 80))
+    label_decades(axis.yaxis)
+    legend_below(figure, 4, _BANDS)
+    return figure
+
+
+@styled
+def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str]) -> Figure:
+    """k_sigma over the fixed joints and deviation against the data set length: mean over studies and how they scatter.
+
+    `studies`: robot and the columns of `table_schemas.repeated`. `printed`: the printed figures. `titles`: name of each robot
+    to draw, by its key. `order`: strategies; one estimator under several names is drawn once, under the first of them.
+    """
+    figure, axes = panels(2, len(titles), 118, sharex=True, sharey="row")
+    quantities = (("k_sigma_fixed_joints", 1.0, "k_sigma", (0.2, 20)), ("deviation", MICRO, "dev", (0.5, 40)))
+    for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
+        for axis, (quantity, scale, name, span) in zip(column, quantities, strict=True):
+            mine = studies[studies.robot == robot]
+            means = mine.pivot_table(index="length", columns="strategy", values=quantity, observed=True)
+            for index in _find_distinct(means, order):
+                strategy, style = order[index], line_style(index)
+                curves = scale * mine[mine.strategy == strategy].pivot(index="study", columns="length", values=quantity)
+                middle, spread = curves.mean(), curves.std()
+                axis.plot(middle.index, middle, label=strategy, **style)
+                axis.fill_between(middle.index, middle - spread, middle + spread, color=style["color"], alpha=0.12, linewidth=0)
+            _printed_marks(axis, printed, robot, name, order)
+            # A margin on the right, where diamonds at the longest length would be cut in halves.
+            axis.set(xscale="log", yscale="log", xlim=(8, 1.05 * studies.length.max()), ylim=span)
+            label_decades(axis.xaxis, axis.yaxis)
+        column[0].set_title(title)
+        column[1].set_xlabel(_LENGTH)
+    axes[0, 0].set_ylabel(r"$k_\Sigma$ of the fixed joints (%)")
+    axes[1, 0].set_ylabel("dev, equation 15 (µm)")
+    bands = "bands: ± one standard deviation between studies"
+    legend_below(figure, 4, f"{bands}; one estimator under several names is drawn once")
+    return figure
+
+
+@styled
+def bias_and_accuracy(
+    metrics: pd.DataFrame, per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str], accuracy_um: float
+) -> Figure:
+    """What the paper's metric hides: the bias of the averaged model against the error that one data set leaves.
+
+    `metrics`: long, of one noise level. `per_dataset`: the table of the same name, of the same noise level. `titles`: name of
+    each robot to draw, by its key. `order`: strategies to draw. `accuracy_um`: wanted; marked by a line.
+    """
+    figure, axes = panels(1, len(titles), 92, sharey=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        for index, strategy in enumerate(order):
+            averaged = metrics[(metrics.robot == robot) & (metrics.strategy == strategy) & (metrics.length > 1)]
+            single = per_dataset[(per_dataset.robot == robot) & (per_dataset.strategy == strategy)]
+            color = PALETTE[index]
+            axis.fill_between(single.ds, single.mean_um, single.p95_um, color=color, alpha=0.13, linewidth=0)
+            axis.plot(single.ds, single.rms_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, RMS")
+            bound = {"color": "black", "marker": "_", "markersize": 7, "linestyle": "none", "zorder": 3 + index}
+            axis.plot(single.ds, single.crlb_rms_um, label=f"{strategy}: Cramér-Rao bound, RMS", **bound)
+            label = f"{strategy}: dev of the paper"
+            axis.plot(averaged.length, MICRO * averaged.deviation, color=color, linestyle="--", label=label)
+        _limit(axis, accuracy_um, "µm")
+        axis.set(title=title, xlabel=_LENGTH, xscale="log", yscale="log", xlim=(2, 100), ylim=(0.5, 2000))
+        for plain in (axis.xaxis, axis.yaxis):
+            plain.set_major_formatter("{x:g}")
+    axes[0, 0].set_ylabel("end-effector error (µm)")
+    title = "bands: from the mean to the 95th percentile of one data set's error"
+    legend_below(figure, len(order), title)
+    return figure
+
+
+@styled
+def accuracy_of_one_data_set(per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str], length: int) -> Figure:
+    """Error that one data set of a given length leaves, strategy by strategy, beside the bound of its own measurements.
+
+    `per_dataset`: the table of the same name, of one noise level. `titles`: name of each robot to draw, by its key. `order`:
+    strategies.
+    """
+    figure, axes = panels(1, len(titles), 72, sharey=True)
+    rows = np.arange(len(order))[::-1]
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        cell = per_dataset[(per_dataset.robot == robot) & (per_dataset.ds == length)].set_index("strategy").loc[list(order)]
+        errors = cell.rms_um_std_error
+        axis.barh(rows, cell.rms_um, xerr=errors, height=0.6, color=PALETTE[5], ecolor="black", label="RMS error")
+        axis.plot(cell.crlb_rms_um, rows, "|", color=PALETTE[1], markersize=14, markeredgewidth=2, label="Cramér-Rao bound")
+        for row, efficiency in zip(rows, cell.efficiency, strict=True):
+            axis.text(1, row, f"{100 * efficiency:.0f} %", va="center", fontsize=7.5)
+        axis.set(title=title, xlabel="RMS end-effector error (µm)", yticks=rows)
+        axis.set_yticklabels(order)
+        axis.grid(visible=False, axis="y")
+    figure.suptitle(f"one data set of {length} configurations; in the bars: efficiency, (bound / RMS)²", fontsize=9)
+    legend_below(figure, 2)
+    return figure
+
+
+def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str, scale: float, order: Sequence[str]) -> None:
+    # Where the mean of 1/c exists in practice.
+    mine = metrics[(metrics.robot == robot) & metrics.trustworthy]
+    for index in _find_distinct(mine.pivot(index="length", columns="strategy", values=quantity), order):
+        cell, style = mine[mine.strategy == order[index]], line_style(index)
+        value, error = scale * cell[quantity], scale * cell[f"{quantity}_std_error"]
+        axis.plot(cell.length, value, label=order[index], **style)
+        axis.fill_between(cell.length, value - error, value + error, color=style["color"], alpha=0.12, linewidth=0)
+    axis.set_xlim(2, 1.02 * metrics.length.max())
+
+
+def _find_distinct(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
+    """Places of the strategies whose curve (a column each) no strategy before them has, to rounding."""
+    found: list[int] = []
+    for index, name in enumerate(order):
+        same = (np.allclose(curves[name], curves[order[other]], rtol=1e-6, atol=0, equal_nan=True) for other in found)
+        if name in curves and not any(same):
+            found.append(index)
+    return found
+
+
+def _printed_marks(axis: Axes, printed: pd.DataFrame, robot: str, quantity: str, order: Sequence[str]) -> None:
+    """Scores that the paper prints at a length, and the lengths at which it has them reach a limit."""
+    label = "the paper's Table 4"
+    for row in printed[(printed.table == "4") & (printed.robot == robot) & printed.strategy.isin(order)].itertuples():
+        score = re.fullmatch(rf"{quantity}_(\d+)", str(row.quantity))
+        reached = re.fullmatch(rf"n_{quantity}_([\d.]+)_\w+", str(row.quantity))
+        if score or reached:
+            place = (float(score[1]), row.value) if score else (row.value, float(reached[1]) if reached else np.nan)
+            colour = line_style(order.index(str(row.strategy)))["color"]
+            axis.plot(*place, "D", color=colour, markeredgecolor="black", markersize=4, zorder=4, label=label)
+            label = "_same"
+
+
+def _limit(axis: Axes, value: float, unit: str) -> None:
+    axis.axhline(value, color="black", linewidth=0.7)
+    place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "xytext": (2, 0), "textcoords": "offset points"}
+    axis.annotate(f"{value:g} {unit}", (1, value), **place, va="center", fontsize=7.5)
+
+
+@styled
+def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
+    """Table 4 among studies of the same size: the paper's figures, how studies scatter, and what is expected of them.
+
+    `comparison`, `expectations`: the tables of these names. `titles`: name of each robot to draw, by its key.
+    """
+    shown = comparison[(comparison.table == "4") & comparison.studies_mean.notna()]
+    quantities, strategies = list(dict.fromkeys(shown.quantity)), list(dict.fromkeys(shown.strategy))
+    if shown.empty:
+        return note("the paper prints nothing of the robots of this study")
+    figure, axes = panels(len(titles), len(quantities), 24 + 38 * len(titles), sharey=True)
+    for line, (robot, title) in zip(axes, titles.items(), strict=True):
+        for axis, quantity in zip(line, quantities, strict=True):
+            cells = shown[(shown.robot == robot) & (shown.quantity == quantity)]
+            rows = [strategies.index(strategy) for strategy in cells.strategy]
+            look: dict[str, Any] = {"color": PALETTE[0], "markersize": 3, "elinewidth": 3, "alpha": 0.6}
+            name = "further studies, mean ± 2 standard deviations"
+            axis.errorbar(cells.studies_mean, rows, xerr=2 * cells.studies_std, fmt="o", label=name, **look)
+            expected = _read_expected(expectations, robot, quantity)
+            axis.plot(expected, [strategies.index(name) for name in expected.index], "|", color="black", markersize=8)
+            for differs, colour, name in ((False, "white", "paper"), (True, PALETTE[1], "paper, differs (Holm)")):
+                some = ((cells.p_holm < LEVEL) == differs).to_numpy()
+                at = np.array(rows)[some]
+                axis.plot(cells.paper[some], at, "D", color=colour, markeredgecolor="black", markersize=4, label=name)
+            axis.set(title=_HEADS.get(quantity, quantity.replace("_", " ")), xlim=(0, None), ylim=(len(strategies) - 0.5, -0.5))
+            axis.grid(visible=False, axis="y")
+        line[0].set(yticks=range(len(strategies)), ylabel=title)
+        line[0].set_yticklabels(strategies)
+    legend_below(figure, 2, more={"expectation in closed form": axes[0, 0].lines[-3]})
+    return figure
+
+
+def _read_expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Series:
+    """Expectations of one quantity by strategy; none of lengths."""
+    names = {f"{quantity}_percent_fixed_joints", f"{quantity}_um"}
+    mine = expectations[(expectations.robot == robot) & expectations.quantity.isin(names) & expectations.paper.notna()]
+    return mine.set_index("strategy").expected
+
+
+@styled
+def table2_samples(initial: Mapping[str, pd.DataFrame], reference: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
+    """Statistics of single data sets, in which the paper's Table 2 lies, although it is far from all data sets together.
+
+    `initial`: the initial table of each robot. `reference`: the printed figures. `titles`: name of each robot to draw, by its
+    key.
+    """
+    figure, axes = panels(1, 3, 66)
+    printed = reference[reference.table == "2"].set_index(["robot", "quantity"]).value
+    single = {robot: find_statistics(frame) for robot, frame in initial.items()}
+    for axis, quantity in zip(axes[0], ("mean", "std", "max"), strict=True):
+        for index, (robot, statistics) in enumerate(single.items()):
+            low, q1, middle, q3, high = np.percentile(MILLI * statistics[quantity], [1, 25, 50, 75, 99])
+            axis.plot([low, high], [index, index], color=PALETTE[index], linewidth=1)
+            axis.plot([q1, q3], [index, index], color=PALETTE[index], linewidth=5, solid_capstyle="butt")
+            axis.plot(middle, index, "o", color="white", markersize=3)
+            if (robot, f"deviation_{quantity}") in printed.index:
+                there = printed[robot, f"deviation_{quantity}"]
+                axis.plot(there, index, "D", color="black", markersize=4, label="paper, Table 2")
+        axis.set(title=quantity, xlabel="mm", yticks=range(len(initial)), ylim=(len(initial) - 0.5, -0.5), xlim=(0, None))
+        axis.set_yticklabels([titles[robot] for robot in initial] if axis is axes[0, 0] else [])
+        axis.grid(visible=False, axis="y")
+    legend_below(figure, 1, "single data sets: 1 to 99 %, quartiles and median")
+    return figure
+
+
+@styled
+def ladder(table: pd.DataFrame) -> Figure:
+    """Error of one data set by number of link springs, for each noise and length, of the first robot with links.
+
+    `table`: from `question_tables.ladder_table`.
+    """
+    if table.empty:
+        return note("no robot of this study has elastic links")
+    table = table[table.robot == table.robot.iloc[0]]
+    steps = table[table.chosen_percent.notna()]
+    noises = list(dict.fromkeys(table.noise_um))
+    figure, axes = panels(1, len(noises), 72, sharey=True)
+    for axis, noise in zip(axes[0], noises, strict=True):
+        for index, (length, cell) in enumerate(steps[steps.noise_um == noise].groupby("length")):
+            springs = cell.link_springs.astype(int)
+            axis.plot(springs, cell.rms_um, color=PALETTE[index], label=f"{length}", marker="o", markersize=2.5)
+            # Where cross-validation stops: the larger the more often.
+            axis.scatter(springs, cell.rms_um, s=0.9 * cell.chosen_percent, color=PALETTE[index], alpha=0.35, linewidths=0)
+        axis.set(title=f"noise {noise:g} µm and µrad", xlabel="link springs in the model", yscale="log")
+        axis.set_xticks(range(int(steps.link_springs.astype(int).max()) + 1))
+        label_decades(axis.yaxis)
+    axes[0, 0].set_ylabel("RMS error of one data set (µm)")
+    title = "configurations in the data set; discs: share of data sets in which cross-validation stops there"
+    legend_below(figure, 6, title)
+    return figure
+
+
+@styled
+def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figure:
+    """Error of one data set by set of measuring points, with as many configurations and with as many measurements.
+
+    `table`: from `budget_tables.budget_table`. `titles`: name of each robot to draw, by its key. `length`: configurations; the
+    budget is twice as many measurements.
+    """
+    labels = list(dict.fromkeys(table.points))
+    figure, axes = panels(1, len(titles), 16 + 7 * len(labels), sharex=True, sharey=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        mine = table[table.robot == robot]
+        same = mine[mine.configurations == length]
+        equal = mine[mine.configurations == 2 * length // mine.measurements_per_configuration]
+        for cells, colour, shift, name in (
+            (same, PALETTE[0], -0.16, f"{length} configurations each"),
+            (equal, PALETTE[1], 0.16, f"{2 * length} measurements each"),
+        ):
+            rows = [labels.index(points) + shift for points in cells.points]
+            spans = QUANTILE * cells.std_error_um
+            axis.errorbar(cells.rms_um, rows, xerr=spans, fmt="o", color=colour, markersize=4, label=name)
+            axis.plot(cells.crlb_rms_um, rows, "|", color="black", markersize=7, label="Cramér-Rao bound")
+        axis.set(title=title, xlabel="RMS error of one data set (µm), 95 % intervals", yticks=range(len(labels)))
+        axis.set(ylim=(len(labels) - 0.5, -0.5), xlim=(0, None))
+        axis.grid(visible=False, axis="y")
+    axes[0, 0].set_yticklabels(labels)
+    legend_below(figure, 3)
+    return figure
+
+
+@styled
+def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) -> Figure:
+    """Cost of an accuracy by each set of points over the first one, by the cost of a configuration.
+
+    `table`: from `costs.cost_table`. `titles`: name of each robot to draw, by its key.
+    """
+    if not table.ratio.gt(0).any():
+        return note(f"no set of points reaches {accuracy_um:g} µm with the configurations of this study")
+    labels = list(dict.fromkeys(table.points))
+    figure, axes = panels(1, len(titles), 78, sharey=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        for index, points in enumerate(labels):
+            cell = table[(table.robot == robot) & (table.points == points) & (table.configuration_cost > 0)]
+            cost, band = cell.configuration_cost, {"color": PALETTE[index], "alpha": 0.12, "linewidth": 0}
+            axis.plot(cost, cell.ratio, **line_style(index), label=points)
+            axis.fill_between(cost, cell.ratio_low, cell.ratio_high, **band)
+        axis.set(title=title, xlabel="cost of a configuration (measurements)", xscale="log", yscale="log")
+        axis.set_xticks([0.01, 0.1, 1, 10])
+        axis.xaxis.set_major_formatter("{x:g}")
+        label_decades(axis.yaxis)
+    axes[0, 0].set_ylabel(f"cost of {accuracy_um:g} µm over that of {labels[0] if labels else ''}")
+    title = "points measured in each configuration; bands: 95 % intervals by bootstrap over data sets"
+    legend_below(figure, 4, title)
+    return figure
+
+
+@styled
+def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, joint_range: str) -> Figure:
+    """Error that random and optimal configurations leave, by their number.
+
+    `table`: from `question_tables.designs_table`. `titles`: name of each robot to draw, by its key. `accuracy_um`: marked by a
+    line. `joint_range`: whose rows are drawn.
+    """
+    table = table[table.joint_range == joint_range]
+    figure, axes = panels(1, len(titles), 80, sharey=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        for index, (kind, name) in enumerate(_DESIGNS.items()):
+            cell = table[(table.robot == robot) & (table.design == kind)]
+            axis.plot(cell.configurations, cell.rms_um, **line_style(index), label=name)
+            if kind == "random":
+                axis.fill_between(cell.configurations, cell.low_um, cell.high_um, color=PALETTE[index], alpha=0.15, linewidth=0)
+        axis.axhline(accuracy_um, color="black", linewidth=0.7)
+        axis.set(title=title, xlabel="configurations", xscale="log", yscale="log")
+        axis.set_xticks(sorted(set(table.configurations)), labels=[f"{size}" for size in sorted(set(table.configurations))])
+        axis.xaxis.set_minor_locator(NullLocator())
+        label_decades(axis.yaxis)
+    axes[0, 0].set_ylabel("bound of the RMS error (µm)")
+    title = f"band: 5 to 95 % of random designs; line: {accuracy_um:g} µm"
+    legend_below(figure, 5, title)
+    return figure
+
+
+@styled
+def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, str]) -> Figure:
+    """Scores of the strategies over those of the classical one, metric by metric.
+
+    `table`: from `ranks.ranks_table`. `titles`: name of each robot to draw, by its key. `names`: what each metric is called.
+    Returns one estimator under several names is drawn once, under the first of them.
+    """
+    figure, axes = panels(1, len(titles), 26 + 8 * len(names), sharey=True, sharex=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        mine = table[table.robot == robot]
+        strategies = mine[mine.metric == next(iter(names))].drop_duplicates("value").strategy
+        for index, strategy in enumerate(strategies):
+            cells = mine[mine.strategy == strategy].set_index("metric").reindex([*names])
+            rows = np.arange(len(names)) + 0.7 * ((index + 0.5) / len(strategies) - 0.5)
+            spans = np.abs(cells[["ratio_low", "ratio_high"]].to_numpy() - cells[["ratio"]].to_numpy()).T
+            axis.errorbar(cells.ratio, rows, xerr=spans, fmt="o", color=PALETTE[index], markersize=3.5, label=strategy)
+        axis.axvline(1.0, color="black", linewidth=0.7)
+        axis.set(title=title, xscale="log", yticks=range(len(names)), ylim=(len(names) - 0.5, -0.5))
+        label_decades(axis.xaxis)
+        axis.grid(visible=False, axis="y")
+    axes[0, 0].set_yticklabels([name.replace("k_Σ", r"$k_\Sigma$") for name in names.values()])
+    title = "score over that of the first strategy, 95 % intervals"
+    legend_below(figure, 5, title)
+    return figure

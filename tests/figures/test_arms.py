@@ -1,0 +1,98 @@
+"""Pictures of arms: seen from the side and a little from above, with what the tables and the plan hold."""
+
+import numpy as np
+import pytest
+from analysed_robots import analysed
+from drawn_figures import assert_nothing_cut_off, legend_entries, texts_in_axes
+from made_study_tables import TITLES, places
+from made_surveys import OPEN, made_candidates, made_survey
+
+from elastocal.application.planning.cell import Cell
+from elastocal.application.planning.plan import choose_plan
+from elastocal.figures.arms import arm_map, arm_with_errors, draw_arm, plan_picture, pose_pictures, project_view
+from elastocal.figures.style import panels
+
+
+def test_up_is_up_and_what_lies_farther_away_is_higher():
+    """The view keeps lengths at right angles to it, and a turn by 90 degrees about the vertical moves what was near away."""
+    np.testing.assert_allclose(project_view(np.zeros(3)), 0.0)
+    up = project_view(np.array([0.0, 0.0, 1.0]))
+    assert up[0] == 0.0 and 0.9 < up[1] < 1.0
+    ahead = np.array([np.cos(np.radians(-60.0)), np.sin(np.radians(-60.0)), 0.0])
+    assert abs(project_view(ahead)[0]) < 1e-12 and project_view(ahead)[1] < 0 < project_view(-ahead)[1]
+    aside = np.array([-ahead[1], ahead[0], 0.0])
+    np.testing.assert_allclose(project_view(aside), [1.0, 0.0], atol=1e-12)
+
+
+def test_an_arm_stands_on_its_base_and_has_a_shadow_on_its_plane():
+    _, axes = panels(1, 1, 40)
+    draw_arm(axes[0, 0], np.array([[0.2, 0.0, 0.5], [1.0, 0.0, 0.5]]), 5)
+    shadow, edge, arm = (line.get_xydata() for line in axes[0, 0].lines)
+    np.testing.assert_allclose(arm[0], 0.0)
+    np.testing.assert_allclose(edge, arm)
+    np.testing.assert_allclose(shadow[-1], project_view(np.array([1.0, 0.0, 0.0])))
+
+
+OUTLINES = {name: np.array([[0, 0, 0], [0, 0, 1.0], [1.0, 0, 1.0], [2.0, 0, 1.0]]) for name in TITLES}
+
+
+def test_places_lie_along_the_arm_with_the_mean_over_the_sides_and_the_best_view():
+    figure = arm_map(places(), OUTLINES, TITLES)
+    kuka = figure.axes[0]
+    assert kuka.get_title() == "Kuka"
+    first, second = kuka.collections
+    # 1.5 m along the chain: half a metre out on the level link.
+    np.testing.assert_allclose(first.get_offsets(), [[0.5, 1.0]])
+    np.testing.assert_allclose(second.get_offsets(), [[2.0, 1.0]])
+    assert first.get_array().tolist() == pytest.approx([1.41])
+    assert texts_in_axes(figure)[:2] == ["1.41, seen 50 %", "1.06, seen 30 %"]
+    assert_nothing_cut_off(figure)
+
+
+@pytest.fixture
+def table():
+    rng = np.random.default_rng(1)
+    columns = {f"q{joint}": rng.uniform(-1, 1, 12) for joint in range(1, 7)}
+    columns |= {
+        f"{stage}_d{axis}": size * rng.standard_normal(12)
+        for stage, size in (("before", 1e-3), ("after", 1e-4))
+        for axis in "xyz"
+    }
+    return columns | {axis: rng.uniform(-2, 2, 12) for axis in "xyz"} | {"held_out": np.arange(12) % 3 == 0}
+
+
+def test_each_panel_has_its_errors_and_their_rms(table):
+    heldout = {"before": {"rms_m": 1.23e-3}, "after": {"rms_m": 0.12e-3}, "poses": 4, "noise_floor_rms_m": 0.105e-3}
+    figure = arm_with_errors(analysed("kuka"), table, heldout)
+    assert [axis.get_title(loc="left") for axis in figure.axes] == ["1.23 mm", "0.12 mm"]
+    for axis, stage in zip(figure.axes, ("before", "after"), strict=True):
+        (arrows,) = [found for found in axis.collections if found.get_gid() == stage]
+        off = np.column_stack([table[f"{stage}_d{each}"] for each in "xyz"])[::3]
+        drawn = np.column_stack([arrows.U, arrows.V])
+        times = np.linalg.norm(drawn) / np.linalg.norm(project_view(off))
+        np.testing.assert_allclose(drawn, times * project_view(off), atol=1e-12)
+        assert times == pytest.approx(400)
+    assert "4 held-out poses" in figure.get_supxlabel() and "400 times" in figure.get_supxlabel()
+
+
+def test_views_show_boxes_tracker_and_both_kinds_of_poses():
+    survey = made_survey()
+    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    cell = Cell((np.array([[1.0, 2.0], [0.0, 1.0], [0.0, 1.0]]),), np.array([3.0, 1.0, 1.0]), 0.1)
+    figure = plan_picture(survey.robot, cell, plan)
+    assert [axis.get_title() for axis in figure.axes] == ["from above", "from the side", "what each pose is worth"]
+    labels = legend_entries(figure)
+    assert labels == ["to fit", "held out", "kept out of", "tracker", "base"]
+    bare = plan_picture(survey.robot, OPEN, plan)
+    assert legend_entries(bare) == ["to fit", "held out", "base"]
+    last = figure.axes[2].lines[-1].get_ydata()[-1]
+    np.testing.assert_allclose(last, 1e3 * plan.accuracy_m[-1])
+
+
+def test_every_pose_has_a_picture_with_its_number_and_pages_are_full():
+    survey = made_survey()
+    plan = choose_plan(survey, made_candidates(survey, 300), 55, 4, "D", 1)
+    pages = pose_pictures(survey.robot, plan)
+    titles = [axis.get_title(loc="left") for page in pages for axis in page.axes if axis.get_title(loc="left")]
+    assert titles == [*(str(pose) for pose in range(1, 56)), *(f"{pose} held out" for pose in range(56, 60))]
+    assert len(pages) == 2

@@ -1,0 +1,102 @@
+"""Schemes of robots: joints stand on the arm and links follow one another, all names are there, and none hides another."""
+
+from itertools import combinations, pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn_figures import texts
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
+
+from elastocal.figures.schemes import kinematic_scheme, lay_out, spring_scheme
+from elastocal.io.documents import read_document
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.mechanics.robot_file import robot_from_document
+
+FILES = sorted((Path(__file__).resolve().parents[2] / "config" / "robots").glob("*.yaml"))
+ROBOTS = {file.stem: robot_from_document(read_document(file)) for file in FILES}
+CHAINS = {
+    "three joints, turned frames": "Rz(q1) Ry(q2) Tx(1.0) Rx(90deg) Ry(q3) Rz(-30deg) Tx(0.5) [EE]",
+    "one joint, no length": "Rz(q1) [EE]",
+    "three axes that meet": "Tz(0.5) Rx(q1) Ry(q2) Rz(q3) Tx(0.4) Ry(-q4) Ty(0.1) Tx(0.3) [EE]",
+    "pitch about x": "Tz(0.34) Rz(q1) Rx(q2) Tz(0.4) Rz(q3) Rx(-q4) Tz(0.4) Rz(q5) Rx(q6) Rz(q7) Tz(0.126) [flange]",
+}
+for words, chain in CHAINS.items():
+    joints = chain.count("q")
+    known = {"joint_limits_deg": [[-180, 180]] * joints, "compliance_urad_per_Nm": [1.0] * joints}
+    ROBOTS[words] = robot_from_document({"name": "made up", "chain": chain, **known})
+each_robot = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+
+
+def assert_no_overlap(figure):
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure.draw(renderer)
+    boxes = []
+    for text in figure.findobj(Text):
+        if text.get_text():
+            frame = text.get_bbox_patch()
+            boxes.append((text.get_text(), (frame or text).get_window_extent(renderer)))
+    for (one, first), (other, second) in combinations(boxes, 2):
+        assert not first.overlaps(second), f"{one!r} on {other!r}"
+    for text, box in boxes:
+        assert figure.bbox.contains(*box.min) and figure.bbox.contains(*box.max), f"{text!r} is cut off"
+
+
+@each_robot
+def test_no_text_of_a_scheme_hides_another_and_each_joint_length_and_point_has_its_name(robot):
+    figure = kinematic_scheme(robot)
+    assert_no_overlap(figure)
+    named = {artist.get_gid() for artist in figure.findobj(Text)}
+    lengths = sum(t.kind == "T" and bool(t.constant) for t in robot.chain.transforms)
+    expected = {f"joint-{n}" for n in range(1, robot.joints + 1)} | {f"length-{n}" for n in range(1, lengths + 1)}
+    assert expected | {f"point-{point.name}" for point in robot.chain.points} <= named
+    assert 25.4 * figure.get_figwidth() == pytest.approx(165, abs=6)
+
+
+@each_robot
+def test_no_text_of_a_spring_scheme_hides_another_and_each_spring_has_its_name(robot):
+    figure = spring_scheme(robot)
+    assert_no_overlap(figure)
+    found, models = texts(figure), 2 if robot.links else 1
+    assert all(found.count(f"$\\theta_{{{joint}}}$") == models for joint in range(1, robot.joints + 1))
+    assert found.count("6D") == len(robot.links)
+
+
+@each_robot
+def test_links_follow_one_another_in_their_order_with_the_lengths_of_the_chain(robot):
+    links = lay_out(robot.chain)[0].links
+    np.testing.assert_allclose(links[0][0], 0)
+    for (_, end, _), (start, _, _) in pairwise(links):
+        np.testing.assert_allclose(end, start)
+    lengths = [1000 * t.constant for t in robot.chain.transforms if t.kind == "T" and t.constant]
+    labels = [label.removesuffix(" mm").split(" = ") for _, _, label in links if label]
+    assert [name for name, _ in labels] == [f"$l_{{{number}}}$" for number in range(1, len(lengths) + 1)]
+    assert [float(value.replace("\N{MINUS SIGN}", "-")) for _, value in labels] == pytest.approx(lengths, abs=0.0501)
+
+
+@each_robot
+def test_every_joint_is_drawn_once_on_the_arm_and_apart_from_the_others(robot):
+    layout, _ = lay_out(robot.chain)
+    assert [number for number, _, _ in layout.joints] == list(range(1, robot.joints + 1))
+    ends = [end for start, end, _ in layout.links for end in (start, end)]
+    for _, place, axis in layout.joints:
+        reach = 0 if axis is None else np.linalg.norm(axis) / 2
+        assert min(np.linalg.norm(place - end) for end in ends) == pytest.approx(reach, abs=1e-9)
+    for (_, one, _), (_, other, _) in combinations(layout.joints, 2):
+        assert np.linalg.norm(one - other) > 7
+
+
+@pytest.mark.parametrize(
+    ("name", "normal"), [("kuka", {2, 3, 5}), ("ur10", {2, 3, 4, 6}), ("panda", {2, 4, 6}), ("pitch about x", {2, 4, 6})]
+)
+def test_joints_that_turn_in_the_plane_of_the_drawing_have_the_sign_of_an_axis_normal_to_it(name, normal):
+    assert {number for number, _, axis in lay_out(ROBOTS[name].chain)[0].joints if axis is None} == normal
+
+
+def test_only_an_offset_moves_a_measuring_point_off_the_arm():
+    points = lay_out(ROBOTS["kuka"].chain)[0].points
+    assert [name for name, _, _ in points] == [point.name for point in ROBOTS["kuka"].chain.points]
+    assert all(np.allclose(node, place) for _, node, place in points)
+    moved = lay_out(with_target_offset(ROBOTS["kuka"], (0.0, 0.1, 0.05)).chain)[0].points
+    assert any(np.linalg.norm(place - node) > 5 for _, node, place in moved)
