@@ -76,6 +76,11 @@ class Conditions:
     progress: np.ndarray | None = None
     of_angles: dict[str, dict[int, tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict, repr=False, compare=False)
 
+    @property
+    def always(self) -> np.ndarray:
+        """One in every state, ndarray (S,)."""
+        return np.ones(len(self.joint_angles))
+
     @cached_property
     def load(self) -> np.ndarray:
         """Generalized force of the external wrench on every coordinate of the sites (equation 7), ndarray (S, C).

@@ -1,10 +1,9 @@
-"""Effects without load, beyond their closed forms: what is offered where, the spring of a compensator, an eccentric nest."""
+"""Weights, beyond their closed forms: what is offered where, and the spring of a compensator."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import chain_of
 from synthetic import candidate_on, conditions_on, displacements, made_states
 
 from elastocal.effects.catalogue import candidates_on
@@ -73,11 +72,3 @@ def test_compensator_torque_spans_the_formula_of_a_spring_with_a_short_crank(sta
     # What is left is of second order in crank over length.
     assert leftovers[0] < 0.005
     assert leftovers[1] < 0.4 * leftovers[0]
-
-
-def test_nest_is_no_candidate_where_the_last_joint_does_not_turn():
-    """A reflector that a slide carries keeps its side to the tracker: there is no angle that it could circle with."""
-    scara = chain_of("Tz(0.4) Rz(q1) Tx(0.4) Rz(q2) Tx(0.3) Tz(-q3) [end]")
-    assert not any(c.effect == "nest_eccentricity" for c in candidates_on(sites_of(scara)).values())
-    turning = chain_of("Tz(0.4) Rz(q1) Tx(0.4) Tz(-q2) Tx(0.3) Rz(q3) [end]")
-    assert {p.name[4] for p in candidate_on(turning, "nest_eccentricity").parameters} == {"x", "y"}

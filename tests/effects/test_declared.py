@@ -1,4 +1,4 @@
-"""The weight that a robot file declares: torques by pinocchio, slopes by central differences, fits that bear wrong masses."""
+"""Springs and weights of the declared model: torques by pinocchio, slopes by central differences, fits with wrong masses."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ from synthetic import (
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.conditions import conditions_of, offered, with_springs
-from elastocal.effects.declared_weight import candidate
+from elastocal.effects.declared import declared_weight, joint_compliance
 from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
@@ -142,7 +142,7 @@ def test_torques_of_masses_are_slopes_of_the_gravity(fanuc):
         moved = with_springs(around, around.compliance, step)
         change = (moved.gravity - around.gravity)[:, :6] / 0.5
         np.testing.assert_allclose(around.mass_torques[number], change, rtol=0, atol=1e-10)
-    made = displacements(candidate(around.sites), around)
+    made = displacements(declared_weight(around.sites), around)
     np.testing.assert_allclose(made[..., :6], around.mass_torques * around.compliance, rtol=1e-14)
 
 
@@ -163,7 +163,7 @@ def test_growth_of_gravity_with_each_correction_is_its_slope_on_the_coordinates_
 
 def test_priors_are_those_of_the_robot_file(fanuc):
     robot = replace(fanuc, masses=(Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1), Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2)))
-    found = candidate(sites_of(robot)).parameters
+    found = declared_weight(sites_of(robot)).parameters
     # A centre is off by its relative error times its distance from the joint, and lies anywhere in the girth of its link.
     width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
@@ -286,3 +286,13 @@ def test_gravity_on_odd_robots_is_the_slope_of_their_potential(name):
         step = 1e-5 * np.eye(robot.joints)[joint]
         slope = (work(states.joint_angles + step) - work(states.joint_angles - step)) / 2e-5
         np.testing.assert_allclose(found[:, joint], slope, rtol=0, atol=1e-7)
+
+
+def test_carriage_yields_to_the_force_along_its_track():
+    robot = robot_of(ODD_CHAINS["track"], [1e-8, 1e-6, 1e-6, 1e-6])
+    model = made_model(robot, (Target("A", "hand", (0, 0, 0)),), fitted_frames=False, compliance=robot.compliance)
+    states = made_states(4, 3, seed=22)
+    shifted = displaced_coordinates(model, made_estimate(model), conditions(model, made_estimate(model), states))[:, 0]
+    # The carriage runs along -x.
+    np.testing.assert_allclose(shifted - states.joint_angles[:, 0], -1e-8 * states.wrench[:, 0], rtol=1e-9)
+    assert [p.unit for p in joint_compliance(model.sites).parameters] == ["m/N", *["rad/(N m)"] * 3]

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.effects.protocol import LOADED_JOINTS, Parameter
-from elastocal.effects.wrench_errors import Axis, at_flange_and_in_pull, base_and_flange, lever_of_pull
+from elastocal.effects.load import lever_of_pull, pushed, shifted, turned
 
 PLACE = np.array([0.1, -0.4, 0.25])
 
@@ -42,21 +41,9 @@ def test_moments_that_are_a_hundredth_off_still_have_a_place_and_others_have_non
 def test_changes_of_a_wrench_are_those_of_a_unit_by_hand():
     """About z: a force along x turns to y; a shift along z of a force along x makes a moment about y."""
     wrench = np.array([[5.0, 0.0, 0.0, 7.0, 8.0, 9.0], [0.0] * 6])
-    axis = Axis(np.tile([0.0, 0.0, 1.0], (2, 1)))
-    np.testing.assert_array_equal(axis.turn(wrench), [[0, 5, 0, 0, 0, 0], [0] * 6])
-    np.testing.assert_array_equal(axis.shift(wrench), [[0, 0, 0, 0, 5, 0], [0] * 6])
+    axis = np.tile([0.0, 0.0, 1.0], (2, 1))
+    np.testing.assert_array_equal(turned(axis, wrench), [[0, 5, 0, 0, 0, 0], [0] * 6])
+    np.testing.assert_array_equal(shifted(axis, wrench), [[0, 0, 0, 0, 5, 0], [0] * 6])
     # A push is there wherever something is recorded, be it a moment alone.
-    np.testing.assert_array_equal(axis.push(wrench), [[0, 0, 1, 0, 0, 0], [0] * 6])
-    np.testing.assert_array_equal(axis.push(wrench[:, [1, 2, 1, 4, 1, 1]])[0], [0, 0, 1, 0, 0, 0])
-
-
-def test_errors_are_offered_in_both_frames_at_the_flange_and_in_the_pull():
-    parameters = (Parameter("a", "N", 1.0),)
-    frames = ["base axes", "flange axes"]
-    for offer, details in (
-        (base_and_flange, frames),
-        (at_flange_and_in_pull, [*frames, *(f"{frame} in the pull" for frame in frames)]),
-    ):
-        found = offer("law", "load", parameters, lambda axis, wrench: axis.push(wrench))
-        assert [law.detail for law in found] == details
-        assert all(law.needs == LOADED_JOINTS and law.joints == () and law.parameters == parameters for law in found)
+    np.testing.assert_array_equal(pushed(axis, wrench), [[0, 0, 1, 0, 0, 0], [0] * 6])
+    np.testing.assert_array_equal(pushed(axis, wrench[:, [1, 2, 1, 4, 1, 1]])[0], [0, 0, 1, 0, 0, 0])

@@ -1,0 +1,158 @@
+"""Gravity: effects that are there without a load, by weights and the compliances of the joints."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.effects.protocol import LOADED_JOINTS, WAVES, Parameter, effect, small_form, turning_joints
+from elastocal.effects.sizes import RATED, SAG, TORQUE, Size
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Candidate, Displacements, Effect
+    from elastocal.mechanics.sites import Sites
+
+_effect = partial(effect, "gravity")
+_LINKS, _OFF_THE_LINE = 2, "off the line"
+# Of a centre of mass off the line of its link; and of a gripper, from the flange.
+_OFF_M, _LEVER_M = 0.2, 0.2
+
+
+@_effect(
+    "gravity sag",
+    Size("mass", 1.5, RATED, "an arm weighs six times what it carries, a quarter of it at the end of a link"),
+    Size("mass of one joint", 1.5, SAG, "the same, by the joint's turn"),
+    detail_words={_OFF_THE_LINE: "centres of mass off the links' axes"},
+)
+def link_weight(own: Effect, sites: Sites) -> Iterator[Candidate]:
+    """Sag of the arm, or of one joint, under the weight of the links that it carries.
+
+    theta_i = c_i sum_k m_k tau_ik(q), with theta_i in rad, c_i the compliance (rad/(N m)), m_k a mass at the far end of link k
+    (kg) and tau_ik its torque on joint i (N m/kg). Given the compliances it is linear in masses and first moments [1], which
+    turn all joints at once; of one joint alone, in the products with its compliance. A link's own mass m at its middle counts
+    as m/2 at either end. Where the robot file declares masses, theirs are parameters already (`declared_weight`). Variants have
+    the first moments of these links across their lines (kg m) too: centres of mass are seldom on them.
+
+    [1] C. G. Atkeson, C. H. An and J. M. Hollerbach, Estimation of inertial parameters of manipulator loads and links,
+        International Journal of Robotics Research 5, 1986.
+    """
+    if sites.masses:
+        return
+    joints = [joint for (joint,) in turning_joints(sites) if sites.carried_links(joint)]
+    near = {joint: sites.carried_links(joint)[:_LINKS] for joint in joints}
+
+    def across(links: Sequence[int], turned: Sequence[int]) -> list[tuple[int, int]]:
+        axes = [(k, axis) for k in links for axis in sites.transverse_axes(k)]
+        return [pair for pair in axes if any(sites.moment_turns(*pair, joint) for joint in turned)]
+
+    def unknowns(links: Sequence[int], axes: Sequence[tuple[int, int]], size: float, of: str, unit: str) -> list[Parameter]:
+        masses = [Parameter(f"{of}mass_at_end_of_link_{k}", unit.format("kg"), size) for k in links]
+        moments = [(f"{of}moment_{'xyz'[axis]}_of_link_{k}", unit.format("kg m"), _OFF_M * size) for k, axis in axes]
+        return [*masses, *(Parameter(*moment) for moment in moments)]
+
+    def torques(around: Conditions, links: Sequence[int], axes: Sequence[tuple[int, int]]) -> list[np.ndarray]:
+        return [*(around.weight[k] for k in links), *(around.weight_moment(k, axis) for k, axis in axes)]
+
+    def of_the_arm(links: Sequence[int], axes: Sequence[tuple[int, int]], detail: str) -> Candidate:
+        parameters = unknowns(links, axes, own.size("mass", sites), "", "{}")
+
+        def law(around: Conditions) -> Displacements:
+            return [dict(enumerate((torque * around.compliance).T)) for torque in torques(around, links, axes)]
+
+        # Without a load the compliances are not identifiable, and nominal ones are far off.
+        return own.candidate((), parameters, law, {"external load"}, detail=detail, location_name="arm")
+
+    def of_joint(joint: int, axes: Sequence[tuple[int, int]], detail: str) -> Candidate:
+        links, size = near[joint], own.size("mass of one joint", sites, joint)
+        parameters = unknowns(links, axes, size, "compliance_times_", "rad {}/(N m)")
+
+        def law(around: Conditions) -> Displacements:
+            return [{joint: torque[:, joint]} for torque in torques(around, links, axes)]
+
+        return own.candidate((joint + 1,), parameters, law, detail=detail)
+
+    # The links behind the first joint that weight can turn turn all others too.
+    for first in joints[:1]:
+        carried, every = sites.carried_links(first), range(sites.joints)
+        yield of_the_arm(near[first], (), "")
+        if off := across(near[first], every):
+            yield of_the_arm(near[first], off, _OFF_THE_LINE)
+        if len(carried) > _LINKS:
+            yield of_the_arm(carried, across(carried, every), "all links")
+    yield from [of_joint(joint, (), "") for joint in joints]
+    yield from [of_joint(joint, off, _OFF_THE_LINE) for joint in joints if (off := across(near[joint], [joint]))]
+
+
+# It hangs on the flange in tasks as in the campaign, until someone takes it off: that moves the robot.
+@_effect("weight of an undeclared payload", Size("mass", 0.15, RATED, "a cable package or a forgotten gripper"))
+def payload(own: Effect, sites: Sites) -> Iterator[Candidate]:
+    """Weight at the flange that the model does not know: a tool, a cable package or an adapter that nobody declared.
+
+    theta = diag(c) J^T (m g, m r x g), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the
+    Jacobian of the end-effector, g gravity (m/s^2), m the mass (kg) and r its centre from there (m). Given the compliances it
+    is linear in m and in the first moments m r along the axes of the end-effector (kg m) [1].
+
+    [1] C. G. Atkeson, C. H. An and J. M. Hollerbach, Estimation of inertial parameters of manipulator loads and links,
+        International Journal of Robotics Research 5, 1986.
+    """
+    mass = own.size("mass", sites)
+    moments = [Parameter(f"moment_{axis}", "kg m", _LEVER_M * mass) for axis in "xyz"]
+
+    def law(around: Conditions) -> Displacements:
+        gravity, found = np.array(sites.gravity_m_s2), []
+        levers = [np.zeros_like(around.wrench[:, :3]), *np.moveaxis(around.end_rotation, -1, 0)]
+        for lever, kilograms in zip(levers, (1.0, 0.0, 0.0, 0.0), strict=True):
+            force = np.broadcast_to(kilograms * gravity, lever.shape)
+            turned = around.joint_deflections(np.concatenate([force, np.cross(lever, gravity)], axis=-1))
+            found.append(dict(enumerate(turned.T)))
+        return found
+
+    # Where neither a load nor what the links weigh is known, what hangs on the flange is not distinguishable from that.
+    known = LOADED_JOINTS - {"load"}
+    tool = own.candidate((), [Parameter("mass", "kg", mass, carried=True), *moments], law, known)
+    # A mass alone is most of what a tool does.
+    yield from (tool, small_form(tool, "mass", slice(1)))
+
+
+def compensated_joint(sites: Sites) -> list[tuple[int]]:
+    """Joint on which the gravity compensator acts, from 0; none where the robot file has none."""
+    on = sites.compensator.joint if sites.compensator else 0
+    return [(on - 1,)] if on and not sites.prismatic[on - 1] else []
+
+
+def waves(angle: np.ndarray) -> list[np.ndarray]:
+    """Cosine and sine of an angle (S,) and of twice the angle, in the order of `wave_parameters`; list of ndarray (S,)."""
+    return [wave(order * angle) for order in (1, 2) for wave in WAVES.values()]
+
+
+def wave_parameters(own: Effect, quantity: str, unit: str, sites: Sites, joint: int) -> list[Parameter]:
+    """Parameters of `waves`, of which those of twice the angle are half as large."""
+    each = [own.parameters(quantity, [f"cos_{k}q", f"sin_{k}q"], unit, sites, joint, over=k) for k in (1, 2)]
+    return [parameter for order in each for parameter in order]
+
+
+@_effect(
+    "torque of the gravity compensator",
+    Size("turn", 0.3, TORQUE, "a compensator bears a third of the weight"),
+    at=compensated_joint,
+)
+def compensator_torque(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+    """Torque of a spring or gas gravity compensator on the shoulder: it bears part of the arm's weight, more in some poses.
+
+    T = -dU/dq = K a L (1 - s0/s) sin(alpha + q), U = K (s - s0)^2 / 2, s^2 = a^2 + L^2 + 2 a L cos(alpha + q),
+
+    in N m, for a spring of stiffness K (N/m) and free length s0 (m) between a crank a on the joint and an anchor at the
+    distance L (m) [1]. For a short crank, a << L, it is a sine of q and of 2q with unknown phases, under the law of a gas
+    cylinder too; the compliance of the joint turns it into theta = sum_k u_k cos(k q) + v_k sin(k q), k = 1, 2, in rad.
+
+    [1] A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet and A. Pashkevich, Identification of geometrical and elastostatic
+        parameters of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
+    """
+    parameters = wave_parameters(own, "turn", "rad", sites, joint)
+    whole = own.candidate((joint + 1,), parameters, lambda around: [{joint: w} for w in waves(around.joint_angles[:, joint])])
+    yield from (whole, small_form(whole, "first order", slice(2)))
