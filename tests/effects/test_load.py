@@ -1,10 +1,11 @@
-"""Where a pull acts, and what a wrong force is per unit of its error."""
+"""Where a pull acts, and where a bias is."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from synthetic import candidate_on, conditions_on, displacements, made_states
 
-from elastocal.effects.load import lever_of_pull, pushed, shifted, turned
+from elastocal.effects.load import lever_of_pull
 
 PLACE = np.array([0.1, -0.4, 0.25])
 
@@ -38,12 +39,12 @@ def test_moments_that_are_a_hundredth_off_still_have_a_place_and_others_have_non
             np.testing.assert_allclose(lever, rotation @ PLACE, atol=0.02)
 
 
-def test_changes_of_a_wrench_are_those_of_a_unit_by_hand():
-    """About z: a force along x turns to y; a shift along z of a force along x makes a moment about y."""
-    wrench = np.array([[5.0, 0.0, 0.0, 7.0, 8.0, 9.0], [0.0] * 6])
-    axis = np.tile([0.0, 0.0, 1.0], (2, 1))
-    np.testing.assert_array_equal(turned(axis, wrench), [[0, 5, 0, 0, 0, 0], [0] * 6])
-    np.testing.assert_array_equal(shifted(axis, wrench), [[0, 0, 0, 0, 5, 0], [0] * 6])
-    # A push is there wherever something is recorded, be it a moment alone.
-    np.testing.assert_array_equal(pushed(axis, wrench), [[0, 0, 1, 0, 0, 0], [0] * 6])
-    np.testing.assert_array_equal(pushed(axis, wrench[:, [1, 2, 1, 4, 1, 1]])[0], [0, 0, 1, 0, 0, 0])
+def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fanuc):
+    states = made_states(6, 3, seed=4)
+    states.wrench[:] = [[300.0, 20.0, 10.0, 1.0, 2.0, 3.0], [0, 0, 0, 0, 5.0, 0], [0] * 6]
+    around = conditions_on(fanuc.chain, states)
+    made = displacements(candidate_on(fanuc.chain, "force_bias[base axes]"), around)[..., :6]
+    for direction, turned in zip(np.eye(6)[:3], made, strict=True):
+        np.testing.assert_allclose(
+            turned, around.joint_deflections(np.array([direction, direction, 0 * direction])), rtol=1e-12
+        )

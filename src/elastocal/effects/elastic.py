@@ -22,10 +22,8 @@ from elastocal.effects.protocol import (
 from elastocal.effects.sizes import JOINT, PER_LENGTH, SHIFT, STIFFEST, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacements, Effect
+    from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "elastic")
@@ -52,7 +50,7 @@ def _bending(sites: Sites) -> list[tuple[tuple[int, ...], str]]:
     part="link",
     detail_words={_ONE_SECTION: "all of one cross-section"},
 )
-def link_elasticity(own: Effect, sites: Sites, links: tuple[int, ...], detail: str) -> Iterator[Candidate]:
+def link_elasticity(own: Effect, sites: Sites, links: tuple[int, ...], detail: str) -> Candidates:
     """A link that bends and twists: a cantilever between two joints.
 
     y = F_y l^3 a/EI + M_z l^2 b/EI, r_z = F_y l^2 b/EI + M_z l c/EI, likewise in the other plane, r_x = M_x l c/GJ,
@@ -104,7 +102,7 @@ def _end_compliance(sites: Sites, link: int, taper: float) -> tuple[np.ndarray, 
 @_effect(
     "bearing tilt", Size("tilt", 1.0, JOINT, "bearings tilt as much as gears turn (Klimchik et al. 2015)", 1), at=every_joint
 )
-def joint_tilt(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
     """A bearing that tilts across its axis under the moment that it carries.
 
     theta_e = c_e (e . M_i) at joint i, with theta_e the tilt (rad) about each of the two axes e across the joint's own, which
@@ -129,7 +127,7 @@ def joint_tilt(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
     Size("tilt", 0.3, STIFFEST, "a foundation is stiffer than what it bears", 1),
     Size("shift", 0.01, SHIFT, "the same at a fifth of the reach", 1),
 )
-def base_compliance(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def base_compliance(own: Effect, sites: Sites) -> Candidates:
     """A foundation that yields elastically: floor, anchors or pedestal let the foot of the robot shift and tilt under the load.
 
     u = C (F, M + p x F), C = diag(c_h, c_h, c_v, c_t, c_t, 0), is the displacement of the foot (m, rad) in base axes under a
@@ -157,7 +155,7 @@ def base_compliance(own: Effect, sites: Sites) -> Iterator[Candidate]:
     Size("coupling", 0.3, JOINT, "of the geometric mean, beyond which a joint would give energy back"),
     at=lambda sites: combinations([joint for (joint,) in turning_joints(sites)], 2),
 )
-def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Iterator[Candidate]:
+def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candidates:
     """Elastic coupling of two joints: each turns under the torque of the other, as where one flexible casting holds both gears.
 
     theta_i = c_ij tau_j and theta_j = c_ij tau_i, with theta in rad, tau the torques of load and declared masses (N m) and c_ij
@@ -178,7 +176,7 @@ def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Iterato
 @_effect(
     "angle-dependent stiffness", Size("variation", 0.3, JOINT, "teeth and rollers in mesh vary by a third"), at=turning_joints
 )
-def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
     """A joint compliance that changes with the angle of the joint: teeth, rollers and housing are not equally stiff all round.
 
     theta_i = tau_i (u cos q_i + v sin q_i), with theta_i and the joint angle q_i in rad, tau_i the torque of load and declared
@@ -199,7 +197,7 @@ def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Iterator
     Size("variation", 0.3, JOINT, "a compensator is an order softer than its gear"),
     at=compensated_joint,
 )
-def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Stiffness that a gravity compensator adds to the shoulder: its spring resists a turn more in some poses than in others.
 
     k = -dT/dq = K a L [(s0/s) (cos p + a L sin^2 p / s^2) - cos p], p = alpha + q,
@@ -226,7 +224,7 @@ def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Iterator[Can
     Size("turn", 0.1, JOINT, "a bolted joint is ten times as stiff as a wrist's gear", 1),
     Size("shift", 1e-2, SHIFT, "the same at a tenth of the reach", 1),
 )
-def flange_flexibility(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     """A flange, its bearing or a tool changer that yields elastically: what holds the tool is a spring behind the last joint.
 
     u = C w, with u the shift (m) and turn (rad) of the flange along its axes, w the external force (N) and moment (N m) there

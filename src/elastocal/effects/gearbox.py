@@ -11,10 +11,10 @@ from elastocal.effects.protocol import LOADED_JOINTS, Shape, effect, every_joint
 from elastocal.effects.sizes import ABSOLUTE, JOINT, Size, full_torque_Nm
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacements, Effect
+    from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "gearbox")
@@ -38,7 +38,7 @@ def _torque(sites: Sites, joint: int, shares: np.ndarray) -> Shape:
     Size("lost beyond", 0.5, JOINT, "of gears' compliance half goes once all teeth bear", -1),
     at=lambda sites: [(joint, law) for law in _AS_AT_REST for (joint,) in turning_joints(sites)],
 )
-def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Iterator[Candidate]:
+def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Candidates:
     """A gear that gets stiffer with torque: more of its teeth, pins or rollers share a larger load.
 
     theta_i = d_i (tau_i - s(tau_i)), with s(tau) = clip(tau, -tau_1, tau_1) or tau_1 tanh(tau / tau_1),
@@ -61,7 +61,7 @@ def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Iterator[C
 
 
 @_effect("lost motion (backlash)", Size("play", 1e-4, ABSOLUTE, "a third of an arc minute", 1), at=turning_joints)
-def lost_motion(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+def lost_motion(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Play that the gear crosses where the torque changes its sign: teeth leave one flank and touch the other.
 
     theta_i = D_i tanh(tau_i / tau_0), with theta_i in rad, tau_i the torque of load and declared masses (N m), D_i half the
@@ -86,7 +86,7 @@ def lost_motion(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
     Size("shift", 2e-5, ABSOLUTE, "the nut of a spindle"),
     at=every_joint,
 )
-def hysteresis(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+def hysteresis(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Friction and backlash that hold a joint back on the side from which it came: the gear stays wound up after a stop.
 
     theta_i = h_i s_i, with s_i = -1 or +1 the sense in which the joint was approached, 0 where it is not known, and h_i half

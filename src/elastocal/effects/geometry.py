@@ -11,10 +11,8 @@ from elastocal.effects.protocol import WAVES, Parameter, effect, every_joint, mo
 from elastocal.effects.sizes import ABSOLUTE, REACH, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacements, Effect
+    from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "geometry")
@@ -27,7 +25,7 @@ _NEST_ORDER, _SAMPLES_PER_PERIOD = 2, 4
     Size("shift", 4e-4, REACH, "as links"),
     at=every_joint,
 )
-def joint_offset(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+def joint_offset(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Zero offset of a joint: its encoder was mastered a little off the mark.
 
     theta_i = delta_i at every pose, with and without load, in rad (m for a prismatic joint) [1]. An offset of the first joint
@@ -48,7 +46,7 @@ def joint_offset(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
     at=every_joint,
     part="link",
 )
-def link_geometry(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+def link_geometry(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Wrong dimensions of a link: machining and assembly leave its far end shifted and turned from where the drawing has it.
 
     u = (d, r), the same at every pose, in the frame of the chain at the far end, d in m and r in rad: to first order all that
@@ -68,7 +66,7 @@ def link_geometry(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
     Size("shift", 5e-4, ABSOLUTE, "a tracker registers to 0.05 to 0.3 mm, unless a step goes wrong"),
     Size("turn", 3e-4, ABSOLUTE, "the same over the reflectors' distance"),
 )
-def base_placement(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def base_placement(own: Effect, sites: Sites) -> Candidates:
     """A robot whose foot does not stand where the campaign declares it: a constant shift and turn.
 
     u = (d, r) at the foot in base axes, d in m and r in rad; a point p (m) moves by d + r x p. Where the placement of the base
@@ -81,7 +79,7 @@ def base_placement(own: Effect, sites: Sites) -> Iterator[Candidate]:
 
 # The reflector circles in its nest, and the flange does not.
 @_effect("eccentric nest of the reflector", Size("shift", 5e-5, ABSOLUTE, "a worn nest of a reflector"), moves_robot=False)
-def nest_eccentricity(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
     """A reflector whose centre is off the axis of its nest at the flange: it circles as the last joint turns.
 
     d = sum_e e (a_e cos 2q + b_e sin 2q) over the two axes e across the last joint, in the frame that turns with it; d, a_e and
@@ -113,7 +111,7 @@ def nest_eccentricity(own: Effect, sites: Sites) -> Iterator[Candidate]:
     Size("scale", 2e-5, ABSOLUTE, "20 K or 70 hPa of air that were not entered"),
     moves_robot=False,
 )
-def tracker_scale(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def tracker_scale(own: Effect, sites: Sites) -> Candidates:
     """A tracker that measures all lengths too long or too short, by its wavelength in warm air or by a bad absolute distance.
 
     p' = (1 + s) p about the tracker, with p a position (m) and s the scale error (m/m) [1]. Scaled about the base positions

@@ -11,10 +11,10 @@ from elastocal.effects.protocol import LOADED_JOINTS, WAVES, Parameter, effect, 
 from elastocal.effects.sizes import RATED, SAG, TORQUE, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacements, Effect
+    from elastocal.effects.protocol import Candidate, Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "gravity")
@@ -29,7 +29,7 @@ _OFF_M, _LEVER_M = 0.2, 0.2
     Size("mass of one joint", 1.5, SAG, "the same, by the joint's turn"),
     detail_words={_OFF_THE_LINE: "centres of mass off the links' axes"},
 )
-def link_weight(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def link_weight(own: Effect, sites: Sites) -> Candidates:
     """Sag of the arm, or of one joint, under the weight of the links that it carries.
 
     theta_i = c_i sum_k m_k tau_ik(q), with theta_i in rad, c_i the compliance (rad/(N m)), m_k a mass at the far end of link k
@@ -50,47 +50,39 @@ def link_weight(own: Effect, sites: Sites) -> Iterator[Candidate]:
         axes = [(k, axis) for k in links for axis in sites.transverse_axes(k)]
         return [pair for pair in axes if any(sites.moment_turns(*pair, joint) for joint in turned)]
 
-    def unknowns(links: Sequence[int], axes: Sequence[tuple[int, int]], size: float, of: str, unit: str) -> list[Parameter]:
+    def form(joint: int | None, links: Sequence[int], axes: Sequence[tuple[int, int]], detail: str) -> Candidate:
+        of, unit = ("", "{}") if joint is None else ("compliance_times_", "rad {}/(N m)")
+        size = own.size("mass", sites) if joint is None else own.size("mass of one joint", sites, joint)
         masses = [Parameter(f"{of}mass_at_end_of_link_{k}", unit.format("kg"), size) for k in links]
         moments = [(f"{of}moment_{'xyz'[axis]}_of_link_{k}", unit.format("kg m"), _OFF_M * size) for k, axis in axes]
-        return [*masses, *(Parameter(*moment) for moment in moments)]
-
-    def torques(around: Conditions, links: Sequence[int], axes: Sequence[tuple[int, int]]) -> list[np.ndarray]:
-        return [*(around.weight[k] for k in links), *(around.weight_moment(k, axis) for k, axis in axes)]
-
-    def of_the_arm(links: Sequence[int], axes: Sequence[tuple[int, int]], detail: str) -> Candidate:
-        parameters = unknowns(links, axes, own.size("mass", sites), "", "{}")
+        parameters = [*masses, *(Parameter(*moment) for moment in moments)]
 
         def law(around: Conditions) -> Displacements:
-            return [dict(enumerate((torque * around.compliance).T)) for torque in torques(around, links, axes)]
+            torques = [*(around.weight[k] for k in links), *(around.weight_moment(k, axis) for k, axis in axes)]
+            if joint is None:
+                return [dict(enumerate((torque * around.compliance).T)) for torque in torques]
+            return [{joint: torque[:, joint]} for torque in torques]
 
-        # Without a load the compliances are not identifiable, and nominal ones are far off.
-        return own.candidate((), parameters, law, {"external load"}, detail=detail, location_name="arm")
-
-    def of_joint(joint: int, axes: Sequence[tuple[int, int]], detail: str) -> Candidate:
-        links, size = near[joint], own.size("mass of one joint", sites, joint)
-        parameters = unknowns(links, axes, size, "compliance_times_", "rad {}/(N m)")
-
-        def law(around: Conditions) -> Displacements:
-            return [{joint: torque[:, joint]} for torque in torques(around, links, axes)]
-
+        if joint is None:
+            # Without a load the compliances are not identifiable, and nominal ones are far off.
+            return own.candidate((), parameters, law, {"external load"}, detail=detail, location_name="arm")
         return own.candidate((joint + 1,), parameters, law, detail=detail)
 
     # The links behind the first joint that weight can turn turn all others too.
     for first in joints[:1]:
         carried, every = sites.carried_links(first), range(sites.joints)
-        yield of_the_arm(near[first], (), "")
+        yield form(None, near[first], (), "")
         if off := across(near[first], every):
-            yield of_the_arm(near[first], off, _OFF_THE_LINE)
+            yield form(None, near[first], off, _OFF_THE_LINE)
         if len(carried) > _LINKS:
-            yield of_the_arm(carried, across(carried, every), "all links")
-    yield from [of_joint(joint, (), "") for joint in joints]
-    yield from [of_joint(joint, off, _OFF_THE_LINE) for joint in joints if (off := across(near[joint], [joint]))]
+            yield form(None, carried, across(carried, every), "all links")
+    yield from [form(joint, links, (), "") for joint, links in near.items()]
+    yield from [form(joint, links, off, _OFF_THE_LINE) for joint, links in near.items() if (off := across(links, [joint]))]
 
 
 # It hangs on the flange in tasks as in the campaign, until someone takes it off: that moves the robot.
 @_effect("weight of an undeclared payload", Size("mass", 0.15, RATED, "a cable package or a forgotten gripper"))
-def payload(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def payload(own: Effect, sites: Sites) -> Candidates:
     """Weight at the flange that the model does not know: a tool, a cable package or an adapter that nobody declared.
 
     theta = diag(c) J^T (m g, m r x g), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the
@@ -141,7 +133,7 @@ def wave_parameters(own: Effect, quantity: str, unit: str, sites: Sites, joint: 
     Size("turn", 0.3, TORQUE, "a compensator bears a third of the weight"),
     at=compensated_joint,
 )
-def compensator_torque(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+def compensator_torque(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Torque of a spring or gas gravity compensator on the shoulder: it bears part of the arm's weight, more in some poses.
 
     T = -dU/dq = K a L (1 - s0/s) sin(alpha + q), U = K (s - s0)^2 / 2, s^2 = a^2 + L^2 + 2 a L cos(alpha + q),

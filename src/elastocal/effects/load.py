@@ -1,11 +1,4 @@
-"""Loads: what the force sensor shows is not what acts, so that a wrong wrench turns the joints.
-
-theta = diag(c) J^T dw, with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the loaded
-point and dw the error of the wrench (N, N m): J^T dw are its torques by the principle of virtual work [1]. None of these moves
-the robot: the wrench was recorded wrongly; one that is declared for a task is right.
-
-[1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
-"""
+"""Loads: what the force sensor shows is not what acts. A wrench that is declared for a task is right: none moves the robot."""
 
 from __future__ import annotations
 
@@ -18,47 +11,37 @@ from elastocal.effects.protocol import LOADED_JOINTS, effect
 from elastocal.effects.sizes import ABSOLUTE, LOAD, REACH, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacements, Effect, Parameter
+    from elastocal.effects.protocol import Candidate, Candidates, Displacements, Effect, Parameter
     from elastocal.mechanics.sites import Sites
 
-    # Change (S, 6) of a wrench (S, 6) per unit of an error along or about a direction (S, 3).
-    Change = Callable[[np.ndarray, np.ndarray], np.ndarray]
+    # Change of force and moment (S, 3) by a unit of an error along or about a direction (S, 3), of the wrench (S, 6).
+    Change = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-_effect = partial(effect, "load")
+_effect = partial(effect, "load", moves_robot=False)
 # Share of the moments that may be left unexplained where a pull acts at one place.
 _OF_ONE_PLACE = 0.01
+# Axes in which an error can be fixed, with the moments right, or with those that the wrong force makes at its lever: between
+# flange and tool a sensor measures forces and moments; in the line of a pull, the force alone.
 _PULL = " in the pull"
+_FRAMES = [("base axes",), ("flange axes",)]
+_AND_IN_PULL = [*_FRAMES, *((frame + _PULL,) for (frame,) in _FRAMES)]
 
 
-def in_both_frames(sites: Sites) -> list[tuple[str]]:
-    """Axes in which an error of the load can be fixed."""
-    return [("base axes",), ("flange axes",)]
-
-
-def at_flange_and_in_pull(sites: Sites) -> list[tuple[str]]:
-    """The same with the moments right, or with those that the wrong force makes at its lever.
-
-    Between flange and tool a sensor measures forces and moments; in the line of a pull, the force alone.
-    """
-    frames = in_both_frames(sites)
-    return [*frames, *((frame + _PULL,) for (frame,) in frames)]
-
-
-def wrong_wrench(own: Effect, parameters: tuple[Parameter, ...], frame: str, change: Change) -> Candidate:
+def _wrong(own: Effect, parameters: tuple[Parameter, ...], frame: str, change: Change) -> Candidate:
     """Candidate of a wrench that is wrong by ``change(direction, wrench)`` for each of the axes of a frame."""
 
     def law(around: Conditions) -> Displacements:
         wrench, rotation = around.wrench, around.end_rotation
         fixed = np.broadcast_to(np.eye(3), rotation.shape)
-        axes = np.moveaxis(rotation if frame.startswith("flange") else fixed, -1, 0)
-        changed = [change(axis, wrench) for axis in axes]
+        changed = [change(axis, wrench) for axis in np.moveaxis(rotation if frame.startswith("flange") else fixed, -1, 0)]
         if frame.endswith(_PULL):
             lever = lever_of_pull(wrench, rotation)
-            changed = [_wrench(wrong[:, :3], np.cross(lever, wrong[:, :3])) for wrong in changed]
-        return [dict(enumerate(around.joint_deflections(wrong).T)) for wrong in changed]
+            changed = [(force, np.cross(lever, force)) for force, _ in changed]
+        wrong = [around.joint_deflections(np.concatenate(part, axis=1)) for part in changed]
+        return [dict(enumerate(turns.T)) for turns in wrong]
 
     return own.candidate((), parameters, law, LOADED_JOINTS, detail=frame)
 
@@ -79,33 +62,12 @@ def lever_of_pull(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     return np.zeros((len(wrench), 3))
 
 
-def _wrench(force: np.ndarray | float, moment: np.ndarray | float) -> np.ndarray:
-    shape = np.shape(force) or np.shape(moment)
-    return np.concatenate([np.broadcast_to(force, shape), np.broadcast_to(moment, shape)], axis=1)
-
-
-def turned(axis: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """Change of a wrench when its force is turned by one radian about an axis."""
-    return _wrench(np.cross(axis, wrench[:, :3]), 0.0)
-
-
-def pushed(axis: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """A force of 1 N along an axis wherever there is a load."""
-    return _wrench(axis * wrench.any(axis=1, keepdims=True), 0.0)
-
-
-def shifted(axis: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """Change of a wrench when its force acts one metre further along an axis."""
-    return _wrench(0.0, np.cross(axis, wrench[:, :3]))
-
-
 @_effect(
     "misalignment of the force sensor",
     Size("turn", 0.02, ABSOLUTE, "a sensor mounted by eye: a degree"),
-    at=at_flange_and_in_pull,
-    moves_robot=False,
+    at=lambda sites: _AND_IN_PULL,
 )
-def force_misalignment(own: Effect, sites: Sites, frame: str) -> Iterator[Candidate]:
+def force_misalignment(own: Effect, sites: Sites, frame: str) -> Candidates:
     """A force sensor that is mounted askew: it shows the right force in a wrong direction.
 
     theta = diag(c) J^T (phi x F, 0), or diag(c) J^T (phi x F, r x (phi x F)) in a pull,
@@ -116,16 +78,16 @@ def force_misalignment(own: Effect, sites: Sites, frame: str) -> Iterator[Candid
     r (m) is wrong, too; elsewhere the moments are as recorded. Derived here: a small turn adds phi x F, and an error dw of the
     wrench loads by J^T dw.
     """
-    yield wrong_wrench(own, own.parameters("turn", [f"about_{axis}" for axis in "xyz"], "rad", sites), frame, turned)
+    parameters = own.parameters("turn", [f"about_{axis}" for axis in "xyz"], "rad", sites)
+    yield _wrong(own, parameters, frame, lambda axis, wrench: (np.cross(axis, wrench[:, :3]), np.zeros_like(axis)))
 
 
 @_effect(
     "zero error of the force sensor",
     Size("force", 0.01, LOAD, "accuracy class of load cells that suit the arm"),
-    at=at_flange_and_in_pull,
-    moves_robot=False,
+    at=lambda sites: _AND_IN_PULL,
 )
-def force_bias(own: Effect, sites: Sites, frame: str) -> Iterator[Candidate]:
+def force_bias(own: Effect, sites: Sites, frame: str) -> Candidates:
     """A force sensor that shows a force where there is none: its zero was not set before the pull, or has moved since.
 
     theta = diag(c) J^T (b, 0) wherever a load is recorded, or (b, r x b) in a pull with the lever r (m); theta are the turns of
@@ -133,16 +95,16 @@ def force_bias(own: Effect, sites: Sites, frame: str) -> Iterator[Candidate]:
     recorded one (N), which is minus what the sensor shows at zero. It is fixed in base axes, or in the flange where the sensor
     turns with the tool. Derived here: a wrench w loads the joints by J^T w, so that its error dw turns them by diag(c) J^T dw.
     """
-    yield wrong_wrench(own, own.parameters("force", [f"along_{axis}" for axis in "xyz"], "N", sites), frame, pushed)
+    parameters = own.parameters("force", [f"along_{axis}" for axis in "xyz"], "N", sites)
+    yield _wrong(own, parameters, frame, lambda axis, wrench: (axis * wrench.any(axis=1, keepdims=True), np.zeros_like(axis)))
 
 
 @_effect(
     "wrong load application point",
     Size("shift", 0.01, REACH, "a hook or a screw beside the point that was meant"),
-    at=in_both_frames,
-    moves_robot=False,
+    at=lambda sites: _FRAMES,
 )
-def application_point(own: Effect, sites: Sites, frame: str) -> Iterator[Candidate]:
+def application_point(own: Effect, sites: Sites, frame: str) -> Candidates:
     """A force that acts elsewhere than was recorded: the pull or the weight is fixed to the tool at another place.
 
     theta = diag(c) J^T (0, dr x F), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian
@@ -150,15 +112,15 @@ def application_point(own: Effect, sites: Sites, frame: str) -> Iterator[Candida
     where the load hangs on the tool. Derived here: a force that is moved by dr has the further moment dr x F, and a wrench w
     loads the joints by J^T w.
     """
-    yield wrong_wrench(own, own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m", sites), frame, shifted)
+    parameters = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m", sites)
+    yield _wrong(own, parameters, frame, lambda axis, wrench: (np.zeros_like(axis), np.cross(axis, wrench[:, :3])))
 
 
 @_effect(
     "scale error of the force sensor",
     Size("scale", 0.02, ABSOLUTE, "a load cell that was calibrated long ago"),
-    moves_robot=False,
 )
-def force_scale(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def force_scale(own: Effect, sites: Sites) -> Candidates:
     """A force sensor that shows too much or too little: its sensitivity differs from the one of its calibration.
 
     theta = diag(c) J^T (s w), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the

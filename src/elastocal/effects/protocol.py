@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
     from typing import Any
 
     from elastocal.effects.conditions import Conditions
@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     Displacements = list[dict[int, np.ndarray]]
     # From the conditions and a value of each of the shapes.
     Law = Callable[..., Displacements]
-    # From the effect, the sites and what tells a place.
-    Listing = Callable[..., Iterable["Candidate"]]
+    # What tells each place on a robot where an effect acts; and its candidates, from the effect, the sites and that of a place.
+    Places = Callable[[Sites], Iterable[tuple[Any, ...]]]
+    Candidates = Iterator["Candidate"]
+    Listing = Callable[..., Candidates]
 
 
 # Needs of laws that go with the load on the joints.
@@ -191,7 +193,7 @@ class Effect:
     doc: str
     sizes: Mapping[str, Size]
     listed: Listing
-    at: Callable[[Sites], Iterable[tuple[Any, ...]]]
+    at: Places
     moves_robot: bool = True
     part: str = "joint"
     detail_words: Mapping[str, str] = field(default_factory=dict)
@@ -202,17 +204,11 @@ class Effect:
         return [candidate for place in self.at(sites) for candidate in self.listed(self, sites, *place)]
 
     def candidate(
-        self,
-        joints: tuple[int, ...],
-        parameters: Iterable[Parameter],
-        displacement: Law,
-        needs: Collection[str] = (),
-        detail: str = "",
-        **more: Any,
+        self, joints: tuple[int, ...], parameters: Iterable[Parameter], law: Law, needs: Collection[str] = (), **more: Any
     ) -> Candidate:
         """A `Candidate` of this effect; `more` as there."""
-        at = self.name, self.family, joints, detail
-        return Candidate(*at, tuple(parameters), displacement, frozenset(needs), **more)
+        at, detail = (self.name, self.family, joints), more.pop("detail", "")
+        return Candidate(*at, detail, tuple(parameters), law, frozenset(needs), **more)
 
     def size(self, quantity: str, sites: Sites, *joints: int) -> float:
         """Size of a quantity of this effect on an arm, see `Size.on`."""
@@ -226,13 +222,7 @@ class Effect:
         return tuple(Parameter(name, unit, size, sign=line.sign, most=line.most) for name in names)
 
 
-def effect(
-    family: str,
-    words: str,
-    *sizes: Size,
-    at: Callable[[Sites], Iterable[tuple[Any, ...]]] = lambda sites: [()],
-    **more: Any,
-) -> Callable[[Listing], Effect]:
+def effect(family: str, words: str, *sizes: Size, at: Places = lambda sites: [()], **more: Any) -> Callable[[Listing], Effect]:
     """Make an effect of a function that yields its candidates, ``name(own, sites, *place)``, for each place on a robot.
 
     Keys and tables call it by the name of the function; its docstring has the physics, the formula with units and the source.
@@ -270,10 +260,7 @@ def small_form(whole: Candidate, detail: str, kept: slice) -> Candidate:
 
 
 def needed(values: np.ndarray | None) -> np.ndarray:
-    """What states need not have, for a law whose candidate names it among its needs.
-
-    `values` (S,), (S, n). Returns (S,), (S, n): the same.
-    """
+    """What states need not have, for a law whose candidate names it among its needs."""
     if values is None:
         raise TypeError("states without what the law of a candidate needs")
     return values

@@ -9,10 +9,8 @@ from elastocal.effects.protocol import Shape, effect, moved_and_turned, needed
 from elastocal.effects.sizes import ABSOLUTE, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacements, Effect
+    from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "drift")
@@ -29,7 +27,7 @@ _WHEN = Shape("when", "1", 0.5, 1 / 12, 11 / 12, tried=11)
     Size("turn an hour", 1e-4, ABSOLUTE, "the same over its height"),
     moves_robot=False,
 )
-def frame_drift(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def frame_drift(own: Effect, sites: Sites) -> Candidates:
     """A tracker or a robot's foot that drifts: stand, floor or bolts settle, and all measurements move as one rigid body.
 
     u = t (d, r) at the foot in base axes, with t the time since the first measurement (h), d in m/h and r in rad/h; a point p
@@ -52,7 +50,7 @@ def frame_drift(own: Effect, sites: Sites) -> Iterator[Candidate]:
     moves_robot=False,
     parameter_words={"when": "share of the measurements before it"},
 )
-def setup_step(own: Effect, sites: Sites) -> Iterator[Candidate]:
+def setup_step(own: Effect, sites: Sites) -> Candidates:
     """A tracker, a nest or a foot that was moved between two rows: a rigid motion of all measurements from there on.
 
     u = (d, r) at the foot in base axes from the share w of the campaign on, zero before; d in m, r in rad, and a point p (m)

@@ -1,11 +1,4 @@
-"""Warmth: by how much the robot is warmer, by the temperature or by the time, and what that does to it.
-
-By the temperature T (°C) it is T - 20, counted from that at which dimensions are stated [1], in K; by the time t since the
-campaign began (s) it is the share 1 - exp(-t / t_0) of the final warmth, the first-order lag of a lumped capacitance [2].
-
-[1] ISO 1, Geometrical product specifications: standard reference temperature, 2016.
-[2] F. P. Incropera and D. P. DeWitt, Fundamentals of Heat and Mass Transfer, Wiley, 2002.
-"""
+"""Warmth: by how much the robot is warmer, by the temperature or by the time, and what that does to it."""
 
 from __future__ import annotations
 
@@ -19,10 +12,8 @@ from elastocal.effects.protocol import Parameter, Shape, effect, needed
 from elastocal.effects.sizes import ABSOLUTE, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacements, Effect
+    from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "drift")
@@ -45,7 +36,7 @@ def warmer(around: Conditions, *lag: float) -> np.ndarray:
     Size("final growth", 3e-4, ABSOLUTE, "10 K of it"),
     at=lambda sites: [("temperature", "expansion", "1/K"), ("time", "final growth", "m/m")],
 )
-def thermal_growth(own: Effect, sites: Sites, cause: str, quantity: str, unit: str) -> Iterator[Candidate]:
+def thermal_growth(own: Effect, sites: Sites, cause: str, quantity: str, unit: str) -> Candidates:
     """Column and links that grow as they warm up: motors, gears and the air warm the castings, which expand.
 
     dl = alpha dT l for each length l (m). With a measured temperature alpha is the expansion (1/K) and dT the temperature above
@@ -80,7 +71,7 @@ def _warmed(sites: Sites) -> list[tuple[int | None, str]]:
         **{f"column {cause}": f"across the column, by {cause}" for cause in CAUSES},
     },
 )
-def temperature_gradient(own: Effect, sites: Sites, link: int | None, cause: str) -> Iterator[Candidate]:
+def temperature_gradient(own: Effect, sites: Sites, link: int | None, cause: str) -> Candidates:
     """An arm that is warmer on one side or at one end than at the other: motors, sun or a draught warm it unevenly.
 
     A gradient g (K/m) across a link bends it to the curvature alpha g (1/m) [1], with alpha the expansion (1/K), so that a link
@@ -93,42 +84,27 @@ def temperature_gradient(own: Effect, sites: Sites, link: int | None, cause: str
     """
     quantity, unit = {"temperature": ("curvature a kelvin", "1/(K m)"), "time": ("curvature", "1/m")}[cause]
     if link is None:
-        names, grown = ["growth_along"], _further(sites)
-
-        def law(around: Conditions, *lag: float) -> Displacements:
-            rise = warmer(around, *lag)
-            return [{coordinate: rise * along * distance for coordinate, along, distance in grown}]
-
+        names, lengths = ["growth_along"], np.linalg.norm(sites.link_vectors_m, axis=1)
+        middle = np.cumsum(lengths) - lengths / 2
+        further = zip(sites.link_end, sites.link_vectors_m, middle - middle @ lengths / lengths.sum(), strict=True)
+        # Of each coordinate of a far end the share of its link, and how far the middle of that is from the mean.
+        displaced = [
+            {c: (along, far) for end, vector, far in further for c, along in zip(end[:3], vector, strict=True) if along}
+        ]
     else:
-        names, bent = [f"curvature_about_{'xyz'[axis]}" for axis in sites.transverse_axes(link)], _bent(sites, link)
+        names, vector = [f"curvature_about_{'xyz'[axis]}" for axis in sites.transverse_axes(link)], sites.link_vectors_m[link]
+        length = np.linalg.norm(vector)
+        # About the two axes least along the link, made square to it. A turn about e by s / l carries the end of a beam along x
+        # by e cross x over half its length.
+        about = [np.eye(3)[axis] - vector[axis] * vector / length**2 for axis in sites.transverse_axes(link)]
+        ends = [np.concatenate([np.cross(e, vector) * length / 2, length * e]) for e in about]
+        displaced = [{c: (part, 1.0) for c, part in zip(sites.link_end[link], end, strict=True) if part} for end in ends]
 
-        def law(around: Conditions, *lag: float) -> Displacements:
-            rise = warmer(around, *lag)
-            return [{coordinate: rise * part for coordinate, part in each.items()} for each in bent]
+    def law(around: Conditions, *lag: float) -> Displacements:
+        rise = warmer(around, *lag)
+        return [{c: rise * part * times for c, (part, times) in each.items()} for each in displaced]
 
     parameters = [Parameter(name, unit, own.size(quantity, sites)) for name in names]
     where = {None: "along", 0: "column"}.get(link, "")
     detail, joints = f"{where} {cause}".strip(), (link,) if link else ()
     yield own.candidate(joints, parameters, law, {cause}, shapes=CAUSES[cause], detail=detail, location_name=where)
-
-
-def _bent(sites: Sites, link: int) -> list[dict[int, float]]:
-    """Displacement of the far end of a link by unit curvature about the two axes least along it, made square to it."""
-    vector, length = sites.link_vectors_m[link], np.linalg.norm(sites.link_vectors_m[link])
-    about = [np.eye(3)[axis] - vector[axis] * vector / length**2 for axis in sites.transverse_axes(link)]
-    # A turn about e by s / l carries the end of a beam along x by e cross x over half its length.
-    ends = [np.concatenate([np.cross(e, vector) * length / 2, length * e]) for e in about]
-    return [{c: part for c, part in zip(sites.link_end[link], end, strict=True) if part} for end in ends]
-
-
-def _further(sites: Sites) -> list[tuple[int, float, float]]:
-    """Coordinates of ends of links, the link along each of them, and how far its middle is from the mean over the arm."""
-    lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
-    middle = np.cumsum(lengths) - lengths / 2
-    further = middle - middle @ lengths / lengths.sum()
-    return [
-        (coordinate, along, distance)
-        for ends, vector, distance in zip(sites.link_end, sites.link_vectors_m, further, strict=True)
-        for coordinate, along in zip(ends[:3], vector, strict=True)
-        if along
-    ]

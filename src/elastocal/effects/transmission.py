@@ -12,10 +12,8 @@ from elastocal.effects.protocol import WAVES, Parameter, Shape, effect, turning_
 from elastocal.effects.sizes import ABSOLUTE, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacements, Effect
+    from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "transmission")
@@ -33,7 +31,7 @@ _ANGLES_OF_MOTOR = 12
     Size("amplitude", 2e-4, ABSOLUTE, "gears are inspected for an arc minute (their catalogues)", most=1.0),
     at=lambda sites: [(joint, *band) for (joint,) in turning_joints(sites) for band in _BANDS],
 )
-def transmission_harmonic(own: Effect, sites: Sites, joint: int, low: int, high: int) -> Iterator[Candidate]:
+def transmission_harmonic(own: Effect, sites: Sites, joint: int, low: int, high: int) -> Candidates:
     """Transmission error of a gear, periodic in the angle of its joint: eccentric and uneven parts let it run ahead and behind.
 
     theta_i = sum_k a_k cos(k q_i) + b_k sin(k q_i), with theta_i, a_k, b_k and the joint angle q_i in rad. Orders 1 and 2 are
@@ -70,7 +68,7 @@ def transmission_harmonic(own: Effect, sites: Sites, joint: int, low: int, high:
     at=lambda sites: [(joint, above) for (joint,) in turning_joints(sites) for above in range(1, _HIGHEST)],
     detail_words={f"order {above}-{above + 1}": f"order between {above} and {above + 1}" for above in range(1, _HIGHEST)},
 )
-def transmission_order(own: Effect, sites: Sites, joint: int, above: int) -> Iterator[Candidate]:
+def transmission_order(own: Effect, sites: Sites, joint: int, above: int) -> Candidates:
     """Transmission error of an order that is no integer: parts of a gear that do not come round with the joint.
 
     theta_i = a cos(k q_i) + b sin(k q_i), with theta_i, a, b and the joint angle q_i in rad and k between two integers:
@@ -108,7 +106,7 @@ def _driven(sites: Sites) -> list[tuple[int, list[int], str]]:
     at=_driven,
     detail_words={f"from {number}": f"coupling from joint {number} alone" for number in range(1, 10)},
 )
-def transmission_ratio(own: Effect, sites: Sites, joint: int, sources: list[int], detail: str) -> Iterator[Candidate]:
+def transmission_ratio(own: Effect, sites: Sites, joint: int, sources: list[int], detail: str) -> Candidates:
     """Wrong ratio of a gear, or coupling from a joint before it: the controller divides the motor's angle by a wrong number.
 
     theta_i = e_i q_i + e_ih q_h, h = i - 1, with theta and q in rad and e in rad/rad (m and m/m for prismatic joints): linear
@@ -134,7 +132,7 @@ def transmission_ratio(own: Effect, sites: Sites, joint: int, sources: list[int]
     Size("amplitude", 5e-5, ABSOLUTE, "milliradians at the motor, over a ratio of a hundred"),
     at=turning_joints,
 )
-def motor_eccentricity(own: Effect, sites: Sites, joint: int) -> Iterator[Candidate]:
+def motor_eccentricity(own: Effect, sites: Sites, joint: int) -> Candidates:
     """An eccentric motor, resolver or input pinion: transmission error once and twice per turn of the motor.
 
     theta_i = sum_k a_k cos(k N q_i) + b_k sin(k N q_i), k = 1, 2, with theta_i, a_k, b_k and the joint angle q_i in rad and N
@@ -163,7 +161,7 @@ def motor_eccentricity(own: Effect, sites: Sites, joint: int) -> Iterator[Candid
     Size("wobble", 5e-5, ABSOLUTE, "the same over the diameter of the bearing"),
     at=lambda sites: [(joint, motion) for motion in ("radial", "axial", "wobble") for (joint,) in turning_joints(sites)],
 )
-def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Iterator[Candidate]:
+def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candidates:
     """A bearing that runs out: races or seats that are out of round or askew move the axis of a joint once and twice per turn.
 
     e = sum_k a_k cos(k q) + b_k sin(k q), k = 1, 2, with q the joint angle (rad), is each of the error motions of an axis of
