@@ -45,7 +45,7 @@ def _bending(sites: Sites) -> list[tuple[tuple[int, ...], str]]:
 
 @_effect(
     "elastic bending and torsion",
-    Size("1/EI", 1.0, PER_LENGTH, "a link bends as much as the gear before it turns", 1),
+    Size("1/EI", 1.0, "a link bends as much as the gear before it turns", PER_LENGTH, sign=1),
     at=_bending,
     part="link",
     detail_words={_ONE_SECTION: "all of one cross-section"},
@@ -100,7 +100,9 @@ def _end_compliance(sites: Sites, link: int, taper: float) -> tuple[np.ndarray, 
 
 
 @_effect(
-    "bearing tilt", Size("tilt", 1.0, JOINT, "bearings tilt as much as gears turn (Klimchik et al. 2015)", 1), at=every_joint
+    "bearing tilt",
+    Size("tilt", 1.0, "bearings tilt as much as gears turn (Klimchik et al. 2015)", JOINT, sign=1),
+    at=every_joint,
 )
 def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
     """A bearing that tilts across its axis under the moment that it carries.
@@ -124,8 +126,8 @@ def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
 
 @_effect(
     "elasticity of the foundation",
-    Size("tilt", 0.3, STIFFEST, "a foundation is stiffer than what it bears", 1),
-    Size("shift", 0.01, SHIFT, "the same at a fifth of the reach", 1),
+    Size("tilt", 0.3, "a foundation is stiffer than what it bears", STIFFEST, sign=1),
+    Size("shift", 0.01, "the same at a fifth of the reach", SHIFT, sign=1),
 )
 def base_compliance(own: Effect, sites: Sites) -> Candidates:
     """A foundation that yields elastically: floor, anchors or pedestal let the foot of the robot shift and tilt under the load.
@@ -152,7 +154,7 @@ def base_compliance(own: Effect, sites: Sites) -> Candidates:
 
 @_effect(
     "elastic coupling",
-    Size("coupling", 0.3, JOINT, "of the geometric mean, beyond which a joint would give energy back"),
+    Size("coupling", 0.3, "of the geometric mean, beyond which a joint would give energy back", JOINT),
     at=lambda sites: combinations([joint for (joint,) in turning_joints(sites)], 2),
 )
 def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candidates:
@@ -164,17 +166,14 @@ def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candida
 
     [1] S. P. Timoshenko and J. N. Goodier, Theory of Elasticity, 3rd edition, McGraw-Hill, 1970.
     """
-    coupling = own.parameters("coupling", ["compliance"], "rad/(N m)", sites, one, other)
+    both, coupling = (one + 1, other + 1), own.parameters("coupling", ["compliance"], "rad/(N m)", sites, one, other)
     yield own.candidate(
-        (one + 1, other + 1),
-        coupling,
-        lambda around: [{one: around.total[:, other], other: around.total[:, one]}],
-        LOADED_JOINTS,
+        both, coupling, lambda around: [{one: around.total[:, other], other: around.total[:, one]}], LOADED_JOINTS
     )
 
 
 @_effect(
-    "angle-dependent stiffness", Size("variation", 0.3, JOINT, "teeth and rollers in mesh vary by a third"), at=turning_joints
+    "angle-dependent stiffness", Size("variation", 0.3, "teeth and rollers in mesh vary by a third", JOINT), at=turning_joints
 )
 def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
     """A joint compliance that changes with the angle of the joint: teeth, rollers and housing are not equally stiff all round.
@@ -194,7 +193,7 @@ def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidat
 
 @_effect(
     "stiffness of the gravity compensator",
-    Size("variation", 0.3, JOINT, "a compensator is an order softer than its gear"),
+    Size("variation", 0.3, "a compensator is an order softer than its gear", JOINT),
     at=compensated_joint,
 )
 def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
@@ -221,8 +220,8 @@ def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
 
 @_effect(
     "flexibility of the flange",
-    Size("turn", 0.1, JOINT, "a bolted joint is ten times as stiff as a wrist's gear", 1),
-    Size("shift", 1e-2, SHIFT, "the same at a tenth of the reach", 1),
+    Size("turn", 0.1, "a bolted joint is ten times as stiff as a wrist's gear", JOINT, sign=1),
+    Size("shift", 1e-2, "the same at a tenth of the reach", SHIFT, sign=1),
 )
 def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     """A flange, its bearing or a tool changer that yields elastically: what holds the tool is a spring behind the last joint.
@@ -234,14 +233,10 @@ def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     [1] A. Klimchik, S. Caro, B. Furet and A. Pashkevich, Complete stiffness model for a serial robot, International Conference
         on Informatics in Control, Automation and Robotics, 2014.
     """
-    coordinates = sites.link_end[-1]
     shifts = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
     turns = own.parameters("turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1)
     every = own.candidate(
-        (),
-        (*shifts, *turns),
-        lambda around: [{coordinate: around.load[:, coordinate]} for coordinate in coordinates],
-        LOADED_JOINTS,
+        (), (*shifts, *turns), lambda around: [{c: around.load[:, c]} for c in sites.link_end[-1]], LOADED_JOINTS
     )
     # Turns alone are most of what a flange does.
     yield from (every, small_form(every, "turns", slice(3, None)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import LOADED_JOINTS, Shape, effect, every_joint, needed, turning_joints
-from elastocal.effects.sizes import ABSOLUTE, JOINT, Size, full_torque_Nm
+from elastocal.effects.sizes import JOINT, Size, full_torque_Nm
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +35,7 @@ def _torque(sites: Sites, joint: int, shares: np.ndarray) -> Shape:
 # Small gears carry less torque and may bend more by it.
 @_effect(
     "gear stiffening",
-    Size("lost beyond", 0.5, JOINT, "of gears' compliance half goes once all teeth bear", -1),
+    Size("lost beyond", 0.5, "of gears' compliance half goes once all teeth bear", JOINT, sign=-1),
     at=lambda sites: [(joint, law) for law in _AS_AT_REST for (joint,) in turning_joints(sites)],
 )
 def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Candidates:
@@ -60,7 +60,7 @@ def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Candidates
     yield own.candidate((joint + 1,), beyond, law, LOADED_JOINTS, shapes=(meeting,), detail=detail)
 
 
-@_effect("lost motion (backlash)", Size("play", 1e-4, ABSOLUTE, "a third of an arc minute", 1), at=turning_joints)
+@_effect("lost motion (backlash)", Size("play", 1e-4, "a third of an arc minute", sign=1), at=turning_joints)
 def lost_motion(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Play that the gear crosses where the torque changes its sign: teeth leave one flank and touch the other.
 
@@ -70,21 +70,14 @@ def lost_motion(own: Effect, sites: Sites, joint: int) -> Candidates:
 
     [1] Nabtesco, Precision Reduction Gear RV, catalogue, glossary: lost motion, the torsion angle at 3 % of the rated torque.
     """
-    play, taken_up = own.parameters("play", ["half_play"], "rad", sites), _torque(sites, joint, _PLAY)
+    play, shapes = own.parameters("play", ["half_play"], "rad", sites), (_torque(sites, joint, _PLAY),)
     yield own.candidate(
-        (joint + 1,),
-        play,
-        lambda around, torque: [{joint: np.tanh(around.total[:, joint] / torque)}],
-        LOADED_JOINTS,
-        shapes=(taken_up,),
+        (joint + 1,), play, lambda around, at: [{joint: np.tanh(around.total[:, joint] / at)}], LOADED_JOINTS, shapes=shapes
     )
 
 
 @_effect(
-    "hysteresis",
-    Size("turn", 1e-4, ABSOLUTE, "a third of an arc minute"),
-    Size("shift", 2e-5, ABSOLUTE, "the nut of a spindle"),
-    at=every_joint,
+    "hysteresis", Size("turn", 1e-4, "a third of an arc minute"), Size("shift", 2e-5, "the nut of a spindle"), at=every_joint
 )
 def hysteresis(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Friction and backlash that hold a joint back on the side from which it came: the gear stays wound up after a stop.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import WAVES, Parameter, effect, every_joint, moved_and_turned
-from elastocal.effects.sizes import ABSOLUTE, REACH, Size
+from elastocal.effects.sizes import REACH, Size
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -21,8 +21,8 @@ _NEST_ORDER, _SAMPLES_PER_PERIOD = 2, 4
 
 @_effect(
     "zero offset",
-    Size("turn", 1e-3, ABSOLUTE, "mastering by marks; measured robots have up to 10 mrad"),
-    Size("shift", 4e-4, REACH, "as links"),
+    Size("turn", 1e-3, "mastering by marks; measured robots have up to 10 mrad"),
+    Size("shift", 4e-4, "as links", REACH),
     at=every_joint,
 )
 def joint_offset(own: Effect, sites: Sites, joint: int) -> Candidates:
@@ -41,8 +41,8 @@ def joint_offset(own: Effect, sites: Sites, joint: int) -> Candidates:
 # The column before joint 1 belongs to the base.
 @_effect(
     "geometric error",
-    Size("length", 4e-4, REACH, "tolerances of castings: a millimetre of 2.5 m"),
-    Size("turn", 1e-3, ABSOLUTE, "a millimetre a metre"),
+    Size("length", 4e-4, "tolerances of castings: a millimetre of 2.5 m", REACH),
+    Size("turn", 1e-3, "a millimetre a metre"),
     at=every_joint,
     part="link",
 )
@@ -63,8 +63,8 @@ def link_geometry(own: Effect, sites: Sites, joint: int) -> Candidates:
 # Several times what registering leaves (0.05 to 0.3 mm, 20 to 100 urad), where a step went wrong.
 @_effect(
     "base that stands elsewhere than declared",
-    Size("shift", 5e-4, ABSOLUTE, "a tracker registers to 0.05 to 0.3 mm, unless a step goes wrong"),
-    Size("turn", 3e-4, ABSOLUTE, "the same over the reflectors' distance"),
+    Size("shift", 5e-4, "a tracker registers to 0.05 to 0.3 mm, unless a step goes wrong"),
+    Size("turn", 3e-4, "the same over the reflectors' distance"),
 )
 def base_placement(own: Effect, sites: Sites) -> Candidates:
     """A robot whose foot does not stand where the campaign declares it: a constant shift and turn.
@@ -78,7 +78,7 @@ def base_placement(own: Effect, sites: Sites) -> Candidates:
 
 
 # The reflector circles in its nest, and the flange does not.
-@_effect("eccentric nest of the reflector", Size("shift", 5e-5, ABSOLUTE, "a worn nest of a reflector"), moves_robot=False)
+@_effect("eccentric nest of the reflector", Size("shift", 5e-5, "a worn nest of a reflector"), moves_robot=False)
 def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
     """A reflector whose centre is off the axis of its nest at the flange: it circles as the last joint turns.
 
@@ -106,11 +106,7 @@ def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
 
 
 # The tracker shows lengths that the robot does not have.
-@_effect(
-    "scale error of the tracker",
-    Size("scale", 2e-5, ABSOLUTE, "20 K or 70 hPa of air that were not entered"),
-    moves_robot=False,
-)
+@_effect("scale error of the tracker", Size("scale", 2e-5, "20 K or 70 hPa of air that were not entered"), moves_robot=False)
 def tracker_scale(own: Effect, sites: Sites) -> Candidates:
     """A tracker that measures all lengths too long or too short, by its wavelength in warm air or by a bad absolute distance.
 

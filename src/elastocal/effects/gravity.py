@@ -25,8 +25,8 @@ _OFF_M, _LEVER_M = 0.2, 0.2
 
 @_effect(
     "gravity sag",
-    Size("mass", 1.5, RATED, "an arm weighs six times what it carries, a quarter of it at the end of a link"),
-    Size("mass of one joint", 1.5, SAG, "the same, by the joint's turn"),
+    Size("mass", 1.5, "an arm weighs six times what it carries, a quarter of it at the end of a link", RATED),
+    Size("mass of one joint", 1.5, "the same, by the joint's turn", SAG),
     detail_words={_OFF_THE_LINE: "centres of mass off the links' axes"},
 )
 def link_weight(own: Effect, sites: Sites) -> Candidates:
@@ -81,7 +81,7 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
 
 
 # It hangs on the flange in tasks as in the campaign, until someone takes it off: that moves the robot.
-@_effect("weight of an undeclared payload", Size("mass", 0.15, RATED, "a cable package or a forgotten gripper"))
+@_effect("weight of an undeclared payload", Size("mass", 0.15, "a cable package or a forgotten gripper", RATED))
 def payload(own: Effect, sites: Sites) -> Candidates:
     """Weight at the flange that the model does not know: a tool, a cable package or an adapter that nobody declared.
 
@@ -130,7 +130,7 @@ def wave_parameters(own: Effect, quantity: str, unit: str, sites: Sites, joint: 
 
 @_effect(
     "torque of the gravity compensator",
-    Size("turn", 0.3, TORQUE, "a compensator bears a third of the weight"),
+    Size("turn", 0.3, "a compensator bears a third of the weight", TORQUE),
     at=compensated_joint,
 )
 def compensator_torque(own: Effect, sites: Sites, joint: int) -> Candidates:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import LOADED_JOINTS, effect
-from elastocal.effects.sizes import ABSOLUTE, LOAD, REACH, Size
+from elastocal.effects.sizes import LOAD, REACH, Size
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,9 +63,7 @@ def lever_of_pull(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
 
 
 @_effect(
-    "misalignment of the force sensor",
-    Size("turn", 0.02, ABSOLUTE, "a sensor mounted by eye: a degree"),
-    at=lambda sites: _AND_IN_PULL,
+    "misalignment of the force sensor", Size("turn", 0.02, "a sensor mounted by eye: a degree"), at=lambda sites: _AND_IN_PULL
 )
 def force_misalignment(own: Effect, sites: Sites, frame: str) -> Candidates:
     """A force sensor that is mounted askew: it shows the right force in a wrong direction.
@@ -84,7 +82,7 @@ def force_misalignment(own: Effect, sites: Sites, frame: str) -> Candidates:
 
 @_effect(
     "zero error of the force sensor",
-    Size("force", 0.01, LOAD, "accuracy class of load cells that suit the arm"),
+    Size("force", 0.01, "accuracy class of load cells that suit the arm", LOAD),
     at=lambda sites: _AND_IN_PULL,
 )
 def force_bias(own: Effect, sites: Sites, frame: str) -> Candidates:
@@ -101,7 +99,7 @@ def force_bias(own: Effect, sites: Sites, frame: str) -> Candidates:
 
 @_effect(
     "wrong load application point",
-    Size("shift", 0.01, REACH, "a hook or a screw beside the point that was meant"),
+    Size("shift", 0.01, "a hook or a screw beside the point that was meant", REACH),
     at=lambda sites: _FRAMES,
 )
 def application_point(own: Effect, sites: Sites, frame: str) -> Candidates:
@@ -116,10 +114,7 @@ def application_point(own: Effect, sites: Sites, frame: str) -> Candidates:
     yield _wrong(own, parameters, frame, lambda axis, wrench: (np.zeros_like(axis), np.cross(axis, wrench[:, :3])))
 
 
-@_effect(
-    "scale error of the force sensor",
-    Size("scale", 0.02, ABSOLUTE, "a load cell that was calibrated long ago"),
-)
+@_effect("scale error of the force sensor", Size("scale", 0.02, "a load cell that was calibrated long ago"))
 def force_scale(own: Effect, sites: Sites) -> Candidates:
     """A force sensor that shows too much or too little: its sensitivity differs from the one of its calibration.
 
@@ -128,9 +123,5 @@ def force_scale(own: Effect, sites: Sites) -> Candidates:
     w of the wrench loads the joints by J^T (s w). Where all compliances are identified and no declared masses load the joints
     it is exactly an alias of them, so that only a reference weight can find it.
     """
-    yield own.candidate(
-        (),
-        own.parameters("scale", ["scale"], "1", sites),
-        lambda around: [dict(enumerate(around.joint_deflections(around.wrench).T))],
-        LOADED_JOINTS,
-    )
+    scale = own.parameters("scale", ["scale"], "1", sites)
+    yield own.candidate((), scale, lambda around: [dict(enumerate(around.joint_deflections(around.wrench).T))], LOADED_JOINTS)

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from elastocal.effects.protocol import Shape, effect, moved_and_turned, needed
-from elastocal.effects.sizes import ABSOLUTE, Size
+from elastocal.effects.sizes import Size
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -23,8 +23,8 @@ _WHEN = Shape("when", "1", 0.5, 1 / 12, 11 / 12, tried=11)
 # Tracker and foot drift alike in the measurements, and a task counts from where the foot stands.
 @_effect(
     "drift of the tracker or of the robot's foot",
-    Size("shift an hour", 2e-4, ABSOLUTE, "a tripod on a warming floor"),
-    Size("turn an hour", 1e-4, ABSOLUTE, "the same over its height"),
+    Size("shift an hour", 2e-4, "a tripod on a warming floor"),
+    Size("turn an hour", 1e-4, "the same over its height"),
     moves_robot=False,
 )
 def frame_drift(own: Effect, sites: Sites) -> Candidates:
@@ -45,8 +45,8 @@ def frame_drift(own: Effect, sites: Sites) -> Candidates:
 # As a drift.
 @_effect(
     "shift of the set-up between rows",
-    Size("shift", 5e-4, ABSOLUTE, "a stand that is knocked"),
-    Size("turn", 2e-4, ABSOLUTE, "the same over its height"),
+    Size("shift", 5e-4, "a stand that is knocked"),
+    Size("turn", 2e-4, "the same over its height"),
     moves_robot=False,
     parameter_words={"when": "share of the measurements before it"},
 )

@@ -34,7 +34,7 @@ _LEAST_LEVER_M, _RATED_OVER_MASS = 0.5, 1 / 6
 class Size:
     """How large one quantity of an effect is on real robots.
 
-    `share`: size in the unit of the arm `of`; of what is sized by itself, in the SI unit of the parameter. `sign`: that physics
+    `share`: size in the SI unit of the parameter, or in the unit of the arm `of`. `sign`: that physics
     gives, 0 for either. `most`: times the size that a bad case reaches: once where the size is one that makers inspect for,
     since what exceeds it is not delivered; several times where it rests on a unit of the arm that is a guess itself, on
     wear, or on what people do.
@@ -42,8 +42,8 @@ class Size:
 
     quantity: str
     share: float
-    of: str
     reason: str
+    of: str = ABSOLUTE
     sign: int = 0
     most: float = 3.0
 

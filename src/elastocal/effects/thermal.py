@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.effects.geometry import longer
 from elastocal.effects.protocol import Parameter, Shape, effect, needed
-from elastocal.effects.sizes import ABSOLUTE, Size
+from elastocal.effects.sizes import Size
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -32,8 +32,8 @@ def warmer(around: Conditions, *lag: float) -> np.ndarray:
 
 @_effect(
     "thermal growth of the links",
-    Size("expansion", 3e-5, ABSOLUTE, "aluminium, and a little more for the gears", 1),
-    Size("final growth", 3e-4, ABSOLUTE, "10 K of it"),
+    Size("expansion", 3e-5, "aluminium, and a little more for the gears", sign=1),
+    Size("final growth", 3e-4, "10 K of it"),
     at=lambda sites: [("temperature", "expansion", "1/K"), ("time", "final growth", "m/m")],
 )
 def thermal_growth(own: Effect, sites: Sites, cause: str, quantity: str, unit: str) -> Candidates:
@@ -60,8 +60,8 @@ def _warmed(sites: Sites) -> list[tuple[int | None, str]]:
 
 @_effect(
     "temperature gradient",
-    Size("curvature a kelvin", 2e-5, ABSOLUTE, "steel, half of the warmth across 0.3 m"),
-    Size("curvature", 1.5e-4, ABSOLUTE, "8 K of it"),
+    Size("curvature a kelvin", 2e-5, "steel, half of the warmth across 0.3 m"),
+    Size("curvature", 1.5e-4, "8 K of it"),
     at=_warmed,
     part="link",
     detail_words={

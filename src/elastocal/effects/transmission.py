@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import WAVES, Parameter, Shape, effect, turning_joints
-from elastocal.effects.sizes import ABSOLUTE, Size
+from elastocal.effects.sizes import Size
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -28,7 +28,7 @@ _ANGLES_OF_MOTOR = 12
 
 @_effect(
     "gear transmission error",
-    Size("amplitude", 2e-4, ABSOLUTE, "gears are inspected for an arc minute (their catalogues)", most=1.0),
+    Size("amplitude", 2e-4, "gears are inspected for an arc minute (their catalogues)", most=1.0),
     at=lambda sites: [(joint, *band) for (joint,) in turning_joints(sites) for band in _BANDS],
 )
 def transmission_harmonic(own: Effect, sites: Sites, joint: int, low: int, high: int) -> Candidates:
@@ -64,7 +64,7 @@ def transmission_harmonic(own: Effect, sites: Sites, joint: int, low: int, high:
 
 @_effect(
     "non-integer gear transmission error",
-    Size("amplitude", 2e-4, ABSOLUTE, "as whole orders: larger waves are another mechanism's, as a torque's", most=1.0),
+    Size("amplitude", 2e-4, "as whole orders: larger waves are another mechanism's, as a torque's", most=1.0),
     at=lambda sites: [(joint, above) for (joint,) in turning_joints(sites) for above in range(1, _HIGHEST)],
     detail_words={f"order {above}-{above + 1}": f"order between {above} and {above + 1}" for above in range(1, _HIGHEST)},
 )
@@ -102,7 +102,7 @@ def _driven(sites: Sites) -> list[tuple[int, list[int], str]]:
 
 @_effect(
     "gear ratio or coupling error",
-    Size("per turn", 1e-3, ABSOLUTE, "a parameter mistyped in its fourth digit"),
+    Size("per turn", 1e-3, "a parameter mistyped in its fourth digit"),
     at=_driven,
     detail_words={f"from {number}": f"coupling from joint {number} alone" for number in range(1, 10)},
 )
@@ -117,20 +117,14 @@ def transmission_ratio(own: Effect, sites: Sites, joint: int, sources: list[int]
     # A spindle has a pitch of its own, but is not coupled to what turns.
     alike = [source for source in sources if sites.prismatic[source] == sites.prismatic[joint]]
     unit = "m/m" if sites.prismatic[joint] else "rad/rad"
-    parameters = own.parameters("per turn", [f"per_q{source + 1}" for source in alike], unit, sites)
+    per = own.parameters("per turn", [f"per_q{source + 1}" for source in alike], unit, sites)
     yield own.candidate(
-        (joint + 1,),
-        parameters,
-        lambda around: [{joint: around.joint_angles[:, source]} for source in alike],
-        detail=detail,
-        fixed=True,
+        (joint + 1,), per, lambda around: [{joint: around.joint_angles[:, q]} for q in alike], detail=detail, fixed=True
     )
 
 
 @_effect(
-    "motor eccentricity",
-    Size("amplitude", 5e-5, ABSOLUTE, "milliradians at the motor, over a ratio of a hundred"),
-    at=turning_joints,
+    "motor eccentricity", Size("amplitude", 5e-5, "milliradians at the motor, over a ratio of a hundred"), at=turning_joints
 )
 def motor_eccentricity(own: Effect, sites: Sites, joint: int) -> Candidates:
     """An eccentric motor, resolver or input pinion: transmission error once and twice per turn of the motor.
@@ -157,8 +151,8 @@ def motor_eccentricity(own: Effect, sites: Sites, joint: int) -> Candidates:
 
 @_effect(
     "bearing runout",
-    Size("shift", 5e-5, ABSOLUTE, "slewing bearings run out by hundredths of a millimetre"),
-    Size("wobble", 5e-5, ABSOLUTE, "the same over the diameter of the bearing"),
+    Size("shift", 5e-5, "slewing bearings run out by hundredths of a millimetre"),
+    Size("wobble", 5e-5, "the same over the diameter of the bearing"),
     at=lambda sites: [(joint, motion) for motion in ("radial", "axial", "wobble") for (joint,) in turning_joints(sites)],
 )
 def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candidates:
@@ -194,12 +188,11 @@ def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candid
 
 def _seen_behind(sites: Sites, joint: int, axis: int, angle: np.ndarray) -> np.ndarray:
     """Unit vector along an axis of the frame before a joint, in the frame that turns with it, ndarray (3, S)."""
-    own, turned = sites.joint_axes[joint], sites.joint_signs[joint] * angle
-    seen = np.zeros((3, len(angle)))
+    own, turned, seen = sites.joint_axes[joint], sites.joint_signs[joint] * angle, np.zeros((3, len(angle)))
     if axis == own:
         seen[axis] = 1.0
-    else:
-        # R(-turned) e_axis: the other axis across follows or goes before it.
-        ahead = 1.0 if (own + 1) % 3 == axis else -1.0
-        seen[axis], seen[3 - own - axis] = np.cos(turned), -ahead * np.sin(turned)
+        return seen
+    # R(-turned) e_axis: the other axis across follows or goes before it.
+    ahead = 1.0 if (own + 1) % 3 == axis else -1.0
+    seen[axis], seen[3 - own - axis] = np.cos(turned), -ahead * np.sin(turned)
     return seen
