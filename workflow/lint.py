@@ -19,7 +19,7 @@ ROOMS = {
     "src/elastocal/crate": 360,
     "src/elastocal/data_checks": 1700,
     "src/elastocal/diagnosis": 5450,
-    "src/elastocal/effects": 1930,
+    "src/elastocal/effects": 1920,
     "src/elastocal/exchange": 3710,
     "src/elastocal/figures": 2650,
     "src/elastocal/fitting": 2600,

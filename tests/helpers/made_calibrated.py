@@ -7,7 +7,8 @@ from synthetic import NOISE
 
 from elastocal.application.calibrated import calibrate_by_model
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.declared import declared_weight, joint_compliance
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.model import Estimate, Model
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.sites import sites_of

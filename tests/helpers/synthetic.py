@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 from elastocal.campaigns.campaign import Measurements, Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.conditions import conditions_of
-from elastocal.effects.declared import declared_weight, joint_compliance
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.model import Estimate, Model
 from elastocal.fitting.noise import Noise

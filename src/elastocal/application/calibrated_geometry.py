@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import MASS_PARAMETERS
-from elastocal.effects.declared import DECLARED_WEIGHT
+from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 
 if TYPE_CHECKING:

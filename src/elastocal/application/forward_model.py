@@ -13,7 +13,8 @@ from elastocal.application.calibrated import NEUTRAL, CalibratedRobot, calibrate
 from elastocal.application.compensation import find_joint_targets
 from elastocal.counting import counted
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.declared import declared_weight, joint_compliance
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.errors import InputError
 from elastocal.fitting.model import Estimate, Model
 from elastocal.fitting.noise import Noise

@@ -12,6 +12,8 @@ from elastocal.effects.gravity import compensated_joint, wave_parameters, waves
 from elastocal.effects.protocol import (
     LOADED_JOINTS,
     WAVES,
+    Candidate,
+    Parameter,
     Shape,
     effect,
     every_joint,
@@ -30,7 +32,24 @@ _effect = partial(effect, "elastic")
 _SHORTEST_M, _ONE_SECTION = 0.05, "one section"
 # Arms get thinner towards the wrist.
 _TAPER = Shape("taper", "1", 0.3, 0.0, 0.6, tried=1)
+# Published compliances are up to five times those that suit the size of an arm.
+_OVER_USUAL = 10.0
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+def joint_compliance(sites: Sites) -> Candidate:
+    """Compliances of all joints as one candidate: each a spring, theta_i = c_i tau_i (equation 7).
+
+    No effect, for nothing is missing: the declared model has it where the compliances are to be identified.
+    """
+
+    def law(around: Conditions) -> Displacements:
+        return [{joint: around.total[:, joint]} for joint in range(sites.joints)]
+
+    units = ["m/N" if prismatic else "rad/(N m)" for prismatic in sites.prismatic]
+    sizes = [_OVER_USUAL * compliance for compliance in sites.compliance]
+    parameters = tuple(Parameter(f"c{j}", unit, size) for j, (unit, size) in enumerate(zip(units, sizes, strict=True), 1))
+    return Candidate("joint_compliance", "declared", (), "", parameters, law, frozenset({"load"}))
 
 
 def _bending(sites: Sites) -> list[tuple[tuple[int, ...], str]]:

@@ -7,20 +7,48 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import LOADED_JOINTS, WAVES, Parameter, effect, small_form, turning_joints
+from elastocal.effects.protocol import LOADED_JOINTS, WAVES, Candidate, Parameter, effect, small_form, turning_joints
 from elastocal.effects.sizes import RATED, SAG, TORQUE, Size
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Candidates, Displacements, Effect
+    from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "gravity")
 _LINKS, _OFF_THE_LINE = 2, "off the line"
 # Of a centre of mass off the line of its link; and of a gripper, from the flange.
 _OFF_M, _LEVER_M = 0.2, 0.2
+DECLARED_WEIGHT = "declared_weight"
+# Links are as wide as a tenth of the arm is long (KUKA KR 270: 0.3 m of 2.7 m); motors and gears put the centre of a slender
+# one so far off the line as well.
+_WIDTH_OF_LENGTH, _LEAST_OFF_M = 0.1, 0.04
+
+
+def declared_weight(sites: Sites) -> Candidate:
+    """Errors of all declared masses and first moments as one candidate, each with the prior of the robot file.
+
+    No effect, for nothing is missing: the declared model has it where the robot file has masses. theta_i = c_i tau_i(q, m) is
+    linear in the error of each mass and of its first moments m c, which are what statics identifies (Atkeson, An and Hollerbach
+    1986); a mass takes its declared centre with it, so that both errors are independent before the data speak.
+    """
+
+    def law(around: Conditions) -> Displacements:
+        torques = around.mass_torques * around.compliance
+        return [{joint: of_joint for joint, of_joint in enumerate(columns.T) if of_joint.any()} for columns in torques]
+
+    width = _WIDTH_OF_LENGTH * float(np.linalg.norm(sites.link_vectors_m, axis=1).sum())
+    parameters: list[Parameter] = []
+    for mass in sites.masses:
+        error = mass.relative_std * mass.mass_kg
+        # Of a centre that is known as well as its mass is, and lies anywhere in the girth of its link (uniform distribution).
+        of_girth = mass.mass_kg * max(_LEAST_OFF_M, width / 12**0.5)
+        moment = float(np.hypot(error * np.linalg.norm(mass.centre_m), of_girth))
+        parameters.append(Parameter(f"mass_error_of_link_{mass.link}", "kg", error, error))
+        parameters += [Parameter(f"moment_error_{axis}_of_link_{mass.link}", "kg m", moment, moment) for axis in "xyz"]
+    return Candidate(DECLARED_WEIGHT, "declared", (), "", tuple(parameters), law)
 
 
 @_effect(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import MASS_PARAMETERS, at_coordinates, conditions_of, with_springs
-from elastocal.effects.declared import DECLARED_WEIGHT
+from elastocal.effects.gravity import DECLARED_WEIGHT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import Conditions, with_springs, with_total
-from elastocal.effects.declared import DECLARED_WEIGHT
+from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.fitting.displacement import (
     displaced_coordinates,
     joint_compliances,

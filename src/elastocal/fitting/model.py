@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import offered
-from elastocal.effects.declared import declared_weight, joint_compliance
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.mechanics.sites import Sites, sites_of
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ from elastocal.application.accuracy import find_absorbed, placement, scope_about
 from elastocal.application.calibrated import nominal_forward
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import declared_candidates
-from elastocal.effects.declared import declared_weight, joint_compliance
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import Estimate, Model
