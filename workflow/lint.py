@@ -19,7 +19,7 @@ ROOMS = {
     "src/elastocal/crate": 360,
     "src/elastocal/data_checks": 1700,
     "src/elastocal/diagnosis": 5470,
-    "src/elastocal/effects": 2700,
+    "src/elastocal/effects": 1920,
     "src/elastocal/exchange": 3760,
     "src/elastocal/figures": 2020,
     "src/elastocal/fitting": 2600,

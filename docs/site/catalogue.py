@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 HEAD = """The catalogue of effects
 ========================
 
-What a calibrated model may lack, one physical effect each. Made of the modules of ``elastocal.effects``: what it says is what
+What a calibrated model may lack, one physical effect each. Made of the functions of ``elastocal.effects``: what it says is what
 the code computes. A diagnosis compares all of them, at every location where they can act on the robot.
 
 How to read the figures
@@ -67,16 +66,16 @@ NEEDS = {
 def page() -> str:
     """The page, in reStructuredText as the docstrings are."""
     listed = effects()
-    unknown = {effect.FAMILY for effect in listed.values()} - set(FAMILIES)
+    unknown = {effect.family for effect in listed.values()} - set(FAMILIES)
     if unknown or set(FORMULAS) != set(listed):
         differ = sorted(unknown | (set(FORMULAS) ^ set(listed)))
         raise KeyError(
             f"docs/site: words of families in catalogue.py and effect_formulas.yaml differ from the catalogue in {differ}"
         )
-    parts = [HEAD, thumbnails(thumbnail(f"/signatures/{n}.svg", e.WORDS, f"#{anchor(n)}") for n, e in listed.items())]
+    parts = [HEAD, thumbnails(thumbnail(f"/signatures/{n}.svg", e.words, f"#{anchor(n)}") for n, e in listed.items())]
     for family, words in FAMILIES.items():
         parts.append(_headed(words, "-"))
-        parts += [_section(effect) for effect in listed.values() if family == effect.FAMILY]
+        parts += [_section(effect) for effect in listed.values() if family == effect.family]
     return "".join(parts)
 
 
@@ -85,23 +84,23 @@ def _headed(title: str, underline: str) -> str:
 
 
 def _section(effect: Effect) -> str:
-    title = f"{effect.WORDS[0].upper()}{effect.WORDS[1:]} (``{effect.NAME}``)"
-    text = with_plain_references(sys.modules[effect.__name__].__doc__ or "")
+    title = f"{effect.words[0].upper()}{effect.words[1:]} (``{effect.name}``)"
+    text = with_plain_references(effect.doc)
     moves = (
-        "Moves the robot, so that tasks feel it." if effect.MOVES_ROBOT else "In the measurements alone: tasks do not feel it."
+        "Moves the robot, so that tasks feel it." if effect.moves_robot else "In the measurements alone: tasks do not feel it."
     )
-    picture = f".. image:: /signatures/{effect.NAME}.svg\n   :alt: What {effect.WORDS} does to a measured point\n\n"
+    picture = f".. image:: /signatures/{effect.name}.svg\n   :alt: What {effect.words} does to a measured point\n\n"
     summary, _, rest = text.strip().partition("\n\n")
     # A heading of a docstring would be a heading of the page.
     rest, _, references = rest.partition("References\n----------\n")
-    formula = f".. math:: {FORMULAS[effect.NAME]}\n\n"
-    head = f".. _{effect.NAME}:\n\n{_headed(title, '~')}"
+    formula = f".. math:: {FORMULAS[effect.name]}\n\n"
+    head = f".. _{effect.name}:\n\n{_headed(title, '~')}"
     parts = (summary, formula + rest, moves, picture + _table(effect), references)
     return head + "\n\n".join(part.strip() for part in parts) + "\n\n"
 
 
 def _table(effect: Effect) -> str:
-    candidate, count = signature(effect.NAME, ROBOT).candidate, len(list_candidates(effect.NAME, ROBOT))
+    candidate, count = signature(effect.name, ROBOT).candidate, len(list_candidates(effect.name, ROBOT))
     rows = [
         "".join(
             (

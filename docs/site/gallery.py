@@ -31,7 +31,7 @@ def page(pages: Iterable[Path]) -> str:
             target = f"../{place.with_suffix('.html').as_posix()}"
             figures.setdefault(picture, thumbnail(f"/{picture.as_posix()}", words, target))
     found = [
-        thumbnail(f"/signatures/{name}.svg", effect.WORDS, f"effects.html#{anchor(name)}") for name, effect in effects().items()
+        thumbnail(f"/signatures/{name}.svg", effect.words, f"effects.html#{anchor(name)}") for name, effect in effects().items()
     ]
     return f"{HEAD}Figures\n-------\n\n{thumbnails(figures.values())}Effects\n-------\n\n{thumbnails(found)}"
 

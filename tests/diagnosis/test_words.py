@@ -21,7 +21,7 @@ from elastocal.figures.candidates import short_name
 
 
 def test_every_effect_of_the_catalogue_brings_its_own_physical_name():
-    named = {name: getattr(module, "WORDS", "") for name, module in effects().items()}
+    named = {name: effect.words for name, effect in effects().items()}
     assert all(named.values()), [name for name, words in named.items() if not words]
     assert len(set(named.values())) == len(named)
     assert not [words for words in named.values() if "_" in words or words != words.strip() or words[0].isupper()]

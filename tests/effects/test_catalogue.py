@@ -1,4 +1,4 @@
-"""The catalogue as a whole: what is in it, on any chain, and that a module is all that a new effect takes."""
+"""The catalogue as a whole: what is in it, on any chain, and that a function in a module is all that a new effect takes."""
 
 import sys
 from dataclasses import replace
@@ -67,16 +67,15 @@ def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_o
 
 
 def test_names_and_families_are_those_of_the_design():
-    assert {name: module.FAMILY for name, module in catalogue.effects().items()} == FAMILIES
+    assert {name: effect.family for name, effect in catalogue.effects().items()} == FAMILIES
 
 
 def test_every_effect_says_whether_it_moves_the_robot_or_only_what_was_measured_of_it(fanuc):
     """A correction must not move the robot by an error of the tracker, its targets, the force sensor or the set-up."""
     sites = equipped(fanuc.chain)
-    for name, module in catalogue.effects().items():
-        assert isinstance(module.MOVES_ROBOT, bool), name
-        instruments = module.FAMILY == "load" or any(candidate.of_setup for candidate in module.candidates(sites))
-        assert module.MOVES_ROBOT is not (instruments or name in ("nest_eccentricity", "tracker_scale")), name
+    for name, effect in catalogue.effects().items():
+        instruments = effect.family == "load" or any(candidate.of_setup for candidate in effect.candidates(sites))
+        assert effect.moves_robot is not (instruments or name in ("nest_eccentricity", "tracker_scale")), name
 
 
 @pytest.mark.parametrize(
@@ -105,6 +104,8 @@ def test_every_effect_says_whether_it_moves_the_robot_or_only_what_was_measured_
         ),
         ("stiffening", "@1 @2 @3 @4 @5 @6 " + " ".join(f"@{joint}[two_slopes]" for joint in range(1, 7))),
         ("lost_motion", "@1 @2 @3 @4 @5 @6"),
+        ("application_point", "[base_axes] [flange_axes]"),
+        ("force_misalignment", "[base_axes] [flange_axes] [base_axes_in_the_pull] [flange_axes_in_the_pull]"),
         ("hysteresis", "@1 @2 @3 @4 @5 @6"),
     ],
 )
@@ -270,7 +271,8 @@ def test_displacement_is_that_of_each_state_by_itself(chain):
     part = type(whole)(**{name: value[kept] for name, value in vars(whole).items()})
     some, every = conditions_on(chain, part), conditions_on(chain, whole)
     for candidate in candidates_on(every.sites).values():
-        if candidate.family == "drift":
+        # A step is where it is in the rows that there are.
+        if candidate.effect == "setup_step":
             continue
         start = [shape.start for shape in candidate.shapes]
         expected = displacements(candidate, every, *start)[:, kept]
@@ -342,32 +344,28 @@ def test_only_gearboxes_are_not_linear_in_the_load(fanuc, family):
 
 
 NEW = '''
-"""Gravity pulls the foot down, for some reason."""
-
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
-
-NAME, FAMILY = "sinking_foot", "drift"
-MOVES_ROBOT = True
+from elastocal.effects.protocol import Parameter, effect
 
 
-def candidates(sites):
-    """One candidate, at the foot."""
-    parameters = (Parameter("depth", "m", 1e-3),)
-    return [Candidate(NAME, FAMILY, (), "", parameters, lambda around: [{sites.base[2]: -np.ones(len(around.wrench))}])]
+@effect("drift", "foot that sinks")
+def sinking_foot(own, sites):
+    """Gravity pulls the foot down, for some reason."""
+    depth = (Parameter("depth", "m", 1e-3),)
+    yield own.candidate((), depth, lambda around: [{sites.base[2]: -np.ones(len(around.wrench))}])
 '''
 
 
 @pytest.fixture
 def one_more_module(tmp_path, monkeypatch):
-    (tmp_path / "sinking_foot.py").write_text(NEW)
+    (tmp_path / "anything.py").write_text(NEW)
     monkeypatch.setattr(elastocal.effects, "__path__", [*elastocal.effects.__path__, str(tmp_path)])
     catalogue.effects.cache_clear()
     yield
     catalogue.effects.cache_clear()
-    sys.modules.pop("elastocal.effects.sinking_foot", None)
-    vars(elastocal.effects).pop("sinking_foot", None)
+    sys.modules.pop("elastocal.effects.anything", None)
+    vars(elastocal.effects).pop("anything", None)
 
 
 def test_adding_an_effect_is_adding_one_module(fanuc, one_more_module):

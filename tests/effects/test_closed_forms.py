@@ -15,7 +15,7 @@ from synthetic import displacements, equipped, made_states
 
 from elastocal.effects import catalogue
 from elastocal.effects.conditions import conditions_of
-from elastocal.effects.joint_compliance import candidate as joint_compliance
+from elastocal.effects.elastic import joint_compliance
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses_and_jacobians
 

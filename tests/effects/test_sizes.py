@@ -1,13 +1,17 @@
-"""The table of priors: complete, in the documentation as in the code, and in units of the arm."""
+"""Sizes of effects: complete, in the documentation as in the code, in units of the arm; levers and weights by hand."""
 
 import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from support import chain_of
+from synthetic import equipped
 
-from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.sizes import SIZES, size_of, sized
+from elastocal.effects.catalogue import candidates_on, effects
+from elastocal.effects.sizes import full_torque_Nm, lever_m
+from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 
 METHOD = Path(__file__).parents[2] / "docs" / "method.md"
@@ -24,8 +28,9 @@ def plausible(robot):
 
 def test_documentation_prints_the_table():
     lines = [
-        f"| {s.effect}, {s.quantity} | {s.share:g} | {s.of} | {'+-'[s.sign < 0] if s.sign else ''} | {s.most:g} | {s.reason} |"
-        for s in SIZES
+        f"| {name}, {s.quantity} | {s.share:g} | {s.of} | {'+-'[s.sign < 0] if s.sign else ''} | {s.most:g} | {s.reason} |"
+        for name, effect in effects().items()
+        for s in effect.sizes.values()
     ]
     (table,) = re.findall(r"<details>.*?</details>", METHOD.read_text(encoding="utf-8"), re.DOTALL)
     assert [line for line in lines if line not in table] == [] and table.count("\n| ") == len(lines) + 1
@@ -44,11 +49,45 @@ def test_what_yields_is_sized_by_the_compliance_of_the_arm_and_nothing_else_is(f
 def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc):
     rigid = replace(fanuc, compliance=0.0 * fanuc.compliance, payload_kg=165.0)
     for joint in range(6):
-        ours = size_of("joint_tilt", "tilt", sites_of(rigid), joint)
+        ours = effects()["joint_tilt"].size("tilt", sites_of(rigid), joint)
         assert 0.1 < ours / fanuc.compliance[joint] < 3.0
 
 
-def test_parameters_have_the_sign_of_the_table(fanuc):
-    (tilt,) = sized("joint_tilt", "tilt", ["t"], "rad/(N m)", sites_of(fanuc), 0, over=4.0)
+def test_loads_and_lengths_are_sized_by_the_rated_load_and_the_reach(fanuc):
+    sites = sites_of(replace(fanuc, payload_kg=100.0))
+    assert effects()["force_bias"].size("force", sites) == pytest.approx(0.01 * 100.0 * 9.80665)
+    assert effects()["payload"].size("mass", sites) == pytest.approx(15.0)
+    long = replace(sites, link_vectors_m=2.0 * sites.link_vectors_m)
+    assert effects()["link_geometry"].size("length", long) == pytest.approx(
+        2.0 * effects()["link_geometry"].size("length", sites)
+    )
+
+
+def test_parameters_have_the_sign_of_the_size(fanuc):
+    own = effects()
+    (tilt,) = own["joint_tilt"].parameters("tilt", ["t"], "rad/(N m)", sites_of(fanuc), 0, over=4.0)
     assert (tilt.sign, tilt.plausible) == (1, pytest.approx(0.25 * fanuc.compliance[0]))
-    assert sized("stiffening", "lost beyond", ["b"], "rad/(N m)", sites_of(fanuc), 0)[0].sign == -1
+    assert own["stiffening"].parameters("lost beyond", ["b"], "rad/(N m)", sites_of(fanuc), 0)[0].sign == -1
+
+
+def test_the_full_torque_has_the_lever_of_a_tool_at_least_and_the_weight_behind_the_joint():
+    """Levers of the outstretched arm, by hand; the weight of a mass half way along its link."""
+    sites = equipped(chain_of("Rz(q1) Tz(1) Ry(q2) Tx(2) Ry(q3) Tx(0.1) [hand]"))
+    assert [lever_m(sites, joint) for joint in range(3)] == pytest.approx([3.1, 2.1, 0.5])
+    g = np.linalg.norm(sites.gravity_m_s2)
+    # Eight kilograms a cubic metre of reach suit an arm whose rated load is not known.
+    assert [full_torque_Nm(sites, joint) for joint in range(3)] == pytest.approx(np.array([3.1, 2.1, 0.5]) * 8 * 3.1**3 * g)
+    loaded = replace(sites, payload_kg=10.0, masses=(Mass(2, 30.0, (-1.0, 0.0, 0.0), 0.1),))
+    # It turns joint 2 at a metre, and joint 1, whose axis stands upright, not at all; it is before joint 3.
+    found = [full_torque_Nm(loaded, joint) for joint in range(3)]
+    assert found[0] == pytest.approx(31 * g) and found[2] == pytest.approx(5 * g)
+    # The longest lever is that of some poses, so almost that of the arm outstretched.
+    assert 0.98 * 30 * g < found[1] - 21 * g <= 30 * g
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.80665), (3.0, 0.0, 4.0)])
+def test_a_rated_payload_pulls_by_its_weight_where_the_robot_stands(gravity):
+    sites = equipped(chain_of("Rz(q1) Ry(q2) Tx(2) [hand]"))
+    loaded = replace(sites, payload_kg=30.0, gravity_m_s2=gravity)
+    assert full_torque_Nm(loaded, 1) == pytest.approx(30.0 * np.linalg.norm(gravity) * 2.0)
+    assert full_torque_Nm(replace(sites, gravity_m_s2=gravity), 1) == pytest.approx(8 * 2.0**3 * np.linalg.norm(gravity) * 2.0)

@@ -6,9 +6,9 @@ import numpy as np
 from synthetic import NOISE
 
 from elastocal.application.calibrated import calibrate_by_model
-from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.joint_compliance import candidate as joint_compliance
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.model import Estimate, Model
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.sites import sites_of
@@ -27,7 +27,7 @@ def plain_model(robot, *keys, identified=True):
     sites = sites_of(robot)
     found = candidates_on(sites)
     springs = (joint_compliance(sites),) if identified else ()
-    weight = (declared_weight.candidate(sites),) if sites.masses else ()
+    weight = (declared_weight(sites),) if sites.masses else ()
     return Model(sites, (), False, 6, robot.compliance, (*springs, *weight, *(found[key] for key in keys)))
 
 

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import Measurements, Target
-from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.conditions import conditions_of
-from elastocal.effects.joint_compliance import candidate as joint_compliance
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.model import Estimate, Model
 from elastocal.fitting.noise import Noise
@@ -55,7 +55,7 @@ def made_model(holder, targets=None, rows=3, fitted_frames=True, compliance=None
     targets = (Target("A", sites.chain.end_effector.name, None),) if targets is None else targets
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else np.asarray(compliance)
     springs = (joint_compliance(sites),) if identified else ()
-    weight = (declared_weight.candidate(sites),) if sites.masses else ()
+    weight = (declared_weight(sites),) if sites.masses else ()
     return Model(sites, tuple(targets), fitted_frames, rows, compliance, (*springs, *weight, *effects))
 
 

@@ -89,7 +89,7 @@ def test_what_acts_without_a_load_is_what_the_catalogue_counts_as_such(weightles
     change = np.abs(seen_poses(with_defects(weightless, [defect]), schedule)[0] - seen_poses(weightless, schedule)[0]).max(
         axis=(1, 2)
     )[unloaded]
-    family = effects()[kind].FAMILY
+    family = effects()[kind].family
     without_load = family in ("geometry", "gravity", "transmission", "drift") or kind == "hysteresis"
     assert (change.max() > 1e-9) == without_load or (kind == "transmission_ratio" and defect.joints == (6,))
 

@@ -14,6 +14,7 @@ from elastocal.campaigns.importers.catalogue import Importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects import catalogue
 from elastocal.effects.conditions import conditions_of
+from elastocal.effects.protocol import Effect
 from elastocal.exchange.controllers.catalogue import controllers
 from elastocal.exchange.controllers.protocol import Controller, axes_of, targets_of
 from elastocal.io.documents import check_document, read_document
@@ -67,9 +68,8 @@ def test_the_strategy_is_one_that_the_papers_robots_can_carry_out_and_none_of_th
 
 
 def test_the_effect_is_whole_and_displaces_what_its_formula_says(module, kuka):
-    effect = module("An effect")
-    assert effect.NAME not in catalogue.effects()
-    assert {"NAME", "FAMILY", "WORDS", "MOVES_ROBOT", "candidates"} <= set(vars(effect))
+    effect = module("An effect").hoses
+    assert isinstance(effect, Effect) and effect.name not in catalogue.effects() and "k q^3" in effect.doc
     sites, states = sites_of(kuka), made_states(6, 5)
     found = effect.candidates(sites)
     assert [candidate.key for candidate in found] == [f"hoses@{joint}" for joint in range(1, 7)]

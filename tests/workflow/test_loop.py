@@ -188,7 +188,7 @@ def test_another_seed_of_the_held_out_poses_reruns_the_campaign_and_nothing_of_t
 EDITS = {
     "figures of the study and style of all figures": (["figures/study", "figures/style"], set(), set(STEPS)),
     "the judgement": (["diagnosis/judge"], set(STEPS[2:]), set(STEPS[:2])),
-    "an effect": (["effects/payload"], set(STEPS[1:]), {"simulate", "measure"}),
+    "an effect": (["effects/gravity"], set(STEPS[1:]), {"simulate", "measure"}),
     "a fault": (["data_checks/loads"], set(STEPS[1:]), set(STEPS[:1])),
 }
 
@@ -222,18 +222,13 @@ SAG = '''"""A sag of joint 2 that no other effect has."""
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
-
-NAME, FAMILY = "sag", "gravity"
+from elastocal.effects.protocol import Parameter, effect
 
 
-def candidates(sites):
-    """One."""
-    return [Candidate(NAME, FAMILY, (2,), "", (Parameter("sag", "rad", 1e-3),), _displacement)]
-
-
-def _displacement(conditions):
-    return [{1: np.cos(5 * conditions.joint_angles[:, 1])}]
+@effect("gravity", "another sag")
+def sag(own, sites):
+    """One candidate."""
+    yield own.candidate((2,), [Parameter("sag", "rad", 1e-3)], lambda around: [{1: np.cos(5 * around.joint_angles[:, 1])}])
 '''
 TINY = {
     "source": "simulated",

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects import declared_weight
 from elastocal.effects.conditions import MASS_PARAMETERS
+from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def fold_effects(calibrated: CalibratedRobot) -> Folded:
             at_ends[joint + 1] = at_ends.get(joint + 1, np.zeros(6)) + values
         elif effect.effect == SPRINGS:
             robot = replace(robot, compliance=values.copy(), compliance_known=True)
-        elif effect.effect == declared_weight.EFFECT:
+        elif effect.effect == DECLARED_WEIGHT:
             robot = _reweigh(robot, values)
         else:
             left_out.append(number)

@@ -12,8 +12,9 @@ from elastocal.application.accuracy import scope_from
 from elastocal.application.calibrated import NEUTRAL, CalibratedRobot, calibrate_by_model, forward
 from elastocal.application.compensation import find_joint_targets
 from elastocal.counting import counted
-from elastocal.effects import declared_weight, joint_compliance
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.errors import InputError
 from elastocal.fitting.model import Estimate, Model
 from elastocal.fitting.noise import Noise
@@ -97,9 +98,9 @@ def read_calibrated(document: Mapping[str, Any], source: str) -> CalibratedRobot
     robot = robot_from_document(document["robot"], source)
     robot = with_rigid_joints(robot) if document["rigid_joints"] else robot
     sites = sites_of(robot)
-    known = candidates_on(sites) | {"joint_compliance": joint_compliance.candidate(sites)}
+    known = candidates_on(sites) | {"joint_compliance": joint_compliance(sites)}
     if sites.masses:
-        known["declared_weight"] = declared_weight.candidate(sites)
+        known["declared_weight"] = declared_weight(sites)
     for number, entry in enumerate(document["effects"]):
         where, key = f"{KEY}.effects[{number}]", entry["key"]
         if key not in known:

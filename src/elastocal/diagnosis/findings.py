@@ -12,9 +12,8 @@ from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities, locations_of
 from elastocal.diagnosis.words import part_of
-from elastocal.effects import payload
-from elastocal.effects.full_load import lever_m
 from elastocal.effects.protocol import Shape
+from elastocal.effects.sizes import lever_m
 from elastocal.fitting.linearization import effect_columns
 
 if TYPE_CHECKING:
@@ -212,7 +211,7 @@ def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: floa
                 found.append(f"{key}: {parameter.name} is {size}, and by its physics {needed}")
             if abs(value) > _IMPLAUSIBLE * parameter.plausible + _SURE * error:
                 found.append(f"{key}: {parameter.name} is {size}, more than {_IMPLAUSIBLE:g} times what such an effect reaches")
-            carried = effects[key].effect == payload.NAME and parameter.unit == "kg" and final.model.identifies_compliance
+            carried = parameter.carried and final.model.identifies_compliance
             if rated_kg is not None and carried and value - _SURE * error > rated_kg:
                 found.append(f"{key}: {parameter.name} is {size}, beyond the rated payload of {rated_kg:g} kg")
     return found

@@ -51,13 +51,13 @@ _MOST_DETAILED = 2
 
 
 def physical_name(effect: str) -> str:
-    """Physical name of an effect of the catalogue; its own name as words where its module has none."""
-    return getattr(effects().get(effect), "WORDS", effect.replace("_", " "))
+    """Physical name of an effect of the catalogue; its own name as words where that has none."""
+    return getattr(effects().get(effect), "words", effect.replace("_", " "))
 
 
 def detail_words(effect: str, detail: str) -> str:
-    """Which variant of an effect, in words where its module has some."""
-    return getattr(effects().get(effect), "DETAIL_WORDS", {}).get(detail, detail)
+    """Which variant of an effect, in words where it has some."""
+    return getattr(effects().get(effect), "detail_words", {}).get(detail, detail)
 
 
 def parameter_words(effect: str, name: str) -> str:
@@ -65,7 +65,7 @@ def parameter_words(effect: str, name: str) -> str:
 
     `effect`: by its name in the catalogue; what is not there, such as a frame, has no words of its own.
     """
-    text = getattr(effects().get(effect), "PARAMETER_WORDS", {}).get(name, name.replace("_", " "))
+    text = getattr(effects().get(effect), "parameter_words", {}).get(name, name.replace("_", " "))
     for pattern, instead in _PARAMETER_WORDS:
         text = re.sub(pattern, instead, text)
     return text
@@ -73,7 +73,7 @@ def parameter_words(effect: str, name: str) -> str:
 
 def part_of(effect: str) -> str:
     """What the numbers of an effect count: joints, or links, which begin at the joint of the same number."""
-    return getattr(effects().get(effect), "PART", "joint")
+    return getattr(effects().get(effect), "part", "joint")
 
 
 def listed(items: Iterable[str], most: int | None = None, last: str = "and") -> str:
@@ -168,7 +168,7 @@ def in_common(effect: str, alternatives: Iterable[str]) -> str:
 
     What the catalogue does not have may be of any.
     """
-    families = {getattr(effects().get(name), "FAMILY", "") for name in (effect, *alternatives)}
+    families = {getattr(effects().get(name), "family", "") for name in (effect, *alternatives)}
     kinds = {_IN_COMMON.get(family, "") for family in families}
     return kinds.pop() if len(kinds) == 1 else ""
 

@@ -1,4 +1,4 @@
-"""The catalogue of physical effects that a calibrated model may lack, one module for each.
+"""The catalogue of physical effects that a calibrated model may lack, by what they have in common.
 
-A module with a NAME is an effect: see `protocol`; the others are what effects share. Imports `mechanics` alone.
+An effect is a function that `protocol.effect` decorates, in whatever module of this package. Imports `mechanics` alone.
 """

@@ -1,26 +1,30 @@
-"""All effects that are there: each module of this package that has a NAME."""
+"""All effects that are there: whatever a module of this package makes one by `effect`."""
 
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, cast
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 import elastocal.effects
-from elastocal.effects.protocol import require_unique
+from elastocal.effects.protocol import Effect, require_unique
 from elastocal.errors import InputError
-from elastocal.io.modules import modules_with
+from elastocal.io.modules import module_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from elastocal.effects.protocol import Candidate, Effect
+    from elastocal.effects.protocol import Candidate
     from elastocal.mechanics.sites import Sites
 
 
 @cache
 def effects() -> dict[str, Effect]:
-    """Modules of the catalogue by the name of their effect."""
-    return {module.NAME: cast("Effect", module) for module in modules_with("NAME", elastocal.effects).values()}
+    """Effects of the catalogue by their names, sorted."""
+    modules = [import_module(f"elastocal.effects.{name}") for name in module_names(elastocal.effects)]
+    found = {id(each): each for module in modules for each in vars(module).values() if isinstance(each, Effect)}
+    require_unique([each.name for each in found.values()])
+    return dict(sorted((each.name, each) for each in found.values()))
 
 
 def candidates_on(sites: Sites) -> dict[str, Candidate]:
@@ -28,7 +32,7 @@ def candidates_on(sites: Sites) -> dict[str, Candidate]:
 
     Returns by their keys.
     """
-    found = [candidate for module in effects().values() for candidate in module.candidates(sites)]
+    found = [candidate for each in effects().values() for candidate in each.candidates(sites)]
     require_unique([candidate.key for candidate in found])
     return {candidate.key: candidate for candidate in found}
 

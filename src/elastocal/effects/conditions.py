@@ -76,6 +76,11 @@ class Conditions:
     progress: np.ndarray | None = None
     of_angles: dict[str, dict[int, tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict, repr=False, compare=False)
 
+    @property
+    def always(self) -> np.ndarray:
+        """One in every state, ndarray (S,)."""
+        return np.ones(len(self.joint_angles))
+
     @cached_property
     def load(self) -> np.ndarray:
         """Generalized force of the external wrench on every coordinate of the sites (equation 7), ndarray (S, C).
@@ -273,20 +278,9 @@ def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
         moved, position=moved.position[..., chosen], rotation=moved.rotation[..., chosen], twist=moved.twist[..., chosen]
     )
 
-    def part(values: np.ndarray | None) -> np.ndarray | None:
-        return None if values is None else values[chosen]
-
-    return replace(
-        conditions,
-        motion=some,
-        joint_angles=conditions.joint_angles[chosen],
-        wrench=conditions.wrench[chosen],
-        approach=part(conditions.approach),
-        time_s=part(conditions.time_s),
-        temperature_c=part(conditions.temperature_c),
-        progress=part(conditions.progress),
-        of_angles={},
-    )
+    columns = ("joint_angles", "wrench", "approach", "time_s", "temperature_c", "progress")
+    kept = {name: values[chosen] for name in columns if (values := getattr(conditions, name)) is not None}
+    return replace(conditions, motion=some, of_angles={}, **kept)
 
 
 def with_springs(conditions: Conditions, compliance: np.ndarray, mass_corrections: np.ndarray) -> Conditions:

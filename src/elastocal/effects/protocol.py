@@ -1,42 +1,40 @@
-"""What every effect of the catalogue is: candidates, each with named parameters and the displacements that they make.
+"""What an effect of the catalogue is: candidates, each with named parameters and the displacements that they make.
 
-An effect is a module of this package with
-
-- ``NAME``, by which keys and tables call it, and ``FAMILY``, the kind of its physics, such as elastic or gearbox;
-- ``WORDS``, its physical name in words that precede "of joint 2", or stand alone where it has no joint;
-  ``DETAIL_WORDS`` and ``PARAMETER_WORDS``, if the detail of a candidate or the name of a parameter alone says too little;
-  ``PART = "link"``, if its joints stand for the links behind them;
-- ``MOVES_ROBOT``, whether it moves the robot, so that its tasks feel it, or only what was measured of it: instruments, targets,
-  the set-up;
-- ``candidates(sites)``, which lists where on this robot the effect can act.
-
-Nothing else knows the effects by name: a new module is a new effect.
+An effect is a function of a module of this package that `effect` decorates. Nothing else knows the effects by name: a new one,
+in a module of its own, is found by the catalogue.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from inspect import cleandoc
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-    from typing import Concatenate
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+    from typing import Any
 
     from elastocal.effects.conditions import Conditions
+    from elastocal.effects.sizes import Size
     from elastocal.mechanics.sites import Sites
 
     # For each parameter, by coordinate of the sites, the displacement per unit of the parameter, ndarray (S,).
     Displacements = list[dict[int, np.ndarray]]
     # From the conditions and a value of each of the shapes.
-    Law = Callable[Concatenate[Conditions, ...], Displacements]
+    Law = Callable[..., Displacements]
+    # What tells each place on a robot where an effect acts; and its candidates, from the effect, the sites and that of a place.
+    Places = Callable[[Sites], Iterable[tuple[Any, ...]]]
+    Candidates = Iterator["Candidate"]
+    Listing = Callable[..., Candidates]
 
 
 # Needs of laws that go with the load on the joints.
 LOADED_JOINTS = frozenset({"load", "load on the joints"})
+WAVES = {"cos": np.cos, "sin": np.sin}
 
 
 def load_behind(sites: Sites, joints: int) -> frozenset[str]:
@@ -65,7 +63,8 @@ class Parameter:
     distinguish only in part, as in ridge regression [1]. None, as nearly everywhere, for no prior. Reported with the estimate.
     `sign`: that such an effect has by its physics; 0 where it may have either. `order`: of a harmonic, whose plausible size
     falls with it; 1 elsewhere. `sized`: whether the prior's standard deviation was estimated from the measurements, not known
-    beforehand. `most`: times its plausible size that a search allows for.
+    beforehand. `most`: times its plausible size that a search allows for. `carried`: whether it is a mass that counts as
+    payload of the robot.
 
     [1] A. E. Hoerl and R. W. Kennard, Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
@@ -78,6 +77,7 @@ class Parameter:
     order: int = 1
     sized: bool = False
     most: float = np.inf
+    carried: bool = False
 
 
 @dataclass(frozen=True)
@@ -183,24 +183,84 @@ def require_unique(names: Sequence[str]) -> None:
         raise ValueError(f"candidates of one name: {', '.join(twice)}")
 
 
-class Effect(Protocol):
-    """A module of this package that is an effect, with what each of them has."""
+@dataclass(frozen=True)
+class Effect:
+    """One effect of the catalogue, as `effect` makes it of the function `listed`; `doc` is the docstring of that."""
 
-    NAME: str
-    FAMILY: str
-    WORDS: str
-    MOVES_ROBOT: bool
+    name: str
+    family: str
+    words: str
+    doc: str
+    sizes: Mapping[str, Size]
+    listed: Listing
+    at: Places
+    moves_robot: bool = True
+    part: str = "joint"
+    detail_words: Mapping[str, str] = field(default_factory=dict)
+    parameter_words: Mapping[str, str] = field(default_factory=dict)
 
     def candidates(self, sites: Sites) -> list[Candidate]:
         """Where on this robot the effect can act."""
-        ...
+        return [candidate for place in self.at(sites) for candidate in self.listed(self, sites, *place)]
+
+    def candidate(
+        self, joints: tuple[int, ...], parameters: Iterable[Parameter], law: Law, needs: Collection[str] = (), **more: Any
+    ) -> Candidate:
+        """A `Candidate` of this effect; `more` as there."""
+        at, detail = (self.name, self.family, joints), more.pop("detail", "")
+        return Candidate(*at, detail, tuple(parameters), law, frozenset(needs), **more)
+
+    def size(self, quantity: str, sites: Sites, *joints: int) -> float:
+        """Size of a quantity of this effect on an arm, see `Size.on`."""
+        return self.sizes[quantity].on(sites, *joints)
+
+    def parameters(
+        self, quantity: str, names: Iterable[str], unit: str, sites: Sites, *joints: int, over: float = 1.0
+    ) -> tuple[Parameter, ...]:
+        """Parameters of one quantity with its size, divided by `over`, and its sign; `joints` as of `Size.on`."""
+        size, line = self.size(quantity, sites, *joints) / over, self.sizes[quantity]
+        return tuple(Parameter(name, unit, size, sign=line.sign, most=line.most) for name in names)
+
+
+def effect(family: str, words: str, *sizes: Size, at: Places = lambda sites: [()], **more: Any) -> Callable[[Listing], Effect]:
+    """Make an effect of a function that yields its candidates, ``name(own, sites, *place)``, for each place on a robot.
+
+    Keys and tables call it by the name of the function; its docstring has the physics, the formula with units and the source.
+    `family`: kind of its physics, such as elastic or gearbox. `words`: its physical name in words that precede "of joint 2", or
+    stand alone where it has no joint. `sizes`: of its quantities. `at`: ``at(sites)`` lists the places. Further by name:
+    `moves_robot`, whether it moves the robot, as without a word, so that its tasks feel it, or only what was measured of it:
+    instruments, targets, the set-up; `part`, "link" if its joints stand for the links behind them; `detail_words` and
+    `parameter_words`, if the detail of a candidate or the name of a parameter alone says too little.
+    """
+
+    def made(listed: Listing) -> Effect:
+        by_quantity = {size.quantity: size for size in sizes}
+        return Effect(listed.__name__, family, words, cleandoc(listed.__doc__ or ""), by_quantity, listed, at, **more)
+
+    return made
+
+
+def every_joint(sites: Sites) -> list[tuple[int]]:
+    """Joints from 0, one a place."""
+    return [(joint,) for joint in range(sites.joints)]
+
+
+def turning_joints(sites: Sites) -> list[tuple[int]]:
+    """The same of those that turn, for effects that have no meaning for prismatic ones."""
+    return [(joint,) for joint in range(sites.joints) if not sites.prismatic[joint]]
+
+
+def small_form(whole: Candidate, detail: str, kept: slice) -> Candidate:
+    """Variant of a candidate that has some of its parameters."""
+
+    def law(conditions: Conditions, *shapes: float) -> Displacements:
+        return whole.displacement(conditions, *shapes)[kept]
+
+    return replace(whole, detail=detail, parameters=whole.parameters[kept], displacement=law)
 
 
 def needed(values: np.ndarray | None) -> np.ndarray:
-    """What states need not have, for a law whose candidate names it among its needs.
-
-    `values` (S,), (S, n). Returns (S,), (S, n): the same.
-    """
+    """What states need not have, for a law whose candidate names it among its needs."""
     if values is None:
         raise TypeError("states without what the law of a candidate needs")
     return values
@@ -209,11 +269,3 @@ def needed(values: np.ndarray | None) -> np.ndarray:
 def effect_of(key: str) -> str:
     """Name of the effect in the key of a candidate."""
     return key.split("@")[0].split("[")[0]
-
-
-def per_joint(sites: Sites, make: Callable[[int], Candidate], prismatic: bool = False) -> list[Candidate]:
-    """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each.
-
-    `prismatic`: whether the effect has a meaning for prismatic joints; most of them are about what turns.
-    """
-    return [make(joint) for joint in range(sites.joints) if prismatic or not sites.prismatic[joint]]

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects import declared_weight
 from elastocal.effects.conditions import MASS_PARAMETERS, at_coordinates, conditions_of, with_springs
+from elastocal.effects.gravity import DECLARED_WEIGHT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -44,7 +44,7 @@ def joint_compliances(model: Model, estimate: Estimate) -> np.ndarray:
 
 def mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
     """By how much the declared masses of an estimate are off the robot file, ndarray (4 m,): see `Conditions`."""
-    return _values_of(declared_weight.EFFECT, model, estimate, np.zeros(MASS_PARAMETERS * len(model.sites.masses)))
+    return _values_of(DECLARED_WEIGHT, model, estimate, np.zeros(MASS_PARAMETERS * len(model.sites.masses)))
 
 
 def _values_of(name: str, model: Model, estimate: Estimate, otherwise: np.ndarray) -> np.ndarray:
@@ -72,7 +72,7 @@ def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditio
         displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * model.nominal_compliance
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
         # The errors of masses are part of the total load.
-        if effect.effect != declared_weight.EFFECT:
+        if effect.effect != DECLARED_WEIGHT:
             displace(displaced, effect, values, shapes, around)
     return displaced
 

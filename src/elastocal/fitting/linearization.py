@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects import declared_weight
 from elastocal.effects.conditions import Conditions, with_springs, with_total
+from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.fitting.displacement import (
     displaced_coordinates,
     joint_compliances,
@@ -33,7 +33,7 @@ _SHAPE_STEP = 1e-4
 # Of the forward difference in what loads the springs, in plausible sizes: laws of gears bend little over that.
 _SPRING_STEP = 1e-4
 # Parameters on which the laws of other effects depend: they turn a wrench into angles, or are part of the load.
-_SPRINGS = ("joint_compliance", declared_weight.EFFECT)
+_SPRINGS = ("joint_compliance", DECLARED_WEIGHT)
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects import declared_weight
 from elastocal.effects.conditions import offered
-from elastocal.effects.joint_compliance import candidate as joint_compliance
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.mechanics.sites import Sites, sites_of
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Mod
     unknown = not sites.masses and not campaign.measurements.wrench.any()
     sites = replace(sites, usual_weight=sites.prismatic[0] and unknown)
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
-    weight = (declared_weight.candidate(sites),) if sites.masses else ()
+    weight = (declared_weight(sites),) if sites.masses else ()
     return Model(
         sites,
         campaign.targets,

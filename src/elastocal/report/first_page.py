@@ -117,7 +117,7 @@ def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
     cost = effect["cost_m"]
     if cost is None:
         module = effects().get(effect["name"])
-        moves = module is None or module.MOVES_ROBOT
+        moves = module is None or module.moves_robot
         return "not in the final model" if moves else "an error of the measurement, not of the robot"
     if cost > NEGLIGIBLE * heldout["after"]["rms_m"]:
         return f"{millimetres(cost)} mm"

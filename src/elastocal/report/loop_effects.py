@@ -81,9 +81,9 @@ def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[
 
 
 def description(effect: str) -> str:
-    """What an effect of the catalogue is, in the words of its module, without the formula."""
-    module = effects().get(effect)
-    summary = module.__doc__.split("\n\n")[0].replace("\n", " ") if module and module.__doc__ else words(effect)
+    """What an effect of the catalogue is, in the first line of its docstring, without the formula."""
+    known = effects().get(effect)
+    summary = known.doc.split("\n")[0] if known and known.doc else words(effect)
     return re.sub(r", \w+\([^,]*=.*$", "", summary.split(":")[0]).rstrip(".")
 
 

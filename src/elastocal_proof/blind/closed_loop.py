@@ -98,7 +98,7 @@ def hidden_effects(robot: PhysicalRobot) -> list[str]:
         name
         for name, kind in KINDS.items()
         if name in known
-        and known[name].MOVES_ROBOT
+        and known[name].moves_robot
         and not kind.needs
         and name not in (*ERRORS_OF_GEOMETRY, *_BY_APPROACH)
         and kind.locations(robot.arm)

@@ -15,9 +15,9 @@ import numpy as np
 from elastocal.application.accuracy import find_absorbed, placement, scope_about
 from elastocal.application.calibrated import nominal_forward
 from elastocal.campaigns.campaign import Target
-from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import declared_candidates
-from elastocal.effects.joint_compliance import candidate as joint_compliance
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import Estimate, Model
@@ -82,7 +82,7 @@ def model_of(survey: Survey) -> tuple[Model, Estimate]:
     """The model that a campaign of this survey declares, at the values of the robot file."""
     robot, sites = survey.robot, sites_of(survey.robot)
     springs = (joint_compliance(sites),) if survey.loaded else ()
-    weight = (declared_weight.candidate(sites),) if sites.masses else ()
+    weight = (declared_weight(sites),) if sites.masses else ()
     effects = (*springs, *weight, *declared_candidates(GEOMETRY, sites))
     model = Model(sites, survey.targets, survey.unknown_base, survey.rows, robot.compliance, effects)
     count = len(survey.targets)

@@ -1,4 +1,4 @@
-"""Gearboxes and transmissions, beyond their closed forms: orders, ranges, sizes and signs of their laws."""
+"""Gearboxes, beyond their closed forms: ranges, sizes and signs of their laws."""
 
 from dataclasses import replace
 
@@ -7,7 +7,6 @@ import pytest
 from support import chain_of
 from synthetic import candidate_on, conditions_on, displacements, equipped, made_states
 
-from elastocal.effects import transmission_harmonic
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.mechanics.sites import sites_of
@@ -29,17 +28,6 @@ def test_play_is_mostly_taken_up_before_the_slopes_of_a_stiffening_gear_meet(fan
         assert taken_up.lowest < taken_up.start < meeting.lowest < taken_up.highest < meeting.start < meeting.highest
         both = np.log(taken_up.highest / meeting.lowest)
         assert all(both < 0.3 * np.log(shape.highest / shape.lowest) for shape in (taken_up, meeting))
-
-
-def test_harmonics_are_cosines_and_sines_of_all_orders_up_to_36(fanuc):
-    orders = {joint: [] for joint in range(1, 7)}
-    for candidate in transmission_harmonic.candidates(sites_of(fanuc)):
-        (joint,) = candidate.joints
-        orders[joint] += [parameter.name for parameter in candidate.parameters]
-        # Four samples a period of its shortest wave.
-        assert candidate.distinct_angles == 4 * int(orders[joint][-1].removeprefix("sin_").removesuffix("q"))
-    expected = [f"{wave}_{order}q" for order in range(1, 37) for wave in ("cos", "sin")]
-    assert all(found == expected for found in orders.values())
 
 
 # An arm of two metres that turns about the vertical; eight kilograms a cubic metre of reach suit it.

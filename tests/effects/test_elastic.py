@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
-from support import OTHER_CHAINS, chain_of
-from synthetic import candidate_on, conditions_on, displacements, made_states
+from support import ODD_CHAINS, OTHER_CHAINS, chain_of, robot_of
+from synthetic import candidate_on, conditions_on, displacements, made_estimate, made_model, made_states
 
+from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.elastic import joint_compliance
+from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.mechanics.sites import sites_of
 
 LINEAR = (
@@ -56,3 +59,13 @@ def test_elastic_effects_are_reciprocal(effect, name, fanuc):
             back = (displacements(candidate, second, *start) * first.load).sum(axis=2)
             np.testing.assert_allclose(there, back, rtol=1e-9, atol=1e-9)
             assert np.abs(there).max() > 0
+
+
+def test_carriage_yields_to_the_force_along_its_track():
+    robot = robot_of(ODD_CHAINS["track"], [1e-8, 1e-6, 1e-6, 1e-6])
+    model = made_model(robot, (Target("A", "hand", (0, 0, 0)),), fitted_frames=False, compliance=robot.compliance)
+    states = made_states(4, 3, seed=22)
+    shifted = displaced_coordinates(model, made_estimate(model), conditions(model, made_estimate(model), states))[:, 0]
+    # The carriage runs along -x.
+    np.testing.assert_allclose(shifted - states.joint_angles[:, 0], -1e-8 * states.wrench[:, 0], rtol=1e-9)
+    assert [p.unit for p in joint_compliance(model.sites).parameters] == ["m/N", *["rad/(N m)"] * 3]

@@ -1,4 +1,4 @@
-"""The weight that a robot file declares: torques by pinocchio, slopes by central differences, fits that bear wrong masses."""
+"""Weights, declared or not: torques by pinocchio, slopes by central differences, fits with wrong masses, a compensator."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
 from synthetic import (
     NOISE,
+    candidate_on,
     conditions_on,
     displacements,
     made_estimate,
@@ -22,7 +23,7 @@ from synthetic import (
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.conditions import conditions_of, offered, with_springs
-from elastocal.effects.declared_weight import candidate
+from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
@@ -142,7 +143,7 @@ def test_torques_of_masses_are_slopes_of_the_gravity(fanuc):
         moved = with_springs(around, around.compliance, step)
         change = (moved.gravity - around.gravity)[:, :6] / 0.5
         np.testing.assert_allclose(around.mass_torques[number], change, rtol=0, atol=1e-10)
-    made = displacements(candidate(around.sites), around)
+    made = displacements(declared_weight(around.sites), around)
     np.testing.assert_allclose(made[..., :6], around.mass_torques * around.compliance, rtol=1e-14)
 
 
@@ -159,6 +160,17 @@ def test_growth_of_gravity_with_each_correction_is_its_slope_on_the_coordinates_
         step[number] = 0.5
         change = (with_springs(around, around.compliance, step).gravity - around.gravity)[:, coordinates] / 0.5
         np.testing.assert_allclose(grown, change.T, rtol=0, atol=1e-10)
+
+
+def test_priors_are_those_of_the_robot_file(fanuc):
+    robot = replace(fanuc, masses=(Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1), Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2)))
+    found = declared_weight(sites_of(robot)).parameters
+    # A centre is off by its relative error times its distance from the joint, and lies anywhere in the girth of its link.
+    width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
+    assert 0.3 < width < 0.7
+    first, second = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5), np.hypot(10.0 * 0.01, 50.0 * width / 12**0.5)
+    assert [p.prior_std for p in found] == pytest.approx([20.0, *[first] * 3, 10.0, *[second] * 3])
+    assert [p.name for p in found[:2]] == ["mass_error_of_link_2", "moment_error_x_of_link_2"]
 
 
 def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(fanuc):
@@ -269,3 +281,66 @@ def test_gravity_on_odd_robots_is_the_slope_of_their_potential(name):
         step = 1e-5 * np.eye(robot.joints)[joint]
         slope = (work(states.joint_angles + step) - work(states.joint_angles - step)) / 2e-5
         np.testing.assert_allclose(found[:, joint], slope, rtol=0, atol=1e-7)
+
+
+def test_link_weight_of_the_arm_may_be_that_of_all_links_with_a_length(fanuc):
+    whole = candidate_on(fanuc.chain, "link_weight[all links]")
+    masses = [int(p.name.split("_")[-1]) for p in whole.parameters if p.unit == "kg"]
+    moments = [p.name for p in whole.parameters if p.unit == "kg m"]
+    assert masses == [2, 3, 6] and whole.location == ("arm",)
+    assert moments == [f"moment_{name}" for name in ("z_of_link_2", "z_of_link_3", "y_of_link_6", "z_of_link_6")]
+    # One finding with that of two links: a model has one of these laws.
+    assert (
+        candidate_on(fanuc.chain, "link_weight").location
+        == whole.location
+        != candidate_on(fanuc.chain, "link_weight@2").location
+    )
+
+
+def test_payload_hangs_at_the_flange_whatever_target_sits_there(fanuc):
+    moved = replace(fanuc.chain, points=tuple(replace(p, offset_m=(0.2, 0.3, 0.4)) for p in fanuc.chain.points))
+    states = made_states(6, 5, seed=3)
+    ours, theirs = (displacements(candidate_on(c, "payload"), conditions_on(c, states)) for c in (moved, fanuc.chain))
+    np.testing.assert_array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize(
+    ("known", "expected"),
+    [
+        ({"payload_kg": 210.0}, 0.15 * 210),
+        # A sixth of the arm's own mass is what arms carry.
+        ({"masses": (600.0, 300.0, 0.0)}, 0.15 * 900 / 6),
+        ({"payload_kg": 20.0, "masses": (600.0, 300.0)}, 0.15 * 20),
+        # Rated loads grow with the volume that an arm reaches.
+        ({}, 0.15 * 8.0 * 3.107**3),
+    ],
+)
+def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_is_known(fanuc, known, expected):
+    masses = tuple(Mass(2 + link, mass, (0.0, 0.0, 0.0), 0.1) for link, mass in enumerate(known.get("masses", ())))
+    sites = replace(sites_of(fanuc.chain), masses=masses, payload_kg=known.get("payload_kg"))
+    tool, alone = (c for c in candidates_on(sites).values() if c.effect == "payload")
+    assert [p.plausible for p in tool.parameters] == pytest.approx([expected, *[0.2 * expected] * 3])
+    assert [p.plausible for p in alone.parameters] == pytest.approx([expected])
+
+
+def compensator(q, stiffness, crank, length, rest, start):
+    """Torque of a spring between a crank on the joint and the frame."""
+    distance = np.sqrt(crank**2 + length**2 + 2 * crank * length * np.cos(start + q))
+    return stiffness * crank * length * (1 - rest / distance) * np.sin(start + q)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.7, 2.5])
+def test_compensator_torque_spans_the_formula_of_a_spring_with_a_short_crank(start, fanuc):
+    states = made_states(6, 60, seed=4)
+    around = conditions_on(fanuc.chain, states)
+    made = displacements(candidate_on(fanuc.chain, "compensator_torque@2"), around)
+    assert not np.delete(made, 1, axis=2).any()
+    columns = made[:, :, 1].T
+    leftovers = []
+    for crank in (0.1, 0.05):
+        torque = compensator(states.joint_angles[:, 1], 1e4, crank, 1.0, 0.6, start)
+        left = torque - columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]
+        leftovers.append(np.linalg.norm(left) / np.linalg.norm(torque))
+    # What is left is of second order in crank over length.
+    assert leftovers[0] < 0.005
+    assert leftovers[1] < 0.4 * leftovers[0]

@@ -18,7 +18,9 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.transmission import transmission_harmonic
 from elastocal.fitting.least_squares import fit
+from elastocal.mechanics.sites import sites_of
 
 
 def test_motor_turns_the_joint_once_and_twice_per_turn_of_its_own(fanuc):
@@ -56,3 +58,14 @@ def test_order_between_integers_is_fitted_where_it_is(fanuc):
     found = fit(model, seen, NOISE, made_estimate(model, size=0.0))
     assert found.converged
     assert abs(found.estimate.shapes[0][0] - 2.68) < 4 * np.sqrt(found.covariance[-1, -1]) < 0.3
+
+
+def test_harmonics_are_cosines_and_sines_of_all_orders_up_to_36(fanuc):
+    orders = {joint: [] for joint in range(1, 7)}
+    for candidate in transmission_harmonic.candidates(sites_of(fanuc)):
+        (joint,) = candidate.joints
+        orders[joint] += [parameter.name for parameter in candidate.parameters]
+        # Four samples a period of its shortest wave.
+        assert candidate.distinct_angles == 4 * int(orders[joint][-1].removeprefix("sin_").removesuffix("q"))
+    expected = [f"{wave}_{order}q" for order in range(1, 37) for wave in ("cos", "sin")]
+    assert all(found == expected for found in orders.values())

@@ -1,0 +1,261 @@
+"""Elastic: effects in proportion to the load."""
+
+from __future__ import annotations
+
+from functools import lru_cache, partial
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.effects.gravity import compensated_joint, wave_parameters, waves
+from elastocal.effects.protocol import (
+    LOADED_JOINTS,
+    WAVES,
+    Candidate,
+    Parameter,
+    Shape,
+    effect,
+    every_joint,
+    load_behind,
+    small_form,
+    turning_joints,
+)
+from elastocal.effects.sizes import JOINT, PER_LENGTH, SHIFT, STIFFEST, Size
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Candidates, Displacements, Effect
+    from elastocal.mechanics.sites import Sites
+
+_effect = partial(effect, "elastic")
+_SHORTEST_M, _ONE_SECTION = 0.05, "one section"
+# Arms get thinner towards the wrist.
+_TAPER = Shape("taper", "1", 0.3, 0.0, 0.6, tried=1)
+# Published compliances are up to five times those that suit the size of an arm.
+_OVER_USUAL = 10.0
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+def joint_compliance(sites: Sites) -> Candidate:
+    """Compliances of all joints as one candidate: each a spring, theta_i = c_i tau_i (equation 7).
+
+    No effect, for nothing is missing: the declared model has it where the compliances are to be identified.
+    """
+
+    def law(around: Conditions) -> Displacements:
+        return [{joint: around.total[:, joint]} for joint in range(sites.joints)]
+
+    units = ["m/N" if prismatic else "rad/(N m)" for prismatic in sites.prismatic]
+    sizes = [_OVER_USUAL * compliance for compliance in sites.compliance]
+    parameters = tuple(Parameter(f"c{j}", unit, size) for j, (unit, size) in enumerate(zip(units, sizes, strict=True), 1))
+    return Candidate("joint_compliance", "declared", (), "", parameters, law, frozenset({"load"}))
+
+
+def _bending(sites: Sites) -> list[tuple[tuple[int, ...], str]]:
+    """Each link with a length, named by the joint before it; the column; and all links with one section.
+
+    One section is what a robot of like tubes has: two parameters for the whole arm, where a candidate a link has two each.
+    """
+    long = tuple(k for k in range(sites.joints + 1) if np.linalg.norm(sites.link_vectors_m[k]) > _SHORTEST_M)
+    together = [(long, _ONE_SECTION)] if len(long) > 1 else []
+    return [*(((link,), "" if link else "column") for link in long), *together]
+
+
+@_effect(
+    "elastic bending and torsion",
+    Size("1/EI", 1.0, "a link bends as much as the gear before it turns", PER_LENGTH, sign=1),
+    at=_bending,
+    part="link",
+    detail_words={_ONE_SECTION: "all of one cross-section"},
+)
+def link_elasticity(own: Effect, sites: Sites, links: tuple[int, ...], detail: str) -> Candidates:
+    """A link that bends and twists: a cantilever between two joints.
+
+    y = F_y l^3 a/EI + M_z l^2 b/EI, r_z = F_y l^2 b/EI + M_z l c/EI, likewise in the other plane, r_x = M_x l c/GJ,
+
+    are shift (m) and turns (rad) of the far end under force F (N) and moment M (N m) there, with x along the link of length l
+    (m): Euler-Bernoulli and St Venant [1]. A uniform link has a, b, c = 1/3, 1/2, 1; one whose diameter falls linearly by a
+    share t to its far end, thin-walled, the integrals over s from 0 to 1 of (1 - s)^2, 1 - s and 1 over (1 - t s)^3. Linear in
+    1/EI and 1/GJ, 1/(N m^2), of the uniform link that a force shifts and a moment along twists as far: so what is estimated of
+    the size hardly depends on the taper. Stretching and shear are left out, for they are small in links much longer than wide.
+
+    [1] S. P. Timoshenko and J. M. Gere, Mechanics of Materials, Van Nostrand Reinhold, 1972.
+    """
+    # A fit asks for the same taper under one load after the other.
+    compliances = lru_cache(maxsize=4)(lambda taper: [_end_compliance(sites, link, taper) for link in links])
+
+    def law(around: Conditions, taper: float) -> Displacements:
+        bent: dict[int, np.ndarray] = {}
+        twisted: dict[int, np.ndarray] = {}
+        load = around.total.T
+        for link, (bending, torsion) in zip(links, compliances(float(taper)), strict=True):
+            coordinates = sites.link_end[link]
+            wrench = load[list(coordinates)]
+            bent |= zip(coordinates, bending @ wrench, strict=True)
+            twisted |= zip(coordinates[3:], torsion @ wrench[3:], strict=True)
+        return [bent, twisted]
+
+    longest = max(links, key=lambda k: float(np.linalg.norm(sites.link_vectors_m[k])))
+    length, before = float(np.linalg.norm(sites.link_vectors_m[longest])), max(longest - 1, 0)
+    names = ("bending_1_over_EI", "torsion_1_over_GJ")
+    parameters = own.parameters("1/EI", names, "1/(N m^2)", sites, before, over=length)
+    joints, needs = tuple(k for k in links if k), load_behind(sites, max(links))
+    yield own.candidate(joints, parameters, law, needs, shapes=(_TAPER,), detail=detail, location_name=detail)
+
+
+def _end_compliance(sites: Sites, link: int, taper: float) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement of the far end of a link by its wrench for a unit of 1/EI, (6, 6), and its turn by the moment for 1/GJ."""
+    places = 0.5 * (1.0 + _NODES)
+    softer = _WEIGHTS / (1.0 - taper * places) ** 3
+    a, b, c = (float(softer @ (1.0 - places) ** power) for power in (2, 1, 0))
+    by_either, turn_by_moment = b / (3.0 * a), c / (3.0 * a)
+    length = np.linalg.norm(sites.link_vectors_m[link])
+    along = sites.link_vectors_m[link] / length
+    lengthwise = np.outer(along, along)
+    across, turned = np.eye(3) - lengthwise, np.cross(np.eye(3), along).T * by_either * length**2
+    bending = np.block([[length**3 / 3.0 * across, turned @ across], [-turned @ across, turn_by_moment * length * across]])
+    return bending, length * lengthwise
+
+
+@_effect(
+    "bearing tilt",
+    Size("tilt", 1.0, "bearings tilt as much as gears turn (Klimchik et al. 2015)", JOINT, sign=1),
+    at=every_joint,
+)
+def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
+    """A bearing that tilts across its axis under the moment that it carries.
+
+    theta_e = c_e (e . M_i) at joint i, with theta_e the tilt (rad) about each of the two axes e across the joint's own, which
+    turn with it, M_i the moment of load and declared masses there (N m) and c_e in rad/(N m) [1]. The carriage of a prismatic
+    joint rolls about its own axis as well.
+
+    [1] C. Reinl, M. Friedmann, J. Bauer, M. Pischan, E. Abele and O. von Stryk, Model-based off-line compensation of path
+        deviation for industrial robots in milling applications, IEEE/ASME Conference on Advanced Intelligent Mechatronics,
+        2011.
+    """
+    # A carriage rolls about its own axis too, which is no joint's.
+    across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
+    tilts = own.parameters("tilt", [f"tilt_about_{'xyz'[axis]}" for axis in across], "rad/(N m)", sites, joint)
+    coordinates = [sites.tilt[joint][axis] for axis in across]
+    yield own.candidate(
+        (joint + 1,), tilts, lambda around: [{c: around.total[:, c]} for c in coordinates], load_behind(sites, joint)
+    )
+
+
+@_effect(
+    "elasticity of the foundation",
+    Size("tilt", 0.3, "a foundation is stiffer than what it bears", STIFFEST, sign=1),
+    Size("shift", 0.01, "the same at a fifth of the reach", SHIFT, sign=1),
+)
+def base_compliance(own: Effect, sites: Sites) -> Candidates:
+    """A foundation that yields elastically: floor, anchors or pedestal let the foot of the robot shift and tilt under the load.
+
+    u = C (F, M + p x F), C = diag(c_h, c_h, c_v, c_t, c_t, 0), is the displacement of the foot (m, rad) in base axes under a
+    force F (N) and a moment M (N m) at p (m), declared masses included; c_h and c_v in m/N, c_t in rad/(N m), like a rigid
+    footing on springs [1]. The compliance about the vertical is that of a joint 1 that turns about it, and is not counted
+    again.
+
+    [1] F. E. Richart, J. R. Hall and R. D. Woods, Vibrations of Soils and Foundations, Prentice-Hall, 1970.
+    """
+    tx, ty, tz, rx, ry, _ = sites.base
+    shifts = own.parameters("shift", ["horizontal", "vertical"], "m/N", sites)
+    tilt = own.parameters("tilt", ["tilt"], "rad/(N m)", sites)
+
+    def law(around: Conditions) -> Displacements:
+        load = around.total
+        return [{tx: load[:, tx], ty: load[:, ty]}, {tz: load[:, tz]}, {rx: load[:, rx], ry: load[:, ry]}]
+
+    every = own.candidate((), (*shifts, *tilt), law, {"load"})
+    # Rocking alone is what most foundations do.
+    yield from (every, small_form(every, "rocking", slice(2, None)))
+
+
+@_effect(
+    "elastic coupling",
+    Size("coupling", 0.3, "of the geometric mean, beyond which a joint would give energy back", JOINT),
+    at=lambda sites: combinations([joint for (joint,) in turning_joints(sites)], 2),
+)
+def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candidates:
+    """Elastic coupling of two joints: each turns under the torque of the other, as where one flexible casting holds both gears.
+
+    theta_i = c_ij tau_j and theta_j = c_ij tau_i, with theta in rad, tau the torques of load and declared masses (N m) and c_ij
+    in rad/(N m), the same both ways by the reciprocal theorem of elastic bodies [1]. Beside the compliances of two parallel
+    joints, seen at the end-effector alone, it is not distinguishable from bending of the link between them in its plane.
+
+    [1] S. P. Timoshenko and J. N. Goodier, Theory of Elasticity, 3rd edition, McGraw-Hill, 1970.
+    """
+    both, coupling = (one + 1, other + 1), own.parameters("coupling", ["compliance"], "rad/(N m)", sites, one, other)
+    yield own.candidate(
+        both, coupling, lambda around: [{one: around.total[:, other], other: around.total[:, one]}], LOADED_JOINTS
+    )
+
+
+@_effect(
+    "angle-dependent stiffness", Size("variation", 0.3, "teeth and rollers in mesh vary by a third", JOINT), at=turning_joints
+)
+def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
+    """A joint compliance that changes with the angle of the joint: teeth, rollers and housing are not equally stiff all round.
+
+    theta_i = tau_i (u cos q_i + v sin q_i), with theta_i and the joint angle q_i in rad, tau_i the torque of load and declared
+    masses (N m), u and v in rad/(N m). Derived here: c_i(q_i) is periodic, and u and v are order 1 of its Fourier series,
+    beside the mean, which is the compliance of the model.
+    """
+
+    def law(around: Conditions) -> Displacements:
+        angle, torque = around.joint_angles[:, joint], around.total[:, joint]
+        return [{joint: torque * wave(angle)} for wave in WAVES.values()]
+
+    variation = own.parameters("variation", ["cos_q", "sin_q"], "rad/(N m)", sites, joint)
+    yield own.candidate((joint + 1,), variation, law, LOADED_JOINTS)
+
+
+@_effect(
+    "stiffness of the gravity compensator",
+    Size("variation", 0.3, "a compensator is an order softer than its gear", JOINT),
+    at=compensated_joint,
+)
+def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
+    """Stiffness that a gravity compensator adds to the shoulder: its spring resists a turn more in some poses than in others.
+
+    k = -dT/dq = K a L [(s0/s) (cos p + a L sin^2 p / s^2) - cos p], p = alpha + q,
+
+    is what the spring [1] adds (N m/rad), with T and its symbols as in `compensator_torque`, and -c^2 k is what that adds to
+    the compliance c of the joint. For a short crank it is theta = tau (u_1 cos q + v_1 sin q + u_2 cos 2q + v_2 sin 2q), with
+    theta in rad, tau the torque of load and declared masses (N m), u and v in rad/(N m). With order 1 alone it is the same as a
+    shoulder whose own stiffness depends on its angle.
+
+    [1] A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet and A. Pashkevich, Identification of geometrical and elastostatic
+        parameters of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
+    """
+
+    def law(around: Conditions) -> Displacements:
+        torque = around.total[:, joint]
+        return [{joint: torque * wave} for wave in waves(around.joint_angles[:, joint])]
+
+    variation = wave_parameters(own, "variation", "rad/(N m)", sites, joint)
+    yield own.candidate((joint + 1,), variation, law, LOADED_JOINTS)
+
+
+@_effect(
+    "flexibility of the flange",
+    Size("turn", 0.1, "a bolted joint is ten times as stiff as a wrist's gear", JOINT, sign=1),
+    Size("shift", 1e-2, "the same at a tenth of the reach", SHIFT, sign=1),
+)
+def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
+    """A flange, its bearing or a tool changer that yields elastically: what holds the tool is a spring behind the last joint.
+
+    u = C w, with u the shift (m) and turn (rad) of the flange along its axes, w the external force (N) and moment (N m) there
+    and C diagonal, m/N and rad/(N m): a spring in six directions, as in complete stiffness models of serial robots [1]. The
+    turn about the axis of the last joint is that of its compliance, and is held by the fit where that is identified.
+
+    [1] A. Klimchik, S. Caro, B. Furet and A. Pashkevich, Complete stiffness model for a serial robot, International Conference
+        on Informatics in Control, Automation and Robotics, 2014.
+    """
+    shifts = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
+    turns = own.parameters("turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1)
+    every = own.candidate(
+        (), (*shifts, *turns), lambda around: [{c: around.load[:, c]} for c in sites.link_end[-1]], LOADED_JOINTS
+    )
+    # Turns alone are most of what a flange does.
+    yield from (every, small_form(every, "turns", slice(3, None)))
