@@ -116,7 +116,7 @@ def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estim
 
 
 def moves_robot(effect: Candidate) -> bool:
-    """Whether an effect moves the robot, as its module says; springs and declared weights, which are no missing effects, do."""
+    """Whether an effect moves the robot, as it says; springs and declared weights, which are no missing effects, do."""
     module = effects().get(effect.effect)
     return not effect.of_setup and (module is None or module.moves_robot)
 
