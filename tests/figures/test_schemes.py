@@ -100,3 +100,14 @@ def test_only_an_offset_moves_a_measuring_point_off_the_arm():
     assert all(np.allclose(node, place) for _, node, place in points)
     moved = lay_out(with_target_offset(ROBOTS["kuka"], (0.0, 0.1, 0.05)).chain)[0].points
     assert any(np.linalg.norm(place - node) > 5 for _, node, place in moved)
+
+
+def test_a_negative_length_is_drawn_backwards_and_bent_links_make_an_arch():
+    def drawn(robot):
+        return {label.split(" = ")[0]: end - start for start, end, label in lay_out(ROBOTS[robot].chain)[0].links if label}
+
+    assert drawn("motoman_right_arm")["$l_{1}$"][1] < 0 < drawn("kuka")["$l_{1}$"][1]
+    kuka = drawn("kuka")
+    headings = [np.degrees(np.arctan2(*kuka[f"$l_{{{number}}}$"][::-1])) for number in (1, 2, 3, 4, 5, 6)]
+    # Down by 41 mm at the elbow: l4 stands across l5, against the direction that a positive one would have.
+    assert headings == pytest.approx([90.0, 0.0, 70.0, headings[4] - 90.0, headings[4], -45.0])
