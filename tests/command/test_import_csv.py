@@ -64,7 +64,7 @@ def test_every_import_ends_with_what_was_read_how_and_what_was_left_out(elastoca
     result = elastocal(*words(*OPTIONS, "--ignore", "Config", text=text))
     assert result.exit_code == 0, result.exception
     lines = result.output.splitlines()
-    assert "file: names of columns in line 2, separator semicolon, decimal comma, thousands not marked, encoding utf-8" in lines
+    assert "file: names of columns in line 2, separator semicolon, decimal comma, encoding utf-8" in lines
     assert "read: q1 from 'J1' in deg; x from 'X' in mm; y from 'Y' in mm; z from 'Z' in mm" in lines
     assert "not used: Temp, Config" in lines
     for note in (
