@@ -188,10 +188,17 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     notes += _surprises(read, angles, {*stated, *(options.units or {})})
     table = _number_poses(read, angles, mapped)
     table |= {name: read.numbers(name) for name in angles}
-    table |= _wrench(read, options.wrench)
+    if forces := [name for name in WRENCH_NAMES if name in columns]:
+        sign, zeros = -1.0 if options.wrench == "by-robot" else 1.0, np.zeros(len(read.kept))
+        # A minus sign before a zero would be read by people as a force.
+        table |= {name: sign * read.numbers(name) + 0.0 if name in forces else zeros for name in WRENCH_NAMES}
     table |= {axis: read.numbers(name) for axis, name in zip(POSITION, position, strict=True)}
     if orientation:
-        table |= dict(zip(VECTOR, _vectors(read, rotation, orientation).T, strict=True))
+        vectors, off = rotation_vectors(rotation, np.column_stack([read.numbers(name) for name in orientation]))
+        if off.any():
+            allowed = "a quaternion of length 1" if rotation == QUATERNIONS else "a rotation matrix, row by row"
+            raise read.fault(int(np.argmax(off)), orientation[0], allowed)
+        table |= dict(zip(VECTOR, vectors.T, strict=True))
     table |= covariates
     table |= {f"approach{j}": read.numbers(f"approach{j}") for j in range(1, len(angles) + 1) if f"approach{j}" in columns}
     table["target"] = _targets(read, options.target)
@@ -240,23 +247,6 @@ def _surprises(read: CellReader, angles: Sequence[str], stated: set[str]) -> lis
             turns = f"{largest / (2 * np.pi):.1f} turns"
             notes.append(f"{read.columns[name]!r} goes to {largest:.4g} rad, {turns}: if these are degrees, --angles deg")
     return notes
-
-
-def _wrench(read: CellReader, acts: str) -> dict[str, np.ndarray]:
-    there = [name for name in WRENCH_NAMES if name in read.columns]
-    if not there:
-        return {}
-    sign, zeros = -1.0 if acts == "by-robot" else 1.0, np.zeros(len(read.kept))
-    # A minus sign before a zero would be read by people as a force.
-    return {name: (sign * read.numbers(name) + 0.0 if name in there else zeros) for name in WRENCH_NAMES}
-
-
-def _vectors(read: CellReader, rotation: str, names: Sequence[str]) -> np.ndarray:
-    vectors, off = rotation_vectors(rotation, np.column_stack([read.numbers(name) for name in names]))
-    if off.any():
-        allowed = "a quaternion of length 1" if rotation == QUATERNIONS else "a rotation matrix, row by row"
-        raise read.fault(int(np.argmax(off)), names[0], allowed)
-    return vectors
 
 
 def _targets(read: CellReader, name: str | None) -> np.ndarray:

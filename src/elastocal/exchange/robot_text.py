@@ -68,24 +68,21 @@ def mass_entries(moments: Mapping[int, np.ndarray], relative_std: float) -> list
 
     `moments` (4,): of what each link carries the mass times its centre, m kg, and the mass, kg; by the number of the link.
     """
-    return [
-        {
-            "link": link,
-            "mass_kg": round(float(moment[3]), _DECIMALS),
-            "centre_m": (np.round(moment[:3] / moment[3], _DECIMALS) + 0.0).tolist(),
-            "relative_std": relative_std,
-        }
-        for link, moment in sorted(moments.items())
-    ]
+    entries = []
+    for link, (*moment, mass) in sorted(moments.items()):
+        centre = np.round(np.array(moment) / mass, _DECIMALS) + 0.0
+        entry = {"link": link, "mass_kg": round(float(mass), _DECIMALS), "centre_m": centre.tolist()}
+        entries.append(entry | {"relative_std": relative_std})
+    return entries
 
 
 def robot_text(result: Imported) -> str:
     """The text of a robot file."""
-    head = [
-        line
-        for text in (result.origin, *(f"{note[:1].upper()}{note[1:]}." for note in result.notes))
-        for line in _comment(text)
-    ]
+    head = []
+    for text in (result.origin, *(f"{note[:1].upper()}{note[1:]}." for note in result.notes)):
+        # Whatever a file's name holds stays inside of a comment.
+        plain = "".join(character if character.isprintable() else "?" for character in text)
+        head += textwrap.wrap(plain, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
     body = [line for key in _ORDER if key in result.document for line in _lines(key, result.document[key])]
     return "\n".join([*head, *body]) + "\n"
 
@@ -111,12 +108,6 @@ def summary(result: Imported) -> list[str]:
         f"measuring points: {', '.join(point.name for point in robot.chain.points)}",
         *(f"note: {note}" for note in result.notes),
     ]
-
-
-def _comment(text: str) -> list[str]:
-    """Comment lines; whatever a file's name holds stays inside of them."""
-    plain = "".join(character if character.isprintable() else "?" for character in text)
-    return textwrap.wrap(plain, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
 
 
 def _lines(key: str, value: Any) -> list[str]:

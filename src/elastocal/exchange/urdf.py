@@ -165,10 +165,10 @@ def robot_from_urdf(
     limits = [_limits(joint, limits_in, notes, source) for joint in chain.joints]
     if limits_in == "deg":
         notes.append("limits read in degrees, as the option says")
-    document: dict[str, Any] = {"name": urdf.name, "joint_names": [joint.name for joint in chain.joints]}
-    document |= {"chain": chain.notation, "joint_limits_deg": limits}
+    names = [joint.name for joint in chain.joints]
+    document: dict[str, Any] = {"name": urdf.name, "joint_names": names, "chain": chain.notation, "joint_limits_deg": limits}
     # The tree's root is upright.
-    before = np.linalg.multi_dot([np.eye(4), *(joint.origin for joint in urdf.path_to(base, None)), np.eye(4)])
+    before = np.linalg.multi_dot([np.eye(4), np.eye(4), *(joint.origin for joint in urdf.path_to(base, None))])
     gravity = np.round(-STANDARD_GRAVITY * before[2, :3], _DECIMALS) + 0.0
     if gravity[2] != -STANDARD_GRAVITY:
         document["gravity_m_s2"] = gravity.tolist()
@@ -399,9 +399,8 @@ def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
         raise InputError(source, both, found, "a tip that the base carries")
     if not any(joint.kind in _MOVING for joint in path):
         raise InputError(source, both, "no joint that moves between them", "links with joints between")
-    for joint in path:
-        if joint.kind not in (*_MOVING, "fixed"):
-            raise InputError(source, f"joint {joint.name!r}", f"type {joint.kind}", " | ".join((*_MOVING, "fixed")))
+    if wrong := next((joint for joint in path if joint.kind not in (*_MOVING, "fixed")), None):
+        raise InputError(source, f"joint {wrong.name!r}", f"type {wrong.kind}", " | ".join((*_MOVING, "fixed")))
     return path
 
 
