@@ -94,22 +94,53 @@ def test_joints_may_be_counted_by_an_index_or_from_0_and_have_the_names_of_topic
     assert bool(found.notes) == ("0" in names[0])
 
 
+TWO_JOINTS, A_RAIL = robot_of("Rz(q1) Tx(1) Rz(q2) [A]"), robot_of("Tx(q1) Rz(q2) [A]")
+BOTH = {"target": None, "targets": {"A": "A", "B": "B"}}
+
+
 @pytest.mark.parametrize(
-    ("names", "columns", "words"),
+    ("header", "options", "robot", "words"),
     [
         # A part of what is counted from 0, four of it, and two counts.
-        ("q[0],q[2],q[3]", {}, ["counted from 0", "--column q1="]),
-        ("q0,q1,q2,q3", {}, ["counted from 0", "--column q1="]),
-        ("q[0],q[1],q[2]", {"q1": "q[0]"}, ["counted from 0"]),
-        ("J1,J2,A3", {}, ["'J1' and 'A3'", "--ignore"]),
-        ("J1,J2,A1,A2", {}, ["both 'J1' and 'A1'", "--ignore"]),
-        ("position0,position1", {}, ["no joint angles", "not yet used: position0, position1"]),
+        ("q[0],q[2],q[3],x,y,z", {}, None, ["counted from 0", "--column q1="]),
+        ("q0,q1,q2,q3,x,y,z", {}, None, ["counted from 0", "--column q1="]),
+        ("q[0],q[1],q[2],x,y,z", {"columns": {"q1": "q[0]"}}, None, ["counted from 0"]),
+        ("J1,J2,A3,x,y,z", {}, None, ["'J1' and 'A3'", "--ignore"]),
+        ("J1,J2,A1,A2,x,y,z", {}, None, ["both 'J1' and 'A1'", "--ignore"]),
+        ("position0,position1,x,y,z", {}, None, ["no joint angles", "not yet used: position0, position1"]),
+        ("J1,J2,J3,x,y,z", {}, TWO_JOINTS, ["3 joints", "--ignore"]),
+        ("J1,x,y,z", {}, TWO_JOINTS, ["no column q2"]),
+        ("a,b,x,y,z", {}, TWO_JOINTS, ["no joint angles"]),
+        ("J1 [deg],J2,x,y,z", {}, A_RAIL, ["unit of 'J1 [deg]'", "--unit"]),
+        ("J1,J2 [mm],x,y,z", {}, A_RAIL, ["unit of 'J2 [mm]'", "--unit"]),
+        *(
+            (f"q1,x,y,z,{part}", {}, None, ["a part of a quaternion", "--column qw=NAME", "--rotation none"])
+            for part in ("qx,qy,qz", "qw,qx", "Q_x,Q_y,Q_z")
+        ),
+        ("q1,x [mm],y,z\ndeg,m,mm,mm", {}, None, ["'x [mm]' and 'm'", "one unit"]),
+        ("q1,x,y,z\nmm,mm,mm,mm", {"units": {}}, robot_of("Rz(q1) Tx(1) [A]"), ["unit of 'q1'", "'mm'", "--unit q1="]),
+        ("q1,A_x,A_y,A_z,B_x,B_y,B_z,A_u95", BOTH, None, ["'A_u95' of A alone", "--ignore 'A_u95'"]),
+        ("q1,A_x,A_y,A_z,B_x,B_y,B_z,B_u95", BOTH, None, ["'B_u95' of B alone"]),
+        ("q1,A_x [mm],A_y,A_z,B_x [m],B_y,B_z", BOTH, None, ["'A_x [mm]' in mm and 'B_x [m]' in m", "one unit"]),
+        ("q1,A_x,A_y,A_z,n", {"target": None, "targets": {"A": "A"}, "columns": {"x": "n"}}, None, ["'n'", "no --target"]),
     ],
 )
-def test_joints_that_may_be_counted_in_two_ways_are_a_question(tmp_path, names, columns, words):
-    text = f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n"
-    with refused(tmp_path / "t.csv", "header", *words):
-        table(tmp_path, text, replace(PLAIN, columns=columns))
+def test_what_may_be_two_things_or_is_there_in_part_is_a_question(tmp_path, header, options, robot, words):
+    row = ",".join("1" * len(header.partition("\n")[0].split(",")))
+    with refused("--column" if words[0] == "'n'" else tmp_path / "t.csv", "", *words):
+        table(tmp_path, f"{header}\n{row}\n", replace(PLAIN, **options), robot)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "name", "value"),
+    [
+        ("q1,x,y,z\nmm,mm,mm,mm\n90,1,2,3\n", {"units": {"q1": "deg"}}, "q1", np.pi / 2),
+        ("q1,x,y,z,qx,qy,qz\n90,1,2,3,0,0,0\n", {"rotation": "none"}, "q1", np.pi / 2),
+    ],
+)
+def test_options_go_before_what_a_table_says(tmp_path, text, options, name, value):
+    found = table(tmp_path, text, replace(PLAIN, **options))
+    assert found.table[name].tolist() == [value] and "rx" not in found.table
 
 
 @pytest.mark.parametrize(
@@ -182,22 +213,6 @@ def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
     assert read_measurement_table(tmp_path / "t.csv", found.options).options == found.options
 
 
-def test_a_rail_is_measured_in_lengths_and_a_joint_in_angles(tmp_path):
-    robot = robot_of("Tx(q1) Rz(q2) [A]")
-    for names, unit in (("J1 [deg],J2", "J1 [deg]"), ("J1,J2 [mm]", "J2 [mm]")):
-        with refused(tmp_path / "t.csv", f"unit of {unit!r}", "--unit"):
-            table(tmp_path, f"{names},x,y,z\n1,2,{ROW}\n", PLAIN, robot)
-
-
-@pytest.mark.parametrize(
-    ("names", "words"), [("J1,J2,J3", ["3 joints", "--ignore"]), ("J1", ["no column q2"]), ("a,b", ["no joint angles"])]
-)
-def test_as_many_joints_as_the_robot_has_are_needed(tmp_path, names, words):
-    text = f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n"
-    with refused(tmp_path / "t.csv", "header", *words):
-        table(tmp_path, text, PLAIN, robot_of("Rz(q1) Tx(1) Rz(q2) [A]"))
-
-
 def test_topics_have_positions_orientations_and_forces(tmp_path):
     names = [f"/tcp/pose/position/{axis}" for axis in "xyz"] + [f"field.pose.orientation.{axis}" for axis in "wxyz"]
     text = f"J1,/ft/wrench/force/x,/tcp/twist/linear/x,{','.join(names)}\n5,6,9,{ROW},1,0,0,0\n"
@@ -216,14 +231,6 @@ def test_q0_beside_the_other_parts_of_a_quaternion_is_its_real_one(tmp_path, joi
     assert (found.options.columns["qw"], found.notes) == ("q0", ())
 
 
-@pytest.mark.parametrize("names", ["qx,qy,qz", "qw,qx", "Q_x,Q_y,Q_z"])
-def test_a_part_of_a_quaternion_is_a_question(tmp_path, names):
-    text = f"q1,x,y,z,{names}\n1,{ROW}{',0' * len(names.split(','))}\n"
-    with refused(tmp_path / "t.csv", "header", "a part of a quaternion", "--column qw=NAME", "--rotation none"):
-        table(tmp_path, text)
-    assert table(tmp_path, text, replace(PLAIN, rotation="none")).ignored == tuple(names.split(","))
-
-
 @pytest.mark.parametrize(
     "head", ["q1,x,y,z,fz\ndeg,mm,mm,mm,kN", "q1,x,y,z,fz\n[deg],[mm],(mm),mm,[ kN ]", "q1 [deg],x,y_mm,z,fz\n,mm,mm,mm,kN"]
 )
@@ -233,16 +240,6 @@ def test_units_may_stand_in_a_row_under_the_header(tmp_path, head):
     assert any(note.startswith("units in the row under the header") for note in found.notes)
     again = table(tmp_path, f"{head}\n90,{ROW},4\n", found.options)
     assert again.options == found.options and again.table["fz"].tolist() == [4000.0]
-
-
-def test_a_unit_of_the_row_that_the_header_contradicts_is_a_question_and_options_go_before_both(tmp_path):
-    text = f"q1,x [mm],y,z\ndeg,m,mm,mm\n90,{ROW}\n"
-    with refused(tmp_path / "t.csv", "header", "'x [mm]' and 'm'", "one unit"):
-        table(tmp_path, text)
-    text = f"q1,x,y,z\nmm,mm,mm,mm\n90,{ROW}\n"
-    with refused(tmp_path / "t.csv", "unit of 'q1'", "'mm'", "--unit q1="):
-        table(tmp_path, text, ImportOptions(target="a"), robot_of("Rz(q1) Tx(1) [A]"))
-    assert table(tmp_path, text, replace(PLAIN, units={"q1": "deg"})).table["q1"][0] == np.pi / 2
 
 
 ARM = ("shoulder_pan", "shoulder_lift", "elbow")
@@ -347,20 +344,6 @@ def test_what_was_commanded_is_no_target_and_a_number_behind_plain_names_is_a_qu
     assert table(tmp_path, text, replace(MARKED, target="a", columns=columns)).table["x"].tolist() == [0.001]
 
 
-@pytest.mark.parametrize(
-    ("headers", "words"),
-    [
-        ("A_x,A_y,A_z,B_x,B_y,B_z,A_u95", ["'A_u95' of A alone", "--ignore 'A_u95'"]),
-        ("A_x,A_y,A_z,B_x,B_y,B_z,B_u95", ["'B_u95' of B alone"]),
-        ("A_x [mm],A_y,A_z,B_x [m],B_y,B_z", ["'A_x [mm]' in mm and 'B_x [m]' in m", "one unit"]),
-    ],
-)
-def test_what_only_one_target_has_is_a_question(tmp_path, headers, words):
-    text = f"q1,{headers}\n1,{','.join('1' * len(headers.split(',')))}\n"
-    with refused(tmp_path / "t.csv", "header", *words):
-        table(tmp_path, text, replace(MARKED, targets={"A": "A", "B": "B"}))
-
-
 @pytest.mark.parametrize("above", ["Name,,SMR1,SMR1,SMR1,SMR2,SMR2,SMR2", ",,SMR1,,,SMR2,,", ",,SMR1,,,SMR2"])
 def test_markers_may_stand_in_the_line_above_the_axes(tmp_path, above):
     text = f"Motive,1.2\n{above}\nq1,Time,X,Y,Z,X,Y,Z\ndeg,s,mm,mm,mm,mm,mm,mm\n90,5,1,2,3,4,5,6\n"
@@ -369,9 +352,3 @@ def test_markers_may_stand_in_the_line_above_the_axes(tmp_path, above):
     found = table(tmp_path, text, ImportOptions(targets={"SMR1": "SMR1", "SMR2": "SMR2"}))
     assert found.table["x"].tolist() == [0.001, 0.004] and found.table["time_s"].tolist() == [5.0, 5.0]
     assert "1 line above the header" in found.notes
-
-
-def test_two_targets_of_one_marker_or_a_column_that_is_none_of_it_are_refused(tmp_path):
-    text = "q1,A_x,A_y,A_z,n\n1,1,2,3,4\n"
-    with refused("--column", "x", "'n'"):
-        table(tmp_path, text, replace(MARKED, targets={"A": "A"}, columns={"x": "n"}))
