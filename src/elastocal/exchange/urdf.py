@@ -45,8 +45,6 @@ from elastocal.mechanics.usual_values import UNLIMITED_DEG
 LARGEST_BYTES = 20_000_000
 # Whole cells with grippers and cameras have some hundred links; each is followed to the root.
 _MOST_PARTS = 2000
-# Programs write 1e16 and more where a joint, a force or a speed has no limit.
-_LARGEST_LIMIT = 1e100
 _MOVING = {"revolute": "R", "continuous": "R", "prismatic": "T"}
 _KINDS = (*_MOVING, "fixed", "floating", "planar")
 _XACRO = "a URDF; this is xacro, run it first: xacro FILE > robot.urdf"
@@ -71,8 +69,6 @@ _DECIMALS = 9
 _FARTHEST_RAD = 4.0 * math.pi + 0.01
 # An angle this close to a right one, and none, is one that was written with few digits: 1.57 and 1.5708 are.
 _NEARLY_RAD, _EXACTLY_RAD = 1e-3, 1e-9
-# Of a shorter axis the direction is no more than rounding.
-_SHORTEST_AXIS = 1e-9
 # So many links of a robot never weigh the same; links and joints that a note names.
 _FEWEST_ALIKE, _NAMED = 3, 4
 
@@ -97,11 +93,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class Urdf:
-    """A tree of links: every name once, every joint between two of them.
+    """A tree of links: every name once, every joint between two of them; `left_out` names other elements of the file.
 
     `moments` (4,): of each link by its name the mass times its centre in the link's frame (kg m), and the mass (kg, 0 where
-    none is stated). `above`: the joint that carries a link, by the link's name; the root has none. `left_out` names other
-    elements of the file.
+    none is stated). `above`: the joint that carries a link, by the link's name; the root has none.
     """
 
     name: str
@@ -160,13 +155,13 @@ def robot_from_urdf(
     """
     urdf, source = read_urdf(path), str(path)
     chain = chain_between(urdf, base, tip, points, source)
-    masses, of_masses = _weights(urdf, chain, relative_std)
-    notes = [f"read: {', '.join(f'q{n} from {joint.name!r}' for n, joint in enumerate(chain.joints, 1))}", *of_masses]
+    masses, notes = _weights(urdf, chain, relative_std)
+    notes.insert(0, f"read: {', '.join(f'q{n} from {joint.name!r}' for n, joint in enumerate(chain.joints, 1))}")
     limits = [_limits(joint, limits_in, notes, source) for joint in chain.joints]
     if limits_in == "deg":
         notes.append("limits read in degrees, as the option says")
-    names = [joint.name for joint in chain.joints]
-    document: dict[str, Any] = {"name": urdf.name, "joint_names": names, "chain": chain.notation, "joint_limits_deg": limits}
+    document: dict[str, Any] = {"name": urdf.name, "joint_names": [joint.name for joint in chain.joints]}
+    document |= {"chain": chain.notation, "joint_limits_deg": limits}
     # The tree's root is upright.
     before = np.linalg.multi_dot([np.eye(4), np.eye(4), *(joint.origin for joint in urdf.path_to(base, None))])
     gravity = np.round(-STANDARD_GRAVITY * before[2, :3], _DECIMALS) + 0.0
@@ -194,8 +189,9 @@ def _limits(joint: Joint, limits_in: str | None, notes: list[str], source: str) 
     if joint.kind == "continuous" and low >= high:
         return list(UNLIMITED_DEG)
     if low >= high and prismatic:
-        allowed = 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
-        raise InputError(source, called, f"{low:g} to {high:g}", allowed)
+        raise InputError(
+            source, called, f"{low:g} to {high:g}", 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
+        )
     if low >= high or (not prismatic and farthest > 2.0 * math.pi * MOST_TURNS):
         notes.append(f"joint {joint.name!r} has no limits in the URDF: a turn either way")
         return list(UNLIMITED_DEG)
@@ -284,7 +280,8 @@ def _check_part(part: Element, called: str, source: str) -> None:
         if len(children) > 1:
             raise InputError(source, called, f"<{tag}> {len(children)} times", "once at most")
         for child in children:
-            largest = _LARGEST_LIMIT if tag == "limit" else LARGEST_NUMBER
+            # Programs write 1e16 and more where a joint, a force or a speed has no limit.
+            largest = 1e100 if tag == "limit" else LARGEST_NUMBER
             for attribute, count in _NUMBERS.get(tag, {}).items():
                 text = child.get(attribute)
                 words = None if text is None else text.split(None, count)
@@ -324,13 +321,13 @@ def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str
                 source, called, f"child {child!r}, which another joint has too", "a tree: each link below one joint"
             )
         parent_of[child] = parent
-    for name in names:
+    for name in parent_of:
         seen, at = {name}, parent_of.get(name)
-        while at is not None:
-            if at in seen:
-                raise InputError(source, f"link {at!r}", "a loop of joints", "a tree: no link below itself")
+        while at is not None and at not in seen:
             seen.add(at)
             at = parent_of.get(at)
+        if at is not None:
+            raise InputError(source, f"link {at!r}", "a loop of joints", "a tree: no link below itself")
 
 
 def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
@@ -372,7 +369,8 @@ def _write_joint(
     joint: Joint, master: str, sign: float, offset: float, numbers: dict[str, int], place: Carried, source: str
 ) -> tuple[list[str], Carried]:
     """Words of a joint that moves, and where it carries what is behind it."""
-    if not np.linalg.norm(joint.axis) > _SHORTEST_AXIS:
+    # Of a shorter axis the direction is no more than rounding.
+    if not np.linalg.norm(joint.axis) > 1e-9:
         raise InputError(source, f"joint {joint.name!r}: axis xyz", " ".join(f"{part:g}" for part in joint.axis), "a direction")
     kind = _MOVING[joint.kind]
     before, letter, minus, after = express_axis(joint.axis)
