@@ -29,7 +29,10 @@ def csv(
         Option(help="Orientations: none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes), euler:xyz (fixed)."),
     ] = None,
     names: Annotated[
-        str | None, Option("--columns", help="Names of all columns in order, q1,q2,…, of a table without a header.")
+        str | None,
+        Option(
+            "--columns", help="Of a table without a header: names of all columns in order, q1,q2,…; none for one to leave out."
+        ),
     ] = None,
     column: Annotated[list[str] | None, Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed.")] = None,
     ignore: Annotated[list[str] | None, Option(help="Header of a column to leave out; as often as needed.")] = None,

@@ -96,7 +96,7 @@ def read_text_table(
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
     if names:
-        header, named_above = 0, False
+        header, named_above, names = 0, False, [name or f"column {place}" for place, name in enumerate(names, 1)]
         separator = stated.separator or next((name for name, mark in SEPARATORS.items() if mark in kept[0][1]), "comma")
     else:
         separator, header, line = _find_header(kept, comments, is_header, stated, wanted, source)

@@ -75,10 +75,7 @@ _FEWEST_ALIKE, _NAMED = 3, 4
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: `origin` (4, 4) in the parent's frame, `axis` (3,) in its own; limits that are not stated are 0.
-
-    `mimic`: the joint that it follows, multiplier and offset.
-    """
+    """A joint: `origin` (4, 4) in the parent's frame, `axis` (3,) in its own; limits not stated are 0; whom it follows."""
 
     name: str
     kind: str
@@ -88,6 +85,7 @@ class Joint:
     axis: np.ndarray
     lower: float
     upper: float
+    # The other joint, multiplier and offset.
     mimic: tuple[str, float, float] | None
 
 
