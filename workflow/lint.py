@@ -20,7 +20,7 @@ ROOMS = {
     "src/elastocal/data_checks": 1700,
     "src/elastocal/diagnosis": 5450,
     "src/elastocal/effects": 2700,
-    "src/elastocal/exchange": 3254,
+    "src/elastocal/exchange": 3256,
     "src/elastocal/figures": 2650,
     "src/elastocal/fitting": 2600,
     "src/elastocal/io": 1200,

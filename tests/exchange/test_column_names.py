@@ -115,7 +115,7 @@ BOTH = {"target": None, "targets": {"A": "A", "B": "B"}}
         ("J1,J2 [mm],x,y,z", {}, A_RAIL, ["unit of 'J2 [mm]'", "--unit"]),
         *(
             (f"q1,x,y,z,{part}", {}, None, ["a part of a quaternion", "--column qw=NAME", "--rotation none"])
-            for part in ("qx,qy,qz", "qw,qx", "Q_x,Q_y,Q_z")
+            for part in ("qx,qy,qz", "qw,qx", "Q_x,Q_y,Q_z", "q0,qx,qy,qz")
         ),
         ("q1,x [mm],y,z\ndeg,m,mm,mm", {}, None, ["'x [mm]' and 'm'", "one unit"]),
         ("q1,x,y,z\nmm,mm,mm,mm", {"units": {}}, robot_of("Rz(q1) Tx(1) [A]"), ["unit of 'q1'", "'mm'", "--unit q1="]),

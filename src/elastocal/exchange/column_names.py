@@ -237,9 +237,11 @@ def find_columns(
                 guesses[header] = with_unit(header, f"q{joint}", unit)
                 certain.add(header)
     named = _find_joints_by_name(text, joint_names, known)
-    if {"qx", "qy", "qz"} <= (names := {name for name, _ in guesses.values()}) and "qw" not in names | mapped.keys():
-        # Beside the other three parts of a quaternion q0 is its real one.
-        named |= {header: "qw" for header in text.columns if _simplify(header) == "q0" and header not in known}
+    parts = {name: header for header, (name, _) in guesses.items() if name in QUATERNION}
+    if parts.keys() == {"qx", "qy", "qz"} and "qw" not in mapped:
+        # With the other three parts of a quaternion q0 has length 1.
+        zero = [header for header in text.columns if _simplify(header) == "q0" and header not in known]
+        named |= {header: "qw" for header in zero if _have_unit_length(text, [header, *parts.values()])}
     guesses |= {header: (name, guesses[header][1]) for header, name in named.items()}
     certain |= {*named}
     free = [header for header in text.columns if header not in certain and guesses[header][0] not in mapped]
