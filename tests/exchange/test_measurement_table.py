@@ -19,6 +19,11 @@ def test_angles_lengths_and_forces_come_in_si_units(tmp_path):
     assert (row["time_s"], row["target"], row["pose"], row["load"], row["repeat"]) == (2.0, "smr", 1, 1, 0)
 
 
+def test_forces_that_the_robot_exerts_are_turned_round(tmp_path):
+    found = table(tmp_path, "q1,x,y,z,fz\n0,1,2,3,5\n", replace(PLAIN, wrench="by-robot"))
+    assert found.table["fz"].tolist() == [-5.0] and not np.signbit(found.table["fx"]).any()
+
+
 def test_poses_loads_and_repeats_are_counted_where_no_column_has_them(tmp_path):
     rows = ["0,0", "0,0", "0,9", "0,9", "10,0", "10,-9", "10,9", "0.001,9"]
     found = table(tmp_path, "q1,fz,x,y,z\n" + "\n".join(f"{row},1,2,3" for row in rows))

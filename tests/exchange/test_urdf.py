@@ -298,6 +298,19 @@ def test_what_moves_beside_the_chain_weighs_as_at_zero_and_is_told(tmp_path):
     assert "open" in note and "zero" in note
 
 
+def test_what_moves_beside_the_column_weighs_on_nothing_and_few_digits_and_other_joints_are_told(tmp_path):
+    bench = (
+        link("door", 7.0),
+        joint("hinge", "base", "door"),
+        link("eye"),
+        joint("bent", "hand", "eye", "fixed", rpy=(1.57, 0, 0)),
+    )
+    result = robot_from_urdf(written(tmp_path, *FLANGED, *bench), "base", "eye")
+    assert [entry["mass_kg"] for entry in result.document["masses"]] == [9.0, 2.0]
+    assert any(note.endswith("few digits: those of bent") for note in result.notes)
+    assert "joints that are no part of the chain, left out: hinge" in result.notes
+
+
 def test_equal_masses_are_placeholders(tmp_path):
     parts = [link(name, 2.0) for name in "abcd"] + [joint(f"j{n}", "abcd"[n], "abcd"[n + 1]) for n in range(3)]
     masses, notes = weights(tmp_path, *parts, base="a", tip="d")
