@@ -173,7 +173,7 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
         options, notes = replace(options, target=None, targets=targets), [*notes, *of_targets]
     columns, stated, of_joints = find_columns(text, mapped, robot)
     notes += of_joints
-    if not has_position(columns) and (lengths := lengths_in(text.columns)):
+    if find_joints(columns) and not has_position(columns) and (lengths := lengths_in(text.columns)):
         allowed = "columns x, y, z of a point; distances alone, as of a draw wire or a ball bar, cannot be used yet"
         raise InputError(text.path, "header", f"{', '.join(map(repr, lengths))} and no position", allowed)
     rotation = find_rotation(text, columns, mapped, options.rotation)
