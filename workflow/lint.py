@@ -20,7 +20,7 @@ ROOMS = {
     "src/elastocal/data_checks": 1700,
     "src/elastocal/diagnosis": 5470,
     "src/elastocal/effects": 1920,
-    "src/elastocal/exchange": 3760,
+    "src/elastocal/exchange": 3310,
     "src/elastocal/figures": 2020,
     "src/elastocal/fitting": 2600,
     "src/elastocal/io": 1200,

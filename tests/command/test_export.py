@@ -15,8 +15,7 @@ from elastocal.campaigns.reading import read_robot
 from elastocal.command.export import _drop_in
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.exchange.urdf_origins import write_calibrated_origins
-from elastocal.exchange.urdf_writing import urdf_of
+from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
 from elastocal.mechanics.kinematics import poses
 
 

@@ -64,7 +64,7 @@ def test_every_import_ends_with_what_was_read_how_and_what_was_left_out(elastoca
     result = elastocal(*words(*OPTIONS, "--ignore", "Config", text=text))
     assert result.exit_code == 0, result.exception
     lines = result.output.splitlines()
-    assert "file: names of columns in line 2, separator semicolon, decimal comma, thousands not marked, encoding utf-8" in lines
+    assert "file: names of columns in line 2, separator semicolon, decimal comma, encoding utf-8" in lines
     assert "read: q1 from 'J1' in deg; x from 'X' in mm; y from 'Y' in mm; z from 'Z' in mm" in lines
     assert "not used: Temp, Config" in lines
     for note in (
@@ -77,3 +77,9 @@ def test_every_import_ends_with_what_was_read_how_and_what_was_left_out(elastoca
         assert any(line.startswith("note: ") and note in line for line in lines), note
     again = elastocal(*words("--options", tmp_path / "cell" / "import.yaml", "--force", text=text))
     assert again.exit_code == 0 and again.output.splitlines()[:-1] == lines[:-1]
+
+
+def test_a_table_without_a_header_is_read_by_the_names_of_its_columns(elastocal, words, tmp_path):
+    result = elastocal(*words(*OPTIONS, "--columns", "q1,,x,y,z", text="90,7,1000.5,2,3\n-90,7,1000,2,3\n"))
+    assert result.exit_code == 0 and "names of columns as stated" in result.output and "not used: column 2" in result.output
+    assert (tmp_path / "cell" / "measurements.csv").read_text().splitlines()[1].endswith(",1.0005,0.002,0.003")

@@ -9,14 +9,10 @@ from elastocal.exchange import csv_dialect
 from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS, Dialect, read_text_table
 
 
-def is_header(cells):
-    return {"x", "y"} <= set(cells)
-
-
-def write_text_file(folder, text, encoding="utf-8"):
+def read(folder, text, encoding="utf-8", dialect=None, **more):
     path = folder / "table.txt"
     path.write_bytes(text.encode(encoding))
-    return path
+    return read_text_table(path, lambda cells: {"x", "y"} <= set(cells), dialect or Dialect(), **more)
 
 
 @pytest.mark.parametrize(
@@ -26,10 +22,9 @@ def write_text_file(folder, text, encoding="utf-8"):
 def test_separator_decimal_mark_encoding_and_header_are_found_out(tmp_path, separator, decimal, encoding):
     mark, point = SEPARATORS[separator], DECIMALS[decimal]
     lines = ["Tracker 7", "# made by hand", "", mark.join("xyn"), mark.join([f"1{point}5", f"-2{point}25e-3", "P1"])]
-    found = read_text_table(write_text_file(tmp_path, "\r\n".join(lines), encoding), is_header)
+    found = read(tmp_path, "\r\n".join(lines), encoding)
     assert (found.dialect.separator, found.dialect.decimal, found.dialect.header) == (separator, decimal, 4)
-    assert found.columns == {"x": ("1.5",), "y": ("-2.25e-3",), "n": ("P1",)}
-    assert found.lines == (5,)
+    assert found.columns == {"x": ("1.5",), "y": ("-2.25e-3",), "n": ("P1",)} and found.lines == (5,)
 
 
 @pytest.mark.parametrize(
@@ -39,77 +34,78 @@ def test_separator_decimal_mark_encoding_and_header_are_found_out(tmp_path, sepa
         ("# a\n\n", ["nothing but comments"]),
         ("a;b\n1;2\n", ["line 1", "--header"]),
         ("x;y\n", ["a header alone"]),
-        ("x;y;x\n1;2;3\n", ["line 1", "'x' twice"]),
+        ("x;y;x\n1;2;3\n", ["line 1", "'x' twice", "--ignore 'x'"]),
         ("x;y\n1;2\n1\n", ["line 3", "1 cell", "2, one for each"]),
+        ("x,y\n1,2,,3\n", ["line 2", "one for each column"]),
         ("x;y\n1,5;2.5\n", ["'2.5' in line 2", "'1,5' in line 2", "--decimal"]),
+        # Three digits behind each comma, or a comma in quotes between commas, may be either.
+        ("x;y\n1,234;22,500\n", ["line 2", "'1,234'", "--decimal comma"]),
+        ('x,y\n"1,5",2\n', ["line 2", "'1,5'", "--decimal comma"]),
         ('x;y\n"1;2\n', ["line 2", "quotes in pairs"]),
+        ("# x;y;n\n# n;y;x\n1;2;3\n", ["line 1 and line 2", "--header LINE"]),
         ("x;y\n1;\x002\n", ["line 2", r"the character '\x00'", "UTF-16"]),
         *((f"x;y\n1{each};2\n", ["line 2", ascii(each), "printable"]) for each in "\x0c\x1b\x85\u2028\u202e\u2067"),
         # A blank that does not break.
         ("x;y\n1\u00a0;2\n1\n", ["line 3", "1 cell"]),
     ],
 )
-def test_what_cannot_be_read_is_refused_with_its_line(tmp_path, text, words):
+def test_what_cannot_be_read_or_in_two_ways_is_refused_with_its_line(tmp_path, text, words):
     with refused((tmp_path / "table.txt").as_posix(), "", *words):
-        read_text_table(write_text_file(tmp_path, text), is_header)
-
-
-def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch):
-    path = write_text_file(tmp_path, "x;y\n" + "1;2\n" * 200)
-    monkeypatch.setattr(csv_dialect, "MOST_LINES", 200)
-    with refused(path, "", "201 lines", "at most 200"):
-        read_text_table(path, is_header)
-    monkeypatch.setattr(csv_dialect, "LARGEST_BYTES", 100)
-    with refused(path, "", "more than 100 bytes"):
-        read_text_table(path, is_header)
+        read(tmp_path, text)
 
 
 @pytest.mark.parametrize(
-    ("header", "encoding"),
-    [("x;y;°", "cp1252"), ("x;y;µm größe", "cp1252"), ("x;y;z", "utf-16-le"), ("x;y;°", "utf-16-be"), ("x;y;°", "utf-8")],
+    ("text", "dialect", "x"),
+    [
+        ("x;y\n1,234;22,500\n", Dialect(decimal="comma"), "1.234"),
+        ("x;y\n1,234;0,500\n", Dialect(), "1.234"),
+        ("# x;y;n\n# n;y;x\n1;2;3\n", Dialect(header=2), "3"),
+        ("x;y;n\ny;x;n\n1;2;3\n", Dialect(header=2), "2"),
+    ],
 )
-def test_an_encoding_that_can_be_no_other_is_found_out(tmp_path, header, encoding):
-    found = read_text_table(write_text_file(tmp_path, f"{header}\n1;2;3\n", encoding), is_header)
-    assert list(found.columns) == header.split(";") and found.dialect.encoding == encoding
+def test_what_an_option_or_another_number_says_is_read(tmp_path, text, dialect, x):
+    assert read(tmp_path, text, dialect=dialect).columns["x"] == (x,)
 
 
 @pytest.mark.parametrize(
-    ("header", "encoding"), [("x;y;角度", "gb18030"), ("x;y;角度", "shift_jis"), ("x;y;°", "cp437"), ("x;y;Łódź", "cp1250")]
+    ("limit", "largest", "words"), [("MOST_LINES", 200, "201 lines"), ("LARGEST_BYTES", 100, "more than 100 bytes")]
 )
-def test_another_encoding_is_asked_for_and_read_where_it_is_stated(tmp_path, header, encoding):
-    path = write_text_file(tmp_path, f"{header}\n1;2;3\n", encoding)
-    with refused(path, "line 1", "not UTF-8", "--encoding cp1252"):
-        read_text_table(path, is_header)
-    assert list(read_text_table(path, is_header, Dialect(encoding=encoding)).columns) == header.split(";")
+def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch, limit, largest, words):
+    monkeypatch.setattr(csv_dialect, limit, largest)
+    with refused(tmp_path / "table.txt", "", words):
+        read(tmp_path, "x;y\n" + "1;2\n" * 200)
 
 
-@pytest.mark.parametrize("encoding", ["klingon", "hex", "a\0b", "undefined"])
-def test_a_stated_encoding_that_is_none_is_refused(tmp_path, encoding):
-    with refused("--encoding", "", "cp1252"):
-        read_text_table(write_text_file(tmp_path, "x;y;°\n1;2;3\n"), is_header, Dialect(encoding=encoding))
+FOUND = [("°", "cp1252"), ("µm größe", "cp1252"), ("z", "utf-16-le"), ("°", "utf-16-be"), ("°", "utf-8")]
+ASKED = [("角度", "gb18030"), ("角度", "shift_jis"), ("°", "cp437"), ("Łódź", "cp1250")]
 
 
-def test_a_stated_encoding_that_the_file_does_not_have_is_refused(tmp_path):
-    path = write_text_file(tmp_path, "x;y;°\n1;2;3\n", "latin-1")
-    with refused(path, "line 1", "not ASCII"):
-        read_text_table(path, is_header, Dialect(encoding="ascii"))
+@pytest.mark.parametrize(("name", "encoding"), FOUND + ASKED)
+def test_an_encoding_that_can_be_no_other_is_found_out_and_another_asked_for(tmp_path, name, encoding):
+    text = f"x;y;{name}\n1;2;3\n"
+    if (name, encoding) in ASKED:
+        with refused(tmp_path / "table.txt", "line 1", "not UTF-8", "--encoding cp1252"):
+            read(tmp_path, text, encoding)
+        assert [*read(tmp_path, text, encoding, Dialect(encoding=encoding)).columns] == ["x", "y", name]
+    else:
+        found = read(tmp_path, text, encoding)
+        assert [*found.columns] == ["x", "y", name] and found.dialect.encoding == encoding
 
 
-@pytest.mark.parametrize("mark", ["# ", "#", "% ", "%", "// ", "%% "])
+@pytest.mark.parametrize("encoding", ["klingon", "hex", "a\0b", "undefined", "ascii"])
+def test_a_stated_encoding_that_is_none_or_another_is_refused(tmp_path, encoding):
+    source, words = ("table.txt", "not ASCII") if encoding == "ascii" else ("--encoding", "cp1252")
+    with refused(tmp_path / source if encoding == "ascii" else source, "", words):
+        read(tmp_path, "x;y;°\n1;2;3\n", dialect=Dialect(encoding=encoding))
+
+
+@pytest.mark.parametrize("mark", ["# ", "#", "% ", "// ", "%% "])
 @pytest.mark.parametrize("separator", [",", " ", ";"])
-def test_a_header_behind_a_comment_mark_is_found(tmp_path, mark, separator):
-    text = f"{mark}made by hand\n{mark}{separator.join('xyn')}\n{separator.join('123')}\n"
-    found = read_text_table(write_text_file(tmp_path, text), is_header)
+def test_a_header_behind_a_comment_mark_is_found_and_a_plain_one_goes_before(tmp_path, mark, separator):
+    head, row = separator.join("xyn"), separator.join("123")
+    found = read(tmp_path, f"{mark}made by hand\n{mark}{head}\n{row}\n")
     assert found.columns == {"x": ("1",), "y": ("2",), "n": ("3",)} and found.dialect.header == 2
-    assert read_text_table(write_text_file(tmp_path, text), is_header, Dialect(header=2)).columns == found.columns
-
-
-def test_two_headers_behind_comment_marks_are_a_question_and_a_plain_one_goes_before(tmp_path):
-    text = "# x;y;n\n# n;y;x\n1;2;3\n"
-    with refused(tmp_path / "table.txt", "line 1 and line 2", "--header LINE"):
-        read_text_table(write_text_file(tmp_path, text), is_header)
-    assert read_text_table(write_text_file(tmp_path, text), is_header, Dialect(header=2)).columns["x"] == ("3",)
-    found = read_text_table(write_text_file(tmp_path, "# x;y;n\nn;x;y\n1;2;3\n#4;5;6\n"), is_header)
+    found = read(tmp_path, f"{mark}{head}\n{separator.join('nxy')}\n{row}\n{mark}4\n")
     assert found.columns["x"] == ("2",)
     assert found.left_out == ("1 line above the header", "1 line of comments below the header")
 
@@ -119,51 +115,23 @@ def test_two_headers_behind_comment_marks_are_a_question_and_a_plain_one_goes_be
     ["x,y,,\n1,2,,\n,,,\n", ",x,,y\n,1,,2\n", "x,y\n1,2,,,\n", "x;y;\n1;2;\n;;\n\n", "\ufeffx;y\n1;2;;\n"],
 )
 def test_nameless_columns_and_rows_that_are_empty_throughout_are_left_out(tmp_path, text):
-    assert read_text_table(write_text_file(tmp_path, text), is_header).columns == {"x": ("1",), "y": ("2",)}
+    assert read(tmp_path, text).columns == {"x": ("1",), "y": ("2",)}
+
+
+def test_a_nameless_column_with_values_is_called_by_its_place(tmp_path):
+    assert read(tmp_path, ",x,y\n0,1,2\n,3,4\n").columns == {"column 1": ("0", ""), "x": ("1", "3"), "y": ("2", "4")}
 
 
 def test_columns_to_ignore_are_left_out_whatever_they_hold(tmp_path):
-    path = write_text_file(tmp_path, "x;y;n;n\n1,5;2;1.5;1.2.3\n")
-    with refused(path, "line 1", "'n' twice", "--ignore 'n'"):
-        read_text_table(path, is_header)
-    assert read_text_table(path, is_header, ignored=["n"]).columns == {"x": ("1.5",), "y": ("2",)}
-    with refused(path, "line 1", "no column 'm' to ignore", "x, y, n"):
-        read_text_table(path, is_header, ignored=["m"])
+    text = "x;y;n;n\n1,5;2;1.5;1.2.3\n"
+    assert read(tmp_path, text, ignored=["n"]).columns == {"x": ("1.5",), "y": ("2",)}
+    with refused(tmp_path / "table.txt", "line 1", "no column 'm' to ignore", "x, y, n"):
+        read(tmp_path, text, ignored=["m"])
 
 
-GROUPED = {
-    "1.234,56": ("point", "1234.56"),
-    "-1,234.56": ("comma", "-1234.56"),
-    "1 234,5": ("space", "1234.5"),
-    "1\u202f234.5": ("space", "1234.5"),
-    "1'234.5": ("apostrophe", "1234.5"),
-    "1\u2019234": ("apostrophe", "1234"),
-    "1,234,567": ("comma", "1234567"),
-    "12.345.678": ("point", "12345678"),
-    "1,234": ("comma", "1234"),
-}
-
-
-@pytest.mark.parametrize("cell", GROUPED)
-def test_marks_between_thousands_are_asked_for(tmp_path, cell):
-    thousands, number = GROUPED[cell]
-    path = write_text_file(tmp_path, f"x;y\n{cell};2\n")
-    with refused(path, "line 2", repr(cell), "--thousands"):
-        read_text_table(path, is_header)
-    assert read_text_table(path, is_header, Dialect(thousands=thousands)).columns["x"] == (number,)
-
-
-def test_three_digits_behind_each_comma_may_be_either_and_anything_else_tells(tmp_path):
-    path = write_text_file(tmp_path, "x;y\n1,234;22,500\n")
-    with refused(path, "line 2", "'1,234'", "--decimal comma", "--thousands comma"):
-        read_text_table(path, is_header)
-    assert read_text_table(path, is_header, Dialect(decimal="comma")).columns["x"] == ("1.234",)
-    assert read_text_table(write_text_file(tmp_path, "x;y\n1,234;0,500\n"), is_header).columns["x"] == ("1.234",)
-    # In quotes between commas it may be either too.
-    path = write_text_file(tmp_path, 'x,y\n"1,5",2\n')
-    with refused(path, "line 2", "'1,5'", "--decimal comma"):
-        read_text_table(path, is_header)
-    with refused("--thousands", "", "decimal mark too"):
-        read_text_table(path, is_header, Dialect(decimal="comma", thousands="comma"))
-    with refused(path, "line 2", "'1,5'", "three digits"):
-        read_text_table(path, is_header, Dialect(separator="comma", thousands="comma"))
+def test_a_table_without_a_header_has_the_names_that_are_stated(tmp_path):
+    found = read(tmp_path, "# raw\n1,2,3\n4,5,6\n", names=["x", "y", "n"])
+    assert found.columns == {"x": ("1", "4"), "y": ("2", "5"), "n": ("3", "6")} and found.lines == (2, 3)
+    for names, words in ((["x", "y"], ["line 2", "2, one for each column of --columns"]), (["x", "y", "x"], ["'x' twice"])):
+        with refused(tmp_path / "table.txt", "", *words):
+            read(tmp_path, "# raw\n1,2,3\n", names=names)

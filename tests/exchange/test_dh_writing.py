@@ -1,5 +1,7 @@
 """DH parameters of a robot: they bring back its poses, and change as little as the robot does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS, analysed
@@ -57,6 +59,14 @@ def test_a_tilt_of_parallel_axes_is_beta_and_not_a_kilometre(tmp_path):
     assert deltas.loc["q1", ["delta_beta_deg", "delta_alpha_deg"]].tolist() == pytest.approx([0.02, 0.01])
     assert deltas["delta_d_m"].abs().max() < 1e-6
     assert_same(tilted, read_back(tilted, tmp_path, nominal))
+
+
+def test_angles_are_the_controllers_where_it_counts_each_joint_by_itself(tmp_path):
+    robot = robot_of("Rz(q1) Tx(1.0) Ry(q2) Tx(0.5) [tip]")
+    turned = replace(robot, reported_matrix=np.diag([-1.0, 1.0]), reported_offset=np.array([0.3, -0.2]))
+    assert_same(turned, read_back(turned, tmp_path))
+    coupled = replace(robot, reported_matrix=np.array([[1.0, 0.0], [1.0, 1.0]]))
+    np.testing.assert_array_equal(dh_rows(coupled), dh_rows(robot))
 
 
 def test_frames_have_their_z_axes_on_the_joints_and_end_at_the_flange(kuka):

@@ -1,6 +1,7 @@
 """Another program's table becomes measurements; what it leaves open is asked for."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,8 +9,7 @@ from durations import growth
 from imported_tables import PLAIN, table
 from support import refused
 
-from elastocal.exchange.import_options import ImportOptions
-from elastocal.exchange.measurement_table import SAME_POSE
+from elastocal.exchange.measurement_table import SAME_POSE, ImportOptions, import_options_text, read_import_options
 
 
 def test_angles_lengths_and_forces_come_in_si_units(tmp_path):
@@ -17,6 +17,11 @@ def test_angles_lengths_and_forces_come_in_si_units(tmp_path):
     row = {name: values[0] for name, values in found.table.items()}
     assert (row["q1"], row["q2"], row["x"], row["fz"], row["fx"]) == (math.pi / 2, -math.pi / 4, 1.0, 500.0, 0.0)
     assert (row["time_s"], row["target"], row["pose"], row["load"], row["repeat"]) == (2.0, "smr", 1, 1, 0)
+
+
+def test_forces_that_the_robot_exerts_are_turned_round(tmp_path):
+    found = table(tmp_path, "q1,x,y,z,fz\n0,1,2,3,5\n", replace(PLAIN, wrench="by-robot"))
+    assert found.table["fz"].tolist() == [-5.0] and not np.signbit(found.table["fx"]).any()
 
 
 def test_poses_loads_and_repeats_are_counted_where_no_column_has_them(tmp_path):
@@ -69,13 +74,24 @@ def test_the_options_found_out_give_the_same_again(tmp_path):
         np.testing.assert_array_equal(again.table[name], values)
 
 
-def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path):
-    text = "q1,x,y,z\n1,1,2,3\n2,,,\n3,1,2,3\n"
-    with refused((tmp_path / "t.csv").as_posix(), "line 3", "no position", "--skip-empty"):
+@pytest.mark.parametrize("empty", [",,", "nan,NaN,1", "1,-,-", "N/A,n/a,NA"])
+def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path, empty):
+    text = f"q1,x,y,z\n1,1,2,3\n2,{empty}\n3,1,2,3\n"
+    with refused((tmp_path / "t.csv").as_posix(), "line 3", "--skip-empty" if empty == ",," else "a number such as"):
         table(tmp_path, text)
-    options = ImportOptions(units={"angles": "deg", "lengths": "mm"}, target="smr", skip_empty=True)
-    found = table(tmp_path, text, options)
+    found = table(tmp_path, text, replace(PLAIN, skip_empty=True))
     assert (len(found.table["x"]), found.skipped) == (2, 1)
+
+
+def test_a_table_without_a_header_has_the_columns_that_are_stated(tmp_path):
+    names = ["q1", "q2", *(f"t{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4))]
+    text = "90,1,0,-1,0,100,1,0,0,200,0,0,1,300\n-90,2,1,0,0,100,0,1,0,200,0,0,1,300\n"
+    with refused(tmp_path / "t.csv", "line 1", "--columns q1,q2"):
+        table(tmp_path, text)
+    found = table(tmp_path, text, replace(PLAIN, names=names))
+    assert found.table["q1"].tolist() == [math.pi / 2, -math.pi / 2] and found.table["z"].tolist() == [0.3, 0.3]
+    np.testing.assert_allclose(found.table["rz"], [math.pi / 2, 0.0])
+    assert table(tmp_path, text, found.options).options == found.options
 
 
 @pytest.mark.parametrize(
@@ -88,6 +104,8 @@ def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path):
         ("q1,x,y,z,Roll\n0,1,2,3,0\n", PLAIN, ["Roll", "--rotation"]),
         ("q1,q3,x,y,z\n0,0,1,2,3\n", PLAIN, ["no column q2"]),
         ("x,y,z\n1,2,3\n", PLAIN, ["no joint angles", "--column q1"]),
+        ("J1 [deg],J2 [deg],L [mm]\n0,1,400\n", PLAIN, ["'L [mm]' and no position", "distances alone"]),
+        ("q1,x,y,z,Distance\n0,1,2,3,400\n", ImportOptions(units=PLAIN.units), ["no column target"]),
         ("q1,J1,x,y,z\n0,0,1,2,3\n", PLAIN, ["both 'q1' and 'J1'", "--column q1=NAME"]),
         ("q1,x,y,z\n0,1,a,3\n", PLAIN, ["line 2, column y", "'a'", "number"]),
         ("q1,x,y,z\n0,1,nan,3\n", PLAIN, ["line 2, column y", "a number such as"]),
@@ -109,3 +127,26 @@ def test_what_is_missing_ambiguous_or_wrong_is_said_with_the_option_that_helps(t
     source = words[0] if words[0].startswith("--") else (tmp_path / "t.csv").as_posix()
     with refused(source, "", *words):
         table(tmp_path, text, options)
+
+
+def test_options_read_back_as_they_were_and_an_unknown_key_is_refused(tmp_path):
+    (tmp_path / "t.csv").write_text("x")
+    options = ImportOptions(
+        *("tab", "comma", 3, None, {"q1": "Achse 1 [°]"}, {"q1": "°"}, "euler:ZYX", "smr", "by-robot", True), names=["q1", "x"]
+    )
+    path = tmp_path / "import.yaml"
+    path.write_text(import_options_text(options, tmp_path / "t.csv"), encoding="utf-8")
+    assert read_import_options(path) == options
+    path.write_text("seperator: tab\n")
+    with refused(path.as_posix(), "seperator", "'separator'?"):
+        read_import_options(path)
+
+
+def test_a_sheet_of_a_plan_that_a_spreadsheet_saved_is_asked_nothing_but_what_was_edited(tmp_path):
+    head = "pose;load;repeat;target;done;q1_mm;q2_deg;q1;q2;fx;fy;fz;mx;my;mz;x;y;z;rx;ry;rz"
+    row = "1;0;0;A;x;250;57,296;0,25;1,00000384;0;0;0;0;0;0;1,5;2,5;3,5;0,1;0,2;0,3"
+    found = table(tmp_path, f"{head}\n{row}\n", ImportOptions())
+    assert [found.table[name][0] for name in ("q1", "q2", "x", "rz")] == pytest.approx([0.25, 1.00000384, 1.5, 0.3])
+    assert found.options.rotation == "vector"
+    with refused((tmp_path / "t.csv").as_posix(), "line 2, column q2_deg", "'58.296'", "57.296, which is q2"):
+        table(tmp_path, f"{head}\n{row.replace('57,296', '58,296')}\n", ImportOptions())

@@ -21,6 +21,13 @@ def result(tmp_path):
     return check_imported(DOCUMENT, tmp_path / "x.urdf", "by hand", ["masses are guessed"])
 
 
+def test_the_text_gives_back_the_document_whatever_the_file_is_called(tmp_path, result):
+    assert yaml.safe_load(robot_text(result)) == DOCUMENT
+    path = tmp_path / "x\u2028payload_kg: 9"
+    path.write_text("")
+    assert yaml.safe_load(robot_text(check_imported(DOCUMENT, path, "by hand", ()))) == DOCUMENT
+
+
 def test_the_head_says_where_it_came_from_and_what_it_lacks(result):
     lines = robot_text(result).splitlines()
     assert lines[0] == "# From x.urdf (sha256 3fc9b689459d738f), by hand."

@@ -1,16 +1,17 @@
-"""URDF to robot file and back into poses and torques, beside pinocchio."""
+"""URDF, read safely, to robot file and back into poses and torques, beside pinocchio; every fault is one line."""
 
 import numpy as np
 import pytest
 import yaml
 from hypothesis import given, settings
-from made_urdf import Pinocchio, assert_same_poses, joint, link, segments, written
+from made_urdf import Pinocchio, assert_same_poses, joint, link, robot, segments, written
 from support import refused
 from synthetic import made_states
 
 from elastocal.effects.conditions import conditions_of
+from elastocal.exchange import urdf
 from elastocal.exchange.robot_text import robot_text
-from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.exchange.urdf import chain_between, read_urdf, robot_from_urdf
 from elastocal.io.documents import check_document
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import sites_of
@@ -35,37 +36,35 @@ ARM = (
 
 
 def through_its_file(result):
-    """The robot of the text that is written, not of the document in memory."""
+    """The arm of the text that is written, not of the document in memory."""
     document = yaml.safe_load(robot_text(result))
     check_document(document, "robot", "robot.yaml")
     return robot_from_document(document)
 
 
-def assert_same_weight(robot, path, within=None):
-    states, by_pinocchio = made_states(robot.joints, 6, seed=3), Pinocchio(path)
-    own = conditions_of(sites_of(robot), robot.compliance, states).gravity[:, : robot.joints]
+def assert_same_weight(arm, path, within=None):
+    states, by_pinocchio = made_states(arm.joints, 6, seed=3), Pinocchio(path)
+    own = conditions_of(sites_of(arm), arm.compliance, states).gravity[:, : arm.joints]
     for angles, torque in zip(states.joint_angles, own, strict=True):
-        expected = by_pinocchio.weight(dict(zip(robot.joint_names, angles, strict=True)), robot.joint_names)
+        expected = by_pinocchio.weight(dict(zip(arm.joint_names, angles, strict=True)), arm.joint_names)
         np.testing.assert_allclose(torque, expected, rtol=0, atol=within or 1e-6 * max(1.0, np.abs(expected).max()))
     return np.abs(own).max()
 
 
-def test_oblique_axes_turned_origins_and_shifts_are_where_pinocchio_has_them(tmp_path):
+@pytest.mark.parametrize(
+    ("base", "tip", "names"),
+    [("base", "flange", ("shoulder", "elbow", "rail", "wrist")), ("upper", "hand", ("elbow", "rail", "wrist"))],
+)
+def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(tmp_path, base, tip, names):
     path = written(tmp_path, *ARM)
-    robot = through_its_file(robot_from_urdf(path, "base", "flange"))
-    assert robot.joint_names == ("shoulder", "elbow", "rail", "wrist")
-    assert robot.chain.prismatic == (False, False, True, False)
-    assert_same_poses(robot, path, "base", "flange")
-    assert assert_same_weight(robot, path) > 1.0
-
-
-def test_a_part_of_the_tree_stands_and_weighs_as_in_the_whole(tmp_path):
-    path = written(tmp_path, *ARM)
-    robot = through_its_file(robot_from_urdf(path, "upper", "hand"))
-    assert robot.joint_names == ("elbow", "rail", "wrist")
-    assert_same_poses(robot, path, "upper", "hand")
-    assert assert_same_weight(robot, path) > 1.0
-    assert {mass.link for mass in robot.masses} == {0, 1, 2, 3}
+    result = robot_from_urdf(path, base, tip, relative_std=0.3)
+    arm = through_its_file(result)
+    assert arm.joint_names == names and {mass.link for mass in arm.masses} == {*range(len(names) + 1)}
+    assert_same_poses(arm, path, base, tip)
+    assert assert_same_weight(arm, path) > 1.0
+    # What a URDF does not say is not made up.
+    assert not arm.compliance_known and {mass.relative_std for mass in arm.masses} == {0.3}
+    assert any("no compliances" in note for note in result.notes) and any("30 %, by assumption" in n for n in result.notes)
 
 
 @pytest.mark.parametrize("limits", [None, (-1e16, 1e16)])
@@ -90,20 +89,6 @@ def test_limits_that_look_like_degrees_are_asked_for(tmp_path, limits):
     np.testing.assert_allclose(radians.robot.joint_limits[0], limits)
 
 
-def test_a_shift_without_limits_is_refused(tmp_path):
-    path = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", "prismatic", limits=None))
-    with refused(path, "joint 'j': limit", "metres"):
-        robot_from_urdf(path, "a", "b")
-
-
-def test_what_a_urdf_does_not_say_is_not_made_up(tmp_path):
-    result = robot_from_urdf(written(tmp_path, *ARM), "base", "flange", relative_std=0.3)
-    assert "compliance_urad_per_Nm" not in result.document and not result.robot.compliance_known
-    assert {mass.relative_std for mass in result.robot.masses} == {0.3}
-    assert any("no compliances" in note for note in result.notes)
-    assert any("30 %, by assumption" in note for note in result.notes)
-
-
 @settings(max_examples=20, deadline=None)
 @given(parts=segments)
 def test_any_chain_is_where_pinocchio_has_it_and_weighs_as_much(tmp_path_factory, parts):
@@ -115,9 +100,9 @@ def test_any_chain_is_where_pinocchio_has_it_and_weighs_as_much(tmp_path_factory
         described.append(joint(f"b{number}", f"l{number}", f"s{number}", "fixed", beside, (0.4, 0.0, 0.2)))
     path = written(tmp_path_factory.mktemp("urdf"), *described)
     tip = f"l{len(parts)}"
-    robot = through_its_file(robot_from_urdf(path, "l0", tip))
-    assert_same_poses(robot, path, "l0", tip, count=4)
-    assert_same_weight(robot, path, 1e-5)
+    arm = through_its_file(robot_from_urdf(path, "l0", tip))
+    assert_same_poses(arm, path, "l0", tip, count=4)
+    assert_same_weight(arm, path, 1e-5)
 
 
 @pytest.mark.parametrize("multiplier, offset", [(1.0, 0.0), (-1.0, 0.0), (-1.0, 0.3), (1.0, -1.1)])
@@ -128,6 +113,220 @@ def test_a_joint_that_mimics_another_is_a_passive_one(tmp_path, multiplier, offs
     parts.append(joint("two", "b", "c", "revolute", (0.2, 0, 0.3), (0, 0.5, 0), (0, 0, 1)))
     parts.append(joint("three", "c", "d", kind, (0.1, 0, 0.3), (0, 0, 0.2), axis, mimic=("one", multiplier, offset)))
     path = written(tmp_path, *parts)
-    robot = through_its_file(robot_from_urdf(path, "a", "d"))
-    assert robot.joint_names == ("one", "two")
-    assert_same_poses(robot, path, "a", "d", lambda values: {"three": multiplier * values["one"] + offset})
+    arm = through_its_file(robot_from_urdf(path, "a", "d"))
+    assert arm.joint_names == ("one", "two")
+    assert_same_poses(arm, path, "a", "d", lambda values: {"three": multiplier * values["one"] + offset})
+
+
+TREE = (
+    *(link(name) for name in ("root", "base", "arm", "hand", "other")),
+    joint("foot", "root", "base", "fixed", (0, 0, 1)),
+    joint("j1", "base", "arm", xyz=(0, 0, 0.5)),
+    joint("j2", "arm", "hand", xyz=(0.4, 0, 0), axis=(0, 1, 0)),
+    joint("side", "base", "other"),
+)
+
+
+def make_mimics(**of):
+    """Three joints; which mimics what, with multiplier and offset."""
+    kinds = {"j2": "revolute"} | of.pop("kinds", {})
+    return [
+        *(link(name) for name in ("base", "arm", "fore", "hand", "beside")),
+        joint("j1", "base", "arm", xyz=(0, 0, 0.5), mimic=of.get("j1")),
+        joint("j2", "arm", "fore", kinds["j2"], xyz=(0.4, 0, 0), mimic=of.get("j2")),
+        joint("j3", "fore", "hand", xyz=(0.4, 0, 0), axis=(0, 1, 0), mimic=of.get("j3")),
+        joint("j4", "base", "beside"),
+    ]
+
+
+def one_joint(*names, **more):
+    return (*map(link, names), *(joint(f"j{n}", *names[n : n + 2], **more) for n in range(len(names) - 1)))
+
+
+def test_a_plain_chain_is_read_as_a_person_would_write_it(tmp_path):
+    found = read_urdf(written(tmp_path, *TREE))
+    assert chain_between(found, "base", "hand", (), "").notation == "Tz(0.5) Rz(q1) Tx(0.4) Ry(q2) [hand]"
+    assert chain_between(found, "root", "hand", (), "").notation == "Tz(1) Tz(0.5) Rz(q1) Tx(0.4) Ry(q2) [hand]"
+
+
+@pytest.mark.parametrize(
+    ("parts", "links", "key", "words"),
+    [
+        (TREE, ("bas", "hand"), "base", ["'bas'", "'base'?"]),
+        (TREE, ("base", "nothing"), "tip", ["'nothing'", "hand"]),
+        (TREE, ("hand", "base"), "base 'hand', tip 'base'", ["other way round"]),
+        (TREE, ("arm", "other"), "base 'arm', tip 'other'", ["two branches"]),
+        (TREE, ("root", "base"), "base 'root', tip 'base'", ["no joint that moves"]),
+        (TREE, ("hand", "hand"), "base 'hand', tip 'hand'", ["no joint that moves"]),
+        (TREE, ("base", "hand", ["other"]), "point", ["'other'", "arm"]),
+        *(
+            ((*TREE[:5], *TREE[6:8], joint("foot", "root", "base", kind)), ("root", "hand"), "joint 'foot'", [kind, "revolute"])
+            for kind in ("floating", "planar")
+        ),
+        (one_joint("a", "b", axis=(0, 0, 0)), ("a", "b"), "joint 'j0'", ["0 0 0"]),
+        (one_joint("a", "b", axis=(1e-20, 0, 0)), ("a", "b"), "joint 'j0'", ["1e-20"]),
+        (one_joint("a", "b c", "b_c"), ("a", "b_c", ["b c"]), "point", ["blanks"]),
+        (one_joint("a", "b", kind="prismatic", limits=None), ("a", "b"), "joint 'j0': limit", ["metres"]),
+        (make_mimics(j2=("j1", 0.5, 0.0)), ("base", "hand"), "joint 'j2': mimic", ["0.5 times 'j1'", "1 or -1"]),
+        (make_mimics(j2=("j4", 1.0, 0.0)), ("base", "hand"), "joint 'j2': mimic", ["'j4'", "j1, j2, j3"]),
+        (make_mimics(j2=("gone", 1.0, 0.0)), ("base", "hand"), "joint 'j2': mimic", ["'gone'"]),
+        (make_mimics(j1=("j2", 1.0, 0.0), j2=("j1", 1.0, 0.0)), ("base", "hand"), "mimic", ["a loop"]),
+        (make_mimics(j2=("j1", 1.0, 0.0), kinds={"j2": "prismatic"}), ("base", "hand"), "joint 'j2': mimic", ["otherwise"]),
+    ],
+)
+def test_what_makes_no_chain_is_refused(tmp_path, parts, links, key, words):
+    path = written(tmp_path, *parts)
+    with refused(path, key, *words):
+        robot_from_urdf(path, *links)
+
+
+def test_a_joint_may_mimic_one_behind_it_and_one_that_mimics(tmp_path):
+    path = written(tmp_path, *make_mimics(j1=("j3", -1.0, 0.2), j2=("j1", -1.0, 0.4)))
+    arm = robot_from_urdf(path, "base", "hand").robot
+    assert arm.joint_names == ("j3",)
+    assert_same_poses(arm, path, "base", "hand", lambda values: {"j1": 0.2 - values["j3"], "j2": 0.2 + values["j3"]})
+
+
+SOUND = (link("a"), link("b"), joint("j", "a", "b"))
+PLACE = 'xyz="0.0 0.0 0.0"'
+LAUGHS = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10))
+BOMB = f'<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY l0 "ha">{LAUGHS}]><robot name="&l9;"><link name="a"/></robot>'
+OUTSIDE = '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="&x;"><link name="a"/></robot>'
+
+
+def file_of(folder, text, encoding="utf-8"):
+    path = folder / "made.urdf"
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def test_meshes_and_what_else_is_no_joint_or_mass_is_left_out(tmp_path):
+    mesh = '<visual><geometry><mesh filename="package://gone/x.stl"/></geometry></visual>'
+    heavy = link("b", 2.0, (0, 0, 1)).replace("</link>", mesh + "</link>")
+    found = read_urdf(file_of(tmp_path, robot(link("a"), heavy, SOUND[2], '<gazebo reference="a"/>', name="arm")))
+    assert found.name == "arm" and {"gazebo", "visual"} <= {*found.left_out}
+    assert found.moments["b"].tolist() == [0, 0, 2, 2] and not found.moments["a"].any()
+
+
+@pytest.mark.parametrize("text", [BOMB, OUTSIDE], ids=["entities of entities", "an entity outside"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_entities_are_refused_before_they_are_looked_at(tmp_path, text, encoding):
+    with refused(tmp_path / "made.urdf", "line 1", "<!DOCTYPE"):
+        read_urdf(file_of(tmp_path, text, encoding))
+
+
+def test_more_than_a_urdf_can_have_is_refused_at_once(tmp_path, monkeypatch):
+    links = [link(f"l{number}") for number in range(2002)]
+    joints = [joint(f"j{number}", f"l{number}", f"l{number + 1}") for number in range(2001)]
+    with refused(tmp_path / "made.urdf", "", "2002 times <link>", "at most 2000"):
+        read_urdf(file_of(tmp_path, robot(*links, *joints)))
+    monkeypatch.setattr(urdf, "LARGEST_BYTES", 1000)
+    with refused(tmp_path / "made.urdf", "", "more than 1000 bytes"):
+        read_urdf(file_of(tmp_path, robot(*SOUND) + " " * 1000))
+
+
+def changed(old, new):
+    return robot(*SOUND[:2], SOUND[2].replace(old, new))
+
+
+MACRO = '<robot name="x" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="y"/></robot>'
+FAULTS = {
+    "a macro": (MACRO, "", ["<xacro:include>", "run it first"]),
+    "a property": (robot(link("${prefix}a"), *SOUND), "<link>", ["${prefix}a", "run it first"]),
+    "no XML": ("name: KUKA\n", "line 1", ["XML"]),
+    "cut off": (robot(*SOUND)[:-20], "line", ["XML"]),
+    "empty": ("", "line 1", ["XML"]),
+    "another language": ("<sdf><model/></sdf>", "", ["<sdf>", "<robot>"]),
+    "no links": ("<robot name='x'/>", "", ["no <link>"]),
+    "no joints": (robot(link("a")), "", ["no <joint>"]),
+    "a link twice": (robot(*SOUND, link("a")), "link 'a'", ["2 times"]),
+    "a joint twice": (robot(*SOUND, link("c"), joint("j", "b", "c")), "joint 'j'", ["2 times"]),
+    "no name": (robot(*SOUND, "<link/>"), "<link>", ["no name"]),
+    "an unknown type": (robot(*SOUND[:2], joint("j", "a", "b", "hinge")), "joint 'j'", ["'hinge'", "revolute"]),
+    "an unknown parent": (robot(*SOUND[:2], joint("j", "x", "b")), "joint 'j'", ["parent 'x'"]),
+    "no child": (robot(*SOUND[:2], joint("j", "a", "b").replace('<child link="b"/>', "")), "joint 'j'", ["child ''"]),
+    "two parents": (robot(*SOUND, joint("k", "a", "b")), "joint 'k'", ["another joint"]),
+    "a loop": (robot(*SOUND, joint("k", "b", "a")), "link", ["a loop"]),
+    "a word for a number": (
+        changed('upper="2"', 'upper="two"'),
+        "joint 'j': limit upper",
+        ["'two'"],
+    ),
+    "two coordinates": (changed(PLACE, 'xyz="0 0"'), "joint 'j': origin xyz", ["3 numbers"]),
+    "no number": (changed(PLACE, 'xyz="0 0 nan"'), "joint 'j': origin xyz", ["nan"]),
+    "two origins": (changed("</joint>", "<origin/></joint>"), "joint 'j'", ["<origin> 2 times"]),
+    "a negative mass": (robot(link("a", -1.0), *SOUND[1:]), "link 'a': mass value", ["-1.0", "0 or more"]),
+    "underscores": (robot(link("a", 1.0).replace('"1.0"', '"1_0"'), *SOUND[1:]), "link 'a': mass value", ["'1_0'", "a number"]),
+    "a number beyond all machines": (
+        changed(PLACE, 'xyz="0 0 1e300"'),
+        "joint 'j': origin xyz",
+        ["1e300", "3 numbers"],
+    ),
+    "a mass of nothing": (robot(link("a", 1.0).replace('value="1.0"', ""), *SOUND[1:]), "link 'a'", ["<mass> without value"]),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_one_line(tmp_path, fault):
+    text, key, words = FAULTS[fault]
+    with refused(tmp_path / "made.urdf", key, *words):
+        read_urdf(file_of(tmp_path, text))
+
+
+def weights(tmp_path, *parts, base="base", tip="hand"):
+    """Entries of the robot file, and notes of what weighs."""
+    found = robot_from_urdf(written(tmp_path, *parts), base, tip)
+    words = ("zero for what", "passive", "placeholders", "gravity")
+    return found.document.get("masses", []), [note for note in found.notes if any(word in note for word in words)]
+
+
+FLANGED = (
+    link("base", 9.0),
+    link("arm", 2.0, (0.1, 0, 0)),
+    link("hand", 0.0),
+    joint("j1", "base", "arm", xyz=(0, 0, 1), axis=(0, 1, 0)),
+    joint("end", "arm", "hand", "fixed", (1, 0, 0)),
+)
+FINGER = (link("finger", 1.0, (0, 0, 0.1)), joint("open", "hand", "finger", "prismatic", (0, 0, 0.2)))
+
+
+def test_what_moves_beside_the_chain_weighs_as_at_zero_and_is_told(tmp_path):
+    masses, (note,) = weights(tmp_path, *FLANGED, *FINGER)
+    assert masses[1] == {
+        "link": 1, "mass_kg": 3.0, "centre_m": pytest.approx([0.4, 0, 0.1]), "relative_std": 0.2
+    }  # fmt: skip
+    assert "open" in note and "zero" in note
+
+
+def test_what_moves_beside_the_column_weighs_on_nothing_and_few_digits_and_other_joints_are_told(tmp_path):
+    bench = (
+        link("door", 7.0),
+        joint("hinge", "base", "door"),
+        link("eye"),
+        joint("bent", "hand", "eye", "fixed", rpy=(1.57, 0, 0)),
+    )
+    result = robot_from_urdf(written(tmp_path, *FLANGED, *bench), "base", "eye")
+    assert [entry["mass_kg"] for entry in result.document["masses"]] == [9.0, 2.0]
+    assert any(note.endswith("few digits: those of bent") for note in result.notes)
+    assert "joints that are no part of the chain, left out: hinge" in result.notes
+
+
+def test_equal_masses_are_placeholders(tmp_path):
+    parts = [link(name, 2.0) for name in "abcd"] + [joint(f"j{n}", "abcd"[n], "abcd"[n + 1]) for n in range(3)]
+    masses, notes = weights(tmp_path, *parts, base="a", tip="d")
+    assert masses == [] and "2 kg: placeholders" in notes[0]
+    other, _ = weights(tmp_path, link("a", 2.1), *parts[1:], base="a", tip="d")
+    assert len(other) == 4
+
+
+def test_behind_a_passive_joint_a_mass_is_told(tmp_path):
+    parts = (link("b"), link("c"), link("d", 1.0), joint("j1", "b", "c"), joint("j2", "c", "d", mimic=("j1", -1.0, 0.0)))
+    _, notes = weights(tmp_path, *parts, base="b", tip="d")
+    assert "passive" in notes[0] and notes[0].endswith(" d")
+
+
+def test_gravity_turns_with_a_base_that_does_not_stand_upright(tmp_path):
+    wall = (link("wall"), joint("bolts", "wall", "base", "fixed", rpy=(0, np.pi / 2, 0)))
+    path = written(tmp_path, *wall, *FLANGED)
+    assert robot_from_urdf(path, "base", "hand").document["gravity_m_s2"] == pytest.approx([9.80665, 0, 0])
+    assert "gravity_m_s2" not in robot_from_urdf(path, "wall", "hand").document

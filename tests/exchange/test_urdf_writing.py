@@ -1,14 +1,196 @@
-"""A robot as URDF, where pinocchio has it and as it is read back."""
+"""A robot as URDF, and the user's own URDF with joint origins changed and nothing else, as MuJoCo and pinocchio have them."""
+
+import re
+import struct
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from made_urdf import Pinocchio
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_calibrated import made_calibrated
+from made_urdf import Pinocchio, assert_same_poses, joint, link, segments, written
+from support import refused
 
-from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.exchange.urdf_writing import urdf_of
+from elastocal.application.calibrated_geometry import fold_effects
+from elastocal.effects.catalogue import candidates_on
+from elastocal.exchange.urdf import read_urdf, robot_from_urdf
+from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
 from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.sites import sites_of
+
+MESH = '<geometry><mesh filename="part.stl" scale="0.5 0.5 0.5"/></geometry>'
+BOX = '<geometry><box size="0.1 0.1 0.1"/></geometry>'
+LINK = """  <link name="{name}">
+    <inertial><origin xyz="0.01 0.02 {z}" rpy="0.1 0 0"/><mass value="{mass}"/>
+      <inertia ixx="0.11" ixy="0.01" ixz="0.002" iyy="0.12" iyz="-0.003" izz="0.09"/></inertial>
+    <visual><origin xyz="0 0 0.05" rpy="0 0 0.1"/>{geometry}<material name="red"/></visual>
+    <collision>{geometry}</collision>
+  </link>
+"""
+# Each: name, type, parent, child, how its origin is written, axis.
+JOINTS = (
+    ("rail", "prismatic", "world_mount", "carriage", '<origin xyz="0 0 0.2" rpy="0 0 0"/>', "0 1 0"),
+    ("a1", "revolute", "carriage", "l1", "<origin rpy='0 0 0.3'\n      xyz='0.1 0 0.4'></origin>", "0 0 1"),
+    ("a2", "revolute", "l1", "l2", '<origin xyz="0.1 0.02 0.2" rpy="1.5707963267948966 0 0"/>', "0 0 -1"),
+    ("a3", "revolute", "l2", "l3", '<origin xyz="0.5 0 0"/>', "0.6 0 0.8"),
+    ("a4", "continuous", "l3", "l4", "", "1 0 0"),
+    ("a5", "revolute", "l4", "l5", '<origin rpy="0 0.4 0"/>', "0 1 0"),
+    ("bolts", "fixed", "l5", "l5b", '<origin xyz="0.15 0 0" rpy="0.2 0 0"/>', ""),
+    ("a6", "revolute", "l5b", "l6", '<origin xyz="0.2 0 0.01" rpy="0 0 0"/>', "1 0 0"),
+    ("a7", "revolute", "l6", "l7", '<origin xyz="0.1 0 0.05" rpy="0 0 0"/>', "0 0 1"),
+    ("flange-tool0", "fixed", "l7", "tool0", '<origin xyz="0.1 0 0" rpy="0 1.5707963267948966 0"/>', ""),
+    ("grip", "prismatic", "l7", "finger", '<origin xyz="0.1 0.03 0" rpy="0 0 0"/>', "0 1 0"),
+    ("grip2", "prismatic", "l7", "finger2", '<origin xyz="0.1 -0.03 0" rpy="0 0 0"/>', "0 -1 0"),
+)
+KEYS = (*(f"joint_offset@{joint}" for joint in range(1, 9)), *(f"link_geometry@{joint}" for joint in range(1, 9)))
+
+
+def text():
+    """With what people have in their files: comments, meshes, other programs' elements, attributes in any form."""
+    parts = ['<?xml version="1.0" encoding="utf-8"?>\n<!-- Zelle 7, geprüft -->\n<robot name="my cell">\n']
+    parts.append('  <material name="red"><color rgba="1 0 0 1"/></material>\n  <link name="world_mount"/>\n')
+    for number, described in enumerate(JOINTS):
+        if described[3] == "tool0":
+            parts.append('  <link name="tool0"/>\n')
+        else:
+            parts.append(
+                LINK.format(name=described[3], z=0.01 * number, mass=1.0 + number, geometry=MESH if number % 2 else BOX)
+            )
+    for name, kind, parent, child, origin, axis in JOINTS:
+        parts.append(f'  <joint type="{kind}"\n     name="{name}"><!-- <origin xyz="9 9 9"/> -->\n    {origin}\n')
+        parts.append(f'    <parent link="{parent}"/><child link="{child}"/>\n')
+        parts.append(f'    <axis xyz="{axis}"/>\n' if axis else "")
+        if kind in ("revolute", "prismatic"):
+            parts.append('    <limit lower="-1.25" upper="2.5" effort="321" velocity="3.5"/><dynamics damping="0.7"/>\n')
+        parts.append('    <mimic joint="grip" multiplier="1" offset="0"/>\n' if name == "grip2" else "")
+        parts.append("  </joint>\n")
+    parts.append('  <transmission name="t"><joint name="a1"><origin xyz="5 5 5"/></joint></transmission>\n')
+    parts.append('  <gazebo reference="l1"><selfCollide>true</selfCollide></gazebo>\n</robot>\n')
+    return "".join(parts)
+
+
+def write_mesh(path):
+    corners = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
+    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    body = b"".join(struct.pack("<12fH", 0, 0, 0, *corners[list(face)].ravel(), 0) for face in faces)
+    path.write_bytes(bytes(80) + struct.pack("<I", len(faces)) + body)
+
+
+@pytest.fixture
+def cell(tmp_path):
+    """The user's file, the robot of it, and that robot calibrated."""
+    write_mesh(tmp_path / "part.stl")
+    path = tmp_path / "cell.urdf"
+    path.write_bytes(text().replace("\n", "\r\n").encode())
+    robot = robot_from_urdf(path, "world_mount", "tool0").robot
+    return path, robot, fold_effects(made_calibrated(robot, *KEYS, identified=False, seed=4)).robot
+
+
+def export_arm(cell):
+    path, robot, calibrated = cell
+    found = write_calibrated_origins(path, robot, calibrated)
+    output = path.with_name("robot.urdf")
+    output.write_bytes(found.content)
+    return output, found
+
+
+def strip_origins(content):
+    """Joint origins of the model are taken out, the others stay."""
+    return re.sub(rb"(</?(joint|link)[^>]*>(?:<!--.*?-->)?)\s*<origin[^>]*>(</origin>)?\s*", rb"\1", content)
+
+
+def test_every_byte_but_those_of_joint_origins_is_as_it_was(cell):
+    output, found = export_arm(cell)
+    before, after = cell[0].read_bytes(), output.read_bytes()
+    assert before != after and found.changed == 9 and (found.base, found.tip) == ("world_mount", "tool0")
+    assert strip_origins(after) == strip_origins(before)
+    bolts = b'<origin xyz="0.15 0 0" rpy="0.2 0 0"/>'
+    for kept in (b"9 9 9", b"5 5 5", "geprüft".encode(), b'xyz="0 0 0.05" rpy="0 0 0.1"', bolts):
+        assert after.count(kept) == before.count(kept)
+
+
+def test_it_moves_as_the_calibrated_robot_in_pinocchio_and_mujoco(cell):
+    output, _ = export_arm(cell)
+    _, robot, calibrated = cell
+    angles = np.random.default_rng(1).uniform(-1.2, 1.2, (6, 8))
+    position, rotation = poses(calibrated.chain, calibrated.model_angles(angles), calibrated.chain.end_effector)
+    nominal = poses(robot.chain, angles, robot.chain.end_effector)[0]
+    assert np.linalg.norm(position - nominal, axis=1).min() > 1e-4
+    assert_same_poses(calibrated, output, "world_mount", "tool0")
+    by_mujoco = mujoco.MjModel.from_xml_path(str(output))
+    state = mujoco.MjData(by_mujoco)
+    (last,) = (joint.origin for joint in read_urdf(output).joints if joint.child == "tool0")
+    for values, at, axes in zip(angles, position, rotation, strict=True):
+        for name, value in zip(robot.joint_names, values, strict=True):
+            state.joint(name).qpos = value
+        mujoco.mj_kinematics(by_mujoco, state)
+        body = state.body("l7")
+        own = body.xmat.reshape(3, 3)
+        np.testing.assert_allclose(body.xpos + own @ last[:3, 3], at, atol=1e-9)
+        np.testing.assert_allclose(own @ last[:3, :3], axes, atol=1e-9)
+
+
+def test_a_controller_that_counts_otherwise_keeps_the_joint_values_of_the_urdf(cell):
+    path, robot, calibrated = cell
+    sense = np.diag([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
+    turned = [replace(r, reported_matrix=sense, reported_offset=r.reported_offset + 0.2) for r in (robot, calibrated)]
+    expected = write_calibrated_origins(path, robot, calibrated).content
+    assert write_calibrated_origins(path, *turned).content == expected
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('xyz="0.5 0 0"', 'xyz="0.5004 0 0"', ("joint 'a3'", "0.4 mm")),
+        ('xyz="0.1 0 0" rpy="0 1.5707963267948966 0"', 'xyz="0.1 0 0"', ("the tip", "90 deg")),
+        ('name="a6"', 'name="axis_6"', ("no chain to 'tool0'", "a6")),
+        ('"tool0"', '"tcp"', ("no link 'tool0'",)),
+        ('xyz="0.6 0 0.8"', 'xyz="-0.6 0 -0.8"', ("joint 'a3'",)),
+        ("utf-8", "utf-16", ("found UTF-16", "allowed: a URDF in UTF-8")),
+    ],
+)
+def test_another_robots_file_is_refused_by_the_joint_that_differs(cell, old, new, words):
+    path, robot, calibrated = cell
+    other = path.with_name("other.urdf")
+    other.write_bytes(text().replace(old, new).encode(new if new == "utf-16" else "utf-8"))
+    with refused(other, *words, "imported" if new != "utf-16" else ""):
+        write_calibrated_origins(other, robot, calibrated)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "iso-8859-1"])
+def test_other_encodings_stay_what_they_are(cell, encoding):
+    path, robot, calibrated = cell
+    other = path.with_name("other.urdf")
+    other.write_bytes(text().replace('encoding="utf-8"', f'encoding="{encoding.removesuffix("-sig")}"').encode(encoding))
+    found = write_calibrated_origins(other, robot, calibrated)
+    assert strip_origins(found.content) == strip_origins(other.read_bytes())
+    assert "geprüft".encode(encoding)[-7:] in found.content
+    usual = path.with_name("usual.urdf")
+    usual.write_bytes(found.content)
+    both = [read_urdf(p).joints for p in (usual, export_arm(cell)[0])]
+    for mine, theirs in zip(*both, strict=True):
+        np.testing.assert_array_equal(mine.origin, theirs.origin)
+
+
+@settings(max_examples=10, deadline=None)
+@given(parts=segments, seed=st.integers(0, 1000))
+def test_any_chain_moves_as_its_calibrated_robot(tmp_path_factory, parts, seed):
+    described = [link("l0")]
+    for number, (kind, xyz, rpy, axis, *_) in enumerate(parts, 1):
+        described += [link(f"l{number}"), joint(f"j{number}", f"l{number - 1}", f"l{number}", kind, xyz, rpy, axis, (-1, 1))]
+    described += [link("tip"), joint("end", f"l{len(parts)}", "tip", "fixed", (0.1, 0, 0.2))]
+    path = written(tmp_path_factory.mktemp("urdf"), *described)
+    robot = robot_from_urdf(path, "l0", "tip").robot
+    places = range(1, robot.joints + 1)
+    keys = [*(f"joint_offset@{place}" for place in places), *(f"link_geometry@{place}" for place in places)]
+    known = candidates_on(sites_of(robot))
+    made = made_calibrated(robot, *(key for key in keys if key in known), identified=False, seed=seed)
+    calibrated = fold_effects(made).robot
+    assert_same_poses(calibrated, export_arm((path, robot, calibrated))[0], "l0", "tip", count=3, within=1e-8)
+
 
 ROBOTS = ("gp180", "iiwa14", "ur10", "fanuc_static", "abb", "wam", "kuka")
 
@@ -19,18 +201,14 @@ def write_urdf(folder, robot):
     return path
 
 
-def draw_angles(robot):
-    low, high = robot.joint_limits.T
-    return low + (high - low) * np.random.default_rng(2).random((12, robot.joints))
-
-
 @pytest.mark.parametrize("name", ROBOTS)
 def test_read_back_it_is_the_robot_that_the_controller_moves(tmp_path, name):
     robot = analysed(name)
     end = robot.chain.end_effector
     others = [point.name for point in robot.chain.points[:-1]]
     back = robot_from_urdf(write_urdf(tmp_path, robot), "base", end.name, others).robot
-    angles = draw_angles(robot)
+    low, high = robot.joint_limits.T
+    angles = low + (high - low) * np.random.default_rng(2).random((12, robot.joints))
     own = np.abs(robot.reported_matrix).tolist() == np.eye(robot.joints).tolist()
     values = robot.reported_angles(angles) if own else angles
     for point in robot.chain.points:

@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 from support import robot_of
 
 from elastocal.errors import InputError
-from elastocal.exchange.import_options import ImportOptions
-from elastocal.exchange.measurement_table import read_measurement_table
+from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +68,7 @@ def test_a_campaign_is_read_as_it_was_measured_where_what_is_ambiguous_is_stated
 
 @given(
     written_campaigns(),
-    st.sets(st.sampled_from(["units", "rotation", "target", "targets", "decimal", "thousands", "separator"])),
+    st.sets(st.sampled_from(["units", "rotation", "target", "targets", "decimal", "separator"])),
     st.booleans(),
 )
 def test_what_is_not_stated_is_found_out_rightly_or_asked_for(path, made, dropped, known):

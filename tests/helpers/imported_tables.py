@@ -1,7 +1,6 @@
 """Tables of other programs, imported as tests write them."""
 
-from elastocal.exchange.import_options import ImportOptions
-from elastocal.exchange.measurement_table import read_measurement_table
+from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
 
 PLAIN = ImportOptions(units={"angles": "deg", "lengths": "mm"}, target="smr")
 ROW = "1,2,3"

@@ -206,26 +206,17 @@ def written_campaigns(draw):
         options["units"] |= {"q1": length}
     headers = [with_unit(header, unit) for header, unit, _ in columns]
     # Cells.
-    grouped = separator != "space" and length == "mm" and pick(False, True)
-    mark = {"point": ",", "comma": "."}[decimal] if grouped else ""
-    if grouped:
-        options["thousands"] = {",": "comma", ".": "point"}[mark]
-        quotes = quotes or separator == "comma"
 
-    def text(cell, unit):
+    def text(cell):
         if isinstance(cell, str):
             return cell
         plain = f"{cell:.12f}".rstrip("0")
         plain = plain + "0" if plain.endswith(".") else plain
-        if grouped and unit == "mm":
-            whole, _, rest = plain.partition(".")
-            plain = f"{int(whole):,}".replace(",", "_") + "." + rest if abs(cell) >= 1000 else plain
-        plain = plain.replace(".", "," if decimal == "comma" else ".")
-        return plain.replace("_", mark)
+        return plain.replace(".", "," if decimal == "comma" else ".")
 
-    if decimal == "comma" or grouped:
+    if decimal == "comma":
         options["decimal"] = decimal
-    body = [[text(cells[row], unit) for _, unit, cells in columns] for row in range(rows)]
+    body = [[text(cells[row]) for _, _, cells in columns] for row in range(rows)]
     buffer = io.StringIO()
     writer = csv.writer(
         buffer, delimiter=SEPARATORS[separator], quoting=csv.QUOTE_ALL if quotes else csv.QUOTE_MINIMAL, lineterminator="\n"
@@ -271,7 +262,7 @@ def written_campaigns(draw):
         expected["rotation"] = matrices.reshape(-1, 3, 3)
     dialect = {
         "joints": style, "positions": called, "shape": shape, "rotation": rotation, "time": time, "units": units,
-        "separator": separator, "decimal": decimal, "thousands": grouped, "quotes": quotes, "encoding": encoding,
+        "separator": separator, "decimal": decimal, "quotes": quotes, "encoding": encoding,
         "comment": comment, "poses": numbered, "beside": beside,
     }  # fmt: skip
     named = called_so if shape == "two lines" else headers

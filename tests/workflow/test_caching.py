@@ -154,7 +154,7 @@ for script in sys.argv[2:]:
         imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))]
         exec(compile(ast.Module(imports, []), script, "exec"), {})
         # What is a catalogue looks up the modules beside it when it is asked.
-        found = [name for name, module in sys.modules.items() if hasattr(module, "modules_with")]
+        found = [name for name, module in sys.modules.items() if {"modules_with", "module_names"} & {*vars(module)}]
         for name in set(found) - {"elastocal.io.modules"}:
             package = sys.modules[name.rpartition(".")[0]]
             sys.modules["elastocal.io.modules"].modules_with("__name__", package)

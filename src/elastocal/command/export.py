@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.exchange.urdf_origins import CorrectedUrdf
+    from elastocal.exchange.urdf_writing import CorrectedUrdf
     from elastocal.mechanics.robot import Robot
 
 ROBOT, URDF, SIDECAR = "robot.yaml", "robot.urdf", "effects.json"
@@ -60,8 +60,7 @@ def export(
     from elastocal.application.calibrated_geometry import fold_effects
     from elastocal.application.scope import campaign_accuracy
     from elastocal.application.sidecar import find_left_out_m, sidecar
-    from elastocal.exchange.urdf_origins import write_calibrated_origins
-    from elastocal.exchange.urdf_writing import urdf_of
+    from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.json_files import write_json
     from elastocal.mechanics.robot_file import document_of
@@ -107,8 +106,8 @@ def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, a
     """Lines to print: what became of the user's URDF, and how far its poses at measured angles are from the robot file's."""
     import numpy as np
 
-    from elastocal.exchange.urdf_origins import nominal_chain
-    from elastocal.exchange.urdf_reading import read_urdf
+    from elastocal.exchange.urdf import read_urdf
+    from elastocal.exchange.urdf_writing import nominal_chain
     from elastocal.mechanics.kinematics import poses
 
     _, chain = nominal_chain(read_urdf(path), drop_in.base, drop_in.tip, path.as_posix())

@@ -28,6 +28,12 @@ def csv(
         str | None,
         Option(help="Orientations: none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes), euler:xyz (fixed)."),
     ] = None,
+    names: Annotated[
+        str | None,
+        Option(
+            "--columns", help="Of a table without a header: names of all columns in order, q1,q2,…; none for one to leave out."
+        ),
+    ] = None,
     column: Annotated[list[str] | None, Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed.")] = None,
     ignore: Annotated[list[str] | None, Option(help="Header of a column to leave out; as often as needed.")] = None,
     unit: Annotated[list[str] | None, Option(help="NAME=UNIT of one column, such as fx=kN.")] = None,
@@ -43,9 +49,6 @@ def csv(
         Literal["tab", "semicolon", "bar", "comma", "space"] | None, Option(help="Between columns. Default: found out.")
     ] = None,
     decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of decimals. Default: found out.")] = None,
-    thousands: Annotated[
-        Literal["point", "comma", "space", "apostrophe"] | None, Option(help="Mark between thousands, where there is one.")
-    ] = None,
     encoding: Annotated[str | None, Option(help="Such as utf-8 or cp1252. Default: found out.")] = None,
     header: Annotated[
         int | None, Option(min=1, max=MOST_ROWS, help="Line with the names of the columns. Default: found out.")
@@ -64,8 +67,13 @@ def csv(
     what was read, how, and what was left out; import.yaml has the options, and what was found out.
     """
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
-    from elastocal.exchange.import_options import IMPORT, ImportOptions, import_options_text, read_import_options
-    from elastocal.exchange.measurement_table import read_measurement_table
+    from elastocal.exchange.measurement_table import (
+        IMPORT,
+        ImportOptions,
+        import_options_text,
+        read_import_options,
+        read_measurement_table,
+    )
     from elastocal.io.atomic_writes import check_places, write_text, write_together
 
     check_places(folder / CSV, folder / PARQUET, folder / IMPORT)
@@ -83,7 +91,12 @@ def csv(
     if len(markers) < len(several) or "" in markers:
         raise InputError("--target", "", ", ".join(several), "a name for each marker, such as A, or A=MARKER")
     stated: dict[str, Any] = {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty, "separator": separator}
-    stated |= {"decimal": decimal, "header": header, "encoding": encoding, "thousands": thousands}
+    stated |= {
+        "decimal": decimal,
+        "header": header,
+        "encoding": encoding,
+        "names": [name.strip() for name in (names or "").split(",") if names],
+    }
     chosen = replace(
         earlier,
         ignore=[*(earlier.ignore or ()), *(ignore or ())] or None,
@@ -147,8 +160,8 @@ def _summary(found: ImportedMeasurements) -> list[str]:
     first = [
         f"{counted(len(table['pose']), 'measurement')} of {targets} at {counted(poses, 'pose')}, "
         f"{counted(found.joints, 'joint')}",
-        f"file: names of columns in line {options.header}, separator {options.separator}, decimal {options.decimal}, "
-        f"thousands {options.thousands or 'not marked'}, encoding {options.encoding}",
+        f"file: names of columns {f'in line {options.header}' if options.header else 'as stated'}, "
+        f"separator {options.separator}, decimal {options.decimal}, encoding {options.encoding}",
     ]
     if found.skipped:
         first.append(f"left out: {counted(found.skipped, 'row')} without a position")

@@ -56,7 +56,7 @@ def urdf(
 
 @importing.command(epilog=example("elastocal import dh arm.csv -o robot.yaml"))
 def dh(
-    file: Annotated[Path, Argument(help="The table, .csv or .yaml; or the kinematics file of the ROS driver.")],
+    file: Annotated[Path, Argument(help="The table, .csv; or the kinematics file of the ROS driver, .yaml.")],
     output: _Output,
     modified: Annotated[bool, Option("--modified", help="Craig's notation: alpha and a come before the joint.")] = False,
     angles: Annotated[Literal["deg", "rad"] | None, Option(help="Unit of columns of angles that state none.")] = None,
@@ -79,8 +79,7 @@ def dh(
 
     2, 0, 0, -0.425, 0, R
     """
-    from elastocal.exchange.dh import robot_from_dh
-    from elastocal.exchange.dh_table import DhOptions
+    from elastocal.exchange.dh import DhOptions, robot_from_dh
     from elastocal.exchange.robot_text import refuse_existing
 
     refuse_existing(output, force)

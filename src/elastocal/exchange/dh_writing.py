@@ -10,60 +10,38 @@ fixed and a and b are the offset. All parameters then change as little as the ro
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import elementary
+from elastocal.exchange.fixed_transforms import elementary, homogeneous, rotation_about
 from elastocal.mechanics.robot import Robot
 
 # Axes within this angle are parallel, and lines within this distance are one: what decimals of a robot file leave.
 _PARALLEL_RAD, _TOGETHER_M = 1e-6, 1e-7
 PARAMETERS = ("theta_deg", "d_m", "a_m", "alpha_deg", "b_m", "beta_deg")
-_ANGLES = ("theta_deg", "alpha_deg", "beta_deg")
+# How a pair of axes is described, that of the nominal robot for the calibrated one: the common normal, None of parallel axes;
+# and theta, None of parallel axes that do not coincide.
+_Kind = tuple[np.ndarray | None, float | None]
 
 
-@dataclass(frozen=True)
-class Row:
-    """Parameters of one row, rad and m."""
+def dh_rows(robot: Robot) -> np.ndarray:
+    """Rows of a robot: of its base, of each joint, and of the end effector's frame, ndarray (n + 2, 6).
 
-    theta: float
-    d: float
-    a: float
-    alpha: float
-    b: float = 0.0
-    beta: float = 0.0
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """How a pair of axes is described: that of the nominal robot serves the calibrated one."""
-
-    parallel: bool
-    together: bool
-    normal: np.ndarray
-    theta: float
-
-
-def dh_rows(robot: Robot) -> list[Row]:
-    """Rows of a robot: of its base, of each joint, and of the end effector's frame.
-
-    Returns n + 2 of them. Angles of joints are the controller's where it counts each joint by itself, else those of the chain.
-    Raises `InputError`: prismatic or passive joints.
+    Columns are `PARAMETERS`, in rad and m. Angles of joints are the controller's where it counts each joint by itself, else
+    those of the chain. Raises `InputError`: prismatic or passive joints.
     """
     return _describe(robot, None, robot.counts_each_joint)[0]
 
 
 def dh_frames(robot: Robot) -> np.ndarray:
     """Frames of the rows in base axes where the controller reports zero, ndarray (n + 2, 4, 4): F_0 before joint 1 first."""
-    frames, here = [], np.eye(4)
+    frames = [np.eye(4)]
     for row in dh_rows(robot):
-        here = here @ _transform(row)
-        frames.append(here)
-    return np.array(frames)
+        frames.append(frames[-1] @ _transform(row))
+    return np.array(frames[1:])
 
 
 def dh_table(robot: Robot, nominal: Robot | None = None) -> pd.DataFrame:
@@ -74,18 +52,22 @@ def dh_table(robot: Robot, nominal: Robot | None = None) -> pd.DataFrame:
     """
     rows: list[dict[str, Any]] = []
     turned, like = 0.0, nominal or robot
-    end = robot.chain.end_effector.name
+
+    def write(kind: str, joint: int | None, theta: float, d: float, a: float, alpha: float) -> None:
+        head = {"joint": f"{joint or ''}", "type": kind, "theta_offset_deg": math.degrees(theta)}
+        rows.append(head | {"d_m": d, "a_m": a, "alpha_deg": math.degrees(alpha), "point": ""})
+
     for number, row in enumerate(_rows(robot, like, robot.counts_each_joint and like.counts_each_joint)):
-        joint = 1 <= number <= robot.joints
-        rows.append(_write_row("R" if joint else "F", number if joint else None, (row.theta - turned, row.d, row.a, row.alpha)))
-        turned = 0.0
-        if row.b or row.beta:
-            # Ry is Rx between quarter turns, of which the next row takes back the second.
-            turned = 0.5 * math.pi
-            rows.append(_write_row("F", None, (turned, 0.0, row.b, row.beta)))
+        theta, d, a, alpha, b, beta = row.tolist()
+        joint = number if 1 <= number <= robot.joints else None
+        write("R" if joint else "F", joint, theta - turned, d, a, alpha)
+        # Ry is Rx between quarter turns, of which the next row takes back the second.
+        turned = 0.5 * math.pi if b or beta else 0.0
+        if turned:
+            write("F", None, turned, 0.0, b, beta)
     if turned:
-        rows.append(_write_row("F", None, (-turned, 0.0, 0.0, 0.0)))
-    rows[-1]["point"] = end
+        write("F", None, -turned, 0.0, 0.0, 0.0)
+    rows[-1]["point"] = robot.chain.end_effector.name
     return pd.DataFrame(rows)
 
 
@@ -94,31 +76,21 @@ def dh_deltas(nominal: Robot, calibrated: Robot) -> pd.DataFrame:
 
     Returns ``row`` (base, q1 .. qn, end effector), the calibrated `PARAMETERS`, then ``delta_..``: calibrated minus nominal.
     """
-    names = ["base", *(f"q{joint}" for joint in range(1, nominal.joints + 1)), nominal.chain.end_effector.name]
     own = nominal.counts_each_joint and calibrated.counts_each_joint
-    found = [np.array([astuple(row) for row in _rows(robot, nominal, own)]) for robot in (nominal, calibrated)]
-    turns = np.isin(PARAMETERS, _ANGLES)
-    delta = found[1] - found[0]
+    before, after = (_rows(robot, nominal, own) for robot in (nominal, calibrated))
+    turns, delta = np.array([name.endswith("_deg") for name in PARAMETERS]), after - before
     delta[:, turns] = np.degrees((delta[:, turns] + math.pi) % (2.0 * math.pi) - math.pi)
-    values = np.where(turns, np.degrees(found[1]), found[1])
-    table = pd.DataFrame(values + 0.0, columns=list(PARAMETERS))
-    return pd.concat(
-        [pd.Series(names, name="row"), table, pd.DataFrame(delta + 0.0, columns=[f"delta_{p}" for p in PARAMETERS])], axis=1
-    )
+    table = pd.DataFrame(np.where(turns, np.degrees(after), after) + 0.0, columns=list(PARAMETERS))
+    table.insert(0, "row", ["base", *(f"q{joint}" for joint in range(1, nominal.joints + 1)), nominal.chain.end_effector.name])
+    return pd.concat([table, pd.DataFrame(delta + 0.0, columns=[f"delta_{name}" for name in PARAMETERS])], axis=1)
 
 
-def _write_row(kind: str, joint: int | None, values: Sequence[float]) -> dict[str, Any]:
-    theta, d, a, alpha = values
-    head = {"joint": f"{joint or ''}", "type": kind, "theta_offset_deg": math.degrees(theta)}
-    return head | {"d_m": d, "a_m": a, "alpha_deg": math.degrees(alpha), "point": ""}
-
-
-def _rows(robot: Robot, nominal: Robot, own: bool) -> list[Row]:
+def _rows(robot: Robot, nominal: Robot, own: bool) -> np.ndarray:
     """Rows of a robot in the description of another one."""
     return _describe(robot, _describe(nominal, None, own)[1], own)[0]
 
 
-def _describe(robot: Robot, kinds: Sequence[_Kind] | None, own: bool) -> tuple[list[Row], list[_Kind]]:
+def _describe(robot: Robot, kinds: Sequence[_Kind] | None, own: bool) -> tuple[np.ndarray, list[_Kind]]:
     """Rows, and how each pair of axes was described."""
     points, directions, end = _axes(robot, own)
     here, rows, used = np.eye(4), [], []
@@ -126,14 +98,13 @@ def _describe(robot: Robot, kinds: Sequence[_Kind] | None, own: bool) -> tuple[l
         inverse = np.linalg.inv(here)
         local, axis = inverse[:3, :3] @ point + inverse[:3, 3], inverse[:3, :3] @ direction
         kind = kinds[number] if kinds else _kind(local, axis)
-        row = _parallel(local, axis, kind) if kind.parallel else _skew(local, axis, kind)
+        row = _parallel(local, axis, kind[1]) if kind[0] is None else _skew(local, axis, kind[0])
         rows.append(row)
         used.append(kind)
         here = here @ _transform(row)
     # What is left to the end effector's own frame turns and shifts along the last axis.
     left = np.linalg.inv(here) @ end
-    rows.append(Row(math.atan2(left[1, 0], left[0, 0]), float(left[2, 3]), 0.0, 0.0))
-    return rows, used
+    return np.array([*rows, (math.atan2(left[1, 0], left[0, 0]), left[2, 3], 0.0, 0.0, 0.0, 0.0)]), used
 
 
 def _axes(robot: Robot, own: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -152,8 +123,7 @@ def _axes(robot: Robot, own: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             points.append(here[:3, 3].copy())
             directions.append(np.sign(transform.sign * sense[transform.coordinate]) * here[:3, transform.axis])
         here = here @ elementary(transform.kind, transform.axis, value)
-    here = here.copy()
-    here[:3, 3] += here[:3, :3] @ np.array(chain.end_effector.offset_m)
+    here = here @ homogeneous(np.eye(3), chain.end_effector.offset_m)
     return np.array([*points, here[:3, 3]]), np.array([*directions, here[:3, 2]]), here
 
 
@@ -161,45 +131,37 @@ def _kind(point: np.ndarray, axis: np.ndarray) -> _Kind:
     """How the next axis lies to the z axis of a frame, by a point on it and its direction there."""
     if math.hypot(axis[0], axis[1]) < _PARALLEL_RAD:
         off = point - axis * point[2] / axis[2]
-        together = math.hypot(off[0], off[1]) < _TOGETHER_M
-        return _Kind(True, together, np.zeros(3), 0.0 if together else math.atan2(off[1], off[0]))
+        return None, 0.0 if math.hypot(off[0], off[1]) < _TOGETHER_M else None
     normal = np.array([-axis[1], axis[0], 0.0]) / math.hypot(axis[0], axis[1])
     # The normal points from one axis to the next; of axes that meet, so that theta is small.
     apart = float(normal @ point)
-    if apart < -_TOGETHER_M or (abs(apart) <= _TOGETHER_M and (normal[0], normal[1]) < (-1e-9, 0.0)):
-        normal = -normal
-    return _Kind(False, False, normal, math.atan2(normal[1], normal[0]))
+    meet = abs(apart) <= _TOGETHER_M
+    return -normal if apart < -_TOGETHER_M or (meet and (normal[0], normal[1]) < (-1e-9, 0.0)) else normal, None
 
 
-def _skew(point: np.ndarray, axis: np.ndarray, kind: _Kind) -> Row:
-    """Row by the common normal of two axes."""
+def _skew(point: np.ndarray, axis: np.ndarray, nominal: np.ndarray) -> tuple[float, ...]:
+    """Row by the common normal of two axes, which points as the nominal one does."""
     normal = np.array([-axis[1], axis[0], 0.0]) / math.hypot(axis[0], axis[1])
-    normal = normal * (1.0 if normal @ kind.normal >= 0.0 else -1.0)
-    a = float(normal @ point)
+    normal = normal * (1.0 if normal @ nominal >= 0.0 else -1.0)
     # Foot on the z axis: where the next axis comes closest to it.
     along = (axis[0] * point[0] + axis[1] * point[1]) / (axis[0] ** 2 + axis[1] ** 2)
-    d = float(point[2] - along * axis[2])
     alpha = math.atan2(float(np.cross(np.array([0.0, 0.0, 1.0]), axis) @ normal), float(axis[2]))
-    return Row(math.atan2(normal[1], normal[0]), d, a, alpha)
+    return math.atan2(normal[1], normal[0]), point[2] - along * axis[2], normal @ point, alpha, 0.0, 0.0
 
 
-def _parallel(point: np.ndarray, axis: np.ndarray, kind: _Kind) -> Row:
-    """Row of Hayati for axes that are nominally parallel: d is 0."""
+def _parallel(point: np.ndarray, axis: np.ndarray, theta: float | None) -> tuple[float, ...]:
+    """Row of Hayati for axes that are nominally parallel: d is 0; theta is fixed where they nominally coincide."""
     met = point - axis * point[2] / axis[2]
-    theta = kind.theta if kind.together else math.atan2(met[1], met[0])
-    cos, sin = math.cos(theta), math.sin(theta)
-    x, y = cos * met[0] + sin * met[1], cos * met[1] - sin * met[0]
-    dx, dy, dz = cos * axis[0] + sin * axis[1], cos * axis[1] - sin * axis[0], axis[2]
+    theta = math.atan2(met[1], met[0]) if theta is None else theta
+    (x, y, _), (dx, dy, dz) = rotation_about("z", -theta) @ met, rotation_about("z", -theta) @ axis
     alpha, beta = math.atan2(-dy, dz), math.asin(float(np.clip(dx, -1.0, 1.0)))
     # Along the next axis to the plane of x and the turned y.
     reach = y * math.tan(alpha) / (dz - dy * math.tan(alpha))
-    return Row(theta, 0.0, float(x + reach * dx), alpha, float((y + reach * dy) / math.cos(alpha)), beta)
+    return theta, 0.0, x + reach * dx, alpha, (y + reach * dy) / math.cos(alpha), beta
 
 
-def _transform(row: Row) -> np.ndarray:
-    found = np.eye(4)
-    for axis, angle, shift in ((2, row.theta, row.d), (0, row.alpha, row.a), (1, row.beta, row.b)):
-        step = elementary("R", axis, angle)
-        step[axis, 3] = shift
-        found = found @ step
-    return found
+def _transform(row: Sequence[float] | np.ndarray) -> np.ndarray:
+    theta, d, a, alpha, b, beta = row
+    steps = ((2, theta, d), (0, alpha, a), (1, beta, b))
+    first, second, third = (homogeneous(rotation_about("xyz"[i], angle), shift * np.eye(3)[i]) for i, angle, shift in steps)
+    return first @ second @ third

@@ -1,10 +1,10 @@
-"""Fixed transforms as words of the chain notation, see `mechanics.chain`.
+"""Fixed transforms, as matrices and as words of the chain notation, see `mechanics.chain`.
 
 A rigid displacement becomes ``Tx Ty Tz Rz Ry Rx``, the rotation by yaw, pitch and roll; what is zero is left out.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,9 +14,17 @@ _DECIMALS = 12
 
 def displacement_words(transform: np.ndarray) -> list[str]:
     """A homogeneous transform (4, 4) in words."""
-    yaw, pitch, roll = yaw_pitch_roll(transform[:3, :3])
-    shifts = [shift_word(axis, amount) for axis, amount in zip("xyz", transform[:3, 3], strict=True)]
-    return [word for word in (*shifts, turn_word("z", yaw), turn_word("y", pitch), turn_word("x", roll)) if word]
+    amounts = dict(zip(("Tx", "Ty", "Tz"), transform[:3, 3], strict=True))
+    amounts |= dict(zip(("Rz", "Ry", "Rx"), yaw_pitch_roll(transform[:3, :3]), strict=True))
+    return [text for name, amount in amounts.items() if (text := word(name, amount))]
+
+
+def word(name: str, amount: float) -> str:
+    """``Tx(0.5)`` of m, ``Rx(90deg)`` of rad; empty for nothing."""
+    turns = name.startswith("R")
+    amount = round(math.degrees(amount) if turns else amount, _DECIMALS)
+    text = np.format_float_positional(abs(amount), trim="-")
+    return f"{name}({'-' if amount < 0 else ''}{text}{'deg' if turns else ''})" if amount else ""
 
 
 def express_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str]]:
@@ -25,38 +33,26 @@ def express_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str]]:
     `axis` (3,): not zero. Returns `before`: words of the rotation that turns z into the axis, empty for x, y and z; `letter`,
     `sign`: of the axis then, and "-" or ""; `after`: words of the rotation back.
     """
-    before, letter, sign = _find_turns(axis)
-    return _words_of(before), letter, sign, _words_of([(name, -angle) for name, angle in reversed(before)])
+    turns, letter, sign = _find_turns(axis)
+    before, after = turns.items(), [(name, -angle) for name, angle in reversed(turns.items())]
+    both = ([text for name, angle in part if (text := word(name, angle))] for part in (before, after))
+    return next(both), letter, sign, next(both)
 
 
 def axis_rotation(axis: np.ndarray) -> np.ndarray:
     """The fixed rotation before a joint about an axis, as in `express_axis`, ndarray (3, 3)."""
     turn = np.eye(3)
-    for name, angle in _find_turns(axis)[0]:
-        turn = turn @ rotation_about(name, math.radians(round(math.degrees(angle), _DECIMALS)))
+    for name, angle in _find_turns(axis)[0].items():
+        turn = turn @ rotation_about(name[1], math.radians(round(math.degrees(angle), _DECIMALS)))
     return turn
 
 
-def _find_turns(axis: np.ndarray) -> tuple[list[tuple[str, float]], str, str]:
+def _find_turns(axis: np.ndarray) -> tuple[dict[str, float], str, str]:
     unit = np.asarray(axis, float) / np.linalg.norm(axis)
     along = int(np.argmax(np.abs(unit)))
     if np.abs(np.delete(unit, along)).max() < 10.0**-_DECIMALS:
-        return [], "xyz"[along], "-" if unit[along] < 0 else ""
-    return [("z", math.atan2(unit[1], unit[0])), ("y", math.atan2(math.hypot(unit[0], unit[1]), unit[2]))], "z", ""
-
-
-def _words_of(turns: Iterable[tuple[str, float]]) -> list[str]:
-    return [word for name, angle in turns if (word := turn_word(name, angle))]
-
-
-def shift_word(letter: str, amount_m: float) -> str | None:
-    """``Tx(0.5)``; None for nothing."""
-    return _word(f"T{letter}", amount_m, "")
-
-
-def turn_word(letter: str, angle_rad: float) -> str | None:
-    """``Rx(90deg)``; None for nothing."""
-    return _word(f"R{letter}", math.degrees(angle_rad), "deg")
+        return {}, "xyz"[along], "-" if unit[along] < 0 else ""
+    return {"Rz": math.atan2(unit[1], unit[0]), "Ry": math.atan2(math.hypot(unit[0], unit[1]), unit[2])}, "z", ""
 
 
 def yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:
@@ -82,25 +78,19 @@ def rotation_about(letter: str, angle_rad: float) -> np.ndarray:
 
 def elementary(kind: str, axis: int, amount: float) -> np.ndarray:
     """Shift (``T``, m) along or turn (``R``, rad) about an axis, 0 to 2, ndarray (4, 4)."""
+    if kind == "R":
+        return homogeneous(rotation_about("xyz"[axis], amount))
+    return homogeneous(np.eye(3), amount * np.eye(3)[axis])
+
+
+def homogeneous(rotation: np.ndarray, shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)) -> np.ndarray:
+    """A turn (3, 3) and a shift (3,) as one, ndarray (4, 4)."""
     found = np.eye(4)
-    if kind == "T":
-        found[axis, 3] = amount
-    else:
-        found[:3, :3] = rotation_about("xyz"[axis], amount)
+    found[:3, :3], found[:3, 3] = rotation, shift
     return found
 
 
 def origin_transform(xyz: Sequence[float], rpy: Sequence[float]) -> np.ndarray:
     """Shift (m), then turn by roll, pitch and yaw (rad) as the origin of a URDF has them, ndarray (4, 4)."""
     roll, pitch, yaw = rpy
-    found = np.eye(4)
-    found[:3, :3] = rotation_about("z", yaw) @ rotation_about("y", pitch) @ rotation_about("x", roll)
-    found[:3, 3] = xyz
-    return found
-
-
-def _word(name: str, amount: float, unit: str) -> str | None:
-    amount = round(amount, _DECIMALS)
-    if amount == 0:
-        return None
-    return f"{name}({'-' if amount < 0 else ''}{np.format_float_positional(abs(amount), trim='-')}{unit})"
+    return homogeneous(rotation_about("z", yaw) @ rotation_about("y", pitch) @ rotation_about("x", roll), xyz)

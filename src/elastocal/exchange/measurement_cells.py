@@ -1,5 +1,6 @@
 """Cells of a table as numbers in SI units, with the line of what is none."""
 
+import re
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 
@@ -8,11 +9,14 @@ import numpy as np
 from elastocal.campaigns.column_bounds import BOUNDS, find_beyond
 from elastocal.campaigns.measurements import show_cell
 from elastocal.errors import InputError
-from elastocal.exchange.column_meanings import find_units
-from elastocal.exchange.column_names import COVARIATES, TIME, UNITS, kind_of, unit_scale
+from elastocal.exchange.column_names import ANGLE, FORCE, LENGTH, MOMENT, NONE, TEMPERATURE, TIME, UNITS, kind_of, unit_scale
 from elastocal.exchange.csv_dialect import TextTable
 from elastocal.io.texts import A_NUMBER, plain_number
+from elastocal.mechanics.robot import Robot
 
+# Of what has a usual unit; angles and lengths have two each and must be stated.
+_USUAL = {FORCE: "N", MOMENT: "Nm", TIME: "s", TEMPERATURE: "C"}
+_COVARIATES = ("time_s", "temperature_c", "u95_m")
 # Nanoseconds since 1970 are 2e18.
 _LARGEST_TIME = 1e19
 # Without a unit, seconds since 1970 of the years 1990 to 2100 cannot be seconds, minutes or hours of a campaign in these.
@@ -23,11 +27,14 @@ _DATES = ("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M")
 _MIDNIGHT = datetime(1900, 1, 1, tzinfo=UTC)
 # Of a pose, load, repeat or session; as in measurements.csv.
 _LARGEST_ORDINAL = 2**31 - 1
+# What programs write where nothing was measured.
+_EMPTY = re.compile(r"|[+-]?nan|-+|n/?a", re.IGNORECASE)
 
 
 def rows_with_position(text: TextTable, columns: Mapping[str, str], position: Sequence[str], skip_empty: bool) -> np.ndarray:
-    """Rows that have a position."""
-    filled = np.array([[bool(cell) for cell in text.columns[columns[name]]] for name in position]).all(axis=0)
+    """Rows that have a position; `skip_empty`: NaN, - and N/A are none either."""
+    empty = _EMPTY.fullmatch if skip_empty else re.compile("").fullmatch
+    filled = np.array([[not empty(cell) for cell in text.columns[columns[name]]] for name in position]).all(axis=0)
     if not filled.all() and not skip_empty:
         row = int(np.argmin(filled))
         of = f" of {text.columns[columns['target']][row]}" if "target" in columns else ""
@@ -36,6 +43,39 @@ def rows_with_position(text: TextTable, columns: Mapping[str, str], position: Se
     if not filled.any():
         raise InputError(text.path, "", "no position in any row", "at least one measurement")
     return np.flatnonzero(filled)
+
+
+def find_units(
+    text: TextTable,
+    columns: Mapping[str, str],
+    wanted: Sequence[str],
+    stated: Mapping[str, str],
+    given: Mapping[str, str],
+    robot: Robot | None = None,
+) -> dict[str, str]:
+    """Units of wanted columns by their names: by options, by headers, or of what has a usual unit that one.
+
+    `stated`: by headers. `given`: by options, ``angles`` and ``lengths`` for all that have no other. Raises `InputError`: no
+    unit, or one of another kind.
+    """
+    found: dict[str, str] = {}
+    for name in wanted:
+        kinds = kind_of(name)
+        if robot and len(kinds) > 1:
+            kinds = (LENGTH if robot.chain.prismatic[int(name[1:]) - 1] else ANGLE,)
+        if kinds == (NONE,):
+            continue
+        for_all = given.get("lengths" if kinds[0] == LENGTH else "angles")
+        # Options go before headers, those for one column before those for all.
+        unit = given.get(name) or stated.get(name) or _USUAL.get(kinds[0]) or for_all
+        if unit is None:
+            option = "--lengths mm" if kinds[0] == LENGTH else "--angles deg"
+            raise InputError(text.path, "header", f"no unit of {columns[name]!r}", f"{option} or such, or --unit {name}=UNIT")
+        if unit_scale(unit, kinds) is None:
+            allowed = f"{', '.join(unit for kind in kinds for unit in UNITS[kind])}, by --unit {name}=UNIT"
+            raise InputError(text.path, f"unit of {columns[name]!r}", repr(unit), allowed)
+        found[name] = unit
+    return found
 
 
 class CellReader:
@@ -60,34 +100,23 @@ class CellReader:
         """ndarray (N,), s: as numbers, a time of day or a date; of dates since 1970, at Greenwich where no zone is stated."""
         cells = self.cells(name)
         numbers = [plain_number(cell, _LARGEST_TIME) for cell in cells]
-        if None in numbers:
-            values = _clock_times(cells)
-            if values is None:
-                allowed = "numbers, times as 10:20:33 or dates as 2023-05-04 10:20:33 (05/04/2023 may be two days)"
-                raise self.fault(numbers.index(None), name, allowed)
-            return values
-        values = np.array(numbers, float) * UNITS[TIME][self.units[name]]
-        if (index := find_beyond(name, values)) is not None:
-            raise self.fault(index, name, BOUNDS[name].allowed)
+        if None not in numbers:
+            return self._bounded(name, np.array(numbers, float) * UNITS[TIME][self.units[name]])
+        values = _clock_times(cells)
+        if values is None:
+            allowed = "numbers, times as 10:20:33 or dates as 2023-05-04 10:20:33 (05/04/2023 may be two days)"
+            raise self.fault(numbers.index(None), name, allowed)
         return values
-
-    def unit_of_epoch(self, name: str) -> str | None:
-        """Unit in which all numbers are times of this age since 1970, which no campaign lasts; None where they are not."""
-        values = np.array([plain_number(cell, _LARGEST_TIME) or 0.0 for cell in self.cells(name)])
-        for unit in ("ms", "us", "ns"):
-            seconds = values * UNITS[TIME][unit]
-            if _EPOCH_S[0] <= seconds.min() and seconds.max() <= _EPOCH_S[1]:
-                return unit
-        return None
 
     def numbers(self, name: str) -> np.ndarray:
         """ndarray (N,), SI units."""
-        cells = self.cells(name)
-        values = np.array([np.nan if (value := plain_number(cell)) is None else value for cell in cells])
+        values = np.array([np.nan if (value := plain_number(cell)) is None else value for cell in self.cells(name)])
         if not np.isfinite(values).all():
             raise self.fault(int(np.argmin(np.isfinite(values))), name, A_NUMBER)
         unit = self.units.get(name)
-        values = values if unit is None else values * (unit_scale(unit, kind_of(name)) or 1.0)
+        return self._bounded(name, values if unit is None else values * (unit_scale(unit, kind_of(name)) or 1.0))
+
+    def _bounded(self, name: str, values: np.ndarray) -> np.ndarray:
         if (index := find_beyond(name, values)) is not None:
             raise self.fault(index, name, BOUNDS[name].allowed)
         return values
@@ -109,27 +138,36 @@ def covariates_of(
     `mapped`: names of columns that options state. `stated`, `given`: units by headers and by options. `notes` is added to.
     """
     found = {}
-    for name in COVARIATES:
+    for name in _COVARIATES:
         if name not in read.columns:
             continue
-        text = any(plain_number(cell, _LARGEST_TIME) is None for cell in read.cells(name))
+        header, numbers = read.columns[name], [plain_number(cell, _LARGEST_TIME) for cell in read.cells(name)]
+        is_time, text = name == "time_s", None in numbers
         try:
             unit = stated.get(name) or given.get(name)
-            if name == "time_s" and unit is None and (unit := read.unit_of_epoch(name)):
-                notes.append(f"{read.columns[name]!r} taken for {unit} since 1970")
+            if is_time and unit is None and (unit := _unit_of_epoch(numbers)):
+                notes.append(f"{header!r} taken for {unit} since 1970")
             read.units |= find_units(read.text, read.columns, [name], stated, {**given, **({name: unit} if unit else {})})
-            found[name] = read.times(name) if name == "time_s" else read.numbers(name)
+            found[name] = read.times(name) if is_time else read.numbers(name)
             if unit is None and not text:
-                notes.append(f"{read.columns[name]!r} in {read.units[name]}, as nothing states a unit")
-            if name == "time_s" and text:
-                notes.append(f"{read.columns[name]!r} read as times of day or dates, such as {read.cells(name)[0]!r}, in s")
+                notes.append(f"{header!r} in {read.units[name]}, as nothing states a unit")
+            if is_time and text:
+                notes.append(f"{header!r} read as times of day or dates, such as {read.cells(name)[0]!r}, in s")
         except InputError as error:
             if name in mapped or name in given or name == "u95_m" or not text:
-                allowed = f"{error.allowed}, or --ignore {read.columns[name]!r}"
-                raise InputError(error.source, error.key, error.found, allowed) from None
+                raise InputError(error.source, error.key, error.found, f"{error.allowed}, or --ignore {header!r}") from None
             read.units.pop(name, None)
-            notes.append(f"{read.columns[name]!r} not read: {error.key} has {error.found}")
+            notes.append(f"{header!r} not read: {error.key} has {error.found}")
     return found
+
+
+def _unit_of_epoch(numbers: Sequence[float | None]) -> str | None:
+    """Unit in which all numbers are times of this age since 1970, which no campaign lasts; None where they are not."""
+    values = np.array([number or 0.0 for number in numbers])
+    low, high = values.min(), values.max()
+    return next(
+        (u for u in ("ms", "us", "ns") if _EPOCH_S[0] <= low * UNITS[TIME][u] and high * UNITS[TIME][u] <= _EPOCH_S[1]), None
+    )
 
 
 def _clock_times(cells: Sequence[str]) -> np.ndarray | None:

@@ -4,33 +4,131 @@ What a name, a unit or a notation leaves open is asked for, never guessed: an an
 rotation vector or Euler angles. What was found out is returned as options with which the import can be repeated.
 """
 
+import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import yaml
 from scipy.spatial import cKDTree
 
 from elastocal.campaigns.column_bounds import FARTHEST_RAD
-from elastocal.campaigns.measurements import file_columns
+from elastocal.campaigns.measurements import SHOWN, SHOWN_TO, TICK, file_columns, sheet_columns, show_cell
+from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, text_fault
-from elastocal.exchange.column_meanings import check_complete, find_columns, find_rotation, find_units
-from elastocal.exchange.column_names import ANGLE, POSITION, UNITS, VECTOR, find_joints, is_name, read_units, recognize_column
-from elastocal.exchange.csv_dialect import read_text_table
-from elastocal.exchange.import_options import BY_ROBOT, ImportOptions, sheet_options
-from elastocal.exchange.markers import choose_markers, has_position, markers_in, one_row_each
-from elastocal.exchange.measurement_cells import CellReader, covariates_of, rows_with_position
-from elastocal.exchange.rotations import HOMOGENEOUS_MATRICES, QUATERNIONS, columns_of_rotation, rotation_vectors
+from elastocal.exchange.column_names import (
+    ANGLE,
+    LENGTH,
+    POSITION,
+    TRANSLATION,
+    UNITS,
+    choose_markers,
+    find_columns,
+    find_joints,
+    has_position,
+    is_name,
+    kind_of,
+    lengths_in,
+    markers_in,
+    one_row_each,
+    read_units,
+    recognize_column,
+)
+from elastocal.exchange.csv_dialect import Dialect, TextTable, read_text_table
+from elastocal.exchange.measurement_cells import CellReader, covariates_of, find_units, rows_with_position
+from elastocal.exchange.rotations import (
+    HOMOGENEOUS_MATRICES,
+    QUATERNIONS,
+    VECTOR,
+    columns_of_rotation,
+    find_rotation,
+    rotation_vectors,
+)
+from elastocal.io.documents import check_document, read_document
+from elastocal.io.texts import plain_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
+IMPORT = "import.yaml"
+# A table names no more.
+_MOST_JOINTS = 99
 # Angles that a controller reports twice at one standstill agree to better; poses of a plan lie degrees apart.
 SAME_POSE = 1e-3
-_TRANSLATION = ("t14", "t24", "t34")
 # Rows of one pose whose joints stand farther apart (rad or m) are not of one pose: a label says something else.
 _ONE_POSE = 0.1
+
+
+@dataclass(frozen=True)
+class ImportOptions(Dialect):
+    """How a table is read; what is None or absent is found out, or refused where it is ambiguous.
+
+    `ignore`: headers of columns that are left out. `columns`: headers by the names of `column_names`. `units`: units by the
+    same names; ``angles`` and ``lengths`` for all that have no other. `rotation`: notation of `rotations`. `target`: name for
+    all rows where no column has it. `targets`: markers of rows that hold several, by the names of the targets that they are.
+    `wrench`: what the forces act on; those that the robot exerts, ``by-robot``, are turned round. `skip_empty`: whether rows
+    without a position are left out. `names`: of the columns of a table without a header, in their order.
+    """
+
+    columns: Mapping[str, str] | None = None
+    units: Mapping[str, str] | None = None
+    rotation: str | None = None
+    target: str | None = None
+    wrench: str = "on-robot"
+    skip_empty: bool = False
+    ignore: Sequence[str] | None = None
+    targets: Mapping[str, str] | None = None
+    names: Sequence[str] | None = None
+
+
+def read_import_options(path: str | Path) -> ImportOptions:
+    """Options of an earlier import; an InputError names an unknown key or a value that none may have."""
+    document = read_document(path) or {}
+    check_document(document, "measurement_import", Path(path).as_posix())
+    known = {field.name for field in fields(ImportOptions)}
+    return ImportOptions(**{key: value for key, value in document.items() if key in known})
+
+
+def import_options_text(options: ImportOptions, source: str | Path) -> str:
+    """Text of the options with which a table, `source`, was imported."""
+    digest = hashlib.sha256(Path(source).read_bytes()).hexdigest()
+    document: dict[str, Any] = {"source": Path(source).name, "sha256": digest}
+    document |= {key: value for key, value in asdict(options).items() if value is not None}
+    body = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+    return f"# The import again: elastocal import csv FILE --options {IMPORT} --folder FOLDER\n{body}"
+
+
+def _sheet_options(text: TextTable, options: ImportOptions) -> ImportOptions:
+    """Options of an import with the units of a sheet of `plan` that a spreadsheet saved, where the table is one.
+
+    Its columns are those of measurements.csv, in its units; stated ones go first. An InputError names the row in which
+    ``q1_deg`` is not ``q1``: one of them was edited.
+    """
+    headers = {header for header in text.columns if header}
+    beside = headers & sheet_columns(_MOST_JOINTS) - {TICK}
+    names = {header.partition("_")[0]: header for header in beside}
+    needed = {TICK, "pose", "load", "repeat", "target", *POSITION, *names}
+    if not (names and needed <= headers and headers - beside - {TICK} <= {*file_columns(_MOST_JOINTS)}):
+        return options
+    units = {}
+    for name, header in names.items():
+        unit = header.partition("_")[2]
+        units[name] = "m" if unit == "mm" else "rad"
+        for line, exact, seen in zip(text.lines, text.columns[name], text.columns[header], strict=True):
+            value, other = plain_number(exact), plain_number(seen)
+            if value is not None and other is not None and abs(value / SHOWN[unit] - other) > SHOWN_TO:
+                allowed = f"{value / SHOWN[unit]:.3f}, which is {name}, or a table without the column {header}"
+                raise InputError(text.path, f"line {line}, column {header}", show_cell(seen), allowed)
+    given = dict(options.units or {})
+    for name in (*POSITION, *VECTOR):
+        kind, usual = ("lengths", "m") if kind_of(name)[0] == LENGTH else ("angles", "rad")
+        if name in headers and kind not in given:
+            units[name] = usual
+    columns = {name: name for name in names} | dict(options.columns or {})
+    rotation = options.rotation or ("vector" if {*VECTOR} <= headers else None)
+    return replace(options, columns=columns, units=units | given, rotation=rotation)
 
 
 @dataclass(frozen=True)
@@ -64,21 +162,25 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
 
     def is_header(cells: Sequence[str]) -> bool:
         names = {recognize_column(cell)[0] for cell in cells} | {name for name, header in mapped.items() if header in cells}
-        return has_position(names) or bool(markers_in(cells))
+        only_lengths = any(name and find_joints([name]) for name in names) and lengths_in(cells)
+        return has_position(names) or bool(markers_in(cells) or only_lengths)
 
-    text = read_text_table(path, is_header, options, options.ignore or (), units_in=read_units)
-    options = sheet_options(text, options)
+    text = read_text_table(path, is_header, options, options.ignore or (), units_in=read_units, names=options.names or ())
+    options = _sheet_options(text, options)
     mapped, notes = dict(options.columns or {}), [f"units in the row under the header: {len(text.units)}"] if text.units else []
     if targets := choose_markers(text, options.target, options.targets, mapped):
         text, mapped, of_targets = one_row_each(text, targets, mapped)
         options, notes = replace(options, target=None, targets=targets), [*notes, *of_targets]
-    columns, stated, counted = find_columns(text, mapped, robot)
-    notes += counted
+    columns, stated, of_joints = find_columns(text, mapped, robot)
+    notes += of_joints
+    if find_joints(columns) and not has_position(columns) and (lengths := lengths_in(text.columns)):
+        allowed = "columns x, y, z of a point; distances alone, as of a draw wire or a ball bar, cannot be used yet"
+        raise InputError(text.path, "header", f"{', '.join(map(repr, lengths))} and no position", allowed)
     rotation = find_rotation(text, columns, mapped, options.rotation)
-    position = _TRANSLATION if rotation == HOMOGENEOUS_MATRICES else POSITION
+    position = TRANSLATION if rotation == HOMOGENEOUS_MATRICES else POSITION
     angles = find_joints(columns)
     orientation = columns_of_rotation(rotation, columns)
-    check_complete(text, columns, angles, (*position, *orientation), robot)
+    _check_complete(text, columns, angles, (*position, *orientation), robot)
     wanted = [*angles, *position, *orientation, *(name for name in WRENCH_NAMES if name in columns)]
     units = find_units(text, columns, wanted, stated, options.units or {}, robot)
     read = CellReader(text, columns, units, rows_with_position(text, columns, position, options.skip_empty))
@@ -86,10 +188,17 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     notes += _surprises(read, angles, {*stated, *(options.units or {})})
     table = _number_poses(read, angles, mapped)
     table |= {name: read.numbers(name) for name in angles}
-    table |= _wrench(read, options.wrench)
+    if forces := [name for name in WRENCH_NAMES if name in columns]:
+        sign, zeros = -1.0 if options.wrench == "by-robot" else 1.0, np.zeros(len(read.kept))
+        # A minus sign before a zero would be read by people as a force.
+        table |= {name: sign * read.numbers(name) + 0.0 if name in forces else zeros for name in WRENCH_NAMES}
     table |= {axis: read.numbers(name) for axis, name in zip(POSITION, position, strict=True)}
     if orientation:
-        table |= dict(zip(VECTOR, _vectors(read, rotation, orientation).T, strict=True))
+        vectors, off = rotation_vectors(rotation, np.column_stack([read.numbers(name) for name in orientation]))
+        if off.any():
+            allowed = "a quaternion of length 1" if rotation == QUATERNIONS else "a rotation matrix, row by row"
+            raise read.fault(int(np.argmax(off)), orientation[0], allowed)
+        table |= dict(zip(VECTOR, vectors.T, strict=True))
     table |= covariates
     table |= {f"approach{j}": read.numbers(f"approach{j}") for j in range(1, len(angles) + 1) if f"approach{j}" in columns}
     table["target"] = _targets(read, options.target)
@@ -103,11 +212,28 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
         rotation=rotation,
     )
     read_headers = {columns[name] for name in columns if name in used}
-    ignored = tuple(header for header in text.columns if header not in read_headers)
+    ignored = (*(header for header in text.columns if header not in read_headers), *(options.ignore or ()))
     skipped = len(text.lines) - len(read.kept)
-    return ImportedMeasurements(
-        table, len(angles), resolved, (*ignored, *(options.ignore or ())), skipped, (*text.left_out, *notes)
-    )
+    return ImportedMeasurements(table, len(angles), resolved, ignored, skipped, (*text.left_out, *notes))
+
+
+def _check_complete(
+    text: TextTable, columns: Mapping[str, str], angles: Sequence[str], needed: Sequence[str], robot: Robot | None
+) -> None:
+    """Refuse a table without all joint angles of the robot (`angles`), or without one of the columns that are needed."""
+    unused = ", ".join(header for header in text.columns if header not in columns.values())[:200] or "none"
+    if not angles:
+        named = f" or as the robot has them: {', '.join(robot.joint_names)}" if robot and robot.joint_names else ""
+        allowed = f"columns q1, q2 …{named}, --column q1=NAME, or --robot FILE with joint_names; not yet used: {unused}"
+        raise InputError(text.path, "header", "no joint angles", allowed)
+    if robot and len(angles) > robot.joints:
+        found = f"{counted(len(angles), 'joint')}: {', '.join(columns[name] for name in angles)}"
+        raise InputError(text.path, "header", found, f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out")
+    last = robot.joints if robot else int(angles[-1][1:])
+    for group in ([f"q{j}" for j in range(1, last + 1)], needed):
+        if missing := [name for name in group if name not in columns]:
+            allowed = f"--column {missing[0]}=NAME; not yet used: {unused}"
+            raise InputError(text.path, "header", f"no column {', '.join(missing)}", allowed)
 
 
 def _surprises(read: CellReader, angles: Sequence[str], stated: set[str]) -> list[str]:
@@ -121,25 +247,6 @@ def _surprises(read: CellReader, angles: Sequence[str], stated: set[str]) -> lis
             turns = f"{largest / (2 * np.pi):.1f} turns"
             notes.append(f"{read.columns[name]!r} goes to {largest:.4g} rad, {turns}: if these are degrees, --angles deg")
     return notes
-
-
-def _wrench(read: CellReader, acts: str) -> dict[str, np.ndarray]:
-    there = [name for name in WRENCH_NAMES if name in read.columns]
-    if not there:
-        return {}
-    sign = -1.0 if acts == BY_ROBOT else 1.0
-    zeros = np.zeros(len(read.kept))
-    # A minus sign before a zero would be read by people as a force.
-    return {name: (sign * read.numbers(name) + 0.0 if name in there else zeros) for name in WRENCH_NAMES}
-
-
-def _vectors(read: CellReader, rotation: str, names: Sequence[str]) -> np.ndarray:
-    values = np.column_stack([read.numbers(name) for name in names])
-    vectors, off = rotation_vectors(rotation, values)
-    if off.any():
-        allowed = "a quaternion of length 1" if rotation == QUATERNIONS else "a rotation matrix, row by row"
-        raise read.fault(int(np.argmax(off)), names[0], allowed)
-    return vectors
 
 
 def _targets(read: CellReader, name: str | None) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,20 +22,10 @@ _WIDTH = 128
 _INDENT = "  "
 # Kilograms and metres to the nanometre.
 _DECIMALS = 9
-_ORDER = (
-    "name",
-    "joint_names",
-    "chain",
-    "lengths_m",
-    "joint_limits_deg",
-    "compliance_urad_per_Nm",
-    "reported_joints",
-    "payload_kg",
-    "gear_ratio",
-    "compensator",
-    "gravity_m_s2",
-    "masses",
-)
+# Of what an import finds.
+_ORDER = ("name", "joint_names", "chain", "joint_limits_deg", "compliance_urad_per_Nm", "gravity_m_s2", "masses")
+# A joint may count any number of turns; a thousand are a mistake.
+MOST_TURNS = 1000
 
 
 @dataclass(frozen=True)
@@ -60,12 +51,16 @@ def check_imported(document: dict[str, Any], path: str | Path, options: str, not
     check_document(document, "robot", source)
     robot = robot_from_document(document, source)
     digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
-    missing = (
-        [] if robot.compliance_known else ["no compliances: set `compliance: identify` in campaign.yaml, or write them here"]
-    )
-    missing += [] if robot.payload_kg is not None else ["no rated load (payload_kg)"]
+    missing = ["no rated load (payload_kg)"] if robot.payload_kg is None else []
+    if not robot.compliance_known:
+        missing.insert(0, "no compliances: set `compliance: identify` in campaign.yaml, or write them here")
     origin = f"From {Path(path).name} (sha256 {digest[:16]}), {options}."
     return Imported(document, robot, origin, (*notes, *missing))
+
+
+def point_name(link: str) -> str:
+    """A link's name as that of a measuring point: blanks and brackets, which the notation needs, become underscores."""
+    return re.sub(r"[\[\]\s]", "_", link)
 
 
 def mass_entries(moments: Mapping[int, np.ndarray], relative_std: float) -> list[dict[str, Any]]:
@@ -73,20 +68,21 @@ def mass_entries(moments: Mapping[int, np.ndarray], relative_std: float) -> list
 
     `moments` (4,): of what each link carries the mass times its centre, m kg, and the mass, kg; by the number of the link.
     """
-    return [
-        {
-            "link": link,
-            "mass_kg": round(float(moment[3]), _DECIMALS),
-            "centre_m": (np.round(moment[:3] / moment[3], _DECIMALS) + 0.0).tolist(),
-            "relative_std": relative_std,
-        }
-        for link, moment in sorted(moments.items())
-    ]
+    entries = []
+    for link, (*moment, mass) in sorted(moments.items()):
+        centre = np.round(np.array(moment) / mass, _DECIMALS) + 0.0
+        entry = {"link": link, "mass_kg": round(float(mass), _DECIMALS), "centre_m": centre.tolist()}
+        entries.append(entry | {"relative_std": relative_std})
+    return entries
 
 
 def robot_text(result: Imported) -> str:
     """The text of a robot file."""
-    head = [line for text in (result.origin, *map(_sentence, result.notes)) for line in _comment(text)]
+    head = []
+    for text in (result.origin, *(f"{note[:1].upper()}{note[1:]}." for note in result.notes)):
+        # Whatever a file's name holds stays inside of a comment.
+        plain = "".join(character if character.isprintable() else "?" for character in text)
+        head += textwrap.wrap(plain, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
     body = [line for key in _ORDER if key in result.document for line in _lines(key, result.document[key])]
     return "\n".join([*head, *body]) + "\n"
 
@@ -114,27 +110,15 @@ def summary(result: Imported) -> list[str]:
     ]
 
 
-def _sentence(note: str) -> str:
-    return f"{note[:1].upper()}{note[1:]}."
-
-
-def _comment(text: str) -> list[str]:
-    """Comment lines; whatever a file's name holds stays inside of them."""
-    plain = "".join(character if character.isprintable() else "?" for character in text)
-    return textwrap.wrap(plain, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
-
-
 def _lines(key: str, value: Any) -> list[str]:
+    whole_words: dict[str, Any] = {"subsequent_indent": _INDENT, "break_on_hyphens": False, "break_long_words": False}
     if key == "chain":
-        return ["chain: >-", *textwrap.wrap(value, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT, **_WHOLE_WORDS)]
+        return ["chain: >-", *textwrap.wrap(value, _WIDTH, initial_indent=_INDENT, **whole_words)]
     if key == "masses":
         return ["masses:", *(f"{_INDENT}- {one_line(entry)}" for entry in value)]
     if key == "joint_limits_deg":
-        return textwrap.wrap(f"{key}: {one_line(value)}", _WIDTH, subsequent_indent=_INDENT, **_WHOLE_WORDS)
+        return textwrap.wrap(f"{key}: {one_line(value)}", _WIDTH, **whole_words)
     return [f"{key}: {one_line(value)}"]
-
-
-_WHOLE_WORDS: dict[str, Any] = {"break_on_hyphens": False, "break_long_words": False}
 
 
 def refuse_existing(path: str | Path, force: bool) -> None:
