@@ -15,7 +15,7 @@ ALLOWED = {
 ROOMS = {
     "src/elastocal/application": 2900,
     "src/elastocal/campaigns": 2400,
-    "src/elastocal/command": 1700,
+    "src/elastocal/command": 1710,
     "src/elastocal/crate": 360,
     "src/elastocal/data_checks": 1700,
     "src/elastocal/diagnosis": 5470,
