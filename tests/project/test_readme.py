@@ -43,7 +43,7 @@ def test_the_first_screen_has_the_claim_a_picture_the_figures_and_three_commands
     commands = [line.split("#")[0].strip() for line in first if line.startswith("    ")]
     assert commands == ["make paper", "make study", ".venv/bin/elastocal demo"]
     screen = "\n".join(first)
-    for words in ("uncorrected | corrected | noise floor", "false alarms", "right cause", "measured UR10"):
+    for words in ("uncorrected | corrected | noise floor", "false alarms", "named correctly", "UR10", "UR5"):
         assert words in screen
 
 
