@@ -22,7 +22,7 @@ import interpretations
 REPOSITORY = Path(__file__).resolve().parents[2]
 SIGNATURES = REPOSITORY / "reports" / "figures" / "signatures"
 # Pages that are read where the repository is hosted as well.
-PAGES = ("*.md", "docs/**/*.md", "config/*.md", "data/*.md", "results/*.md", "reports/*.md", "benchmarks/*.md")
+PAGES = ("*.md", "docs/**/*.md", "config/*.md", "data/**/*.md", "results/*.md", "reports/*.md", "benchmarks/*.md")
 # Of the site alone.
 NO_PAGES = ("docs/site/index.md",)
 # In Markdown and in HTML.

@@ -43,7 +43,7 @@ def part_of_the_study(folder):
     """Sources whose default target is a part of the study."""
     study = Study.of_sources(folder)
     study.configure(CHANGES)
-    study.replace("Snakefile", "        rules.study.input,\n        rules.loop.input,\n", TARGETS.lstrip("\n"))
+    study.replace("Snakefile", "        rules.paper.input,\n        rules.main_loops.input,\n", TARGETS.lstrip("\n"))
     return study
 
 

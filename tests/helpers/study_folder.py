@@ -37,7 +37,7 @@ SMALL = {
     # So many configurations reach them.
     "questions": {"accuracies_um": [120, 90]},
     # The loop has tests of its own.
-    "loop": {"proposed_states": 2, "campaigns": [], "measured": []},
+    "loop": {"proposed_states": 2, "main": [], "campaigns": [], "measured": []},
 }
 # What most tests need of it: the paper's tables and figures of one robot.
 ROBOT, LEVEL = "kuka", "200"
