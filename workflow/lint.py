@@ -36,7 +36,7 @@ ROOMS = {
     "src/elastocal_proof/league": 650,
     "src/elastocal_proof/plant": 3120,
     "src/elastocal_proof/report": 340,
-    "tests": 42000,
+    "tests": 40800,
     "workflow": 6330,
 }
 
