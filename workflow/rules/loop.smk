@@ -6,7 +6,14 @@ results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. N
 
 SIMULATED = [name for name, source in SOURCES.items() if source["source"] == "simulated"]
 PUBLIC = [name for name in SOURCES if name not in SIMULATED]
-LOOP_FIGURES = ["before_after", "arrows", "residuals", "candidates", "confounding"]
+# Pictures of a campaign, with what `snakemake --report` says that each shows.
+LOOP_FIGURES = {
+    "before_after": "Errors before and after",
+    "arrows": "Residuals in space",
+    "residuals": "Residuals before and after",
+    "candidates": "Candidates",
+    "confounding": "What the poses confuse",
+}
 LOOP_REPORTS = [
     "verdict.json",
     "before_after.csv",

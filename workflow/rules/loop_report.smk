@@ -4,16 +4,6 @@ Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Write
 reports/loop/{campaign}/report.pdf and report.html, and, of the study too, the pictures of the README.
 """
 
-# Each of LOOP_FIGURES, with its caption and what `snakemake --report` says that it shows.
-SHOWN = {
-    "before_after": "Errors before and after",
-    "arrows": "Residuals in space",
-    "residuals": "Residuals before and after",
-    "candidates": "Candidates",
-    "confounding": "What the poses confuse",
-}
-
-
 rule draw_campaign:
     input:
         descriptions=rules.read_campaign.output.descriptions,
@@ -25,24 +15,24 @@ rule draw_campaign:
         confounding=rules.diagnose_campaign.output.confounding,
         sources=sources("draw_campaign.py"),
     output:
-        pdf=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=LOOP_FIGURES),
+        pdf=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=[*LOOP_FIGURES]),
         png=[
             shown(
                 f"reports/loop/{{campaign}}/figures/{figure}.png",
                 f"loop_{figure}",
                 "Campaigns",
                 campaign="{campaign}",
-                shows=SHOWN[figure],
+                shows=shows,
                 kind="figure",
             )
-            for figure in LOOP_FIGURES
+            for figure, shows in LOOP_FIGURES.items()
         ],
     log:
         "results/logs/draw_campaign/{campaign}.log",
     benchmark:
         "results/timings/draw_campaign/{campaign}.tsv"
     params:
-        figures=LOOP_FIGURES,
+        figures=list(LOOP_FIGURES),
     script:
         "../scripts/draw_campaign.py"
 
