@@ -4,6 +4,7 @@ Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Write
 reports/loop/{campaign}/report.pdf and report.html, and, of the study too, the pictures of the README.
 """
 
+
 rule draw_campaign:
     input:
         descriptions=rules.read_campaign.output.descriptions,
