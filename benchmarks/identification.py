@@ -8,11 +8,17 @@ import numpy as np
 from common import Row, interleaved, load_robot, load_strategy
 
 from elastocal.mechanics.robot import Robot
-from elastocal.study.identification import Estimates, Measurements, estimate_compliance, identify
-from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
-from elastocal.study.steps.blocks import blocks_of_sets
-from elastocal.study.steps.columns import deflection_columns, experiment_columns
-from elastocal.study.steps.identify import Situation
+from elastocal.study.equation_11 import Measurements, estimate_compliance, identify
+from elastocal.study.identify import Situation
+from elastocal.study.simulation import (
+    Loading,
+    blocks_of_sets,
+    deflection_columns,
+    experiment_columns,
+    measurement_noise,
+    random_experiments,
+    true_deflections,
+)
 from elastocal.study.strategies import Strategy
 
 ROWS = 6
@@ -57,7 +63,7 @@ def rows(work: Path, setting: Setting) -> list[Row]:
                 number += 1
         return found
 
-    def with_covariance() -> list[Estimates]:
+    def with_covariance() -> list[tuple[np.ndarray, ...]]:
         return [identify(strategy, measurements, joints) for measurements in blocks]
 
     _assert_equal(np.concatenate(ours(), axis=2).transpose(2, 0, 1)[..., order], loop())

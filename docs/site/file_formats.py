@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from importlib import import_module, resources
 from inspect import isfunction, signature
+from pkgutil import iter_modules
 from textwrap import dedent, indent
 
 import yaml
@@ -23,7 +24,7 @@ DOCUMENTS = {
 }
 # Each module of table schemas with where its tables lie.
 TABLES = {
-    "elastocal.study.table_schemas": "The study: `data/simulated`, `results`.",
+    "elastocal.study": "The study: `data/simulated`, `results`.",
     "elastocal.loop.schemas": "The loop: `results/loop`, `reports/loop`.",
     "elastocal_proof.league.schemas": "The league of methods: `results/league`, `reports/league`.",
     "elastocal_proof.blind.schemas": "The closed loop and bad rows: `results/closed_loop`, `results/bad_rows`.",
@@ -83,10 +84,14 @@ def _tables() -> str:
 
 
 def table_schemas(module: str) -> list[TableSchema]:
-    """Every schema of a module, those included that go with the number of joints."""
+    """Every schema of a module, or of those of a package, with those that go with the number of joints."""
+    package = import_module(module)
+    if hasattr(package, "__path__"):
+        names = sorted(each.name for each in iter_modules(package.__path__, f"{module}."))
+        return [schema for name in names for schema in table_schemas(name)]
     found = []
-    for name, thing in vars(import_module(module)).items():
-        if isinstance(thing, TableSchema):
+    for name, thing in vars(package).items():
+        if isinstance(thing, TableSchema) and thing.name.upper() == name:
             found.append(thing)
         elif isfunction(thing) and thing.__module__ == module and not name.startswith("_"):
             made_of = list(signature(thing).parameters), thing.__annotations__.get("return")

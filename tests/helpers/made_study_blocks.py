@@ -3,12 +3,17 @@
 import numpy as np
 from support import PinocchioPoint, without_tool
 
-from elastocal.study.simulation import Loading
-from elastocal.study.steps.evaluate import evaluate_strategy, judge_from
-from elastocal.study.steps.identify import identified_blocks, paired_blocks
-from elastocal.study.steps.measure import measured_blocks
-from elastocal.study.steps.simulate import experiment_blocks, ideal_blocks
-from elastocal.study.steps.weights import weight_blocks
+from elastocal.study.evaluation import evaluate_strategy, judge_from
+from elastocal.study.identify import identified_blocks, paired_blocks
+from elastocal.study.simulation import (
+    Loading,
+    blocks_of_sets,
+    experiment_columns,
+    ideal_blocks,
+    measured_blocks,
+    random_experiments,
+    weight_blocks,
+)
 
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
 OFFSET = (0.1, 0.05, 0.2)
@@ -18,7 +23,10 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 def experiments_of(robot, sets=5, configurations=4, purpose="identification", key="kuka"):
-    return list(experiment_blocks(robot.chain, robot.joint_limits, key, 1, PAPER, purpose, sets, configurations))
+    """Blocks of the experiments table."""
+    drawn = (robot.chain, robot.joint_limits, 1, key, PAPER, purpose)
+    blocks = blocks_of_sets(sets)
+    return [experiment_columns(numbers, random_experiments(*drawn, numbers, configurations)) for numbers in blocks]
 
 
 def as_read(blocks):

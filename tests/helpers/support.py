@@ -11,7 +11,7 @@ import pytest
 from elastocal.errors import InputError
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.robot import Robot
-from elastocal.study.experiments import Experiments
+from elastocal.study.simulation import Experiments
 
 UR10 = "Tz(0.1273) Rz(q1) Ty(0.1639) Ry(q2) Tx(0.612) Ry(q3) Tx(0.5723) Ry(q4) Rz(q5) Tz(-0.1157) Ry(q6) Ty(0.0922) [flange]"
 THREE_JOINTS = "Tz(0.4) Rz(q1) Tx(0.1) Ry(q2) Tx(0.7) [elbow] Ry(q3) Tx(0.6) [hand]"

@@ -1,12 +1,15 @@
 """Places on an arm: where they are, and when a tracker sees them."""
 
 import numpy as np
+import pandas as pd
 import pytest
+from made_studies import few_of
 from scipy.optimize import minimize
 
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import poses
-from elastocal.study.arm_points import BAR, FLANGE, _segment_distances, in_sight, places
+from elastocal.study.arm_points import BAR, FLANGE, _segment_distances, in_sight, place_columns, places, places_table
+from elastocal.study.points import budget_blocks
 
 # Upright column, then an arm of a metre that a joint turns in the level plane, then one of half a metre.
 CHAIN = parse_chain("Tz(h) Rz(q1) Tx(a) [elbow] Rz(q2) Tx(b) [end]", {"h": 0.5, "a": 1.0, "b": 0.5}, "test")
@@ -62,3 +65,30 @@ def test_distances_of_segments_are_the_least_over_both():
 
         best = min(minimize(gap, x0, bounds=[(0, 1), (0, 1)]).fun for x0 in ([0.5, 0.5], [0, 0], [1, 1], [0, 1], [1, 0]))
         assert distance == pytest.approx(best, abs=1e-4)
+
+
+ARM = {"sets": 6, "radius_m": 0.15, "bar_m": 0.5, "acceptance_deg": 30}
+
+
+@pytest.fixture(scope="module")
+def table(kuka):
+    return pd.DataFrame(place_columns(few_of(kuka), (4.0, 0.0, 1.5), ARM))
+
+
+def test_a_target_on_the_flange_is_the_end_effector_measured_twice(kuka, table):
+    (block,) = budget_blocks(few_of(kuka), {"twice": ["6DoF", "6DoF"]})
+    expected = block["bound"][block["length"] == 20]
+    np.testing.assert_allclose(table[table.side == "flange"].bound, expected, rtol=1e-6)
+
+
+def test_a_reflector_that_stays_as_it_is_is_seen_less_often_than_one_that_is_turned(table):
+    assert (table.fixed <= table.turned).all() and 0 < table.fixed.mean() < table.turned.mean() < 0.7
+
+
+def test_places_are_compared_by_the_ratio_of_root_mean_bounds_paired_by_data_set():
+    frame = pd.DataFrame({"joints": 2, "along": 1.2, "side": "+y", "data_set": range(4), "bound": [4.0, 8.0, 4.0, 8.0]})
+    frame = frame.assign(bound_end_effector=frame.bound / 4, turned=[0.5, 0.4, 0.5, 0.4], fixed=0.1)
+    (row,) = places_table({"arm": frame}).to_dict("records")
+    assert (row["ratio"], row["ratio_low"], row["ratio_high"]) == pytest.approx((2, 2, 2))
+    assert (row["robot"], row["joints"], row["side"]) == ("arm", 2, "+y")
+    assert (row["seen_turned_percent"], row["seen_fixed_percent"]) == pytest.approx((45, 10))

@@ -1,9 +1,22 @@
 """Designs against each other and against their bound."""
 
 import numpy as np
+import pandas as pd
 import pytest
+from made_studies import few_of
 
-from elastocal.study.designs import CONTINUOUS, RANDOM, rate_designs
+from elastocal.study.designs import (
+    CONTINUOUS,
+    RANDOM,
+    design_columns,
+    designs_table,
+    observability,
+    observability_columns,
+    observability_table,
+    rate_designs,
+    simulated_design_blocks,
+    simulated_designs_table,
+)
 
 
 @pytest.fixture(scope="module")
@@ -14,7 +27,8 @@ def found():
 
 
 def worth(found, kind, size):
-    (one,) = [each for each in found if (each.kind, each.configurations) == (kind, size)]
+    """RMS error of designs of a kind, with 5 and 95 % of random ones."""
+    (one,) = [each[2:] for each in found if each[:2] == (kind, size)]
     return one
 
 
@@ -22,7 +36,74 @@ def worth(found, kind, size):
 def test_designs_lie_between_the_bound_and_random_ones(found, size):
     random, least = worth(found, RANDOM, size), worth(found, CONTINUOUS, size)
     for kind in ("D", "A", "I"):
-        assert least.rms <= worth(found, kind, size).rms < random.rms
+        assert least[0] <= worth(found, kind, size)[0] < random[0]
     # What is optimised is best, as far as an exchange finds it.
-    assert worth(found, "I", size).rms <= 1.001 * min(worth(found, "D", size).rms, worth(found, "A", size).rms)
-    assert random.low < random.rms < random.high
+    assert worth(found, "I", size)[0] <= 1.001 * min(worth(found, "D", size)[0], worth(found, "A", size)[0])
+    assert random[1] < random[0] < random[2]
+
+
+def test_indices_are_those_of_the_singular_values():
+    singular = np.array([4.0, 2.0, 1.0])
+    turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
+    indices = observability((turn * singular**2) @ turn.T, 4)
+    assert [float(indices[name]) for name in ("O1", "O2", "O3", "O4", "O5")] == pytest.approx([1.0, 0.25, 1.0, 0.25, 1 / 1.75])
+
+
+def test_designs_are_worth_more_than_random_ones(kuka):
+    table = pd.DataFrame(design_columns(few_of(kuka), candidates=200, sizes=[5]))
+    for _, within in table.groupby("joint_range"):
+        rms = within.set_index("design").rms
+        assert rms["bound"] <= rms["I"] < rms["random"] and set(rms.index) == {"random", "D", "A", "I", "bound"}
+    assert table.joint_range.unique().tolist() == ["full_turn", "limits"]
+
+
+USES = {"centre_m": [1.6, 0.0, 1.0], "edge_m": 1.0, "weight_N": 1000}
+LOADS = {"random": None, "hanging": [0, 0, -1]}
+
+
+@pytest.fixture(scope="module")
+def table(kuka):
+    return pd.concat([pd.DataFrame(block) for block in simulated_design_blocks(few_of(kuka), 150, [6, 12], LOADS, USES)])
+
+
+def test_chosen_configurations_leave_less_than_random_ones(table):
+    for _, cell in table.groupby(["load", "configurations"]):
+        rms = cell.set_index("design").rms
+        assert set(rms.index) == {"random", "D", "A", "I", "test pose"}
+        assert rms["I"] < rms["random"]
+
+
+def test_the_test_pose_criterion_is_best_at_its_pose(table):
+    by = table[(table.load == "random") & (table.configurations == 12)].set_index("design")
+    assert by.there["test pose"] < 1.2 * by.there.drop("test pose").min() and by.rms["I"] < by.rms["test pose"]
+
+
+def test_observability_stands_beside_bound_and_error_of_the_same_data_set(kuka):
+    table = observability_columns(few_of(kuka))
+    assert {"data_set", "O1", "O5", "bound", "mean_square"} <= set(table)
+    assert (table["bound"] > 0).all() and 0.1 < table["mean_square"].mean() / table["bound"].mean() < 4
+
+
+def test_designs_are_in_micrometres():
+    frame = pd.DataFrame({"design": ["D"], "configurations": [4], "rms": [8e-5], "low": [7e-5], "high": [9e-5]})
+    found = designs_table({"arm": frame.assign(joint_range="limits")}).iloc[0].tolist()
+    assert found == pytest.approx(["arm", "limits", "D", 4, 80.0, 70.0, 90.0])
+
+
+def test_an_index_that_orders_data_sets_as_the_bound_does_has_rank_correlation_one():
+    rng = np.random.default_rng(1)
+    bound = rng.uniform(1, 2, 400)
+    frame = pd.DataFrame({f"O{number}": rng.uniform(size=400) for number in range(1, 6)})
+    frame = frame.assign(O1=1 / bound, bound=bound, mean_square=bound * rng.chisquare(3, 400))
+    table = observability_table({"arm": frame}).set_index("index")
+    assert table.rank_correlation_with_bound["O1"] == pytest.approx(-1.0)
+    # Unrelated: within four standard errors of nothing.
+    assert abs(table.rank_correlation_with_bound["O2"]) < 4 * table.rank_correlation_with_bound_std_error["O2"]
+    assert table.rank_correlation_with_error["bound"] == pytest.approx(-table.rank_correlation_with_error["O1"])
+
+
+def test_the_gain_of_a_design_is_over_random_ones_of_its_size_and_load():
+    rows = [("a", "random", 5, 80e-6), ("a", "I", 5, 40e-6), ("b", "random", 5, 60e-6), ("b", "I", 5, 40e-6)]
+    frame = pd.DataFrame(rows, columns=["load", "design", "configurations", "rms"])
+    frame = frame.assign(unobservable="", std_error=1e-6, there=frame.rms)
+    assert simulated_designs_table({"arm": frame}).gain.tolist() == pytest.approx([1.0, 2.0, 1.0, 1.5])

@@ -4,19 +4,26 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from made_study_blocks import OFFSET, evaluated_in_one_block, experiments_of, pinocchio_regressors
+from made_study_blocks import judge as judged
 from support import random_loads
 
-from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
+from elastocal.mechanics.elastostatics import joint_torques
+from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.study import simulation
 from elastocal.study.evaluation import (
     accuracy_sums,
     accuracy_table,
     average,
+    bound_blocks,
     find_length,
     metrics_table,
     replicates_table,
+    to_weights,
 )
 from elastocal.study.metrics import make_judge, mean_deviation, position_errors
-from elastocal.study.simulation import true_deflections
+from elastocal.study.simulation import bootstrap_weights, to_experiments, true_deflections, weight_blocks
 
 SETS, LENGTHS, REPLICATES, TESTS = 60, 3, 25, 30
 METHODS = ("stiffness", "compliance", "median")
@@ -44,7 +51,7 @@ def weights():
 @pytest.fixture(scope="module")
 def counts():
     """How often each test configuration counts."""
-    return bootstrap_test_weights(1, "kuka", TESTS, REPLICATES)
+    return to_weights([*weight_blocks("kuka", 1, SETS, TESTS, REPLICATES)][-1])
 
 
 def blocks_of(estimates, weights, *cuts):
@@ -186,3 +193,60 @@ def test_a_length_comes_with_the_spread_of_replicates_that_go_on_beyond_their_cu
     replicates = np.column_stack([[3.0, 3.0, 2.0], [0.9, 2.6, 0.9], ends])
     found, error = find_length(np.array([3.0, 0.9, 0.5]), replicates, limit)
     assert found == length and error == pytest.approx(np.std(lengths, ddof=1))
+
+
+def make_same_estimates(robot, factors, sets=12):
+    """The identified table of data sets that all give the same compliances: this factor of the nominal ones at each length."""
+    lengths = len(factors)
+    table = {"data_set": np.repeat(np.arange(sets), lengths), "length": np.tile(np.arange(1, lengths + 1), sets)}
+    return table | {f"c{j + 1}": np.tile(c * np.array(factors), sets) for j, c in enumerate(robot.compliance)}
+
+
+def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
+    metrics, replicates, accuracy = evaluated_in_one_block(
+        make_same_estimates(kuka, (2.0, 1.25)), judged(kuka), (0, 1), "stiffness", 10, [2]
+    )
+    # k / k0 - 1 = 1 / 1.25 - 1 = -20 % in each of six joints, of which two are fixed in the last stage; twice as soft, -50 %.
+    assert metrics["length"].tolist() == [1, 2]
+    for joint in range(1, 7):
+        np.testing.assert_allclose(metrics[f"delta_k_{joint}"], [-50.0, -20.0], rtol=1e-12)
+        ratio = metrics[f"compliance_{joint}"] / kuka.compliance[joint - 1]
+        np.testing.assert_allclose(ratio, [2.0, 1.25], rtol=1e-12)
+        np.testing.assert_allclose(accuracy[f"relative_error_{joint}"], [25.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics["k_sigma"], [-300.0, -120.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics["k_sigma_fixed_joints"], [-100.0, -40.0], rtol=1e-12)
+    # All data sets are alike: which of them a replicate draws makes no difference.
+    np.testing.assert_allclose(metrics["k_sigma_std_error"], 0.0, atol=1e-10)
+    assert metrics["trustworthy"].all() and not metrics["nonpositive_share"].any()
+    assert replicates["replicate"].tolist() == np.repeat(range(1, 11), 2).tolist()
+    np.testing.assert_allclose(replicates["k_sigma"], np.tile([-300.0, -120.0], 10), rtol=1e-12)
+
+
+def test_bounds_of_a_target_off_the_flange_are_those_of_a_load_at_the_flange(kuka):
+    moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka)
+    scores, loads = judged(kuka), to_experiments(experiments[0])
+    (found,) = bound_blocks(experiments, moved.chain, [("6DoF",)], 6, "end_effector", scores)
+    torques = joint_torques(kuka.chain, loads.joint_angles, loads.wrench, kuka.chain.end_effector)
+    rows = poses_and_jacobians(moved.chain, loads.joint_angles, moved.chain.end_effector)[2] * torques[..., None, :]
+    bounds = [np.trace(scores.form[:-1, :-1] @ np.linalg.inv(np.einsum("kri,krj->ij", one, one))) for one in rows]
+    assert found["rms_per_noise"][-1] == pytest.approx(np.sqrt(np.mean(bounds)), rel=1e-6)
+
+
+def test_the_bound_is_the_root_mean_square_over_the_data_sets_of_all_blocks(kuka, monkeypatch):
+    monkeypatch.setattr(simulation, "SETS_PER_BLOCK", 2)
+    experiments, scores = experiments_of(kuka, sets=3), judged(kuka)
+    (found,) = bound_blocks(experiments, kuka.chain, [("3DoF", "6DoF")], 6, "end_effector", scores)
+    assert len(experiments) == 2 and found["length"].tolist() == [1, 2, 3, 4]
+    moment, squares = scores.form[:-1, :-1], []
+    for block in experiments:
+        parts = [pinocchio_regressors(kuka.chain, block, name).reshape(-1, 4, 6, 6) for name in ("3DoF", "6DoF")]
+        for number in range(len(parts[0])):
+            matrices = [np.concatenate([part[number, :length].reshape(-1, 6) for part in parts]) for length in (1, 2, 3, 4)]
+            squares.append([np.trace(moment @ np.linalg.inv(matrix.T @ matrix)) for matrix in matrices])
+    np.testing.assert_allclose(found["rms_per_noise"], np.sqrt(np.mean(squares, axis=0)), rtol=1e-6)
+
+
+def test_positions_on_the_last_axis_never_bound_its_joint(kuka):
+    """The flange lies on the axis of joint 6, so that no position of it shows that joint's compliance."""
+    (found,) = bound_blocks(experiments_of(kuka), kuka.chain, [("6DoF",)], 3, "end_effector", judged(kuka))
+    assert np.isinf(found["rms_per_noise"]).all()

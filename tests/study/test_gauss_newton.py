@@ -9,8 +9,8 @@ from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, 
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study import gauss_newton
+from elastocal.study.equation_11 import Measurements, first_solvable_length, identify
 from elastocal.study.gauss_newton import identify_exactly
-from elastocal.study.identification import Measurements, first_solvable_length, identify
 from elastocal.study.simulation import true_deflections
 
 SETS, CONFIGURATIONS = 3, 4
@@ -42,7 +42,7 @@ class Data:
             matrix = np.moveaxis(regressor(jacobian, self.torques[point.name]), (-2, -1), (0, 1))
             deflection = np.moveaxis(self.deflections[point.name], -1, 0)
             measurements[point.name] = Measurements(matrix[: len(deflection)], deflection)
-        return identify(strategy, measurements, self.robot.joints).compliance[-1]
+        return identify(strategy, measurements, self.robot.joints)[0][-1]
 
 
 def find_distance(found, robot):

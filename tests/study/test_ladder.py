@@ -1,13 +1,16 @@
 """The ladder of models: against dense least squares, and on a robot whose links yield."""
 
 import numpy as np
+import pandas as pd
 import pytest
-from made_study_blocks import PAPER
+from made_studies import few_of
+from made_study_blocks import PAPER, compliances, deflections_of, experiments_of, identified, judge
 
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.links import extended_chain, spring_compliance
-from elastocal.study.ladder import ladder, products_of, spring_columns
+from elastocal.study.ladder import CHOSEN, ladder, ladder_blocks, ladder_table, products_of, spring_columns
+from elastocal.study.metrics import position_errors
 from elastocal.study.simulation import random_experiments, true_deflections
 
 FOLDS = 4
@@ -81,3 +84,41 @@ def test_a_robot_with_one_yielding_link_gets_that_spring_first_and_nothing_of_wo
     assert (found.order[:, 0] == 2).all() and (found.chosen >= 1).all()
     assert (found.cross_validated[:, 0] > 100 * found.cross_validated[:, 1]).all()
     assert (found.cross_validated[:, 1] < 1.1 * found.cross_validated.min(axis=1)).all()
+
+
+def test_the_ladder_of_a_robot_with_elastic_links_falls_and_flattens(kuka_extended):
+    blocks = list(ladder_blocks(few_of(kuka_extended), lengths=[10, 20], noises=[1e-6]))
+    assert [(block["length"][0], len(block["length"])) for block in blocks] == [(10, 36), (20, 36)]
+    table = pd.DataFrame(blocks[1])
+    rms = np.sqrt(table.groupby("link_springs").mean_square.mean())
+    # Joints alone leave tenths of a millimetre, all springs what linearisation leaves.
+    assert rms[0] > 1e-4 and rms[5] < 0.1 * rms[0]
+    assert (table.groupby("data_set").chosen.sum() == 1).all()
+    assert (table[table.link_springs == 0].added_link == 0).all()
+    assert sorted(table[(table.data_set == 0) & (table.link_springs > 0)].added_link) == [1, 2, 3, 4, 5]
+
+
+def test_joints_alone_leave_what_the_reduced_model_leaves(kuka_extended, strategies):
+    """The first rung is equation 11 with poses of the end-effector."""
+    experiments = experiments_of(kuka_extended, 6, 20)
+    table = identified(kuka_extended, strategies["6DoF"], experiments, deflections_of(kuka_extended, experiments))
+    expected = (position_errors(judge(kuka_extended), compliances(table, 20)) ** 2).mean(axis=1)
+    (block,) = ladder_blocks(few_of(kuka_extended), lengths=[20], noises=[0.0])
+    # The judge predicts with exact kinematics, the ladder by the linear equation: percents of a percent.
+    np.testing.assert_allclose(block["mean_square"][block["link_springs"] == 0], expected, rtol=0.02)
+
+
+def ladder_frame():
+    """Two data sets: errors of 4 and 2 µm without springs, 1 and 3 with one; the first stops at one, the second at none."""
+    rows = [(200e-6, 10, 0, 0, 0, False, 16e-12), (200e-6, 10, 0, 1, 3, True, 1e-12)]
+    rows += [(200e-6, 10, 1, 0, 0, True, 4e-12), (200e-6, 10, 1, 1, 3, False, 9e-12)]
+    return pd.DataFrame(rows, columns=["noise", "length", "data_set", "link_springs", "added_link", "chosen", "mean_square"])
+
+
+def test_the_ladder_has_a_row_for_each_number_of_springs_and_one_for_what_was_chosen():
+    table = ladder_table({"arm": ladder_frame()})
+    assert table.link_springs.tolist() == ["0", "1", CHOSEN]
+    assert table.rms_um.tolist() == pytest.approx([np.sqrt(10), np.sqrt(5), np.sqrt(2.5)])
+    assert table.chosen_percent.tolist()[:2] == [50, 50] and np.isnan(table.chosen_percent[2])
+    assert table.usual_link[1] == 3 and table.usual_link.isna().tolist() == [True, False, True]
+    assert table.noise_um.tolist() == [200.0] * 3

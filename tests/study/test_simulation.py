@@ -4,10 +4,33 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_study_blocks import AT, WRENCH, compliances, deflections_of, experiments_of, identified, joined
+from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
+from support import OTHER_CHAINS, PinocchioPoint, random_loads, robot_of, without_tool
 
 from elastocal.mechanics.kinematics import poses
-from elastocal.study.simulation import Loading, measurement_noise, random_experiments
+from elastocal.study import simulation
+from elastocal.study.evaluation import to_weights
+from elastocal.study.simulation import (
+    DATA_SETS,
+    DEFLECTIONS,
+    TESTS,
+    Loading,
+    bending,
+    bootstrap_weights,
+    data_sets,
+    deflection_columns,
+    experiment_columns,
+    experiments,
+    ideal_blocks,
+    measured_blocks,
+    measurement_noise,
+    random_experiments,
+    to_deflections,
+    to_experiments,
+    weight_blocks,
+)
 
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
 
@@ -65,3 +88,154 @@ def test_noise_is_standard_normal_and_independent_between_components():
     for component in noise.T:
         assert kstest(component, "norm").pvalue > 1e-4
     np.testing.assert_allclose(np.corrcoef(noise.T), np.eye(6), atol=5 / np.sqrt(len(noise)))
+
+
+def test_numbers_of_a_data_set_do_not_depend_on_how_many_there_are_or_how_long_they_are(kuka):
+    few, many = joined(experiments_of(kuka, 2, 3)), joined(experiments_of(kuka, 5, 4))
+    shared = (many["data_set"] < 2) & (many["configuration"] < 3)
+    for name, values in few.items():
+        np.testing.assert_array_equal(many[name][shared], values)
+
+
+@pytest.mark.parametrize(("size", "expected"), [(2, [[0, 1], [2, 3], [4]]), (5, [[0, 1, 2, 3, 4]]), (9, [[0, 1, 2, 3, 4]])])
+def test_blocks_are_full_but_for_the_last_and_hold_each_data_set_once(kuka, monkeypatch, size, expected):
+    monkeypatch.setattr(simulation, "SETS_PER_BLOCK", size)
+    found = experiments_of(kuka, sets=5, configurations=3)
+    assert [block["data_set"].tolist() for block in found] == [np.repeat(sets, 3).tolist() for sets in expected]
+    assert all(block["configuration"].tolist() == [0, 1, 2] * len(sets) for block, sets in zip(found, expected, strict=True))
+
+
+@pytest.mark.parametrize("at", AT)
+@pytest.mark.parametrize("name", ["three joints", "fixed rotations"])
+def test_ideal_deflections_are_the_poses_by_pinocchio_with_the_joints_yielded(name, at):
+    robot = robot_of(OTHER_CHAINS[name])
+    experiments = experiments_of(robot, sets=2, configurations=2)
+    found = list(ideal_blocks(experiments, robot, at))
+    assert [block["point"] for block in found] == [point.name for point in robot.chain.points]
+    loads = joined(experiments)
+    angles = np.column_stack([loads[f"q{j + 1}"] for j in range(robot.joints)])
+    wrench = np.column_stack([loads[component] for component in WRENCH])
+    for block, point in zip(found, robot.chain.points, strict=True):
+        assert block["data_set"].tolist() == [0, 0, 1, 1] and block["configuration"].tolist() == [0, 1, 0, 1]
+        seen = PinocchioPoint(robot.chain, point)
+        loaded = PinocchioPoint(robot.chain, without_tool(robot.chain.end_effector) if at == "end_effector" else point)
+        found = to_deflections(block).reshape(-1, 6)
+        for q, force, row in zip(angles, wrench, found, strict=True):
+            yielded = q + robot.compliance * (loaded.pose_and_jacobian(q)[2].T @ force)
+            (before, turned_before), (after, turned_after) = (seen.pose_and_jacobian(each)[:2] for each in (q, yielded))
+            turn = Rotation.from_matrix(turned_after @ turned_before.T).as_rotvec()
+            np.testing.assert_allclose(row, [*(after - before), *turn], rtol=0, atol=1e-12)
+
+
+COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
+
+
+def make_zeros(sets, configurations):
+    columns = deflection_columns("6DoF", sets, np.zeros((len(sets), configurations, 6)))
+    return columns | {"point": np.full(len(columns["data_set"]), "6DoF", dtype=object)}
+
+
+def test_measurements_are_ideal_plus_scaled_noise_of_each_point(kuka):
+    experiments = experiments_of(kuka)
+    ideal = deflections_of(kuka, experiments)
+    for noise in (5e-5, 5e-4):
+        measured = deflections_of(kuka, experiments, noise)
+        for name in ideal:
+            error = to_deflections(measured[name][0]) - to_deflections(ideal[name][0])
+            expected = noise * measurement_noise(1, "kuka", name, range(5), 4)
+            np.testing.assert_allclose(error, expected, rtol=0, atol=1e-15)
+
+
+def test_noise_of_a_data_set_is_the_same_in_whatever_block_it_stands():
+    (whole,) = measured_blocks([make_zeros(range(4), 3)], "kuka", 1, 1e-4)
+    parts = list(measured_blocks([make_zeros([0], 3), make_zeros([1, 2, 3], 3)], "kuka", 1, 1e-4))
+    for name in COMPONENTS:
+        np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), whole[name])
+
+
+def test_experiments_come_back_as_they_were():
+    for text in OTHER_CHAINS.values():
+        robot = robot_of(text)
+        loads = random_loads(robot, 2, 3)
+        columns = experiment_columns([0, 1], loads)
+        assert set(columns) == {column.name for column in experiments(robot.joints).columns}
+        back = to_experiments(columns)
+        np.testing.assert_array_equal(back.joint_angles, loads.joint_angles)
+        np.testing.assert_array_equal(back.wrench, loads.wrench)
+
+
+def test_deflections_come_back_as_they_were():
+    deflections = np.random.default_rng(1).standard_normal((2, 3, 6))
+    columns = deflection_columns("3DoF", [4, 7], deflections)
+    assert set(columns) == {column.name for column in DEFLECTIONS.columns} and columns["point"] == "3DoF"
+    assert columns["data_set"].tolist() == [4, 4, 4, 7, 7, 7] and columns["configuration"].tolist() == [0, 1, 2] * 2
+    assert data_sets(columns).tolist() == [4, 7]
+    assert columns["dy"][4] == deflections[1, 1, 1] and columns["rz"][2] == deflections[0, 2, 5]
+    np.testing.assert_array_equal(to_deflections(columns), deflections)
+
+
+def test_statistics_are_of_the_lengths_of_the_displacements_set_by_set():
+    """Lengths 5 and 1; 7 and 13; what follows the displacements does not count."""
+    found = bending(np.pad([[[3.0, 4, 0], [0, 0, 1]], [[2, 3, 6], [0, -5, 12]]], ((0, 0), (0, 0), (0, 3)), constant_values=9))
+    expected = {"mean": [3.0, 10.0], "mean_square": [13.0, 109.0], "maximum": [5.0, 13.0]}
+    assert {name: values.tolist() for name, values in found.items()} == expected
+
+
+def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatch):
+    for size in (500, 5, 2):
+        monkeypatch.setattr(simulation, "SETS_PER_BLOCK", size)
+        *sets, tests = weight_blocks("kuka", 1, 5, 7, 4)
+        assert [block["members"] for block in sets] == [DATA_SETS] * -(-5 // size) and tests["members"] == TESTS
+        np.testing.assert_array_equal(np.hstack([to_weights(b) for b in sets]), bootstrap_weights(1, "kuka", range(5), 4))
+        assert to_weights(tests).shape == (5, 7)
+
+
+def test_weights_of_a_table_written_by_hand():
+    columns = {
+        "number": np.array([4, 4, 4, 5, 5, 5]),
+        "replicate": np.array([1, 2, 3, 1, 2, 3]),
+        "count": np.array([0, 2, 1, 3, 0, 1]),
+    }
+    # Replicate 0 has every member once, the others their counts.
+    assert to_weights(columns).tolist() == [[1, 1], [0, 3], [2, 0], [1, 1]]
+
+
+def test_data_sets_count_once_on_average_and_independently_of_the_tests():
+    sets, tests = (to_weights(block)[1:] for block in weight_blocks("kuka", 1, 400, 400, 50))
+    # 20 000 Poisson counts of mean and variance one: five standard errors, a level of 1e-6 for each of two means and variances;
+    # a mean or variance off by 8 % is seen with power above 0.99.
+    for counts in (sets, tests):
+        assert abs(counts.mean() - 1) < 5 / np.sqrt(counts.size)
+        assert abs(counts.var() - 1) < 5 * np.sqrt(3 / counts.size)
+    # Uncorrelated: at a level of 1e-6.
+    assert abs(np.corrcoef(sets.ravel(), tests.ravel())[0, 1]) < 5 / np.sqrt(sets.size)
+
+
+def test_numbers_do_not_depend_on_blocks(kuka, strategies, monkeypatch):
+    tables = []
+    for size in (500, 5, 2, 1):
+        monkeypatch.setattr(simulation, "SETS_PER_BLOCK", size)
+        experiments = experiments_of(kuka)
+        assert len(experiments) == -(-5 // size)
+        deflections = deflections_of(kuka, experiments, noise=2e-4)
+        table = identified(kuka, strategies["4-6DoF-after-6+3DoF"], experiments, deflections)
+        tables.append((joined(experiments), joined(deflections["3DoF"]), table))
+    for other in tables[1:]:
+        for name, values in tables[0][0].items():
+            np.testing.assert_array_equal(other[0][name], values)
+        for name in ("dx", "rz"):
+            # Whole vectors and their remainders may round otherwise.
+            np.testing.assert_allclose(other[1][name], tables[0][1][name], rtol=0, atol=1e-14)
+        for name, values in tables[0][2].items():
+            np.testing.assert_allclose(other[2][name], values, rtol=1e-6, atol=1e-12, err_msg=name)
+
+
+def test_links_bend_beyond_what_joints_explain(kuka_extended, strategies):
+    experiments = experiments_of(kuka_extended, key="kuka_extended")
+    reduced = replace(kuka_extended, links=())
+    stiff, elastic = (
+        compliances(identified(robot, strategies["6DoF"], experiments, deflections_of(robot, experiments)), 4)
+        for robot in (reduced, kuka_extended)
+    )
+    # What bends in the links is laid on the joints: the shoulder looks softer.
+    assert (elastic[:, 1] > 1.2 * stiff[:, 1]).all()

@@ -5,14 +5,7 @@ import pandas as pd
 import pytest
 from made_metrics import metrics_of, replicates_of
 
-from elastocal.study.tables import (
-    merge_errors,
-    per_dataset_table,
-    solver_summary,
-    table2,
-    table4,
-    word_value,
-)
+from elastocal.study.tables import merge_errors, per_dataset_table, table2, table4, word_value
 
 
 def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law_it_follows():
@@ -62,20 +55,6 @@ def test_efficiency_is_the_squared_ratio_of_bound_and_error_and_is_empty_without
     assert np.isnan(table.efficiency[0]) and table.efficiency[1] == pytest.approx(0.25)
     assert table.efficiency_std_error[1] == pytest.approx(2 * 0.25 * 4 / 80)
     assert {"ds", "relative_error_1_percent", "relative_error_1_percent_std_error"} <= set(table)
-
-
-def test_solver_summary_pairs_the_strategies_that_are_the_same_estimator():
-    def block(strategy, factor):
-        columns = {"strategy": strategy, "data_set": [0, 1]}
-        for solver, shift in (("equation_11", 1.001), ("gauss_newton", 1.0)):
-            columns[f"{solver}_c1"] = np.array([1.0, 2.0]) * factor * shift
-        return pd.DataFrame(columns)
-
-    frame = pd.concat([block("A", 1.0), block("B", 1.5), block("C", 1.0)], ignore_index=True)
-    table = solver_summary({"arm": frame}).set_index("strategy")
-    assert table.closest_strategy[["A", "C"]].tolist() == ["C", "A"]
-    assert table.gauss_newton_difference["A"] == 0 and table.gauss_newton_difference["B"] == pytest.approx(0.5)
-    assert table.between_solvers.to_numpy() == pytest.approx(0.001)
 
 
 @pytest.mark.parametrize(

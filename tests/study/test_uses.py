@@ -1,11 +1,16 @@
 """Poses of ISO 9283 and a milling path: where they lie, and that the robot reaches them within its limits."""
 
 import numpy as np
+import pandas as pd
 import pytest
+from made_studies import USUAL
+from made_study_blocks import compliances, deflections_of, experiments_of, identified, judge
 
 from elastocal.application.inverse_kinematics import find_beyond_limits
 from elastocal.mechanics.kinematics import poses
-from elastocal.study.uses import iso_9283, milling_path
+from elastocal.study.in_memory import Size, StudyInMemory
+from elastocal.study.metrics import position_errors
+from elastocal.study.uses import REFERENCE, Score, iso_9283, milling_path, pairs_table, ranks_table, scores, use_blocks
 
 CENTRE = (1.6, 0.0, 1.0)
 
@@ -40,3 +45,127 @@ def test_a_milling_path_is_straight_and_level_with_a_force_against_its_feed(robo
     assert np.linalg.norm(force, axis=1) == pytest.approx(500.0) and (force @ steps[0] < 0).all() and (force[:, 2] > 0).all()
     # No jump from one posture to another.
     assert np.abs(np.diff(use.joint_angles[0], axis=0)).max() < 0.05
+
+
+LENGTH, SETS = 20, 200
+
+
+def uses_of(strategy, size, seed=1, tests=50):
+    """Errors of data sets that strategies share, times a size in µm."""
+    errors = 1e-6 * size * np.abs(np.random.default_rng(seed).normal(size=(SETS, tests)))
+    pooled = np.quantile(errors, 0.95)
+    # Of |normal|: density 2 phi(1.96) at the quantile.
+    slope = 1e-6 * size / (2 * np.exp(-(1.96**2) / 2) / np.sqrt(2 * np.pi))
+    return pd.DataFrame(
+        {
+            "strategy": strategy,
+            "data_set": np.arange(SETS),
+            "mean": errors.mean(axis=1),
+            "mean_square": (errors**2).mean(axis=1),
+            "p95": np.quantile(errors, 0.95, axis=1),
+            "pooled_p95": pooled,
+            "pooled_p95_influence": slope * ((errors > pooled).mean(axis=1) - 0.05),
+            "iso_9283": errors[:, :5].max(axis=1),
+            "path_mean_square": (errors[:, 5:10] ** 2).mean(axis=1),
+            "path_max": errors[:, 5:10].max(axis=1),
+        }
+    )
+
+
+def average(strategy, k_sigma, fixed):
+    values = {"k_sigma": k_sigma, "k_sigma_fixed_joints": fixed, "deviation": 1e-6 * k_sigma}
+    metrics = pd.DataFrame([{"strategy": strategy, "length": LENGTH} | values])
+    drawn = [{"strategy": strategy, "length": LENGTH, "replicate": n + 1} for n in range(50)]
+    wobble = 1 + 0.05 * np.random.default_rng(2).normal(size=50)
+    replicates = pd.DataFrame(drawn).assign(**{name: value * wobble for name, value in values.items()})
+    return metrics, replicates
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Strategy B leaves 1.5 times the error of A; C is A under another name; only the fixed joints of B look better."""
+    uses = pd.concat([uses_of("A", 50.0), uses_of("B", 75.0), uses_of("C", 50.0)])
+    both = [average("A", 4.0, 4.0), average("B", 6.0, 2.0), average("C", 4.0, 4.0)]
+    metrics, replicates = (pd.concat(parts) for parts in zip(*both, strict=True))
+    return {"arm": scores(uses, metrics, replicates, LENGTH)}
+
+
+def test_scores_are_in_the_units_of_people_with_roots_of_means_of_squares(found):
+    rms = found["arm"][REFERENCE]
+    # Root of the mean square of a normal variable: its standard deviation.
+    assert rms["A"].value == pytest.approx(50.0, rel=0.02) and rms["B"].value == pytest.approx(1.5 * rms["A"].value)
+    assert found["arm"]["pooled_p95_um"]["A"].value == pytest.approx(1.96 * 50, rel=0.03)
+    assert found["arm"]["dev_um"]["A"].value == pytest.approx(4.0)
+
+
+def test_one_estimator_under_two_names_has_one_rank_and_ratio_one(found):
+    table = ranks_table(found, "A").set_index(["metric", "strategy"])
+    assert table["rank"][REFERENCE].to_dict() == {"A": 1, "B": 3, "C": 1}
+    assert table.loc[(REFERENCE, "C"), ["ratio", "ratio_low", "ratio_high"]].tolist() == [1.0, 1.0, 1.0]
+    assert table["rank"]["k_sigma_percent_fixed_joints"].to_dict() == {"A": 2, "B": 1, "C": 2}
+
+
+def test_only_the_metric_that_puts_them_in_the_other_order_reverses(found):
+    table = pairs_table(found)
+    assert set(table.strategy) == {"A"} and set(table.other) == {"B"}
+    assert table[table.reversed].metric.tolist() == ["k_sigma_percent_fixed_joints"]
+
+
+def test_intervals_of_ratios_hold_the_ratio_of_the_population():
+    """Two independent strategies of ratio 1.5: 95 % of 100 intervals hold it; fewer than 88 % by chance in 1 of 500 tries."""
+    covered = dict.fromkeys((REFERENCE, "mean_um", "pooled_p95_um"), 0)
+    for seed in range(100):
+        one, other = uses_of("A", 75.0, 2 * seed), uses_of("B", 50.0, 2 * seed + 1)
+        metrics, replicates = (pd.concat(parts) for parts in zip(average("A", 1, 1), average("B", 1, 1), strict=True))
+        found = scores(pd.concat([one, other]), metrics, replicates, LENGTH)
+        for metric in covered:
+            _, low, high = found[metric]["A"].ratio(found[metric]["B"])
+            covered[metric] += low < 1.5 < high
+    assert min(covered.values()) >= 88, covered
+
+
+def test_pairing_takes_out_what_strategies_share():
+    shared = np.random.default_rng(3).normal(size=100)
+    one, other = Score(2.0, shared, 0.1), Score(1.0, shared, 0.1)
+    assert one.ratio(other) == (2.0, 2.0, 2.0) and one.std_error() == pytest.approx(0.2 * shared.std(ddof=1))
+
+
+def test_metrics_at_places_that_a_robot_does_not_reach_are_left_out():
+    uses = uses_of("A", 50.0).assign(iso_9283=np.nan)
+    found = scores(uses, *average("A", 4.0, 4.0), LENGTH)
+    assert "iso_9283_um" not in found and {REFERENCE, "path_rms_um"} < set(found)
+
+
+USES = {"centre_m": (1.6, 0.0, 1.0), "edge_m": 1.0, "weight_N": 1000, "path_m": 0.5, "cutting_N": 500}
+NAMES = ("6DoF", "6DoF-after-3DoF", "3-6DoF-after-2DoF")
+
+
+@pytest.fixture(scope="module")
+def tables(kuka, strategies):
+    study = StudyInMemory(kuka, "kuka", 1, USUAL, Size(data_sets=40, configurations=10, tests=30, noise=1e-5))
+    blocks = use_blocks(study, [strategies[name] for name in NAMES], USES)
+    return {block["strategy"]: pd.DataFrame(block) for block in blocks}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_errors_are_those_of_the_pipelines_estimates(kuka, strategies, tables, name):
+    experiments = experiments_of(kuka, 40, 10)
+    table = identified(kuka, strategies[name], experiments, deflections_of(kuka, experiments, 1e-5))
+    errors = position_errors(judge(kuka), compliances(table, 10))
+    found = tables[strategies[name].name]
+    np.testing.assert_allclose(found["mean"], errors.mean(axis=1), rtol=1e-6)
+    np.testing.assert_allclose(found["mean_square"], (errors**2).mean(axis=1), rtol=1e-6)
+    assert found.pooled_p95.unique() == pytest.approx([np.quantile(errors, 0.95)], rel=1e-6)
+
+
+def test_influence_values_give_the_standard_error_of_the_pooled_percentile(tables):
+    """Against the bootstrap over data sets, whose own error is 5 % with 200 replicates; the density is rough with 40 sets."""
+    influence = tables["6DoF"].pooled_p95_influence
+    assert abs(influence.mean()) < 0.2 * influence.std()
+    assert 0.01 < influence.std() / np.sqrt(40) / tables["6DoF"].pooled_p95[0] < 0.2
+
+
+def test_a_robot_that_does_not_reach_has_no_errors_there(kuka, strategies):
+    study = StudyInMemory(kuka, "kuka", 1, USUAL, Size(data_sets=3, configurations=10, tests=30, noise=1e-5))
+    (block,) = use_blocks(study, [strategies["6DoF"]], USES | {"centre_m": (9.0, 0.0, 1.0)})
+    assert np.isnan(block["iso_9283"]).all() and np.isnan(block["path_max"]).all() and (block["mean"] > 0).all()

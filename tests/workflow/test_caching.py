@@ -19,6 +19,8 @@ SCRIPTS = sorted(
     if path.read_text(encoding="utf-8").splitlines()[-1].startswith("run(")
 )
 RUN_STEP = "run_step.py"
+# Modules of the study, most of which hold a step of a rule, by the script that calls it.
+STEPS = [f"{RUN_STEP}:elastocal.study.{path.stem}" for path in sorted((REPOSITORY / "src/elastocal/study").glob("[a-z]*.py"))]
 DATA = {"draw_experiments", "simulate", "measure"}
 GRID = DATA | {"identify"}
 STAGED = "4-6DoF-after-3DoF"
@@ -45,7 +47,7 @@ def test_what_changes_no_result_reruns_nothing(finished_paper):
     for name in study.files("config.yaml", "config/robots/*.yaml", "config/strategies/*.yaml"):
         study.append(name, "# a comment\n")
     study.append("src/elastocal/study/metrics.py", "# a comment\n")
-    study.replace("src/elastocal/study/identification.py", '"""Equation 11', '"""Of equation 11')
+    study.replace("src/elastocal/study/equation_11.py", '"""Equation 11', '"""Of equation 11')
     for name in ("test", "cluster", "crate", "install"):
         study.path(f"requirements/{name}.lock").write_text("# edited\n", encoding="utf-8")
     for name in study.files("Snakefile", "config.yaml", "config/**/*.*", "workflow/**/*.*", "src/**/*.*", "README.md"):
@@ -151,12 +153,14 @@ import ast, json, os, sys
 from pathlib import Path
 root = Path(sys.argv[1])
 sys.path.insert(0, str(root / "workflow" / "scripts"))
-for script in sys.argv[2:]:
+for each in sys.argv[2:]:
+    script, _, step = each.partition(":")
     read, write = os.pipe()
     if not os.fork():
         body = ast.parse((root / "workflow" / "scripts" / script).read_text()).body
         imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))]
         exec(compile(ast.Module(imports, []), script, "exec"), {})
+        exec(f"import {step}" if step else "")
         # What is a catalogue looks up the modules beside it when it is asked.
         found = [name for name, module in sys.modules.items() if {"modules_with", "module_names"} & {*vars(module)}]
         for name in set(found) - {"elastocal.io.modules"}:
@@ -167,18 +171,21 @@ for script in sys.argv[2:]:
         os.write(write, json.dumps(own).encode())
         os._exit(0)
     os.close(write)
-    print(script, os.fdopen(read).read())
+    print(each, os.fdopen(read).read())
     assert os.wait()[1] == 0
 """
 )
 
 
 # Each twelfth has scripts of every kind: data, questions, the loop, proofs.
-@pytest.mark.parametrize("scripts", [SCRIPTS[::12], pytest.param(SCRIPTS, marks=pytest.mark.slow)], ids=["some", "all"])
+@pytest.mark.parametrize(
+    "scripts", [[*SCRIPTS[::12], *STEPS[::8]], pytest.param([*SCRIPTS, *STEPS], marks=pytest.mark.slow)], ids=["some", "all"]
+)
 def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
     command = [sys.executable, "-c", _LOADED, str(unstarted.folder), *scripts]
     environment = unstarted.command()["env"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=HUNG_S)
-    for script, loaded in (line.split(" ", 1) for line in done.stdout.splitlines()):
-        found = closure(unstarted.path("workflow/scripts") / script, unstarted.path("src"))
-        assert [file.relative_to(unstarted.folder).as_posix() for file in found] == json.loads(loaded), script
+    for each, loaded in (line.split(" ", 1) for line in done.stdout.splitlines()):
+        script, _, step = each.partition(":")
+        found = closure(unstarted.path("workflow/scripts") / script, unstarted.path("src"), *([step] if step else []))
+        assert [file.relative_to(unstarted.folder).as_posix() for file in found] == json.loads(loaded), each

@@ -91,7 +91,7 @@ def test_two_runs_of_the_same_files_are_refused_in_one_line(unstarted):
 def test_a_killed_job_leaves_no_file_under_the_final_name(finished_paper):
     """Killed after its first block, with no chance to tidy up."""
     finished_paper.append(
-        "src/elastocal/study/steps/measure.py",
+        "src/elastocal/study/simulation.py",
         "\n_blocks = measured_blocks\n\n\ndef measured_blocks(*arguments):\n    import time\n\n"
         "    for block in _blocks(*arguments):\n        yield block\n        time.sleep(600)\n",
     )

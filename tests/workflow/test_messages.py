@@ -31,10 +31,7 @@ def test_a_dry_run_is_a_summary_and_every_job_is_listed_on_request(unstarted):
 
 def test_the_log_of_a_script_that_fails_while_it_imports_says_why(finished_paper):
     finished_paper.path(IDENTIFIED).unlink()
-    script = finished_paper.path("workflow/scripts/identify.py")
-    script.write_text(
-        script.read_text(encoding="utf-8").replace("\nfrom elastocal", "\n1 / 0\nfrom elastocal", 1), encoding="utf-8"
-    )
+    finished_paper.append("src/elastocal/study/evaluation.py", "1 / 0\n")
     ended = finished_paper.snakemake("-j1", IDENTIFIED)
     last = "ZeroDivisionError: division by zero"
     assert ended.returncode != 0 and ended.stderr.splitlines()[-1] == last
@@ -43,16 +40,17 @@ def test_the_log_of_a_script_that_fails_while_it_imports_says_why(finished_paper
 
 
 def test_a_source_that_is_no_python_is_one_line(unstarted):
-    unstarted.append("workflow/scripts/identify.py", "half = (\n")
+    unstarted.append("workflow/scripts/run_step.py", "half = (\n")
     ended = unstarted.snakemake("-j1", IDENTIFIED)
     last = ended.stderr.splitlines()[-1]
-    assert ended.returncode != 0 and "workflow/scripts/identify.py: line " in last and last.endswith("; allowed: Python")
+    assert ended.returncode != 0 and "workflow/scripts/run_step.py: line " in last and last.endswith("; allowed: Python")
     assert "Traceback" not in ended.stderr
 
 
 def test_a_script_that_is_ended_before_it_begins_has_no_log_and_is_said_to_have_none(finished_paper):
-    finished_paper.path(IDENTIFIED).unlink()
-    finished_paper.replace("workflow/scripts/identify.py", "from job import Job, run\n", "import os\n\nos._exit(9)\n")
-    ended = finished_paper.snakemake("-j1", IDENTIFIED)
-    found = f"identify: found an end before its log began ({LOG}); allowed: "
+    finished_paper.replace(
+        "workflow/scripts/typeset_table.py", "from job import Job, origin_of, run\n", "import os\n\nos._exit(9)\n"
+    )
+    ended = finished_paper.snakemake("-j1", "reports/tables/table1.md")
+    found = "typeset_table: found an end before its log began (results/logs/typeset_table/table1.log); allowed: "
     assert ended.returncode != 0 and ended.stderr.splitlines()[-1].startswith(found)

@@ -73,7 +73,7 @@ def test_every_figure_and_table_has_a_record_that_names_commit_configuration_and
 
 def test_existing_rows_stay_with_more_data_sets_another_order_and_other_blocks(unstarted, paper):
     unstarted.configure({"robots": ["fanuc", "kuka"], "noise_um": [0, 200], "data_sets": TINY["data_sets"] + 3})
-    unstarted.replace("src/elastocal/study/steps/blocks.py", "SETS_PER_BLOCK = 500", "SETS_PER_BLOCK = 5")
+    unstarted.replace("src/elastocal/study/simulation.py", "SETS_PER_BLOCK = 500", "SETS_PER_BLOCK = 5")
     name = "data/simulated/kuka/200um/measured.parquet"
     unstarted.run(name)
     assert pq.ParquetFile(unstarted.path("data/simulated/kuka/experiments.parquet")).num_row_groups == 5

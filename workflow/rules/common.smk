@@ -50,6 +50,16 @@ def shown(file, caption, category, **labels):
     return report(file, caption=str(ROOT / "workflow" / "report" / f"{caption}.rst"), category=category, labels=labels)
 
 
+# Categories of the report.
+PAPER, ABOUT = "Tables and figures of the paper", "Questions beyond the paper"
+
+
+def table_of(name, category, caption=None, shows=None):
+    """A table for people, shown where it has a caption."""
+    file = f"reports/tables/{name}.csv"
+    return shown(file, caption, category, shows=shows, kind="table") if caption else file
+
+
 # What Snakemake and we have imported by now stays to the end; to look through it for garbage, again and again while the jobs are
 # laid out, took a fifth of a rerun with nothing to do.
 gc.freeze()

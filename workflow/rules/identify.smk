@@ -9,7 +9,7 @@ results/weights/{robot}.parquet, results/identified/, results/metrics/, results/
 rule judge_design:
     input:
         experiments="data/simulated/{robot}/experiments.parquet",
-        sources=sources("judge_design.py"),
+        sources=sources("elastocal.study.identify.judge_design"),
     output:
         design="results/design/{robot}/{strategy}.parquet",
     log:
@@ -17,6 +17,7 @@ rule judge_design:
     benchmark:
         "results/timings/judge_design/{robot}/{strategy}.tsv"
     params:
+        step="elastocal.study.identify.judge_design",
         chain=lambda wildcards: robot_document(wildcards)["chain"],
         lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
         strategy=strategy_document,
@@ -25,12 +26,12 @@ rule judge_design:
         tool_offset_m=INTERPRETATIONS["tool_offset_m"],
         wrench_at=INTERPRETATIONS["wrench_at"],
     script:
-        "../scripts/judge_design.py"
+        "../scripts/run_step.py"
 
 
 rule draw_weights:
     input:
-        sources=sources("draw_weights.py"),
+        sources=sources("elastocal.study.simulation.draw_weights"),
     output:
         weights="results/weights/{robot}.parquet",
     log:
@@ -38,12 +39,13 @@ rule draw_weights:
     benchmark:
         "results/timings/draw_weights/{robot}.tsv"
     params:
+        step="elastocal.study.simulation.draw_weights",
         seed=config["seed"],
         data_sets=config["data_sets"],
         tests=config["test_configurations"],
         replicates=config["evaluation"]["bootstrap_replicates"],
     script:
-        "../scripts/draw_weights.py"
+        "../scripts/run_step.py"
 
 
 rule identify:
@@ -53,7 +55,7 @@ rule identify:
         weights=rules.draw_weights.output.weights,
         test_experiments="data/simulated/{robot}/test/experiments.parquet",
         test_ideal="data/simulated/{robot}/test/ideal.parquet",
-        sources=sources("identify.py"),
+        sources=sources("elastocal.study.evaluation.identify"),
     output:
         identified="results/identified/{robot}/{noise}um/{strategy}.parquet",
         metrics="results/metrics/{robot}/{noise}um/{strategy}.parquet",
@@ -64,6 +66,7 @@ rule identify:
     benchmark:
         "results/timings/identify/{robot}/{noise}um/{strategy}.tsv"
     params:
+        step="elastocal.study.evaluation.identify",
         robot=robot_document,
         strategy=strategy_document,
         seed=config["seed"],
@@ -79,7 +82,7 @@ rule identify:
             else None
         ),
     script:
-        "../scripts/identify.py"
+        "../scripts/run_step.py"
 
 
 rule bound:
@@ -87,7 +90,7 @@ rule bound:
         experiments="data/simulated/{robot}/experiments.parquet",
         test_experiments="data/simulated/{robot}/test/experiments.parquet",
         test_ideal="data/simulated/{robot}/test/ideal.parquet",
-        sources=sources("bound.py"),
+        sources=sources("elastocal.study.evaluation.bound"),
     output:
         bounds="results/bounds/{robot}.parquet",
     log:
@@ -95,6 +98,7 @@ rule bound:
     benchmark:
         "results/timings/bound/{robot}.tsv"
     params:
+        step="elastocal.study.evaluation.bound",
         robot=robot_document,
         point_sets=list(STUDY.points.values()),
         seed=config["seed"],
@@ -102,4 +106,4 @@ rule bound:
         tool_offset_m=INTERPRETATIONS["tool_offset_m"],
         wrench_at=INTERPRETATIONS["wrench_at"],
     script:
-        "../scripts/bound.py"
+        "../scripts/run_step.py"

@@ -15,7 +15,7 @@ MEASURED = {"pose": USUAL} | {
 
 rule repeat_studies:
     input:
-        sources=sources("repeat_studies.py"),
+        sources=sources("elastocal.study.repeated.repeat_studies"),
     output:
         repeated="results/studies/{interpretation}/{robot}.parquet",
     log:
@@ -25,11 +25,12 @@ rule repeat_studies:
     wildcard_constraints:
         interpretation="|".join([USUAL, *config["switched"]]),
     params:
+        step="elastocal.study.repeated.repeat_studies",
         study=study_in_memory(),
         strategies=list(STUDY.strategies.values()),
         studies=config["evaluation"]["studies"],
     script:
-        "../scripts/repeat_studies.py"
+        "../scripts/run_step.py"
 
 
 rule expect:
@@ -42,7 +43,7 @@ rule expect:
         design="results/design/{robot}/{strategy}.parquet",
         test_experiments="data/simulated/{robot}/test/experiments.parquet",
         test_ideal="data/simulated/{robot}/test/ideal.parquet",
-        sources=sources("expect.py"),
+        sources=sources("elastocal.study.repeated.expect"),
     output:
         expected="results/expected/{robot}/{noise}um/{strategy}.parquet",
     log:
@@ -50,6 +51,7 @@ rule expect:
     benchmark:
         "results/timings/expect/{robot}/{noise}um/{strategy}.tsv"
     params:
+        step="elastocal.study.repeated.expect",
         robot=robot_document,
         strategy=strategy_document,
         seed=config["seed"],
@@ -58,7 +60,7 @@ rule expect:
         average=INTERPRETATIONS["average"],
         deviation_of=INTERPRETATIONS["deviation_of"],
     script:
-        "../scripts/expect.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_expectations:
@@ -66,74 +68,59 @@ rule tabulate_expectations:
         studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
         expected=cells("expected", REDUCED, TABLE_NOISE),
         reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("tabulate_expectations.py"),
+        sources=sources("elastocal.study.study_tables.tabulate_expectations"),
     output:
-        table=shown(
-            "reports/tables/expectations.csv",
-            "expectations",
-            "Tables and figures of the paper",
-            shows="Expectations in closed form",
-            kind="table",
-        ),
+        table=table_of("expectations", PAPER, "expectations", "Expectations in closed form"),
     log:
         "results/logs/tabulate_expectations.log",
     benchmark:
         "results/timings/tabulate_expectations.tsv"
     params:
+        step="elastocal.study.study_tables.tabulate_expectations",
         length=config["tables"]["length"],
         strategies=list(NAMES.values()),
     script:
-        "../scripts/tabulate_expectations.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_studies:
     input:
         studies=expand(rules.repeat_studies.output.repeated, interpretation=MEASURED.values(), robot=REDUCED),
         reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("tabulate_studies.py"),
+        sources=sources("elastocal.study.study_tables.tabulate_studies"),
     output:
-        table=shown(
-            "reports/tables/table4_studies.csv",
-            "table4_studies",
-            "Tables and figures of the paper",
-            shows="Table 4 over studies, by what is measured",
-            kind="table",
-        ),
+        table=table_of("table4_studies", PAPER, "table4_studies", "Table 4 over studies, by what is measured"),
         joint="reports/tables/joint_test.csv",
     log:
         "results/logs/tabulate_studies.log",
     benchmark:
         "results/timings/tabulate_studies.tsv"
     params:
+        step="elastocal.study.study_tables.tabulate_studies",
         measured={name: kind for kind, name in MEASURED.items()},
         usual=USUAL,
         slugs={name: key for key, name in NAMES.items()},
         length=config["tables"]["length"],
         limits={"k_sigma": config["tables"]["k_sigma_limit_percent"], "deviation": config["tables"]["deviation_limit_um"]},
     script:
-        "../scripts/tabulate_studies.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_interpretations:
     input:
         studies=expand(rules.repeat_studies.output.repeated, interpretation=[USUAL, *config["switched"]], robot=REDUCED),
         reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("tabulate_interpretations.py"),
+        sources=sources("elastocal.study.study_tables.tabulate_interpretations"),
     output:
-        table=shown(
-            "reports/tables/interpretations.csv",
-            "interpretations",
-            "Tables and figures of the paper",
-            shows="Other interpretations of the paper",
-            kind="table",
-        ),
+        table=table_of("interpretations", PAPER, "interpretations", "Other interpretations of the paper"),
     log:
         "results/logs/tabulate_interpretations.log",
     benchmark:
         "results/timings/tabulate_interpretations.tsv"
     params:
+        step="elastocal.study.study_tables.tabulate_interpretations",
         length=config["tables"]["length"],
         usual=USUAL,
         classical=NAMES[CLASSICAL],
     script:
-        "../scripts/tabulate_interpretations.py"
+        "../scripts/run_step.py"

@@ -47,25 +47,24 @@ rule judge_claims:
         expected=cells("expected", REDUCED, NOISE, CLASSICAL),
         comparison=rules.compare_with_studies.output.table,
         solvers=rules.tabulate_solvers.output.table,
-        starts=rules.tabulate_decisions.output.starts,
-        stiffness=rules.tabulate_decisions.output.stiffness,
+        starts=rules.tabulate_starts.output.table,
+        stiffness=rules.tabulate_stiffness.output.table,
         designs=rules.tabulate_designs.output.table,
         pairs=rules.tabulate_budget.output.pairs,
         score_pairs=rules.tabulate_uses.output.pairs,
-        sources=sources("judge_claims.py"),
+        sources=sources("elastocal.study.claims.judge_claims"),
     output:
-        table=shown(
-            "reports/tables/claims.csv", "claims", "Tables and figures of the paper", shows="Claims of the paper", kind="table"
-        ),
+        table=table_of("claims", PAPER, "claims", "Claims of the paper"),
     log:
         "results/logs/judge_claims.log",
     benchmark:
         "results/timings/judge_claims.tsv"
     params:
+        step="elastocal.study.claims.judge_claims",
         length=config["tables"]["length"],
         robots=REDUCED,
     script:
-        "../scripts/judge_claims.py"
+        "../scripts/run_step.py"
 
 
 rule state_answers:
@@ -94,9 +93,9 @@ rule state_answers:
         costs=rules.tabulate_costs.output.costs,
         break_even=rules.tabulate_costs.output.break_even,
         simulated="reports/tables/simulated_designs_few.csv",
-        few=rules.tabulate_decisions.output.few,
-        kinds=rules.tabulate_decisions.output.kinds,
-        stiffness=rules.tabulate_decisions.output.stiffness,
+        few=rules.tabulate_few.output.table,
+        kinds=rules.tabulate_kinds.output.table,
+        stiffness=rules.tabulate_stiffness.output.table,
         citation=placed(ROOT / "CITATION.cff"),
         metrics=cells("metrics", REDUCED, TABLE_NOISE),
         replicates=cells("replicates", REDUCED, TABLE_NOISE),

@@ -7,7 +7,7 @@ the configurations that judge, and {noise}um/measured.parquet.
 
 rule draw_experiments:
     input:
-        sources=sources("draw_experiments.py"),
+        sources=sources("elastocal.study.simulation.draw_experiments"),
     output:
         experiments="data/simulated/{robot}{test}/experiments.parquet",
     log:
@@ -15,6 +15,7 @@ rule draw_experiments:
     benchmark:
         "results/timings/draw_experiments/{robot}{test}.tsv"
     params:
+        step="elastocal.study.simulation.draw_experiments",
         chain=lambda wildcards: robot_document(wildcards)["chain"],
         lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
         joint_limits_deg=lambda wildcards: robot_document(wildcards)["joint_limits_deg"],
@@ -24,13 +25,13 @@ rule draw_experiments:
         data_sets=lambda wildcards: 1 if wildcards.test else config["data_sets"],
         configurations=lambda wildcards: config["test_configurations" if wildcards.test else "configurations"],
     script:
-        "../scripts/draw_experiments.py"
+        "../scripts/run_step.py"
 
 
 rule simulate:
     input:
         experiments=rules.draw_experiments.output.experiments,
-        sources=sources("simulate.py"),
+        sources=sources("elastocal.study.simulation.simulate"),
     output:
         ideal="data/simulated/{robot}{test}/ideal.parquet",
     log:
@@ -38,18 +39,19 @@ rule simulate:
     benchmark:
         "results/timings/simulate/{robot}{test}.tsv"
     params:
+        step="elastocal.study.simulation.simulate",
         robot=robot_document,
         seed=config["seed"],
         tool_offset_m=INTERPRETATIONS["tool_offset_m"],
         wrench_at=INTERPRETATIONS["wrench_at"],
     script:
-        "../scripts/simulate.py"
+        "../scripts/run_step.py"
 
 
 rule measure:
     input:
         ideal="data/simulated/{robot}/ideal.parquet",
-        sources=sources("measure.py"),
+        sources=sources("elastocal.study.simulation.measure"),
     output:
         measured="data/simulated/{robot}/{noise}um/measured.parquet",
     log:
@@ -57,6 +59,7 @@ rule measure:
     benchmark:
         "results/timings/measure/{robot}/{noise}um.tsv"
     params:
+        step="elastocal.study.simulation.measure",
         seed=config["seed"],
     script:
-        "../scripts/measure.py"
+        "../scripts/run_step.py"

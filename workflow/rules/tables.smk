@@ -7,7 +7,7 @@ Needs results/. Writes reports/tables/*.csv and, for each, the same as Markdown 
 rule summarize_initial:
     input:
         ideal="data/simulated/{robot}/ideal.parquet",
-        sources=sources("summarize_initial.py"),
+        sources=sources("elastocal.study.simulation.summarize_initial"),
     output:
         initial="results/initial/{robot}.parquet",
     log:
@@ -15,17 +15,18 @@ rule summarize_initial:
     benchmark:
         "results/timings/summarize_initial/{robot}.tsv"
     params:
+        step="elastocal.study.simulation.summarize_initial",
         seed=config["seed"],
         end_effector=lambda wildcards: STUDY.end_effectors[wildcards.robot],
     script:
-        "../scripts/summarize_initial.py"
+        "../scripts/run_step.py"
 
 
 rule compare_solvers:
     input:
         experiments="data/simulated/{robot}/experiments.parquet",
         measured=f"data/simulated/{{robot}}/{TABLE_NOISE}um/measured.parquet",
-        sources=sources("compare_solvers.py"),
+        sources=sources("elastocal.study.solvers.compare_solvers"),
     output:
         solvers="results/solvers/{robot}.parquet",
     log:
@@ -33,6 +34,7 @@ rule compare_solvers:
     benchmark:
         "results/timings/compare_solvers/{robot}.tsv"
     params:
+        step="elastocal.study.solvers.compare_solvers",
         chain=lambda wildcards: robot_document(wildcards)["chain"],
         lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
         strategies=list(STUDY.strategies.values()),
@@ -43,168 +45,141 @@ rule compare_solvers:
         length=config["tables"]["length"],
         start=1e-6 * config["identification"]["start_urad_per_Nm"],
     script:
-        "../scripts/compare_solvers.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_compliances:
     input:
-        sources=sources("tabulate_compliances.py"),
+        sources=sources("elastocal.study.tables.tabulate_compliances"),
     output:
-        table=shown(
-            "reports/tables/table1.csv",
-            "table1",
-            "Tables and figures of the paper",
-            shows="Table 1: compliances",
-            kind="table",
-        ),
+        table=table_of("table1", PAPER, "table1", "Table 1: compliances"),
     log:
         "results/logs/tabulate_compliances.log",
     benchmark:
         "results/timings/tabulate_compliances.tsv"
     params:
+        step="elastocal.study.tables.tabulate_compliances",
         robots={name: STUDY.robots[name] for name in REDUCED},
     script:
-        "../scripts/tabulate_compliances.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_initial:
     input:
         initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
-        sources=sources("tabulate_initial.py"),
+        sources=sources("elastocal.study.tables.tabulate_initial"),
     output:
-        table=shown(
-            "reports/tables/table2.csv",
-            "table2",
-            "Tables and figures of the paper",
-            shows="Table 2: deflection before calibration",
-            kind="table",
-        ),
+        table=table_of("table2", PAPER, "table2", "Table 2: deflection before calibration"),
     log:
         "results/logs/tabulate_initial.log",
     benchmark:
         "results/timings/tabulate_initial.tsv"
     params:
+        step="elastocal.study.tables.tabulate_initial",
         robots=config["robots"],
         seed=config["seed"],
         replicates=config["evaluation"]["bootstrap_replicates"],
     script:
-        "../scripts/tabulate_initial.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_identified:
     input:
         metrics=cells("metrics", REDUCED, TABLE_NOISE, CLASSICAL),
-        sources=sources("tabulate_identified.py"),
+        sources=sources("elastocal.study.tables.tabulate_identified"),
     output:
-        table=shown(
-            "reports/tables/table3.csv",
-            "table3",
-            "Tables and figures of the paper",
-            shows="Table 3: identified compliances",
-            kind="table",
-        ),
+        table=table_of("table3", PAPER, "table3", "Table 3: identified compliances"),
     log:
         "results/logs/tabulate_identified.log",
     benchmark:
         "results/timings/tabulate_identified.tsv"
     params:
+        step="elastocal.study.tables.tabulate_identified",
         robots=REDUCED,
         strategy=NAMES[CLASSICAL],
         noise_um=config["tables"]["noise_um"],
         length=config["tables"]["length"],
     script:
-        "../scripts/tabulate_identified.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_strategies:
     input:
         metrics=cells("metrics", REDUCED, TABLE_NOISE),
         replicates=cells("replicates", REDUCED, TABLE_NOISE),
-        sources=sources("tabulate_strategies.py"),
+        sources=sources("elastocal.study.tables.tabulate_strategies"),
     output:
-        table=shown(
-            "reports/tables/table4.csv", "table4", "Tables and figures of the paper", shows="Table 4: strategies", kind="table"
-        ),
+        table=table_of("table4", PAPER, "table4", "Table 4: strategies"),
     log:
         "results/logs/tabulate_strategies.log",
     benchmark:
         "results/timings/tabulate_strategies.tsv"
     params:
+        step="elastocal.study.tables.tabulate_strategies",
         robots=REDUCED,
         strategies={name: key for key, name in NAMES.items()},
         cells={key: value for key, value in config["tables"].items() if key != "classical_strategy"},
     script:
-        "../scripts/tabulate_strategies.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_extended:
     input:
         metrics=cells("metrics", EXTENDED, TABLE_NOISE),
         replicates=cells("replicates", EXTENDED, TABLE_NOISE),
-        sources=sources("tabulate_extended.py"),
+        sources=sources("elastocal.study.tables.tabulate_extended"),
     output:
-        table=shown(
-            "reports/tables/extended.csv", "extended", "Questions beyond the paper", shows="Elastic links", kind="table"
-        ),
+        table=table_of("extended", ABOUT, "extended", "Elastic links"),
     log:
         "results/logs/tabulate_extended.log",
     benchmark:
         "results/timings/tabulate_extended.tsv"
     params:
+        step="elastocal.study.tables.tabulate_extended",
         robots=EXTENDED,
         strategies=list(NAMES.values()),
         noise_um=config["tables"]["noise_um"],
         length=config["tables"]["length"],
     script:
-        "../scripts/tabulate_extended.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_accuracy:
     input:
         accuracy=cells("accuracy", config["robots"], NOISE),
         bounds=expand(rules.bound.output.bounds, robot=config["robots"]),
-        sources=sources("tabulate_accuracy.py"),
+        sources=sources("elastocal.study.tables.tabulate_accuracy"),
     output:
-        table=shown(
-            "reports/tables/per_dataset.csv",
-            "per_dataset",
-            "Questions beyond the paper",
-            shows="Accuracy of one data set",
-            kind="table",
-        ),
+        table=table_of("per_dataset", ABOUT, "per_dataset", "Accuracy of one data set"),
     log:
         "results/logs/tabulate_accuracy.log",
     benchmark:
         "results/timings/tabulate_accuracy.tsv"
     params:
+        step="elastocal.study.tables.tabulate_accuracy",
         robots=config["robots"],
         points={NAMES[name]: list(points) for name, points in STUDY.points.items()},
         slugs={name: key for key, name in NAMES.items()},
     script:
-        "../scripts/tabulate_accuracy.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_solvers:
     input:
         solvers=expand(rules.compare_solvers.output.solvers, robot=REDUCED),
-        sources=sources("tabulate_solvers.py"),
+        sources=sources("elastocal.study.solvers.tabulate_solvers"),
     output:
-        table=shown(
-            "reports/tables/solvers.csv",
-            "solvers",
-            "Questions beyond the paper",
-            shows="Strategies that are one estimator",
-            kind="table",
-        ),
+        table=table_of("solvers", ABOUT, "solvers", "Strategies that are one estimator"),
     log:
         "results/logs/tabulate_solvers.log",
     benchmark:
         "results/timings/tabulate_solvers.tsv"
     params:
+        step="elastocal.study.solvers.tabulate_solvers",
         robots=REDUCED,
         joints=[len(STUDY.robots[name]["compliance_urad_per_Nm"]) for name in REDUCED],
     script:
-        "../scripts/tabulate_solvers.py"
+        "../scripts/run_step.py"
 
 
 rule compare_with_paper:
@@ -217,24 +192,19 @@ rule compare_with_paper:
         extended=rules.tabulate_extended.output.table,
         metrics=cells("metrics", config["robots"], TABLE_NOISE),
         replicates=cells("replicates", config["robots"], TABLE_NOISE),
-        sources=sources("compare_with_paper.py"),
+        sources=sources("elastocal.study.printed.compare_with_paper"),
     output:
-        table=shown(
-            "reports/tables/beside_paper.csv",
-            "beside_paper",
-            "Tables and figures of the paper",
-            shows="Every printed figure beside ours",
-            kind="table",
-        ),
+        table=table_of("beside_paper", PAPER, "beside_paper", "Every printed figure beside ours"),
     log:
         "results/logs/compare_with_paper.log",
     benchmark:
         "results/timings/compare_with_paper.tsv"
     params:
+        step="elastocal.study.printed.compare_with_paper",
         noise_um=config["tables"]["noise_um"],
         length=config["tables"]["length"],
     script:
-        "../scripts/compare_with_paper.py"
+        "../scripts/run_step.py"
 
 
 rule compare_with_studies:
@@ -242,24 +212,19 @@ rule compare_with_studies:
         beside=rules.compare_with_paper.output.table,
         studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
         initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
-        sources=sources("compare_with_studies.py"),
+        sources=sources("elastocal.study.printed.compare_with_studies"),
     output:
-        table=shown(
-            "reports/tables/comparison.csv",
-            "comparison",
-            "Tables and figures of the paper",
-            shows="Every printed figure among further studies",
-            kind="table",
-        ),
+        table=table_of("comparison", PAPER, "comparison", "Every printed figure among further studies"),
     log:
         "results/logs/compare_with_studies.log",
     benchmark:
         "results/timings/compare_with_studies.tsv"
     params:
+        step="elastocal.study.printed.compare_with_studies",
         robots=config["robots"],
         length=config["tables"]["length"],
     script:
-        "../scripts/compare_with_studies.py"
+        "../scripts/run_step.py"
 
 
 rule typeset_table:

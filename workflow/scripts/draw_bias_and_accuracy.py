@@ -7,7 +7,7 @@ import pandas as pd
 from elastocal.figures.study import bias_and_accuracy
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
-from elastocal.study.table_schemas import metrics
+from elastocal.study.evaluation import metrics
 
 
 def draw_bias_and_accuracy(job: Job) -> None:

@@ -5,7 +5,7 @@ from job import Job, origin_of, run
 from elastocal.figures.study import noise_impact
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
-from elastocal.study.table_schemas import metrics
+from elastocal.study.evaluation import metrics
 
 
 def draw_noise_impact(job: Job) -> None:

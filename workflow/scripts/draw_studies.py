@@ -7,7 +7,7 @@ import pandas as pd
 from elastocal.figures.study import over_studies
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_studies
-from elastocal.study.table_schemas import repeated
+from elastocal.study.repeated import repeated
 
 
 def draw_studies(job: Job) -> None:

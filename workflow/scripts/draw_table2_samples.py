@@ -7,7 +7,7 @@ import pandas as pd
 from elastocal.figures.study import table2_samples
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_frame
-from elastocal.study.table_schemas import INITIAL
+from elastocal.study.simulation import INITIAL
 
 
 def draw_table2_samples(job: Job) -> None:

@@ -12,8 +12,8 @@ from elastocal.io.documents import read_document
 from elastocal.report.answers import answers
 from elastocal.report.question_answers import brief_names, stated
 from elastocal.report.study_questions import Asked, answer_questions
+from elastocal.study.evaluation import REPLICATES, metrics
 from elastocal.study.strategies import strategy_from_document
-from elastocal.study.table_schemas import REPLICATES, metrics
 
 _PLAIN = (
     *("expectations", "table2", "per_dataset", "extended", "solvers"),

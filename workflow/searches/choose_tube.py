@@ -6,8 +6,8 @@ Its answer, rounded to 0.1 mm, stands in config/robots/kuka_extended.yaml; nothi
 
 from elastocal.io.documents import read_document
 from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.study.assumptions import diameter_for_mean_deflection
 from elastocal.study.simulation import Loading, random_experiments
-from elastocal.study.tube_choice import diameter_for_mean_deflection
 
 TABLE_2_MEAN_M = 1.749e-3
 

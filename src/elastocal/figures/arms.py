@@ -64,7 +64,7 @@ def draw_arm(axis: Axes, links: np.ndarray, width: float) -> None:
 def arm_map(table: pd.DataFrame, outlines: Mapping[str, np.ndarray], titles: Mapping[str, str]) -> Figure:
     """Side views of the arms, each place coloured by the error with a target there, over that with none.
 
-    `table`: from `question_tables.places_table`. `outlines` (K, 3): corners of each robot's arm in one posture, m. `titles`:
+    `table`: from `arm_points.places_table`. `outlines` (K, 3): corners of each robot's arm in one posture, m. `titles`:
     name of each robot to draw, by its key.
     """
     figure, axes = panels(1, len(titles), 104, sharex=True, sharey=True)

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from elastocal.figures.style import MICRO, MILLI, PALETTE, label_decades, legend_below, line_style, note, panels, styled
-from elastocal.study.budget_tables import QUANTILE
+from elastocal.study.points import QUANTILE
 from elastocal.study.printed import LEVEL
-from elastocal.study.tables import find_statistics
+from elastocal.study.simulation import find_statistics
 
 # Of the linear panels of the noise impact: what a reader compares with the wanted accuracy.
 _LINEAR_UM = 20.0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.study.steps.simulated_designs import TEST_POSE
+from elastocal.study.designs import TEST_POSE
 from elastocal.study.tables import word_value
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.report.answers import ratio_words, with_error
-from elastocal.study.ranks import REFERENCE
+from elastocal.study.uses import REFERENCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.report.answers import ratio_words, with_error, worded
-from elastocal.study.question_tables import CHOSEN
+from elastocal.study.ladder import CHOSEN
 from elastocal.study.tables import word_value
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Places on an arm where a target can sit, and whether a tracker sees it there."""
+"""Where on the arm a second target pays (RQ2): each place at an equal number of measurements, and how often it is seen."""
 
 from __future__ import annotations
 
@@ -7,13 +7,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.io.storage import write_table
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import corners, poses
+from elastocal.study.in_memory import study_of
+from elastocal.study.jobs import SET, Job, frames, origin, real, rows_as_frame, table, text, whole, write_csvs
+from elastocal.study.points import ratio_of_roots
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    import pandas as pd
 
     from elastocal.mechanics.chain import Chain
+    from elastocal.study.in_memory import StudyInMemory
+    from elastocal.study.simulation import Experiments
+
+PLACES = table(
+    "places",
+    whole("joints", "joints that move the target", 1),
+    real("along", "m", "way from the base along the chain"),
+    text("side", "of the link, the flange, or a bar on the flange"),
+    SET,
+    real("bound", "m^2", "Cramér-Rao bound with the target beside the end-effector"),
+    real("bound_end_effector", "m^2", "the same of the end-effector in twice as many configurations"),
+    real("turned", "", "share of configurations in which a tracker sees a reflector turned to it"),
+    real("fixed", "", "the same of a reflector that stays as it is"),
+)
 
 FLANGE, BAR = "flange", "bar"
 _AXES = "xyz"
@@ -118,3 +139,63 @@ def _sides(axis: int) -> list[tuple[str, tuple[float, ...]]]:
 def _last_axis(chain: Chain) -> int:
     """Axis of the last fixed translation: which way the flange looks."""
     return [t.axis for t in chain.transforms if t.kind == "T" and t.coordinate is None][-1]
+
+
+def place_columns(study: StudyInMemory, tracker_m: Sequence[float], arm: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Cramér-Rao bounds of the end-effector and a second target, against the end-effector in twice as many configurations.
+
+    `study`: with as many configurations as both are measured in. `arm`: sets, radius_m, bar_m, acceptance_deg; see `places` and
+    `in_sight`.
+    """
+    chain, length, sets = study.robot.chain, study.size.configurations, np.arange(arm["sets"])
+    drawn, moment = study.experiments(sets, 2 * length), study.judge().form[:-1, :-1]
+    first = drawn.first(length)
+    once = _information(study, first, chain.end_effector)
+    angles = first.joint_angles.reshape(-1, chain.coordinates)
+    scale, columns = study.size.noise**2, []
+    alone = scale * _bounds(_information(study, drawn, chain.end_effector), moment)
+    for place in places(chain, arm["radius_m"], arm["bar_m"]):
+        seen = in_sight(chain, angles, place, tracker_m, arm["radius_m"], arm["acceptance_deg"])
+        turned, fixed = (each.reshape(len(sets), length).mean(axis=1) for each in seen)
+        both = scale * _bounds(once + _information(study, first, place.point), moment)
+        of_place = (np.full(len(sets), each) for each in (place.joints, place.along_m))
+        columns.append((*of_place, np.full(len(sets), place.side, object), sets, both, alone, turned, fixed))
+    names = [column.name for column in PLACES.columns]
+    return {name: np.concatenate(parts) for name, parts in zip(names, zip(*columns, strict=True), strict=True)}
+
+
+def _information(study: StudyInMemory, experiments: Experiments, point: MeasuringPoint) -> np.ndarray:
+    """Sum of A' A (sets, n, n) over the configurations of each data set, from what is measured of a point."""
+    rows = study.regressor(experiments, point)[:, :, : study.interpretation.rows]
+    flat = rows.reshape(len(rows), -1, rows.shape[-1])
+    return flat.swapaxes(1, 2) @ flat
+
+
+def _bounds(information: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    return (np.linalg.inv(information) * moment).sum(axis=(1, 2))
+
+
+def places_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """A second target at each place of the arm, against the end-effector in twice as many configurations.
+
+    ratio: of the bounds at as many measurements, with its 95 % interval; the shares of configurations in which a tracker sees
+    the target in percent.
+    """
+    rows = []
+    for robot, frame in found.items():
+        for (joints, along, side), cell in frame.groupby(["joints", "along", "side"], sort=False):
+            ratio = ratio_of_roots(cell.bound.to_numpy(), cell.bound_end_effector.to_numpy())
+            rows.append((robot, joints, along, side, *ratio, 100 * cell.turned.mean(), 100 * cell.fixed.mean()))
+    head = ("robot", "joints", "along_m", "side", "ratio", "ratio_low", "ratio_high")
+    return rows_as_frame(rows, (*head, "seen_turned_percent", "seen_fixed_percent"))
+
+
+def map_arm(job: Job) -> None:
+    """Places on the arm of one robot."""
+    columns = place_columns(study_of(job), job.params.tracker_m, job.params.arm_points)
+    write_table(job.output.places, PLACES, [columns], origin(job))
+
+
+def tabulate_places(job: Job) -> None:
+    """Of all robots."""
+    write_csvs(job, table=places_table(frames(job, job.input.places, PLACES)))

@@ -14,8 +14,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from elastocal.io.data_frames import read_long, read_studies
+from elastocal.study.jobs import MICRO, Job, write_csvs
 from elastocal.study.metrics import length_to_reach
-from elastocal.study.printed import LEVEL, MICRO, Predicted
+from elastocal.study.printed import LEVEL, Predicted
+from elastocal.study.repeated import expected, repeated
 
 _ALL, _FIXED, _DEV = "k_sigma", "k_sigma_fixed_joints", "deviation"
 _BEST, _COMB, _PLAIN = "4-6DoF after 6+3DoF", "3+6DoF comb", "6DoF"
@@ -32,7 +35,7 @@ HOLDS, PARTLY, FAILS = "holds", "holds in part", "does not hold"
 class Evidence:
     """What the claims are judged by.
 
-    `studies`: robot and the columns of `table_schemas.repeated`. `expected`: long, of the classical strategy at every noise.
+    `studies`: robot and the columns of `repeated.repeated`. `expected`: long, of the classical strategy at every noise.
     `tables`: comparison, solvers, starts, stiffness, designs, pairs, needed, score_pairs. `length`: data set length of the
     tables. `robots`: those of the paper, KUKA first.
     """
@@ -363,3 +366,12 @@ _CLAIMS: tuple[tuple[str, str, Callable[[Evidence], Finding]], ...] = (
     ("6.3", "Combining data sets gives more accurate results", _more_data),
     ("6.4", "Most metrics coincide", _metrics_agree),
 )
+
+
+def judge_claims(job: Job) -> None:
+    """Claims of the paper, one by one."""
+    names = ("comparison", "solvers", "starts", "stiffness", "designs", "pairs", "score_pairs")
+    tables = {name: pd.read_csv(job.input[name], dtype={"table": str}) for name in names}
+    studies, expectations = read_studies(job.input.studies, repeated), read_long(job.input.expected, expected)
+    evidence = Evidence(studies, expectations, tables, job.params.length, tuple(job.params.robots))
+    write_csvs(job, table=claims_table(evidence))

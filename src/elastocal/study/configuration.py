@@ -9,7 +9,7 @@ from typing import Any
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, document_path, named_document, parsed
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.identification import first_solvable_length
+from elastocal.study.equation_11 import first_solvable_length
 from elastocal.study.strategies import check_strategy, strategy_from_document
 
 # A measuring point in chain notation.

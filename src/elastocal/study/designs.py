@@ -1,61 +1,326 @@
-"""How much chosen configurations are worth over random ones (RQ3).
+"""Which configurations (RQ3): random against chosen ones, by their bound and simulated, and which index tells their worth.
 
 Candidates are random configurations with their loads; a design is some of them. Its worth is the Cramér-Rao bound of the RMS
-end-effector error.
+end-effector error, or the error that simulated data sets of it leave. Beside D, A and I stands the test-pose criterion: the
+accuracy at one pose under the load of its task [1], [2].
+
+Observability indices are numbers of the singular values s_1 >= ... >= s_m of the identification Jacobian of k configurations
+[3]: O1 = (s_1 ... s_m)^(1/m) / sqrt(k), O2 = s_m / s_1, O3 = s_m, O4 = s_m^2 / s_1, O5 = 1 / sum 1/s_i.
+
+[1] Klimchik, A., Wu, Y., Pashkevich, A., Caro, S. and Furet, B., Optimal selection of measurement configurations for stiffness
+    model calibration of anthropomorphic manipulators, Applied Mechanics and Materials 162, 2012.
+[2] Wu, Y., Klimchik, A., Caro, S., Furet, B. and Pashkevich, A., Geometric calibration of industrial robots using enhanced
+    partial pose measurements and design of experiments, Robotics and Computer-Integrated Manufacturing 35, 2015.
+[3] Sun, Y. and Hollerbach, J. M., Observability index selection for robot calibration, IEEE International Conference on
+    Robotics and Automation, 2008.
 """
 
-from collections.abc import Sequence
+from __future__ import annotations
+
 from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.application.planning.bound import best_value
 from elastocal.application.planning.criteria import CRITERIA, Criterion, criterion, mean_squares
 from elastocal.application.planning.exchange import choose_greedily, exchange_candidates, matrix_of
+from elastocal.io.storage import write_table
+from elastocal.random_streams import stream
+from elastocal.study.equation_11 import estimate_compliance, prefix_information
+from elastocal.study.in_memory import study_of
+from elastocal.study.jobs import (
+    MICRO,
+    ON_TESTS,
+    SET,
+    Job,
+    below,
+    frames,
+    origin,
+    real,
+    rows_as_frame,
+    table,
+    text,
+    whole,
+    write_csvs,
+)
+from elastocal.study.metrics import make_judge, mean_square_errors, squared_error_bounds
+from elastocal.study.strategies import all_at_once
+from elastocal.study.uses import iso_9283
 
-RANDOM, CONTINUOUS = "random", "bound"
-# Random designs of each size.
-_RANDOM_DESIGNS = 400
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from typing import Any
+
+    import pandas as pd
+
+    from elastocal.study.in_memory import StudyInMemory
+
+RANDOM, CONTINUOUS, TEST_POSE = "random", "bound", "test pose"
+INDICES = ("O1", "O2", "O3", "O4", "O5")
+DESIGNS = table(
+    "designs",
+    text("joint_range", "of candidates and validation configurations: full_turn or limits"),
+    text("design", "criterion by which the configurations are chosen, random, or the bound of all designs"),
+    whole("configurations", "configurations of the design", 1),
+    real("rms", "m", "Cramér-Rao bound of the RMS end-effector error"),
+    real("low", "m", "5 % of random designs"),
+    real("high", "m", "95 % of random designs"),
+)
+SIMULATED_DESIGNS = table(
+    "simulated_designs",
+    text("load", "kind of load: random directions, or one direction in every configuration"),
+    text("design", "criterion by which the configurations are chosen, or random"),
+    whole("configurations", "configurations of the design", 1),
+    text("unobservable", "joints that the loads do not move, from 1, with commas between them"),
+    real("rms", "m", "RMS end-effector error over simulated data sets on test configurations"),
+    real("std_error", "m", "Monte Carlo standard error of the same"),
+    real("there", "m", "RMS end-effector error at the test pose"),
+)
+OBSERVABILITY = table(
+    "observability",
+    SET,
+    *(real(index, "", f"observability index {index}") for index in INDICES),
+    real("bound", "m^2", "Cramér-Rao bound of the mean square end-effector error"),
+    real("mean_square", "m^2", ON_TESTS),
+)
+# Interpretation R3 both ways: a robot on the floor cannot turn its joints fully.
+_JOINT_RANGES = ("full_turn", "limits")
+# Random designs of each size: rated by their bound, and simulated; of these each has as many noisy data sets as all have
+# together over this.
+_RATED, _SIMULATED = 400, 200
+# A joint whose columns are smaller than this share of the largest is not moved by the loads.
+_MOVED = 1e-9
 
 
-@dataclass(frozen=True)
-class Worth:
-    """RMS error that designs of one kind and size leave, m.
-
-    `kind`: one of `CRITERIA`, `RANDOM` or `CONTINUOUS`. `rms`: of random designs, the root of the mean square. `low`, `high`: 5
-    and 95 % of random designs; else as `rms`.
-    """
-
-    kind: str
-    configurations: int
-    rms: float
-    low: float
-    high: float
-
-
-def rate_designs(rows: np.ndarray, accuracy_rows: np.ndarray, sizes: Sequence[int], draws: np.random.Generator) -> list[Worth]:
+def rate_designs(
+    rows: np.ndarray, accuracy_rows: np.ndarray, sizes: Sequence[int], draws: np.random.Generator
+) -> list[tuple[str, int, float, float, float]]:
     """Random, chosen and best possible designs.
 
     `rows` (N, rows, n): regressors of the candidates over the noise, in plausible sizes of the compliances. `accuracy_rows`
-    (tests, 3, n): of the end-effector position where the robot shall be accurate, m per plausible size. `sizes`: configurations
-    of a design.
+    (tests, 3, n): of the end-effector position where the robot shall be accurate, m per plausible size. Returns kind (of
+    `CRITERIA`, `RANDOM` or `CONTINUOUS`), configurations and three RMS errors (m): of random designs the root of the mean
+    square, and 5 and 95 %; else three times the same.
     """
-    weight = mean_squares(accuracy_rows)
-    exact = Criterion(weight)
-    found = []
+    exact, found = Criterion(mean_squares(accuracy_rows)), []
+
+    def error(chosen: np.ndarray | list[int]) -> float:
+        return float(np.sqrt(-exact.value(matrix_of(rows, chosen))))
+
     for size in sizes:
-        random = np.array([_error(rows, draws.choice(len(rows), size, replace=False), exact) for _ in range(_RANDOM_DESIGNS)])
+        random = np.array([error(draws.choice(len(rows), size, replace=False)) for _ in range(_RATED)])
         low, high = np.quantile(random, [0.05, 0.95])
-        found.append(Worth(RANDOM, size, float(np.sqrt((random**2).mean())), float(low), float(high)))
+        found.append((RANDOM, size, float(np.sqrt((random**2).mean())), float(low), float(high)))
         for kind in CRITERIA:
             rule = criterion(kind, accuracy_rows)
             chosen = exchange_candidates(rows, choose_greedily(rows, size, rule), rule)
-            error = _error(rows, chosen, exact)
-            found.append(Worth(kind, size, error, error, error))
-        least = float(np.sqrt(-best_value(rows, size, exact, chosen)))
-        found.append(Worth(CONTINUOUS, size, least, least, least))
+            found.append((kind, size, *3 * (error(chosen),)))
+        found.append((CONTINUOUS, size, *3 * (float(np.sqrt(-best_value(rows, size, exact, chosen))),)))
     return found
 
 
-def _error(rows: np.ndarray, chosen: np.ndarray | list[int], exact: Criterion) -> float:
-    return float(np.sqrt(-exact.value(matrix_of(rows, chosen))))
+def design_columns(study: StudyInMemory, candidates: int, sizes: Sequence[int]) -> dict[str, np.ndarray]:
+    """Random against optimal configurations, measured at the end-effector; `candidates`: random ones among which is chosen."""
+    found = []
+    for joint_range in _JOINT_RANGES:
+        within = study.under(joint_range=joint_range)
+        drawn = within.experiments([0], candidates, "candidates of designs")
+        rows = study.robot.compliance / study.size.noise * within.regressor(drawn)[0, :, : study.interpretation.rows]
+        accuracy = study.robot.compliance * within.regressor(within.tests())[0, :, :3]
+        rated = rate_designs(rows, accuracy, sizes, stream(study.seed, study.key, "random designs", 0))
+        found += [(joint_range, *one) for one in rated]
+    kinds = dict.fromkeys(("joint_range", "design"), object)
+    names = [column.name for column in DESIGNS.columns]
+    return {name: np.array(values, kinds.get(name)) for name, values in zip(names, zip(*found, strict=True), strict=True)}
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Configurations under loads of one kind, among which is chosen.
+
+    `rows` (N, rows, n): regressors, m per rad/(N m). `deflections` (N, rows): without noise. `observable` (n,): joints that the
+    loads move. `forms`: mean squared error over the test configurations, and at the test pose, as quadratic forms.
+    """
+
+    rows: np.ndarray
+    deflections: np.ndarray
+    observable: np.ndarray
+    forms: list[np.ndarray]
+
+
+def simulated_design_blocks(
+    study: StudyInMemory, count: int, sizes: Sequence[int], loads: Mapping[str, Sequence[float] | None], uses: Mapping[str, Any]
+) -> Iterator[dict[str, np.ndarray]]:
+    """Errors that designs leave in simulated data sets of their configurations, kind of load by kind.
+
+    `count`: candidates. `loads`: direction of the force by the name of its kind, base axes; None for one that is random in each
+    configuration. `uses`: of which the cube and its weight give the test pose. Where the loads do not move a joint, it is left
+    out, and the test configurations have the loads of the candidates.
+    """
+    for load, direction in loads.items():
+        candidates = _candidates(study, count, direction, uses)
+        of = candidates.observable
+        scale = study.robot.compliance[of]
+        rows = candidates.rows[..., of] * scale / study.size.noise
+        # Both forms are of the squared error in all compliances and 1.
+        weights = dict(zip(("I", TEST_POSE), candidates.forms, strict=True))
+        rules = {kind: Criterion(weights[kind][np.ix_(of, of)] * np.outer(scale, scale)) for kind in weights}
+        rules |= {kind: criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"}
+        found: list[tuple[str, int, Sequence[np.ndarray] | np.ndarray | list[int]]] = []
+        for kind, rule in rules.items():
+            # A greedy choice of fewer is the beginning of that of more.
+            longest = choose_greedily(rows, max(sizes), rule)
+            found += [(kind, size, exchange_candidates(rows, longest[:size], rule)) for size in sizes]
+        draws = stream(study.seed, study.key, f"random designs/{load}", 0)
+        found += [(RANDOM, size, [draws.choice(count, size, False) for _ in range(_SIMULATED)]) for size in sizes]
+        errors = np.array([_simulate(study, candidates, np.atleast_2d(chosen)) for _, _, chosen in found])
+        hidden = ", ".join(str(joint + 1) for joint in np.flatnonzero(~of))
+        yield {
+            "load": np.full(len(found), load, object),
+            "design": np.array([kind for kind, _, _ in found], object),
+            "configurations": np.array([size for _, size, _ in found]),
+            "unobservable": np.full(len(found), hidden, object),
+            **dict(zip(("rms", "std_error", "there"), errors.T, strict=True)),
+        }
+
+
+def _candidates(study: StudyInMemory, count: int, direction: Sequence[float] | None, uses: Mapping[str, Any]) -> Candidates:
+    robot, read = study.robot, study.interpretation
+    within = study if direction is None else study.under(direction=tuple(direction))
+    drawn = within.experiments([0], count, "candidates of designs")
+    rows = within.regressor(drawn)[0, :, : read.rows]
+    size = np.abs(rows).max(axis=(0, 1))
+    observable = size > _MOVED * size.max()
+    tests = study.tests() if observable.all() else within.tests()
+    pose = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
+    # The first of the five poses is the centre of the cube; a robot that does not reach it has its first test configuration.
+    centre = (pose or tests).first(1)
+    forms = [make_judge(robot, each, within.deflections(each), read.wrench_at).form for each in (tests, centre)]
+    return Candidates(rows, within.deflections(drawn)[0, :, : read.rows], observable, forms)
+
+
+def _simulate(study: StudyInMemory, candidates: Candidates, designs: np.ndarray) -> tuple[float, float, float]:
+    """RMS error with its standard error, and RMS error at the test pose, of noisy data sets by designs (D, size)."""
+    repeats = -(-study.size.data_sets // len(designs))
+    draws = stream(study.seed, study.key, f"noise of designs/{designs.shape[1]}", 0)
+    of = candidates.observable
+    rows = candidates.rows[designs][..., of].reshape(len(designs), -1, of.sum())
+    ideal = candidates.deflections[designs].reshape(len(designs), -1, 1)
+    measured = ideal + study.size.noise * draws.standard_normal((*ideal.shape[:2], repeats))
+    across = rows.swapaxes(1, 2)
+    error = np.zeros((len(of), len(designs) * repeats))
+    estimates = np.linalg.solve(across @ rows, across @ measured)
+    error[of] = np.moveaxis(estimates, 1, 0).reshape(of.sum(), -1) - study.robot.compliance[of][:, None]
+    squares, there = (mean_square_errors(form, error) for form in candidates.forms)
+    rms = np.sqrt(squares.mean())
+    # Data sets of one design go together.
+    each = squares.reshape(len(designs), repeats)
+    groups = each.mean(axis=1) if len(designs) > 1 else each[0]
+    return float(rms), float(groups.std(ddof=1) / np.sqrt(len(groups)) / (2 * rms)), float(np.sqrt(there.mean()))
+
+
+def observability(information: np.ndarray, configurations: int) -> dict[str, np.ndarray]:
+    """Observability indices (...) of identification Jacobians, by their products J'J (..., m, m) in any units."""
+    values = np.sqrt(np.clip(np.linalg.eigvalsh(information), np.finfo(float).tiny, None))
+    smallest, largest = values[..., 0], values[..., -1]
+    every = (
+        np.exp(np.log(values).mean(axis=-1)) / np.sqrt(configurations),
+        smallest / largest,
+        smallest,
+        smallest**2 / largest,
+        1.0 / (1.0 / values).sum(axis=-1),
+    )
+    return dict(zip(INDICES, every, strict=True))
+
+
+def observability_columns(study: StudyInMemory) -> dict[str, np.ndarray]:
+    """Observability indices of each data set beside its bound and its error, by measurements of the end-effector.
+
+    Compliances are in units of their true values, so that an index does not depend on the units of measurement.
+    """
+    robot, sets, judge = study.robot, np.arange(study.size.data_sets), study.judge()
+    point, n = robot.chain.end_effector.name, robot.joints
+    measurements = study.measure(sets, (point,))
+    compliance = estimate_compliance(all_at_once((point,), n), measurements, n)[0][-1]
+    information = prefix_information(measurements[point].regressor)[-1:]
+    scaled = information[0] * np.outer(robot.compliance, robot.compliance)
+    return {
+        "data_set": sets,
+        **observability(scaled, study.size.configurations),
+        "bound": study.size.noise**2 * squared_error_bounds(information, judge.form[:-1, :-1])[0],
+        "mean_square": judge.mean_square(compliance),
+    }
+
+
+def designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Random against optimal configurations; low_um and high_um: 5 and 95 % of random designs."""
+    frame = below(found)
+    errors = (MICRO * frame[["rms", "low", "high"]]).add_suffix("_um")
+    return frame[["robot", "joint_range", "design", "configurations"]].join(errors)
+
+
+def simulated_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Simulated errors of random and chosen configurations by the kind of load.
+
+    gain: the error of random designs of the size over that of the design.
+    """
+    frame = below(found)
+    names = {"rms": "rms_um", "std_error": "rms_um_std_error", "there": "at_test_pose_um"}
+    errors = MICRO * frame[[*names]].rename(columns=names)
+    part = frame[["robot", "load", "design", "configurations", "unobservable"]].join(errors)
+    size = ["robot", "load", "configurations"]
+    random = part[part.design == RANDOM].set_index(size).rms_um.rename("random")
+    return part.assign(gain=part.join(random, on=size).random / part.rms_um)
+
+
+def observability_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """How well an index of random configurations, or their bound, tells their worth, by rank correlation.
+
+    -1 where a larger index always means a smaller error; standard errors by a normal approximation.
+    """
+    from scipy.stats import spearmanr
+
+    rows = []
+    for (robot, frame), index in product(found.items(), (*INDICES, "bound")):
+        row: dict[str, Any] = {"robot": robot, "index": index}
+        for name, against in (("bound", "bound"), ("error", "mean_square")):
+            rank = float(spearmanr(frame[index], frame[against]).statistic)
+            row[f"rank_correlation_with_{name}"] = rank
+            row[f"rank_correlation_with_{name}_std_error"] = (1 - rank**2) / np.sqrt(len(frame) - 1)
+        rows.append(row)
+    return rows_as_frame(rows)
+
+
+def choose_designs(job: Job) -> None:
+    """Designs of one robot by their bound."""
+    columns = design_columns(study_of(job), job.params.candidates, job.params.sizes)
+    write_table(job.output.designs, DESIGNS, [columns], origin(job))
+
+
+def simulate_designs(job: Job) -> None:
+    """Designs of one robot, simulated."""
+    asked = job.params
+    blocks = simulated_design_blocks(study_of(job), asked.candidates, asked.sizes, asked.loads, asked.uses)
+    write_table(job.output.designs, SIMULATED_DESIGNS, blocks, origin(job))
+
+
+def index_observability(job: Job) -> None:
+    """Observability of one robot's data sets."""
+    write_table(job.output.observability, OBSERVABILITY, [observability_columns(study_of(job))], origin(job))
+
+
+def tabulate_designs(job: Job) -> None:
+    """Of all robots."""
+    write_csvs(job, table=designs_table(frames(job, job.input.designs, DESIGNS)))
+
+
+def tabulate_simulated_designs(job: Job) -> None:
+    """Of all robots."""
+    write_csvs(job, table=simulated_designs_table(frames(job, job.input.designs, SIMULATED_DESIGNS)))
+
+
+def tabulate_observability(job: Job) -> None:
+    """Of all robots."""
+    write_csvs(job, table=observability_table(frames(job, job.input.observabilities, OBSERVABILITY)))

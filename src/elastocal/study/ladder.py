@@ -17,14 +17,48 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.io.storage import Column, write_table
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.links import beam_axes, extended_chain
+from elastocal.study.in_memory import study_of
+from elastocal.study.jobs import (
+    LENGTH,
+    MICRO,
+    ON_TESTS,
+    SET,
+    Job,
+    frames,
+    origin,
+    real,
+    rows_as_frame,
+    table,
+    whole,
+    write_csvs,
+)
+from elastocal.study.points import root_mean
 
 if TYPE_CHECKING:
-    from elastocal.mechanics.robot import Robot
-    from elastocal.study.experiments import Experiments
+    from collections.abc import Iterator, Mapping, Sequence
 
+    import pandas as pd
+
+    from elastocal.mechanics.robot import Robot
+    from elastocal.study.in_memory import StudyInMemory
+    from elastocal.study.simulation import Experiments
+
+LADDER = table(
+    "ladder",
+    real("noise", "m, rad", "standard deviation of the measurements"),
+    LENGTH,
+    SET,
+    whole("link_springs", "number of link springs in the model", 0),
+    whole("added_link", "link whose spring came last, from 1; 0 where there is none", 0),
+    Column("chosen", "bool", "", "whether cross-validation stops here"),
+    real("mean_square", "m^2", ON_TESTS),
+)
+CHOSEN = "by cross-validation"
+FOLDS = 5
 # Elements of the compliance of a beam along x: (row, column) of those that are not zero, each with its mirror image.
 _ELEMENTS = ((0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (1, 5), (2, 4))
 # Share of a column's squares that keeps normal equations well posed where springs do the same, as the torsion of the first link
@@ -110,9 +144,8 @@ def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
     order = np.zeros((sets, 0), int)
     scores, fits = [_cross_validate(parts, whole, columns)], [_fit(whole, columns)]
     for _ in range(links):
-        tried = [
-            np.concatenate([columns, _of_link(left[:, place], joints, elements)], axis=1) for place in range(left.shape[1])
-        ]
+        added = [joints + elements * left[:, [place]] + np.arange(elements) for place in range(left.shape[1])]
+        tried = [np.concatenate([columns, of_link], axis=1) for of_link in added]
         found = np.stack([_cross_validate(parts, whole, some) for some in tried], axis=1)
         best = np.argmin(found, axis=1)
         order = np.concatenate([order, left[each, best][:, None]], axis=1)
@@ -121,10 +154,6 @@ def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
         scores.append(found[each, best])
         fits.append(_fit(whole, columns))
     return Ladder(order, np.stack(scores, axis=1), np.stack(fits, axis=1))
-
-
-def _of_link(link: np.ndarray, joints: int, elements: int) -> np.ndarray:
-    return joints + elements * link[:, None] + np.arange(elements)
 
 
 def _cross_validate(parts: list[Products], whole: Products, columns: np.ndarray) -> np.ndarray:
@@ -145,3 +174,62 @@ def _fit(products: Products, columns: np.ndarray) -> np.ndarray:
     found = np.zeros_like(products.along)
     found[each, columns] = np.linalg.solve(scaled, (products.along[each, columns] / scale)[..., None])[..., 0] / scale
     return found
+
+
+def ladder_blocks(study: StudyInMemory, lengths: Sequence[int], noises: Sequence[float]) -> Iterator[dict[str, np.ndarray]]:
+    """Models with more and more link springs, in each data set of the study of the tables.
+
+    `study`: of a robot with links; the noise of its size is not looked at. `lengths`: configurations from which to identify.
+    `noises`: standard deviations, the same number in m and rad.
+    """
+    robot, tests = study.robot, study.tests()
+    judged = products_of(spring_columns(robot, tests)[:, :, :3], study.deflections(tests)[..., :3])
+    longest, count = max(lengths), len(robot.links)
+    for sets in study.blocks():
+        drawn = study.experiments(sets, longest)
+        columns, ideal, normal = spring_columns(robot, drawn), study.deflections(drawn), study.noise(sets, None, longest)
+        for noise, length in ((noise, length) for noise in noises for length in lengths):
+            deflection = ideal + noise * normal
+            folds = [products_of(columns[:, fold:length:FOLDS], deflection[:, fold:length:FOLDS]) for fold in range(FOLDS)]
+            found = ladder(folds, robot.joints, count)
+            errors = np.stack([judged.squared_error(some) for some in found.coefficients.swapaxes(0, 1)], axis=1)
+            yield {
+                "noise": np.full(errors.size, noise),
+                "length": np.full(errors.size, length),
+                "data_set": np.repeat(sets, count + 1),
+                "link_springs": np.tile(np.arange(count + 1), len(sets)),
+                "added_link": np.pad(found.order + 1, ((0, 0), (1, 0))).ravel(),
+                "chosen": (np.arange(count + 1) == found.chosen[:, None]).ravel(),
+                "mean_square": errors.ravel() / study.size.tests,
+            }
+
+
+def ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Error of one data set on configurations that it has not seen, by number of link springs, or `CHOSEN`.
+
+    `found`: the ladder table of each robot with links. chosen_percent: share of data sets in which cross-validation stops
+    there; usual_link: the link added most often at this step, from 1.
+    """
+    rows = []
+    for robot, frame in found.items():
+        for (noise, length), cell in frame.groupby(["noise", "length"]):
+            steps = [(str(number), some) for number, some in cell.groupby("link_springs")]
+            for name, some in [*steps, (CHOSEN, cell[cell.chosen])]:
+                rms, error = root_mean(some.mean_square.to_numpy())
+                chosen = 100 * some.chosen.mean() if name != CHOSEN else np.nan
+                usual = int(some.added_link.mode().iloc[0]) if name not in ("0", CHOSEN) else np.nan
+                noise_um = round(MICRO * float(str(noise)), 6)
+                rows.append((robot, noise_um, length, name, MICRO * rms, MICRO * error, chosen, usual))
+    head = ("robot", "noise_um", "length", "link_springs")
+    return rows_as_frame(rows, (*head, "rms_um", "rms_um_std_error", "chosen_percent", "usual_link"))
+
+
+def climb_ladder(job: Job) -> None:
+    """Link springs on one robot."""
+    blocks = ladder_blocks(study_of(job), job.params.lengths, job.params.noises)
+    write_table(job.output.ladder, LADDER, blocks, origin(job))
+
+
+def tabulate_ladder(job: Job) -> None:
+    """Of all robots with links."""
+    write_csvs(job, table=ladder_table(frames(job, job.input.ladders, LADDER)))

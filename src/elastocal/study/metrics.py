@@ -1,20 +1,22 @@
-"""Equations 12-15: how good an identified model is, in its stiffnesses and at the end-effector."""
+"""Equations 12-15: how good an identified model is, in its stiffnesses and at the end-effector; and the best it could be."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, loaded_point, regressor
 from elastocal.mechanics.kinematics import jacobians
+from elastocal.study.equation_11 import LARGEST_CONDITION
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.mechanics.robot import Robot
-    from elastocal.study.experiments import Experiments
+    from elastocal.study.simulation import Experiments
 
 # So many models at a time keep their errors at 500 test configurations in a second-level cache.
 MODELS_AT_A_TIME = 400
@@ -34,6 +36,30 @@ class Judge:
     quadratic_forms: np.ndarray
     initial_errors: np.ndarray
     mean_rows: np.ndarray
+
+    @cached_property
+    def forms(self) -> np.ndarray:
+        """Matrices (tests, n + 1, n + 1) of the quadratic forms."""
+        size = len(self.reference) + 1
+        first, second = np.triu_indices(size)
+        forms = np.zeros((len(self.quadratic_forms), size, size))
+        forms[:, first, second] = self.quadratic_forms / 2
+        return forms + forms.swapaxes(1, 2)
+
+    @cached_property
+    def form(self) -> np.ndarray:
+        """Their mean over the test configurations; but for the last row and column that of A^T A, m^2 per (rad/(N m))^2."""
+        return self.forms.mean(axis=0)
+
+    def mean_square(self, compliance: np.ndarray) -> np.ndarray:
+        """Mean squared position error (..., models) over the test configurations, m^2, of compliances (..., n, models)."""
+        return mean_square_errors(self.form, compliance - self.reference[:, None])
+
+
+def mean_square_errors(form: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """A quadratic form in (error, 1) of errors (..., n, models) of compliances."""
+    whole = np.concatenate([error, np.ones_like(error[..., :1, :])], axis=-2)
+    return (whole * (form @ whole)).sum(axis=-2)
 
 
 def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarray, wrench_at: str = "end_effector") -> Judge:
@@ -60,63 +86,22 @@ def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarr
 
 
 def signed_deviation(judge: Judge, compliance: np.ndarray) -> np.ndarray:
-    """Equation 15 without a norm: the position error with its sign, mean over test configurations and coordinates.
+    """Equation 15 without a norm: the position error with its sign, m, mean over test configurations and coordinates.
 
-    `compliance` (models, n): rad/(N m). Returns (models,): m.
+    `compliance` (models, n): rad/(N m). Returns (models,).
     """
     error = np.column_stack([compliance - judge.reference, np.ones(len(compliance))])
     return error @ judge.mean_rows.mean(axis=0)
 
 
-def error_moment(judge: Judge) -> np.ndarray:
-    """Mean over the test configurations of A^T A: the quadratic form of the mean squared position error.
-
-    Returns (n, n): m^2 per (rad/(N m))^2.
-    """
-    return mean_form(judge)[:-1, :-1]
-
-
-def mean_form(judge: Judge) -> np.ndarray:
-    """Quadratic form (n + 1, n + 1) in (c - reference, 1) of the squared position error, mean over the test configurations."""
-    return error_forms(judge).mean(axis=0)
-
-
-def mean_square_errors(form: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Mean squared position error of models over the test configurations.
-
-    `form` (n + 1, n + 1): from `mean_form`. `error` (..., n, models): compliances less the reference, rad/(N m). Returns (...,
-    models): m^2.
-    """
-    whole = np.concatenate([error, np.ones_like(error[..., :1, :])], axis=-2)
-    return (whole * (form @ whole)).sum(axis=-2)
-
-
-def error_forms(judge: Judge) -> np.ndarray:
-    """Matrices of the quadratic forms of the squared position error in (c - reference, 1).
-
-    Returns (tests, n + 1, n + 1).
-    """
-    size = len(judge.reference) + 1
-    first, second = np.triu_indices(size)
-    forms = np.zeros((len(judge.quadratic_forms), size, size))
-    forms[:, first, second] = judge.quadratic_forms / 2
-    return forms + forms.swapaxes(1, 2)
-
-
 def split_models(groups: int, models: int) -> list[slice]:
-    """Slices of groups of models, small enough for the errors of one to stay in the cache.
-
-    `models`: in each group.
-    """
+    """Slices of groups of so many models each, small enough for the errors of one to stay in the cache."""
     size = max(1, MODELS_AT_A_TIME // models)
     return [slice(start, start + size) for start in range(0, groups, size)]
 
 
 def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
-    """End-effector position error of models at every test configuration.
-
-    `compliance` (models, n): rad/(N m). Returns (models, tests): m.
-    """
+    """End-effector position error (models, tests), m, of models (models, n) at every test configuration."""
     error = np.column_stack([compliance - judge.reference, np.ones(len(compliance))])
     first, second = np.triu_indices(error.shape[1])
     squares = (error[:, first] * error[:, second]) @ judge.quadratic_forms.T
@@ -140,18 +125,12 @@ def mean_deviation(judge: Judge, compliance: np.ndarray, test_weights: np.ndarra
 
 
 def relative_stiffness_error(compliance: np.ndarray, true_compliance: np.ndarray) -> np.ndarray:
-    """Equation 13, (k - k0) / k0 in percent, with k = 1 / c.
-
-    `compliance` (..., n): inverse of the averaged stiffness. `true_compliance` (n,). Returns (..., n).
-    """
+    """Equation 13, (k - k0) / k0 in percent, with k = 1 / c; of compliances (..., n)."""
     return 100.0 * (true_compliance / compliance - 1.0)
 
 
 def k_sigma(compliance: np.ndarray, true_compliance: np.ndarray, joints: Sequence[int] | slice = slice(None)) -> np.ndarray:
-    """Equation 14: sum of the relative stiffness errors over joints, in percent.
-
-    `compliance`, `true_compliance`: as in `relative_stiffness_error`. `joints`: only these (interpretation R10). Returns (...).
-    """
+    """Equation 14: sum of the relative stiffness errors in percent over joints, or some of them (interpretation R10)."""
     return relative_stiffness_error(compliance, true_compliance)[..., joints].sum(axis=-1)
 
 
@@ -168,8 +147,41 @@ def first_length_below(values: np.ndarray, limit: float) -> np.ndarray:
 def length_to_reach(values: np.ndarray, limit: float) -> np.ndarray:
     """Data set length at which a metric comes down to `limit`, past the longest one if need be.
 
-    `values` (..., lengths): for the lengths 1, 2, 3 ... Returns (...): as `first_length_below`; where that is infinite, the
-    metric is continued as a bias of second order, which falls as 1 / length.
+    As `first_length_below`; where that is infinite, the metric is continued as a bias of second order, which falls as 1 /
+    length.
     """
     first, longest = first_length_below(values, limit), values.shape[-1]
     return np.where(np.isfinite(first), first, longest * np.maximum(np.abs(values[..., -1]) / limit, 1.0))
+
+
+def squared_error_bounds(information: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """Cramér-Rao bound of the mean squared end-effector position error, for normal measurements of unit variance [1], [2].
+
+    The least that any unbiased estimator can have; as a criterion for designs it is V-optimality [3].
+
+    `information` (configurations, sets, n, n): sum of A^T A over the measurements of the first k configurations, for every k
+    (`equation_11.prefix_information`). `moment` (n, n): mean over test configurations of A^T A of the end-effector position
+    (of `Judge.form`). Returns (configurations, sets): trace(M N^-1), m^2 per m^2 of measurement variance; infinite where N is
+    singular.
+
+    The sweep operator [4] solves N X = M for all prefixes at once; inverses by LAPACK, one small matrix after the other, take
+    twice as long. N is singular where of a diagonal element less than the precision is left as its pivot.
+
+    [1] Rao, C. R., Information and the accuracy attainable in the estimation of statistical parameters, Bulletin of the
+        Calcutta Mathematical Society 37, 1945.
+    [2] Cramér, H., Mathematical Methods of Statistics, Princeton University Press, 1946.
+    [3] Atkinson, A. C., Donev, A. N. and Tobias, R. D., Optimum Experimental Designs, with SAS, Oxford University Press, 2007.
+    [4] Goodnight, J. H., A tutorial on the SWEEP operator, The American Statistician 33, 1979.
+    """
+    size = len(moment)
+    system = np.empty((size, 2 * size, *information.shape[:2]))
+    system[:, :size] = np.moveaxis(information, (2, 3), (0, 1))
+    system[:, size:] = moment[..., None, None]
+    least = np.einsum("ii...->i...", system[:, :size]) / LARGEST_CONDITION**2
+    for pivot in range(size):
+        head = system[pivot, pivot]
+        row = system[pivot, pivot + 1 :] / np.where(head > least[pivot], head, np.nan)
+        system[:, pivot + 1 :] -= system[:, pivot, None] * row
+        system[pivot, pivot + 1 :] = row
+    trace = np.einsum("ii...->...", system[:, size:])
+    return np.where(np.isnan(trace), np.inf, trace)

@@ -60,26 +60,19 @@ def all_at_once(points: Sequence[str], joints: int) -> Strategy:
 
 
 def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
-    """Make a strategy from the contents of its file, already validated against the strategy schema.
+    """A strategy from its file, checked by ``schemas/strategy.yaml``, where joints count from 1."""
 
-    `document`: keys as in ``schemas/strategy.yaml``; joints count from 1.
-    """
-    stages = [
-        Stage(
-            tuple(stage["points"]),
-            tuple(joint - 1 for joint in stage["joints"]),
-            tuple(joint - 1 for joint in stage.get("held", ())),
-        )
-        for stage in document["stages"]
-    ]
+    def joints(stage: Mapping[str, Any], key: str) -> tuple[int, ...]:
+        return tuple(joint - 1 for joint in stage.get(key, ()))
+
+    stages = [Stage(tuple(each["points"]), joints(each, "joints"), joints(each, "held")) for each in document["stages"]]
     return Strategy(document["name"], tuple(stages), document.get("prior_std"))
 
 
 def drop_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:
     """What of a strategy the solution of equation 11 depends on: a stage that identifies every joint forgets those before it.
 
-    `joints`: number of joints, n. Returns its points are those of the stages that are left. An iterative solver needs all
-    stages, to start from.
+    An iterative solver needs all stages, to start from.
     """
     first = max([0, *(index for index, stage in enumerate(strategy.stages) if len(stage.identified) == joints)])
     return replace(strategy, stages=strategy.stages[first:])

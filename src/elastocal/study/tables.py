@@ -1,6 +1,6 @@
-"""The paper's tables and those beside them, as data frames, from the metrics of all strategies.
+"""The paper's tables and those beside them, as data frames, from the metrics of all strategies; and how people read them.
 
-Long frames come in with the columns robot, noise_um and strategy in front of those of `table_schemas`. Every quantity that was
+Long frames come in with the columns robot, noise_um and strategy in front of those of the files. Every quantity that was
 measured by simulation has a column of its Monte Carlo standard error, ``<quantity>_std_error``.
 """
 
@@ -13,33 +13,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from elastocal.study.evaluation import find_length
+from elastocal.io.data_frames import read_long
+from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.study.evaluation import BOUNDS, REPLICATES, accuracy, find_length, metrics
+from elastocal.study.jobs import MICRO, MILLI, Job, frames, write_csvs
+from elastocal.study.simulation import INITIAL, bootstrap_weights, find_statistics
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from elastocal.mechanics.robot import Robot
 
-MICRO, MILLI = 1e6, 1e3
-
 
 def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
-    """Joint compliances that the study takes as true.
-
-    Returns robot, c1.. in µrad/(N m).
-    """
-    rows = []
-    for name, robot in robots.items():
-        rows.append({"robot": name} | {f"c{j}": value for j, value in enumerate((MICRO * robot.compliance).tolist(), 1)})
-    return pd.DataFrame(rows)
+    """Joint compliances that the study takes as true, µrad/(N m)."""
+    found = {name: dict(enumerate((MICRO * robot.compliance).tolist(), 1)) for name, robot in robots.items()}
+    return pd.DataFrame([{"robot": name} | {f"c{j}": value for j, value in row.items()} for name, row in found.items()])
 
 
 def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray]) -> pd.DataFrame:
     """End-effector deviation before calibration, over all configurations of all data sets.
 
     `initial`: the initial table of each robot. `weights` (1 + replicates, sets): bootstrap weights of each robot's data sets.
-    Returns robot, mean_mm, std_mm with standard errors, max_mm without one, as the bootstrap has none for a maximum; and the
-    spread of the same figures between single data sets, ``mean_mm_one_set`` (average) and ``mean_mm_one_set_std``.
+    The bootstrap has no standard error for a maximum. Beside them the average of the same figures of single data sets and its
+    spread, ``mean_mm_one_set`` and ``mean_mm_one_set_std``.
     """
     rows = []
     for robot, frame in initial.items():
@@ -47,25 +44,17 @@ def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray
         mean = weights[robot] @ (frame.configurations * frame["mean"]) / count
         std = np.sqrt(weights[robot] @ (frame.configurations * frame.mean_square) / count - mean**2)
         row: dict[str, str | float] = {"robot": robot}
-        for name, values in (("mean_mm", mean), ("std_mm", std)):
-            row |= _value_and_error(name, MILLI * values)
+        for name, values in (("mean_mm", MILLI * mean), ("std_mm", MILLI * std)):
+            row |= {name: float(values[0]), f"{name}_std_error": float(np.std(values[1:], ddof=1))}
         row["max_mm"] = MILLI * frame.maximum.max()
-        for name, values in find_statistics(frame).items():
-            row |= {f"{name}_mm_one_set": MILLI * values.mean(), f"{name}_mm_one_set_std": MILLI * values.std(ddof=1)}
+        for name, each in find_statistics(frame).items():
+            row |= {f"{name}_mm_one_set": MILLI * each.mean(), f"{name}_mm_one_set_std": MILLI * each.std(ddof=1)}
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def find_statistics(frame: pd.DataFrame) -> dict[str, pd.Series]:
-    """Mean, standard deviation and largest of the deflections of each data set, m, of the initial table or that of tubes."""
-    return {"mean": frame["mean"], "std": (frame.mean_square - frame["mean"] ** 2) ** 0.5, "max": frame.maximum}
-
-
 def table3(metrics: pd.DataFrame, robots: Iterable[str], strategy: str, noise_um: float, length: int) -> pd.DataFrame:
-    """Compliances from the averaged stiffness (equation 12) by one strategy.
-
-    `metrics`: long. Returns robot, c1.. in µrad/(N m), with standard errors.
-    """
+    """Compliances from the averaged stiffness (equation 12) by one strategy, µrad/(N m)."""
     rows = []
     for robot in robots:
         cell = _row_of(_by_length(metrics, robot, noise_um, strategy), length)
@@ -87,20 +76,18 @@ def table4(
     k_sigma_limit_percent: float,
     deviation_limit_um: float,
 ) -> pd.DataFrame:
-    """Comparison of the strategies at one noise level.
+    """Comparison of the strategies at one noise level: scores at a length, and lengths at which scores reach a limit.
 
-    `metrics`, `replicates`: long. `length`: data set length of the first and third figure. `k_sigma_limit_percent`,
-    `deviation_limit_um`: limits whose data set lengths are the second and fourth figure. Returns a length that no data set
-    reaches is infinite.
+    A length that no data set reaches is infinite.
     """
     limit = f"{k_sigma_limit_percent:g}_percent"
-    rows = []
     # Column of the metrics, its factor, and the limit and names of its score and of the length at which that reaches the limit.
     figures = [
         (f"k_sigma{end}", 1.0, k_sigma_limit_percent, f"k_sigma_{length}_percent{end}", f"n_k_sigma_{limit}{end}")
         for end in ("", "_fixed_joints")
     ]
     figures.append(("deviation", MICRO, deviation_limit_um, f"dev_{length}_um", f"n_dev_{deviation_limit_um:g}_um"))
+    rows = []
     for strategy, robot in product(strategies, robots):
         cell = _by_length(metrics, robot, noise_um, strategy)
         drawn = _cell(replicates, robot, noise_um, strategy)
@@ -108,7 +95,8 @@ def table4(
         row: dict[str, str | float] = {"strategy": strategy, "robot": robot}
         for name, factor, least, score, reached in figures:
             row |= {score: factor * at[name], f"{score}_std_error": factor * at[f"{name}_std_error"]}
-            found = find_length(cell[name].to_numpy(), _curves(drawn, name), least / factor)
+            curves = drawn.pivot(index="replicate", columns="length", values=name).to_numpy()
+            found = find_length(cell[name].to_numpy(), curves, least / factor)
             row |= dict(zip((reached, f"{reached}_std_error"), found, strict=True))
         rows.append(row)
     return pd.DataFrame(rows)
@@ -122,11 +110,7 @@ def extended_table(
     noise_um: float,
     length: int,
 ) -> pd.DataFrame:
-    """What the reduced model leaves of the deviation of robots with elastic links.
-
-    `metrics`, `replicates`: long. Returns strategy, initial_mean_mm, residual_mean_um, share_compensated_percent with standard
-    errors; robot where several.
-    """
+    """What the reduced model leaves of the deviation of robots with elastic links."""
     rows = []
     for robot, strategy in product(robots, strategies):
         at = _row_of(_by_length(metrics, robot, noise_um, strategy), length)
@@ -142,10 +126,7 @@ def extended_table(
 def share_compensated(
     metrics: pd.DataFrame, replicates: pd.DataFrame, robot: str, strategy: str, noise_um: float, length: int
 ) -> tuple[float, float]:
-    """Share of the initial deviation that calibration removes, in percent, with its standard error; NaN where not studied.
-
-    `metrics`, `replicates`: long.
-    """
+    """Share of the initial deviation that calibration removes, in percent, with its standard error; NaN where not studied."""
     cell = _by_length(metrics, robot, noise_um, strategy)
     if cell.empty:
         return np.nan, np.nan
@@ -157,10 +138,7 @@ def share_compensated(
 def deviation_ratio(
     metrics: pd.DataFrame, replicates: pd.DataFrame, robot: str, strategy: str, over: str, noise_um: float, length: int
 ) -> tuple[float, float]:
-    """How many times smaller the deviation of `over` is than that of `strategy`, with its error; NaN where not studied.
-
-    `metrics`, `replicates`: long.
-    """
+    """How many times smaller the deviation of `over` is than that of `strategy`, with its error; NaN where not studied."""
     values, drawn = [], []
     for name in (strategy, over):
         cell = _by_length(metrics, robot, noise_um, name)
@@ -177,9 +155,7 @@ def per_dataset_table(
     """What one data set gives: accuracy on test configurations beside the Cramér-Rao bound of the same measurements.
 
     `accuracy`: long. `bounds`: the bounds table of each robot. `points`: measuring points that each strategy, by its name,
-    reads. Returns strategy, robot, noise_um, ds, mean_um, rms_um, p95_um, max_um, crlb_rms_um, efficiency, their errors and the
-    relative error of each compliance. The efficiency is (crlb_rms / rms)^2: at most one for an unbiased estimator, empty
-    without noise.
+    reads. The efficiency is (crlb_rms / rms)^2: at most one for an unbiased estimator, empty without noise.
     """
     frame = accuracy.rename(columns={"length": "ds"}).copy()
     limits = pd.concat([bound.assign(robot=robot) for robot, bound in bounds.items()]).rename(columns={"length": "ds"})
@@ -198,46 +174,11 @@ def per_dataset_table(
     return result.join(percent.rename(columns=lambda name: name.replace("_std_error_percent", "_percent_std_error")))
 
 
-def solver_summary(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Which strategies are the same estimator, under either solver.
-
-    `frames`: the solvers table of each robot. Returns robot, strategy, closest_strategy (under Gauss-Newton), the largest
-    relative difference to it under each solver, and that between the solvers, which is the second-order error of equation 11.
-    """
-    rows = []
-    for robot, frame in frames.items():
-        estimates = {
-            solver: {
-                strategy: group.sort_values("data_set").filter(like=solver).to_numpy()
-                for strategy, group in frame.groupby("strategy", sort=False, observed=True)
-            }
-            for solver in ("equation_11", "gauss_newton")
-        }
-        linear, exact = estimates["equation_11"], estimates["gauss_newton"]
-        for strategy in exact:
-            distance = {other: _largest_difference(exact[strategy], exact[other]) for other in exact if other != strategy}
-            closest = min(distance, key=distance.__getitem__, default=strategy)
-            rows.append(
-                {
-                    "robot": robot,
-                    "strategy": strategy,
-                    "closest_strategy": closest,
-                    "equation_11_difference": _largest_difference(linear[strategy], linear[closest]),
-                    "gauss_newton_difference": _largest_difference(exact[strategy], exact[closest]),
-                    "between_solvers": _largest_difference(linear[strategy], exact[strategy]),
-                }
-            )
-    return pd.DataFrame(rows)
-
-
 def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
-    """A table with the names of the strategies' files, which those of folders are, behind the names of strategies.
-
-    `slugs`: names of files by the names of strategies.
-    """
-    return frame.assign(strategy_file=frame.strategy.map(slugs))[
-        [name for column in frame.columns for name in (column, *(["strategy_file"] if column == "strategy" else []))]
-    ]
+    """A table with the names of the strategies' files, `slugs` by the names of strategies, behind these."""
+    found = frame.copy()
+    found.insert([*frame.columns].index("strategy") + 1, "strategy_file", frame.strategy.map(slugs))
+    return found
 
 
 def merge_errors(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
@@ -299,10 +240,6 @@ def word_value(value: float | str, error: float, digits: int = 3) -> str:
     return f"{value:.{decimals}f} ± {error:.{decimals}f}"
 
 
-def _largest_difference(values: np.ndarray, others: np.ndarray) -> float:
-    return float(np.abs(values / others - 1.0).max())
-
-
 def _cell(frame: pd.DataFrame, robot: str, noise_um: float, strategy: str) -> pd.DataFrame:
     return frame[(frame.robot == robot) & (frame.noise_um == noise_um) & (frame.strategy == strategy)]
 
@@ -318,10 +255,45 @@ def _row_of(cell: pd.DataFrame, length: int) -> pd.Series:
     return row
 
 
-def _curves(drawn: pd.DataFrame, name: str) -> np.ndarray:
-    """Replicates of one quantity as (replicates, lengths)."""
-    return drawn.pivot(index="replicate", columns="length", values=name).to_numpy()
+def tabulate_compliances(job: Job) -> None:
+    """Table 1."""
+    write_csvs(job, table=table1({name: robot_from_document(document, name) for name, document in job.params.robots.items()}))
 
 
-def _value_and_error(name: str, replicated: np.ndarray) -> dict[str, float]:
-    return {name: float(replicated[0]), f"{name}_std_error": float(np.std(replicated[1:], ddof=1))}
+def tabulate_initial(job: Job) -> None:
+    """Table 2."""
+    initial = frames(job, job.input.initial, INITIAL)
+    drawn = job.params.seed, job.params.replicates
+    weights = {name: bootstrap_weights(drawn[0], name, frame.data_set.to_numpy(), drawn[1]) for name, frame in initial.items()}
+    write_csvs(job, table=table2(initial, weights))
+
+
+def tabulate_identified(job: Job) -> None:
+    """Table 3."""
+    asked = job.params
+    frame = read_long(job.input.metrics, metrics)
+    write_csvs(job, table=table3(frame, asked.robots, asked.strategy, asked.noise_um, asked.length))
+
+
+def tabulate_strategies(job: Job) -> None:
+    """Table 4."""
+    asked, long = job.params, (read_long(job.input.metrics, metrics), read_replicates(job))
+    write_csvs(job, table=add_slugs(table4(*long, asked.robots, [*asked.strategies], **asked.cells), asked.strategies))
+
+
+def tabulate_extended(job: Job) -> None:
+    """Robots with elastic links."""
+    asked, long = job.params, (read_long(job.input.metrics, metrics), read_replicates(job))
+    write_csvs(job, table=extended_table(*long, asked.robots, asked.strategies, asked.noise_um, asked.length))
+
+
+def tabulate_accuracy(job: Job) -> None:
+    """What one data set gives."""
+    bounds = frames(job, job.input.bounds, BOUNDS)
+    table = per_dataset_table(read_long(job.input.accuracy, accuracy), bounds, job.params.points)
+    write_csvs(job, table=add_slugs(table, job.params.slugs))
+
+
+def read_replicates(job: Job) -> pd.DataFrame:
+    """Bootstrap replicates of the scores of all strategies."""
+    return read_long(job.input.replicates, lambda joints: REPLICATES)

@@ -1,26 +1,92 @@
-"""What a robot is used for: the poses of ISO 9283 under its load, and a path under a cutting force.
+"""How to evaluate (RQ4): what strategies leave by several yardsticks, and where these rank them differently, with intervals.
 
 An accuracy on random configurations says little to whom the robot works in one corner of its space. ISO 9283 [1] has five
 poses in a cube and one orientation; the accuracy of a pose is the distance of the mean of the reached positions from the
 commanded one. A model that corrects the command leaves its own error there, as repeatability averages out.
 
+All strategies see the same data sets, so that their scores go up and down together: what counts is the ratio of two of them,
+data set by data set. For a score that is a smooth function of means over data sets its influence values give the variance of
+the logarithm of a ratio (delta method [2]; of a quantile by Bahadur's representation); the paper's scores of averaged models
+have the bootstrap replicates, whose weights all strategies share.
+
 [1] ISO 9283:1998, Manipulating industrial robots: Performance criteria and related test methods.
+[2] van der Vaart, A. W., Asymptotic Statistics, chapters 3 and 21, Cambridge University Press, 1998.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits
-from elastocal.study.experiments import Experiments
+from elastocal.io.storage import write_table
+from elastocal.study.evaluation import REPLICATES, metrics
+from elastocal.study.in_memory import study_of
+from elastocal.study.jobs import (
+    MICRO,
+    SET,
+    STRATEGY,
+    Job,
+    frames,
+    origin,
+    real,
+    rows_as_frame,
+    strategies_of,
+    table,
+    write_csvs,
+)
+from elastocal.study.metrics import make_judge, position_errors
+from elastocal.study.points import QUANTILE
+from elastocal.study.simulation import Experiments
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
+
+    import pandas as pd
 
     from elastocal.mechanics.robot import Robot
+    from elastocal.study.in_memory import StudyInMemory
+    from elastocal.study.strategies import Strategy
 
+    # Of each robot by metric and strategy.
+    Scores = Mapping[str, Mapping[str, Mapping[str, "Score"]]]
+
+USES = table(
+    "uses",
+    STRATEGY,
+    SET,
+    real("mean", "m", "mean end-effector error on test configurations"),
+    real("mean_square", "m^2", "mean square of the same"),
+    real("p95", "m", "95th percentile of the same"),
+    real("pooled_p95", "m", "95th percentile over test configurations and data sets, the same in every row"),
+    real("pooled_p95_influence", "m", "influence of the data set on the pooled percentile"),
+    real("iso_9283", "m", "largest error at the five poses of ISO 9283", missing=True),
+    real("path_mean_square", "m^2", "mean square error along the milling path", missing=True),
+    real("path_max", "m", "largest error along the milling path", missing=True),
+)
+REFERENCE = "rms_um"
+# Of single data sets: column and whether the score is the root of its mean.
+_SINGLE = {
+    REFERENCE: ("mean_square", True),
+    "mean_um": ("mean", False),
+    "p95_um": ("p95", False),
+    "iso_9283_um": ("iso_9283", False),
+    "path_rms_um": ("path_mean_square", True),
+    "path_max_um": ("path_max", False),
+}
+# Of averaged models, with the factor to their units.
+_AVERAGED = {
+    "k_sigma_percent": ("k_sigma", 1.0),
+    "k_sigma_percent_fixed_joints": ("k_sigma_fixed_joints", 1.0),
+    "dev_um": ("deviation", MICRO),
+}
+# Scores of strategies that are one estimator agree to rounding.
+_DIGITS = 6
+# The quantile that is pooled, and over how much about it its density is taken.
+_POOLED, _ABOUT = 0.95, 0.01
 # Of a diagonal, from its ends: where the outer four poses lie.
 _FROM_ENDS = 0.1
 _PATH_POSES = 50
@@ -56,3 +122,156 @@ def _find_loaded(robot: Robot, position: np.ndarray, force: np.ndarray) -> Exper
     if (left > SOLVED_M).any() or find_beyond_limits(robot, angles).any():
         return None
     return Experiments(angles[None], np.pad(force, ((0, 0), (0, 3)))[None])
+
+
+def use_blocks(
+    study: StudyInMemory, strategies: Sequence[Strategy], uses: Mapping[str, Any]
+) -> Iterator[dict[str, np.ndarray | str]]:
+    """Errors of the models of all data sets, strategy by strategy, from all configurations of a data set.
+
+    `uses`: centre_m, edge_m, weight_N, path_m and cutting_N. Not a number for uses out of the robot's reach.
+    """
+    robot, at = study.robot, study.interpretation.wrench_at
+    cube = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
+    path = milling_path(robot, uses["centre_m"], uses["path_m"], uses["cutting_N"])
+    judges = [study.judge(), *(use and make_judge(robot, use, study.deflections(use), at) for use in (cube, path))]
+    for strategy, blocks in study.estimates(strategies).items():
+        models = np.concatenate([block[:, -1] for block in blocks])
+        tests, at_cube, on_path = (
+            position_errors(judge, models) if judge else np.full((len(models), 1), np.nan) for judge in judges
+        )
+        low, pooled, high = np.quantile(tests, [_POOLED - _ABOUT, _POOLED, _POOLED + _ABOUT])
+        slope = (high - low) / (2 * _ABOUT)
+        yield {
+            "strategy": strategy,
+            "data_set": np.arange(study.size.data_sets),
+            "mean": tests.mean(axis=1),
+            "mean_square": (tests**2).mean(axis=1),
+            "p95": np.quantile(tests, _POOLED, axis=1),
+            "pooled_p95": np.full(len(tests), pooled),
+            "pooled_p95_influence": slope * ((tests > pooled).mean(axis=1) - (1 - _POOLED)),
+            "iso_9283": at_cube.max(axis=1),
+            "path_mean_square": (on_path**2).mean(axis=1),
+            "path_max": on_path.max(axis=1),
+        }
+
+
+@dataclass(frozen=True)
+class Score:
+    """A score of one strategy.
+
+    `relative` (N,): deviations of its logarithm, of data sets or replicates that all strategies share. `spread`: the standard
+    error over the standard deviation of `relative`: 1 over the root of N for data sets, 1 for replicates.
+    """
+
+    value: float
+    relative: np.ndarray
+    spread: float
+
+    def std_error(self) -> float:
+        """Standard error of the value."""
+        return float(abs(self.value) * self.spread * self.relative.std(ddof=1))
+
+    def ratio(self, other: Score) -> tuple[float, float, float]:
+        """Ratio to another strategy's score with its 95 % interval, paired."""
+        ratio = self.value / other.value
+        error = QUANTILE * self.spread * (self.relative - other.relative).std(ddof=1)
+        return ratio, ratio * np.exp(-error), ratio * np.exp(error)
+
+
+def scores(uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, length: int) -> dict[str, dict[str, Score]]:
+    """Scores of one robot's strategies by every metric.
+
+    `uses`: the uses table. `metrics`, `replicates`: long, of the robot at the noise of the tables. Returns metric, strategy;
+    without metrics at places that the robot does not reach.
+    """
+    found: dict[str, dict[str, Score]] = {}
+    for strategy in dict.fromkeys(uses.strategy):
+        mine = uses[uses.strategy == strategy].sort_values("data_set")
+        for name, score in _of_single_sets(mine).items():
+            found.setdefault(name, {})[strategy] = score
+        at = metrics[(metrics.strategy == strategy) & (metrics.length == length)]
+        drawn = replicates[(replicates.strategy == strategy) & (replicates.length == length)].sort_values("replicate")
+        for name, (column, factor) in _AVERAGED.items():
+            value = float(at[column].iloc[0])
+            relative = drawn[column].to_numpy() / value - 1
+            found.setdefault(name, {})[strategy] = Score(factor * value, relative, 1.0)
+    return found
+
+
+def ranks_table(found: Scores, classical: str) -> pd.DataFrame:
+    """Every strategy by every metric, its rank, and its ratio to the classical strategy with its 95 % interval.
+
+    One estimator under two names has one rank, from 1.
+    """
+    from scipy.stats import rankdata
+
+    rows = []
+    for robot, by_metric in found.items():
+        for metric, by_strategy in by_metric.items():
+            values = np.array([score.value for score in by_strategy.values()])
+            places = rankdata(_round(np.abs(values)), method="min")
+            for (strategy, score), rank in zip(by_strategy.items(), places, strict=True):
+                ratio = score.ratio(by_strategy[classical])
+                rows.append((robot, metric, strategy, score.value, score.std_error(), *ratio, int(rank)))
+    head = ("robot", "metric", "strategy", "value", "value_std_error")
+    return rows_as_frame(rows, (*head, "ratio", "ratio_low", "ratio_high", "rank"))
+
+
+def pairs_table(found: Scores) -> pd.DataFrame:
+    """Every two different estimators by every metric and by the RMS error of one data set.
+
+    reversed: both intervals exclude one, on opposite sides.
+    """
+    rows = []
+    for robot, by_metric in found.items():
+        reference = by_metric[REFERENCE]
+        # The first name of each estimator.
+        seen: dict[float, str] = {}
+        for strategy, score in reference.items():
+            seen.setdefault(float(_round(np.array([score.value]))[0]), strategy)
+        names = [*seen.values()]
+        for metric, by_strategy in by_metric.items():
+            for strategy, other in combinations(names, 2):
+                ratio, by_rms = (some[strategy].ratio(some[other]) for some in (by_strategy, reference))
+                sides = [int(low > 1) - int(high < 1) for _, low, high in (ratio, by_rms)]
+                rows.append((robot, metric, strategy, other, *ratio, *by_rms, sides[0] * sides[1] < 0))
+    columns = [f"{of}ratio{end}" for of in ("", "rms_") for end in ("", "_low", "_high")]
+    return rows_as_frame(rows, ("robot", "metric", "strategy", "other", *columns, "reversed"))
+
+
+def _of_single_sets(mine: pd.DataFrame) -> dict[str, Score]:
+    spread, found = 1 / np.sqrt(len(mine)), {}
+    for name, (column, root) in _SINGLE.items():
+        values = mine[column].to_numpy()
+        if np.isnan(values).any():
+            continue
+        mean = values.mean()
+        # The logarithm of a root deviates half as much as that of the mean below it.
+        relative = (values / mean - 1) / (2 if root else 1)
+        found[name] = Score(MICRO * float(np.sqrt(mean) if root else mean), relative, spread)
+    pooled = float(mine.pooled_p95.iloc[0])
+    found["pooled_p95_um"] = Score(MICRO * pooled, mine.pooled_p95_influence.to_numpy() / pooled, spread)
+    return found
+
+
+def _round(values: np.ndarray) -> np.ndarray:
+    return np.array([float(f"{value:.{_DIGITS}g}") for value in values])
+
+
+def judge_in_use(job: Job) -> None:
+    """Strategies on one robot, in use."""
+    write_table(job.output.uses, USES, use_blocks(study_of(job), strategies_of(job), job.params.uses), origin(job))
+
+
+def tabulate_uses(job: Job) -> None:
+    """Of all robots."""
+    from elastocal.io.data_frames import read_long
+
+    asked = job.params
+    averaged, drawn = read_long(job.input.metrics, metrics), read_long(job.input.replicates, lambda joints: REPLICATES)
+    found = {
+        robot: scores(frame, averaged[averaged.robot == robot], drawn[drawn.robot == robot], asked.length)
+        for robot, frame in frames(job, job.input.uses, USES).items()
+    }
+    write_csvs(job, scores=ranks_table(found, asked.classical), pairs=pairs_table(found))

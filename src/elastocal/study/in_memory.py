@@ -1,0 +1,200 @@
+"""Data sets and test configurations of a study, drawn and measured in memory: nothing of them is kept.
+
+They are the same as those of the pipeline's steps: random streams have names, see `random_streams`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regressor
+from elastocal.mechanics.kinematics import jacobians, poses
+from elastocal.mechanics.robot import Robot, with_target_offset
+from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.study.equation_11 import Measurements, estimate_compliance, first_solvable_length
+from elastocal.study.identify import Design, configuration_first
+from elastocal.study.metrics import Judge, make_judge
+from elastocal.study.simulation import (
+    Experiments,
+    Loading,
+    blocks_of_sets,
+    measurement_noise,
+    random_experiments,
+    true_deflections,
+)
+from elastocal.study.strategies import Strategy, drop_forgotten_stages
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from elastocal.mechanics.chain import MeasuringPoint
+    from elastocal.study.jobs import Job
+    from elastocal.study.strategies import Stage
+
+
+@dataclass(frozen=True)
+class Interpretation:
+    """How the paper is read; see `interpretations` in config.yaml.
+
+    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: R6. `average`, `deviation_of`: R7 and R8, see
+    `evaluation.average`. `reflectors_m`: from each measuring point, in its frame, to the reflectors whose positions are
+    measured there; without, the target of the robot itself is measured.
+    """
+
+    loading: Loading
+    rows: int
+    wrench_at: str
+    average: str
+    deviation_of: str
+    reflectors_m: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def independent_rows(self) -> int:
+        """Independent measurements of one point in one configuration: a rigid body moves in six ways."""
+        return min(6, self.rows * max(1, len(self.reflectors_m)))
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a study is; `noise`: standard deviation, the same number in m and rad."""
+
+    data_sets: int
+    configurations: int
+    tests: int
+    noise: float
+
+
+@dataclass(frozen=True)
+class StudyInMemory:
+    """The study of one robot, and further ones of the same size.
+
+    Studies have numbers; that of the tables is 0. The data sets of one follow on those of the one before, and each has test
+    configurations of its own. `robot`: with the offset of its targets. `key`: name of the robot's file; part of the name of the
+    random streams.
+    """
+
+    robot: Robot
+    key: str
+    seed: int
+    interpretation: Interpretation
+    size: Size
+
+    def under(self, **loading: Any) -> StudyInMemory:
+        """The same study where the robot is moved and loaded otherwise, by attributes of `Loading`."""
+        changed = replace(self.interpretation.loading, **loading)
+        return replace(self, interpretation=replace(self.interpretation, loading=changed))
+
+    def blocks(self, number: int = 0) -> Iterator[np.ndarray]:
+        """Numbers of the data sets of a study, block by block, ndarray of int each."""
+        for sets in blocks_of_sets(self.size.data_sets):
+            yield np.array(sets) + number * self.size.data_sets
+
+    def experiments(
+        self, sets: Sequence[int] | np.ndarray, configurations: int | None = None, purpose: str = "identification"
+    ) -> Experiments:
+        """Configurations and loads of data sets, as many as in the study where nothing else is said."""
+        robot, count = self.robot, configurations or self.size.configurations
+        loading = self.interpretation.loading
+        return random_experiments(robot.chain, robot.joint_limits, self.seed, self.key, loading, purpose, sets, count)
+
+    def tests(self, number: int = 0) -> Experiments:
+        """Test configurations of a study, as one data set."""
+        return self.experiments([number], self.size.tests, "test")
+
+    def deflections(self, experiments: Experiments, point: str | None = None) -> np.ndarray:
+        """Deflections (sets, configurations, 6) of a measuring point, of the end-effector where none is named."""
+        return true_deflections(self.robot, experiments, self._point(point), self.interpretation.wrench_at)
+
+    def noise(
+        self, sets: Sequence[int] | np.ndarray, point: str | None = None, configurations: int | None = None
+    ) -> np.ndarray:
+        """Standard normal noise (sets, configurations, 6) of the measurements of a point."""
+        name = point or self.robot.chain.end_effector.name
+        return measurement_noise(self.seed, self.key, name, sets, configurations or self.size.configurations)
+
+    def regressor(self, experiments: Experiments, point: MeasuringPoint | None = None) -> np.ndarray:
+        """Regressors (sets, configurations, 6, n) of poses of a point of the arm, of the end-effector without."""
+        chain, angles = self.robot.chain, experiments.joint_angles
+        point = point or chain.end_effector
+        torques = joint_torques(chain, angles, experiments.wrench, loaded_point(chain, point, self.interpretation.wrench_at))
+        return regressor(jacobians(chain, angles, point), torques)
+
+    def judge(self, number: int = 0) -> Judge:
+        """Score sheet of the test configurations of a study."""
+        tests = self.tests(number)
+        return make_judge(self.robot, tests, self.deflections(tests), self.interpretation.wrench_at)
+
+    def measure(
+        self, sets: np.ndarray, points: Sequence[str], repeat: str = "", drawn: Experiments | None = None
+    ) -> dict[str, Measurements]:
+        """What each measuring point contributes to some data sets.
+
+        `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`: part of the name of the noise's stream,
+        by which measurements of the same configurations differ. `drawn`: other configurations and loads than those of the
+        study, as many of them.
+        """
+        drawn, read = drawn or self.experiments(sets), self.interpretation
+        rows = 6 if read.reflectors_m else read.rows
+        regressors = Design(drawn, self.robot.chain, points, rows, read.wrench_at).regressors
+        found = {}
+        for name in points:
+            deflection = self.deflections(drawn, name)
+            if read.reflectors_m:
+                found[name] = self._reflectors(sets, name, repeat, drawn, regressors[name], deflection)
+            else:
+                deflection = deflection + self.size.noise * self.noise(sets, name + repeat)
+                found[name] = Measurements(regressors[name], np.moveaxis(configuration_first(deflection)[..., :rows], -1, 0))
+        return found
+
+    def estimate(self, strategy: Strategy, measurements: Mapping[str, Measurements]) -> np.ndarray:
+        """Compliances (lengths, n, sets), rad/(N m), not a number where a length does not determine them."""
+        compliance = estimate_compliance(strategy, measurements, self.robot.joints)[0]
+        compliance[: first_solvable_length(strategy, self.interpretation.independent_rows) - 1] = np.nan
+        return compliance
+
+    def estimates(self, strategies: Sequence[Strategy], number: int = 0) -> dict[str, list[np.ndarray]]:
+        """Compliances (sets, lengths, n) from all data sets of a study, block by block, by the names of strategies.
+
+        Strategies that are one estimator under equation 11 are worked out once and share their arrays.
+        """
+        stages = {strategy.name: drop_forgotten_stages(strategy, self.robot.joints).stages for strategy in strategies}
+        points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
+        found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
+        for sets in self.blocks(number):
+            measurements = self.measure(sets, points)
+            for estimator in dict.fromkeys(stages.values()):
+                compliance = self.estimate(Strategy("", estimator), measurements)
+                found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
+        return {name: found[estimator] for name, estimator in stages.items()}
+
+    def _reflectors(
+        self, sets: np.ndarray, name: str, repeat: str, drawn: Experiments, regressor: np.ndarray, deflection: np.ndarray
+    ) -> Measurements:
+        """Positions of the reflectors at a point, whose pose they move with as a rigid body."""
+        from scipy.spatial.transform import Rotation
+
+        turned = poses(self.robot.chain, drawn.joint_angles, self._point(name))[1]
+        loaded = Rotation.from_rotvec(deflection[..., 3:].reshape(-1, 3)).as_matrix().reshape(turned.shape)
+        matrices, measured = [], []
+        for number, offset in enumerate(self.interpretation.reflectors_m, 1):
+            lever = turned @ np.array(offset, float)
+            noise = self.noise(sets, f"{name}{repeat}/reflector {number}")[..., :3]
+            moved = deflection[..., :3] + (loaded @ lever[..., None])[..., 0] - lever + self.size.noise * noise
+            across = np.moveaxis(configuration_first(lever), -1, 0)[:, None]
+            matrices.append(regressor[:3] + np.cross(regressor[3:], across, axis=0))
+            measured.append(np.moveaxis(configuration_first(moved), -1, 0))
+        return Measurements(np.concatenate(matrices), np.concatenate(measured))
+
+    def _point(self, name: str | None) -> MeasuringPoint:
+        return self.robot.chain.point(name) if name else self.robot.chain.end_effector
+
+
+def study_of(job: Job) -> StudyInMemory:
+    """The study of a rule's robot: its file, the seed, how the paper is read, the study's size (`study` of its parameters)."""
+    read = job.params.study
+    robot = with_target_offset(robot_from_document(read["robot"]), read["tool_offset_m"])
+    conventions = Interpretation(Loading(**read["loading"]), **read["interpretation"])
+    return StudyInMemory(robot, job.wildcards.robot, read["seed"], conventions, Size(**read["size"]))

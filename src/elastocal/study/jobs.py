@@ -1,0 +1,126 @@
+"""What jobs of the study share: the robot of a rule, how a table is declared, tables of every robot in frames, and rows in one.
+
+Pandas is imported where a frame is made: most jobs make none.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import Column, TableSchema
+from elastocal.mechanics.chain import parse_chain
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.study.strategies import strategy_from_document
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    import pandas as pd
+
+    from elastocal.mechanics.chain import Chain
+    from elastocal.mechanics.robot import Robot
+    from elastocal.study.strategies import Strategy
+
+MICRO, MILLI = 1e6, 1e3
+
+
+class Job(Protocol):
+    """What Snakemake hands to a step; the names in each part are the rule's."""
+
+    input: Any
+    output: Any
+    params: Any
+    wildcards: Any
+
+
+def origin(job: Job) -> dict[str, Any]:
+    """Provenance of a file of one robot, noise or strategy, which its wildcards are."""
+    return provenance(job.params, **dict(job.wildcards))
+
+
+def robot_of(job: Job) -> Robot:
+    """The robot of a rule with the offset of its targets (interpretation R5)."""
+    return with_target_offset(robot_from_document(job.params.robot), job.params.tool_offset_m)
+
+
+def chain_of(job: Job) -> Chain:
+    """The chain of a rule that needs no more of its robot."""
+    return with_target_offset(
+        parse_chain(job.params.chain, job.params.lengths_m, job.wildcards.robot), job.params.tool_offset_m
+    )
+
+
+def strategies_of(job: Job) -> list[Strategy]:
+    """The strategies of a rule, in its order."""
+    return [strategy_from_document(document) for document in job.params.strategies]
+
+
+def table(name: str, *columns: Column) -> TableSchema:
+    """A table: its name and its columns with units and meanings, written down beside the function that fills it."""
+    return TableSchema(name, columns)
+
+
+def real(name: str, unit: str, meaning: str, missing: bool = False, minimum: float | None = None) -> Column:
+    """Numbers; `missing`: some may be not a number or infinite."""
+    return Column(name, "float64", unit, meaning, missing, minimum)
+
+
+def whole(name: str, meaning: str, minimum: int | None = None) -> Column:
+    """Counts and numbers of things."""
+    return Column(name, "int32", "", meaning, minimum=minimum)
+
+
+def group(name: str, meaning: str) -> Column:
+    """A word that is the same in a whole row group."""
+    return Column(name, "string", "", meaning)
+
+
+def text(name: str, meaning: str) -> Column:
+    """A word of its own in each row."""
+    return Column(name, "text", "", meaning)
+
+
+SET = whole("data_set", "number of the data set, from 0", 0)
+CONFIGURATION = whole("configuration", "number of the configuration in its data set, from 0", 0)
+LENGTH = whole("length", "data set length ds: how many configurations, from the first, were used", 1)
+STRATEGY = group("strategy", "name of the strategy; a row group holds one")
+ON_TESTS = "mean square end-effector error on test configurations"
+ERROR = real("mean_square", "m^2", ON_TESTS, missing=True)
+
+
+def frames(job: Job, files: Iterable[str], schema: TableSchema) -> dict[str, pd.DataFrame]:
+    """The table of each robot of a rule."""
+    from elastocal.io.data_frames import read_frame
+
+    return {robot: read_frame(path, schema) for robot, path in zip(job.params.robots, files, strict=True)}
+
+
+def below(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """The tables of all robots one below the other, with the name of the robot in front."""
+    import pandas as pd
+
+    return pd.concat(found, names=["robot"]).reset_index("robot").reset_index(drop=True)
+
+
+def rows_as_frame(rows: Sequence[Any], columns: Sequence[str] = ()) -> pd.DataFrame:
+    """Rows as a data frame; `columns`: those of a table that may have no rows."""
+    import pandas as pd
+
+    return pd.DataFrame(rows, columns=[*columns] or None)
+
+
+def read_reference(path: str) -> pd.DataFrame:
+    """The printed figures."""
+    import pandas as pd
+
+    return pd.read_csv(path, dtype={"table": str}, keep_default_na=False)
+
+
+def write_csvs(job: Job, **found: pd.DataFrame) -> None:
+    """Tables for people, by the names of the rule's outputs."""
+    from elastocal.io.data_frames import write_csv
+
+    for name, frame in found.items():
+        write_csv(job.output[name], frame)

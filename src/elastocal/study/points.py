@@ -1,0 +1,284 @@
+"""Which points to measure, and what an accuracy costs (RQ2): sets of points over as many measurements and over their costs.
+
+One least-squares problem over each set of points, beside its bound. Sets share their configurations and noise, so that they
+are compared data set by data set. In units of one measurement, n configurations with m measurements each cost n (r + m), where
+going to a configuration costs r. A set of points that needs fewer configurations pays from the cost on at which both are equal:
+its break-even.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.io.storage import write_table
+from elastocal.study.equation_11 import prefix_information
+from elastocal.study.in_memory import study_of
+from elastocal.study.jobs import ERROR, LENGTH, MICRO, SET, Job, frames, group, origin, real, rows_as_frame, table, write_csvs
+from elastocal.study.metrics import squared_error_bounds
+from elastocal.study.simulation import bootstrap_weights, prefix_index_columns
+from elastocal.study.strategies import all_at_once
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    import pandas as pd
+
+    from elastocal.study.in_memory import StudyInMemory
+
+    Frames = Mapping[str, pd.DataFrame]
+    PointSets = Mapping[str, Sequence[str]]
+
+BUDGET = table(
+    "budget",
+    group("points", "set of measuring points; a row group holds one"),
+    SET,
+    LENGTH,
+    ERROR,
+    real("bound", "m^2", "Cramér-Rao bound of the same", missing=True),
+)
+# A point that is measured twice in a configuration has noise of its own the second time.
+_AGAIN = "/again"
+# Of a normal distribution: 95 % within.
+QUANTILE = 1.96
+# Costs of a configuration, in measurements, at which curves are given: from none to a robot that is loaded by hand.
+_CONFIGURATION_COSTS = (0.0, *np.logspace(-2, 1.5, 43).round(4).tolist())
+
+
+def budget_blocks(study: StudyInMemory, point_sets: PointSets) -> Iterator[dict[str, np.ndarray | str]]:
+    """Squared error of each data set at every length, and the least that an unbiased estimator could have.
+
+    `point_sets`: measuring points by the names of sets; a point may stand in a set twice. Sets with a point that the robot
+    lacks are left out.
+    """
+    n, judge, there = study.robot.joints, study.judge(), {point.name for point in study.robot.chain.points}
+    point_sets = {label: points for label, points in point_sets.items() if there.issuperset(points)}
+    names = tuple(dict.fromkeys(name for points in point_sets.values() for name in points))
+    twice = tuple(name for name in names if any([*points].count(name) > 1 for points in point_sets.values()))
+    for sets in study.blocks():
+        measurements = study.measure(sets, names)
+        again = study.measure(sets, twice, _AGAIN) if twice else {}
+        measurements |= {name + _AGAIN: found for name, found in again.items()}
+        information = {name: prefix_information(measurements[name].regressor) for name in names}
+        for label, points in point_sets.items():
+            read = tuple(name + _AGAIN * (name in points[:place]) for place, name in enumerate(points))
+            squares = judge.mean_square(study.estimate(all_at_once(read, n), measurements))
+            together = sum((information[name] for name in points), np.zeros(()))
+            bounds = squared_error_bounds(together, judge.form[:-1, :-1])
+            yield {
+                **prefix_index_columns(sets, len(squares)),
+                "points": label,
+                "mean_square": squares.T.ravel(),
+                "bound": np.where(np.isfinite(bounds), study.size.noise**2 * bounds, np.nan).T.ravel(),
+            }
+
+
+def root_mean(squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root of the mean over data sets, of squares (sets, ...), with its standard error by the delta method."""
+    root = np.sqrt(squares.mean(axis=0))
+    return root, squares.std(axis=0, ddof=1) / np.sqrt(len(squares)) / (2 * root)
+
+
+def ratio_of_roots(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float, float]:
+    """Ratio of two root mean squares over the same data sets (sets,) with its 95 % interval, by the delta method."""
+    ratio = float(np.sqrt(ours.mean() / theirs.mean()))
+    relative = (ours / ours.mean() - theirs / theirs.mean()) / 2
+    error = QUANTILE * relative.std(ddof=1) / np.sqrt(len(ours))
+    return ratio, ratio * np.exp(-error), ratio * np.exp(error)
+
+
+def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFrame:
+    """Error of one data set by set of points: with as many configurations, and with as many measurements.
+
+    `found`: the budget table of each robot. `length`: configurations; the budget is twice as many measurements. Without rows
+    that would take longer data sets.
+    """
+    rows = []
+    for robot, frame in found.items():
+        for points, names in point_sets.items():
+            for configurations in sorted({length, 2 * length // len(names)}):
+                at = _at(frame, points, configurations)
+                if len(at):
+                    rms, error = root_mean(at.mean_square.to_numpy())
+                    head = (robot, points, len(names), configurations)
+                    rows.append((*head, MICRO * np.sqrt(at.bound.mean()), MICRO * rms, MICRO * error))
+    columns = ("robot", "points", "measurements_per_configuration", "configurations")
+    return rows_as_frame(rows, (*columns, "crlb_rms_um", "rms_um", "std_error_um"))
+
+
+def paired_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFrame:
+    """Sets of points against the first one, at a budget of twice `length` measurements, paired by data set.
+
+    The ratio has its 95 % interval; the difference its standard error by the delta method.
+    """
+    rows = []
+    against = next(iter(point_sets))
+    for robot, frame in found.items():
+        theirs_at = 2 * length // len(point_sets[against])
+        theirs = _at(frame, against, theirs_at).mean_square.to_numpy()
+        for points, names in point_sets.items():
+            configurations = 2 * length // len(names)
+            ours = _at(frame, points, configurations).mean_square.to_numpy()
+            if points == against or not len(ours) or not len(theirs):
+                continue
+            roots = np.sqrt([ours.mean(), theirs.mean()])
+            # Deviations of both roots data set by data set.
+            each = np.stack([ours, theirs]) / (2 * roots[:, None])
+            error = (each[0] - each[1]).std(ddof=1) / np.sqrt(len(ours))
+            head = (robot, points, against, configurations * len(names), configurations, theirs_at)
+            rows.append((*head, MICRO * (roots[0] - roots[1]), MICRO * error, *ratio_of_roots(ours, theirs)))
+    columns = ("robot", "points", "against", "measurements", "configurations", "configurations_against")
+    return rows_as_frame(rows, (*columns, "difference_um", "difference_um_std_error", "ratio", "ratio_low", "ratio_high"))
+
+
+def lengths_table(found: Frames, point_sets: PointSets, accuracies_um: Sequence[float]) -> pd.DataFrame:
+    """How many random configurations bring the error of one data set to a wanted accuracy for good, with 95 % intervals.
+
+    Infinite where the longest data set does not reach it.
+    """
+    rows = []
+    for robot, frame in found.items():
+        for points, names in point_sets.items():
+            mine = frame[frame.points == points]
+            if mine.empty:
+                continue
+            squares = mine.pivot(index="data_set", columns="length", values="mean_square")
+            lengths = squares.columns.to_numpy()
+            rms, error = root_mean(squares.to_numpy())
+            curves = {
+                "configurations": rms,
+                "configurations_low": rms - QUANTILE * error,
+                "configurations_high": rms + QUANTILE * error,
+                "configurations_by_bound": np.sqrt(mine.groupby("length").bound.mean().reindex(lengths).to_numpy()),
+            }
+            for accuracy in accuracies_um:
+                needed = {name: _first(lengths, MICRO * values <= accuracy) for name, values in curves.items()}
+                head = {"robot": robot, "points": points, "accuracy_um": accuracy}
+                rows.append(head | needed | {"measurements": needed["configurations"] * len(names)})
+    return rows_as_frame(rows)
+
+
+def _at(frame: pd.DataFrame, points: str, configurations: int) -> pd.DataFrame:
+    return frame[(frame.points == points) & (frame.length == configurations)].sort_values("data_set")
+
+
+def _first(lengths: np.ndarray, reached: np.ndarray) -> float:
+    """The first length from which on it is reached for good."""
+    missed = np.flatnonzero(~reached)
+    place = missed[-1] + 1 if len(missed) else 0
+    return float(lengths[place]) if place < len(lengths) else np.inf
+
+
+def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
+    """Configurations after which the RMS error stays below an accuracy, a real number by interpolation of its logarithm.
+
+    `squares` (..., lengths): mean square errors for the lengths 1, 2, 3 ... `accuracy`: in the units of their roots. Returns
+    (...): infinite where the longest does not reach it.
+    """
+    excess = np.log(np.where(np.isnan(squares), np.inf, squares)) - 2 * np.log(accuracy)
+    above = excess > 0
+    last = excess.shape[-1] - 1 - np.argmax(above[..., ::-1], axis=-1)
+    reached = ~above[..., -1]
+    start = np.minimum(last, excess.shape[-1] - 2)[..., None]
+    before, after = (np.take_along_axis(excess, start + k, -1)[..., 0] for k in (0, 1))
+    with np.errstate(invalid="ignore"):
+        share = np.where(np.isinf(before), 1.0, before / (before - after))
+    between = np.exp(np.log1p(start[..., 0]) + share * np.log1p(1.0 / (start[..., 0] + 1.0)))
+    return np.where(~above.any(axis=-1), 1.0, np.where(reached, between, np.inf))
+
+
+def find_needed_by_set(
+    frame: pd.DataFrame, point_sets: PointSets, accuracy_um: float, weights: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Configurations needed by each set of points in each bootstrap replicate, the first of which is no replicate.
+
+    `frame`: the budget table of one robot. `weights` (1 + replicates, sets): from `simulation.bootstrap_weights`.
+    """
+    found = {}
+    for points in point_sets:
+        mine = frame[frame.points == points]
+        if len(mine):
+            squares = mine.pivot(index="data_set", columns="length", values="mean_square").to_numpy()
+            mean = weights @ squares / weights.sum(axis=1, keepdims=True)
+            found[points] = configurations_needed(mean, accuracy_um / MICRO)
+    return found
+
+
+def break_even_table(
+    found: Frames, point_sets: PointSets, accuracies_um: Sequence[float], weights: Mapping[str, np.ndarray]
+) -> pd.DataFrame:
+    """From which cost of a configuration on each set of points is cheaper than the first one, with its 95 % interval.
+
+    `weights`: bootstrap weights of each robot's data sets. Costs are in measurements; infinite where the set never pays.
+    """
+    rows = []
+    against = next(iter(point_sets))
+    for robot, frame in found.items():
+        for accuracy in accuracies_um:
+            needed = find_needed_by_set(frame, point_sets, accuracy, weights[robot])
+            theirs, m = needed.pop(against, np.full(1, np.inf)), len(point_sets[against])
+            for points, ours in needed.items():
+                if not (np.isfinite(ours[0]) and np.isfinite(theirs[0])):
+                    continue
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    even = (ours * len(point_sets[points]) - theirs * m) / (theirs - ours)
+                even = np.where(ours < theirs, np.maximum(even, 0.0), np.inf)
+                rows.append((robot, accuracy, points, against, ours[0], theirs[0], *_interval(even)))
+    columns = ("robot", "accuracy_um", "points", "against", "configurations", "configurations_against")
+    return rows_as_frame(rows, (*columns, "break_even", "break_even_low", "break_even_high"))
+
+
+def cost_table(found: Frames, point_sets: PointSets, accuracy_um: float, weights: Mapping[str, np.ndarray]) -> pd.DataFrame:
+    """What an accuracy costs by each set of points over the first one, by the cost of a configuration, and which is cheapest.
+
+    `weights`: as in `break_even_table`. The cost is in measurements, the ratio to the first set has its 95 % interval.
+    """
+    rows: list[tuple[Any, ...]] = []
+    against = next(iter(point_sets))
+    for robot, frame in found.items():
+        needed = find_needed_by_set(frame, point_sets, accuracy_um, weights[robot])
+        for each in _CONFIGURATION_COSTS:
+            costs = {points: n * (each + len(point_sets[points])) for points, n in needed.items() if np.isfinite(n[0])}
+            cheapest = min(costs, key=lambda points: costs[points][0], default="")
+            for points, cost in costs.items():
+                ratio = cost / costs[against] if against in costs else np.full_like(cost, np.nan)
+                rows.append((robot, points, each, cost[0], *_interval(ratio), points == cheapest))
+    columns = ("robot", "points", "configuration_cost", "cost")
+    return rows_as_frame(rows, (*columns, "ratio", "ratio_low", "ratio_high", "cheapest"))
+
+
+def _interval(values: np.ndarray) -> tuple[float, float, float]:
+    """A value, the first, with its 95 % interval over replicates."""
+    low, high = np.quantile(values[1:], [0.025, 0.975], method="nearest")
+    return values[0], low, high
+
+
+def compare_point_sets(job: Job) -> None:
+    """Sets of points on one robot."""
+    write_table(job.output.budget, BUDGET, budget_blocks(study_of(job), job.params.point_sets), origin(job))
+
+
+def tabulate_budget(job: Job) -> None:
+    """Of all robots: at an equal budget, paired, and how many configurations each set needs."""
+    asked, found = job.params, frames(job, job.input.budgets, BUDGET)
+    write_csvs(
+        job,
+        budget=budget_table(found, asked.point_sets, asked.length),
+        pairs=paired_table(found, asked.point_sets, asked.length),
+        lengths=lengths_table(found, asked.point_sets, asked.accuracies_um),
+    )
+
+
+def tabulate_costs(job: Job) -> None:
+    """Of all robots."""
+    asked, found = job.params, frames(job, job.input.budgets, BUDGET)
+    weights = {
+        robot: bootstrap_weights(asked.weights["seed"], robot, sorted(set(frame.data_set)), asked.weights["replicates"])
+        for robot, frame in found.items()
+    }
+    write_csvs(
+        job,
+        costs=cost_table(found, asked.point_sets, asked.accuracies_um[0], weights),
+        break_even=break_even_table(found, asked.point_sets, asked.accuracies_um, weights),
+    )

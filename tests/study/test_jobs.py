@@ -1,0 +1,48 @@
+"""Tables of the study: every column has a name of its own, a meaning, and a unit where it has one; and what jobs share."""
+
+from importlib import import_module
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from elastocal import study
+from elastocal.io.storage import TableSchema, read_provenance, write_table
+from elastocal.study.evaluation import accuracy, metrics
+from elastocal.study.identify import covariance_columns, design, identified
+from elastocal.study.jobs import ERROR, SET, frames, origin, table, write_csvs
+from elastocal.study.repeated import expected, repeated
+from elastocal.study.simulation import experiments
+from elastocal.study.solvers import solvers
+
+MODULES = [import_module(f"elastocal.study.{path.stem}") for path in Path(study.__file__).parent.glob("[a-z]*.py")]
+SCHEMAS = {thing.name: thing for module in MODULES for thing in vars(module).values() if isinstance(thing, TableSchema)}
+BY_JOINTS = (experiments, design, identified, metrics, accuracy, repeated, expected, solvers)
+ALL = [*SCHEMAS.values(), *(make(joints) for make in BY_JOINTS for joints in (3, 7))]
+
+
+@pytest.mark.parametrize("schema", ALL, ids=lambda schema: f"{schema.name} of {len(schema.columns)} columns")
+def test_columns_have_a_name_of_their_own_a_meaning_and_a_unit_but_for_shares_and_ratios(schema):
+    names = [column.name for column in schema.columns]
+    assert len(set(names)) == len(names) and all(column.meaning for column in schema.columns)
+    without = {column.name for column in schema.columns if column.type.startswith("float") and not column.unit}
+    shares = {"condition", "nonpositive_share", "relative_spread", "nominal_error", "difference", "unsettled"}
+    assert without <= shares | {"turned", "fixed", "O1", "O2", "O3", "O4", "O5"}
+
+
+def test_there_is_one_column_for_each_joint_and_one_covariance_for_each_pair():
+    for joints in (3, 7):
+        assert {f"c{j + 1}" for j in range(joints)} <= {column.name for column in identified(joints).columns}
+        pairs = covariance_columns(joints)
+        assert {name for name, _, _ in pairs} <= {column.name for column in design(joints).columns}
+        assert [(i, j) for _, i, j in pairs] == [(i, j) for i in range(joints) for j in range(i + 1)]
+
+
+def test_a_job_keeps_a_table_with_its_origin_and_reads_those_of_all_robots(tmp_path):
+    job = SimpleNamespace(params={"seed": 1, "step": "of no account"}, wildcards={"robot": "arm"}, output={})
+    schema = table("made", SET, ERROR)
+    write_table(tmp_path / "arm.parquet", schema, [{"data_set": [0, 1], "mean_square": [1.0, 4.0]}], origin(job))
+    assert read_provenance(tmp_path / "arm.parquet")["configuration"] == {"seed": 1}
+    job = SimpleNamespace(params=SimpleNamespace(robots=["arm"]), output={"table": tmp_path / "table.csv"})
+    write_csvs(job, table=frames(job, [tmp_path / "arm.parquet"], schema)["arm"])
+    assert (tmp_path / "table.csv").read_text(encoding="utf-8") == "data_set,mean_square\n0,1\n1,4\n"

@@ -1,0 +1,171 @@
+"""Sets of points compared: made-up errors, by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_studies import USUAL
+from made_study_blocks import deflections_of, experiments_of, identified, judge
+
+from elastocal.study.evaluation import bound_blocks
+from elastocal.study.in_memory import Size, StudyInMemory
+from elastocal.study.metrics import position_errors
+from elastocal.study.points import (
+    break_even_table,
+    budget_blocks,
+    budget_table,
+    configurations_needed,
+    cost_table,
+    lengths_table,
+    paired_table,
+    root_mean,
+)
+
+POINT_SETS = {"E": ["E"], "E twice": ["E", "E"], "three": ["A", "B", "E"]}
+SETS, LENGTHS = 50, 12
+
+
+def frame_of(scatter=0.2):
+    """Mean squares that fall as one over the measurements, with a scatter that all sets of points of a data set share."""
+    common = 1 + scatter * np.random.default_rng(1).standard_normal(SETS)
+    parts = []
+    for label, size in {"E": 1.0, "E twice": 2.2, "three": 2.5}.items():
+        for length in range(1, LENGTHS + 1):
+            square = 1e-8 * common / (size * length)
+            parts.append(pd.DataFrame({"points": label, "data_set": range(SETS), "length": length, "mean_square": square}))
+    frame = pd.concat(parts, ignore_index=True)
+    return frame.assign(bound=0.9 * frame.mean_square)
+
+
+def test_rows_have_as_many_configurations_and_as_many_measurements():
+    table = budget_table({"arm": frame_of()}, POINT_SETS, 6)
+    pairs = list(zip(table.points, table.configurations, table.measurements_per_configuration, strict=True))
+    assert pairs == [("E", 6, 1), ("E", 12, 1), ("E twice", 6, 2), ("three", 4, 3), ("three", 6, 3)]
+    mean = frame_of().query("points == 'E' and length == 6").mean_square.mean()
+    assert table.rms_um[0] == pytest.approx(1e6 * np.sqrt(mean)) and table.crlb_rms_um[0] == pytest.approx(
+        np.sqrt(0.9) * table.rms_um[0]
+    )
+    assert list(table)[-3:] == ["crlb_rms_um", "rms_um", "std_error_um"]
+
+
+def test_pairs_are_compared_data_set_by_data_set():
+    """The scatter that both share is in neither interval."""
+    table = paired_table({"arm": frame_of()}, POINT_SETS, 6)
+    assert table.points.tolist() == ["E twice", "three"]
+    assert table.measurements.tolist() == [12, 12] and table.configurations_against.tolist() == [12, 12]
+    assert table.ratio.tolist() == pytest.approx([np.sqrt(12 / 13.2), np.sqrt(12 / 10)])
+    np.testing.assert_allclose(table.ratio_high / table.ratio_low, 1.0, atol=1e-9)
+    alone = root_mean(frame_of().query("points == 'three' and length == 4").mean_square.to_numpy())[1]
+    assert (table.difference_um_std_error < 0.2 * 1e6 * alone).all()
+
+
+def test_data_sets_that_are_too_short_for_the_budget_have_no_row():
+    short = frame_of().query("length < 12")
+    assert paired_table({"arm": short}, POINT_SETS, 6).empty
+    assert set(budget_table({"arm": short}, POINT_SETS, 6).configurations) == {4, 6}
+
+
+def test_lengths_are_exact_with_an_interval():
+    table = lengths_table({"arm": frame_of()}, POINT_SETS, [40.0, 1.0])
+    row = table[(table.points == "E") & (table.accuracy_um == 40)].iloc[0]
+    # 1e-8 / n <= (40e-6)^2 from n = 6.25 on.
+    mean = frame_of().query("points == 'E' and length == 1").mean_square.mean()
+    assert row.configurations == np.ceil(mean / 40e-6**2) == row.measurements
+    assert row.configurations_low <= row.configurations <= row.configurations_high
+    assert row.configurations_by_bound <= row.configurations
+    assert np.isinf(table[table.accuracy_um == 1].configurations).all()
+
+
+def test_a_length_counts_where_the_accuracy_is_kept_for_good():
+    frame = frame_of(0.0)
+    frame.loc[frame.length == 9, "mean_square"] = 1.0
+    assert lengths_table({"arm": frame}, {"E": ["E"]}, [40.0]).configurations[0] == 10
+
+
+POINT_SETS_OF_COSTS = {"one": ["A"], "two": ["A", "B"], "useless": ["A", "A"]}
+LENGTHS_OF_COSTS = np.arange(1, 101)
+
+
+def frame(sizes=(300.0, 200.0, 300.0)):
+    """Errors in µm of one configuration by set, the same in each of ten data sets."""
+    parts = [
+        pd.DataFrame(
+            {
+                "points": name,
+                "data_set": number,
+                "length": LENGTHS_OF_COSTS,
+                "mean_square": (1e-6 * size) ** 2 / LENGTHS_OF_COSTS,
+            }
+        )
+        for name, size in zip(POINT_SETS_OF_COSTS, sizes, strict=True)
+        for number in range(10)
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+@pytest.fixture
+def weights():
+    drawn = np.random.default_rng(1).poisson(1.0, (20, 10)) + 1.0
+    return {"arm": np.vstack([np.ones(10), drawn])}
+
+
+def test_the_length_is_where_the_curve_crosses_the_accuracy():
+    squares = (300.0**2) / LENGTHS_OF_COSTS
+    assert configurations_needed(squares, 60.0) == pytest.approx(25.0)
+    assert configurations_needed(squares, 59.0) == pytest.approx((300 / 59) ** 2, rel=1e-3)
+    assert configurations_needed(squares, 1.0) == np.inf and configurations_needed(squares, 400.0) == 1.0
+
+
+def test_a_set_pays_from_the_cost_on_at_which_both_cost_the_same(weights):
+    table = break_even_table({"arm": frame()}, POINT_SETS_OF_COSTS, [60.0], weights).set_index("points")
+    # 25 configurations of one measurement, 100/9 of two: 25 (r + 1) = 100/9 (r + 2).
+    expected = (200 / 9 - 25) / (25 - 100 / 9)
+    assert table.break_even["two"] == pytest.approx(max(expected, 0.0), abs=0.01)
+    assert table.break_even["useless"] == np.inf
+    costly = break_even_table({"arm": frame((300, 240, 300))}, POINT_SETS_OF_COSTS, [60.0], weights).set_index("points")
+    assert costly.break_even["two"] == pytest.approx((32 - 25) / (25 - 16), rel=1e-2)
+    assert costly.break_even_low["two"] <= costly.break_even["two"] <= costly.break_even_high["two"]
+
+
+def test_the_cheapest_set_changes_at_its_break_even(weights):
+    table = cost_table({"arm": frame((300, 240, 300))}, POINT_SETS_OF_COSTS, 60.0, weights)
+    cheapest = table[table.cheapest].set_index("configuration_cost").points
+    assert (
+        cheapest[0.0] == "one" and cheapest.iloc[-1] == "two" and table.groupby("configuration_cost").cheapest.sum().eq(1).all()
+    )
+    assert table[table.points == "one"].ratio.eq(1.0).all()
+
+
+POINT_SETS_OF_BUDGET = {"6DoF": ["6DoF"], "6DoF twice": ["6DoF", "6DoF"], "3+6DoF": ["3DoF", "6DoF"]}
+SIZE = Size(data_sets=40, configurations=6, tests=30, noise=1e-5)
+
+
+@pytest.fixture(scope="module")
+def found(kuka):
+    blocks = list(budget_blocks(StudyInMemory(kuka, "kuka", 1, USUAL, SIZE), POINT_SETS_OF_BUDGET))
+    return {block["points"]: {name: block[name].reshape(40, 6) for name in ("mean_square", "bound")} for block in blocks}
+
+
+@pytest.mark.parametrize(("points", "strategy"), [("6DoF", "6DoF"), ("3+6DoF", "3+6DoF-comb")])
+def test_errors_are_those_of_the_strategy_that_measures_the_points_together(kuka, strategies, found, points, strategy):
+    experiments = experiments_of(kuka, 40, 6)
+    table = identified(kuka, strategies[strategy], experiments, deflections_of(kuka, experiments, 1e-5))
+    models = np.column_stack([table[f"c{j}"] for j in range(1, 7)])[table["length"] == 6]
+    expected = (position_errors(judge(kuka), models) ** 2).mean(axis=1)
+    np.testing.assert_allclose(found[points]["mean_square"][:, 5], expected, rtol=1e-6)
+
+
+def test_bounds_are_those_of_the_pipeline(kuka, found):
+    sets = [("6DoF",), ("3DoF", "6DoF")]
+    blocks = bound_blocks(experiments_of(kuka, 40, 6), kuka.chain, sets, 6, "end_effector", judge(kuka))
+    expected = {block["points"]: block["rms_per_noise"] for block in blocks}
+    for ours, theirs in (("6DoF", "6DoF"), ("3+6DoF", "3DoF+6DoF")):
+        np.testing.assert_allclose(np.sqrt(found[ours]["bound"].mean(axis=0))[2:], 1e-5 * expected[theirs][2:], rtol=1e-8)
+
+
+def test_a_point_measured_twice_has_half_the_variance_and_noise_of_its_own(found):
+    np.testing.assert_allclose(found["6DoF twice"]["bound"], found["6DoF"]["bound"] / 2, rtol=1e-9)
+    ratio = found["6DoF twice"]["mean_square"][:, 5] / found["6DoF"]["mean_square"][:, 5]
+    # 40 data sets: the mean of the ratio of means has an error of about 15 %.
+    assert (ratio.std() > 0.1) and 0.3 < (
+        found["6DoF twice"]["mean_square"][:, 5].mean() / found["6DoF"]["mean_square"][:, 5].mean()
+    ) < 0.8
