@@ -27,6 +27,132 @@ FIGURES = [
     "metrics",
 ]
 
+# Each other figure: its function, file, caption, category, what it shows, tables, settings.
+DRAWN = {
+    "draw_noise_impact": (
+        ("noise_impact", "fig4", "fig4", PAPER, "Figure 4: impact of noise"),
+        {"metrics": cells("metrics", REDUCED, NOISE, CLASSICAL)},
+        {"strategy": NAMES[CLASSICAL], "titles": REDUCED_TITLES},
+    ),
+    "draw_bias_and_accuracy": (
+        ("bias_and_accuracy", "bias_and_accuracy", "bias_and_accuracy", ABOUT, "What the paper's scores measure"),
+        {"metrics": cells("metrics", REDUCED, TABLE_NOISE, BEST_TWO), "per_dataset": rules.tabulate_accuracy.output.table},
+        {
+            "titles": REDUCED_TITLES,
+            "order": [NAMES[name] for name in BEST_TWO],
+            "accuracy_um": QUESTIONS["accuracies_um"][0],
+        },
+    ),
+    "draw_accuracy": (
+        (
+            "accuracy_of_one_data_set",
+            "accuracy_of_one_data_set",
+            "accuracy_of_one_data_set",
+            ABOUT,
+            "Error of one data set by strategy",
+        ),
+        {"per_dataset": rules.tabulate_accuracy.output.table},
+        {"titles": REDUCED_TITLES, "order": list(NAMES.values())} | LENGTH,
+    ),
+    "draw_scores": (
+        ("scores", "scores_against_paper", "scores_against_paper", PAPER, "Table 4 against further studies"),
+        {"comparison": rules.compare_with_studies.output.table, "expectations": rules.tabulate_expectations.output.table},
+        {"titles": REDUCED_TITLES},
+    ),
+    "draw_table2_samples": (
+        ("table2_samples", "table2_samples", "table2_samples", PAPER, "Table 2 against single data sets"),
+        {
+            "initial": expand(rules.summarize_initial.output.initial, robot=config["robots"]),
+            "reference": f"{CONFIG}/paper/reference.csv",
+        },
+        {"titles": TITLES},
+    ),
+    "draw_ladder": (
+        ("ladder", "ladder", "ladder", ABOUT, "How many springs (RQ1)"),
+        {"table": rules.tabulate_ladder.output.table},
+        {},
+    ),
+    "draw_budget": (
+        ("budget", "budget", "budget", ABOUT, "Which points (RQ2)"),
+        {"table": rules.tabulate_budget.output.budget},
+        {"titles": REDUCED_TITLES} | LENGTH,
+    ),
+    "draw_designs": (
+        ("designs", "designs", "designs", ABOUT, "Which configurations (RQ3)"),
+        {"table": rules.tabulate_designs.output.table},
+        {
+            "titles": REDUCED_TITLES,
+            "accuracy_um": QUESTIONS["accuracies_um"][0],
+            "joint_range": INTERPRETATIONS["joint_range"],
+        },
+    ),
+    "draw_costs": (
+        ("costs", "costs", "costs", ABOUT, "Cost of an accuracy (RQ2)"),
+        {"table": rules.tabulate_costs.output.costs},
+        {"titles": REDUCED_TITLES, "accuracy_um": QUESTIONS["accuracies_um"][0]},
+    ),
+    "draw_studies": (
+        ("over_studies", "studies", "studies", PAPER, "Strategies over studies"),
+        {
+            "studies": expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
+            "printed": f"{CONFIG}/paper/reference.csv",
+        },
+        {"titles": REDUCED_TITLES, "order": list(NAMES.values())},
+    ),
+}
+# Figures 5a and 5b, and 5c and 5d: their panels, function, caption, words, and the limit that they show.
+PANELS = {
+    "draw_stiffness_errors": (
+        *(STIFFNESS_PANELS, "stiffness_errors", "fig5_stiffness", "stiffness errors of all strategies"),
+        {"limit_percent": config["tables"]["k_sigma_limit_percent"]},
+    ),
+    "draw_deviations": (
+        *(DEVIATION_PANELS, "deviations", "fig5_deviation", "deviation by all strategies"),
+        {"limit_um": config["tables"]["deviation_limit_um"]},
+    ),
+}
+
+
+def draw_panel(panels, function, caption, words, limit):
+    def settings(wildcards):
+        robot = panels[wildcards.panel]
+        return {"title": TITLES[robot], "robot": robot, "order": list(NAMES.values())} | limit
+
+    tables = {
+        "metrics": lambda wildcards: cells("metrics", panels[wildcards.panel], TABLE_NOISE),
+        "printed": f"{CONFIG}/paper/reference.csv",
+    }
+    return (function, "fig5{panel}", caption, PAPER, f"Figure 5{{panel}}: {words}"), tables, settings
+
+
+DRAWN |= {name: draw_panel(*panel) for name, panel in PANELS.items()}
+
+
+for drawn, ((function, file, caption, category, words), tables, settings) in DRAWN.items():
+
+    rule:
+        name:
+            drawn
+        input:
+            **tables,
+            sources=sources("draw_study.py"),
+        output:
+            pdf=f"reports/figures/{file}.pdf",
+            png=shown(f"reports/figures/{file}.png", caption, category, shows=words, kind="figure"),
+        log:
+            f"results/logs/{drawn}/{file}.log",
+        benchmark:
+            f"results/timings/{drawn}/{file}.tsv"
+        wildcard_constraints:
+            panel="|".join(PANELS[drawn][0] if drawn in PANELS else ()) or "none",
+        params:
+            figure=function,
+            tables=[*tables],
+            settings=settings,
+            noise_um=config["tables"]["noise_um"],
+        script:
+            "../scripts/draw_study.py"
+
 
 rule draw_scheme:
     input:
@@ -51,251 +177,6 @@ rule draw_scheme:
         scheme=lambda wildcards: "spring_scheme" if wildcards.scheme == "fig3" else "kinematic_scheme",
     script:
         "../scripts/draw_scheme.py"
-
-
-rule draw_noise_impact:
-    input:
-        metrics=cells("metrics", REDUCED, NOISE, CLASSICAL),
-        sources=sources("draw_noise_impact.py"),
-    output:
-        pdf="reports/figures/fig4.pdf",
-        png=shown(
-            "reports/figures/fig4.png",
-            "fig4",
-            "Tables and figures of the paper",
-            shows="Figure 4: impact of noise",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_noise_impact.log",
-    benchmark:
-        "results/timings/draw_noise_impact.tsv"
-    params:
-        strategy=NAMES[CLASSICAL],
-        titles=REDUCED_TITLES,
-    script:
-        "../scripts/draw_noise_impact.py"
-
-
-rule draw_stiffness_errors:
-    input:
-        metrics=lambda wildcards: cells("metrics", STIFFNESS_PANELS[wildcards.panel], TABLE_NOISE),
-        reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("draw_stiffness_errors.py"),
-    output:
-        pdf="reports/figures/fig5{panel}.pdf",
-        png=shown(
-            "reports/figures/fig5{panel}.png",
-            "fig5_stiffness",
-            "Tables and figures of the paper",
-            shows="Figure 5{panel}: stiffness errors of all strategies",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_stiffness_errors/fig5{panel}.log",
-    benchmark:
-        "results/timings/draw_stiffness_errors/fig5{panel}.tsv"
-    wildcard_constraints:
-        panel="|".join(STIFFNESS_PANELS) or "none",
-    params:
-        robot=lambda wildcards: STIFFNESS_PANELS[wildcards.panel],
-        title=lambda wildcards: TITLES[STIFFNESS_PANELS[wildcards.panel]],
-        order=list(NAMES.values()),
-        limit=config["tables"]["k_sigma_limit_percent"],
-    script:
-        "../scripts/draw_stiffness_errors.py"
-
-
-rule draw_deviations:
-    input:
-        metrics=lambda wildcards: cells("metrics", DEVIATION_PANELS[wildcards.panel], TABLE_NOISE),
-        reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("draw_deviations.py"),
-    output:
-        pdf="reports/figures/fig5{panel}.pdf",
-        png=shown(
-            "reports/figures/fig5{panel}.png",
-            "fig5_deviation",
-            "Tables and figures of the paper",
-            shows="Figure 5{panel}: deviation by all strategies",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_deviations/fig5{panel}.log",
-    benchmark:
-        "results/timings/draw_deviations/fig5{panel}.tsv"
-    wildcard_constraints:
-        panel="|".join(DEVIATION_PANELS) or "none",
-    params:
-        robot=lambda wildcards: DEVIATION_PANELS[wildcards.panel],
-        title=lambda wildcards: TITLES[DEVIATION_PANELS[wildcards.panel]],
-        order=list(NAMES.values()),
-        limit=config["tables"]["deviation_limit_um"],
-    script:
-        "../scripts/draw_deviations.py"
-
-
-rule draw_bias_and_accuracy:
-    input:
-        metrics=cells("metrics", REDUCED, TABLE_NOISE, BEST_TWO),
-        per_dataset=rules.tabulate_accuracy.output.table,
-        sources=sources("draw_bias_and_accuracy.py"),
-    output:
-        pdf="reports/figures/bias_and_accuracy.pdf",
-        png=shown(
-            "reports/figures/bias_and_accuracy.png",
-            "bias_and_accuracy",
-            "Questions beyond the paper",
-            shows="What the paper's scores measure",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_bias_and_accuracy.log",
-    benchmark:
-        "results/timings/draw_bias_and_accuracy.tsv"
-    params:
-        titles=REDUCED_TITLES,
-        order=[NAMES[name] for name in BEST_TWO],
-        noise_um=config["tables"]["noise_um"],
-        accuracy_um=QUESTIONS["accuracies_um"][0],
-    script:
-        "../scripts/draw_bias_and_accuracy.py"
-
-
-rule draw_accuracy:
-    input:
-        per_dataset=rules.tabulate_accuracy.output.table,
-        sources=sources("draw_accuracy.py"),
-    output:
-        pdf="reports/figures/accuracy_of_one_data_set.pdf",
-        png=shown(
-            "reports/figures/accuracy_of_one_data_set.png",
-            "accuracy_of_one_data_set",
-            "Questions beyond the paper",
-            shows="Error of one data set by strategy",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_accuracy.log",
-    benchmark:
-        "results/timings/draw_accuracy.tsv"
-    params:
-        titles=REDUCED_TITLES,
-        order=list(NAMES.values()),
-        noise_um=config["tables"]["noise_um"],
-        length=config["tables"]["length"],
-    script:
-        "../scripts/draw_accuracy.py"
-
-
-rule draw_scores:
-    input:
-        comparison=rules.compare_with_studies.output.table,
-        expectations=rules.tabulate_expectations.output.table,
-        sources=sources("draw_scores.py"),
-    output:
-        pdf="reports/figures/scores_against_paper.pdf",
-        png=shown(
-            "reports/figures/scores_against_paper.png",
-            "scores_against_paper",
-            "Tables and figures of the paper",
-            shows="Table 4 against further studies",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_scores.log",
-    benchmark:
-        "results/timings/draw_scores.tsv"
-    params:
-        titles=REDUCED_TITLES,
-    script:
-        "../scripts/draw_scores.py"
-
-
-rule draw_table2_samples:
-    input:
-        initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
-        reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("draw_table2_samples.py"),
-    output:
-        pdf="reports/figures/table2_samples.pdf",
-        png=shown(
-            "reports/figures/table2_samples.png",
-            "table2_samples",
-            "Tables and figures of the paper",
-            shows="Table 2 against single data sets",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_table2_samples.log",
-    benchmark:
-        "results/timings/draw_table2_samples.tsv"
-    params:
-        titles=TITLES,
-    script:
-        "../scripts/draw_table2_samples.py"
-
-
-rule draw_ladder:
-    input:
-        table=rules.tabulate_ladder.output.table,
-        sources=sources("draw_ladder.py"),
-    output:
-        pdf="reports/figures/ladder.pdf",
-        png=shown(
-            "reports/figures/ladder.png", "ladder", "Questions beyond the paper", shows="How many springs (RQ1)", kind="figure"
-        ),
-    log:
-        "results/logs/draw_ladder.log",
-    benchmark:
-        "results/timings/draw_ladder.tsv"
-    script:
-        "../scripts/draw_ladder.py"
-
-
-rule draw_budget:
-    input:
-        table=rules.tabulate_budget.output.budget,
-        sources=sources("draw_budget.py"),
-    output:
-        pdf="reports/figures/budget.pdf",
-        png=shown(
-            "reports/figures/budget.png", "budget", "Questions beyond the paper", shows="Which points (RQ2)", kind="figure"
-        ),
-    log:
-        "results/logs/draw_budget.log",
-    benchmark:
-        "results/timings/draw_budget.tsv"
-    params:
-        titles=REDUCED_TITLES,
-        length=config["tables"]["length"],
-    script:
-        "../scripts/draw_budget.py"
-
-
-rule draw_designs:
-    input:
-        table=rules.tabulate_designs.output.table,
-        sources=sources("draw_designs.py"),
-    output:
-        pdf="reports/figures/designs.pdf",
-        png=shown(
-            "reports/figures/designs.png",
-            "designs",
-            "Questions beyond the paper",
-            shows="Which configurations (RQ3)",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_designs.log",
-    benchmark:
-        "results/timings/draw_designs.tsv"
-    params:
-        titles=REDUCED_TITLES,
-        accuracy_um=QUESTIONS["accuracies_um"][0],
-        joint_range=INTERPRETATIONS["joint_range"],
-    script:
-        "../scripts/draw_designs.py"
 
 
 rule draw_arm_map:
@@ -343,52 +224,3 @@ rule draw_metrics:
         titles=REDUCED_TITLES,
     script:
         "../scripts/draw_metrics.py"
-
-
-rule draw_costs:
-    input:
-        table=rules.tabulate_costs.output.costs,
-        sources=sources("draw_costs.py"),
-    output:
-        pdf="reports/figures/costs.pdf",
-        png=shown(
-            "reports/figures/costs.png",
-            "costs",
-            "Questions beyond the paper",
-            shows="Cost of an accuracy (RQ2)",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_costs.log",
-    benchmark:
-        "results/timings/draw_costs.tsv"
-    params:
-        titles=REDUCED_TITLES,
-        accuracy_um=QUESTIONS["accuracies_um"][0],
-    script:
-        "../scripts/draw_costs.py"
-
-
-rule draw_studies:
-    input:
-        studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
-        reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("draw_studies.py"),
-    output:
-        pdf="reports/figures/studies.pdf",
-        png=shown(
-            "reports/figures/studies.png",
-            "studies",
-            "Tables and figures of the paper",
-            shows="Strategies over studies",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_studies.log",
-    benchmark:
-        "results/timings/draw_studies.tsv"
-    params:
-        titles=REDUCED_TITLES,
-        order=list(NAMES.values()),
-    script:
-        "../scripts/draw_studies.py"

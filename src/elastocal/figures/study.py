@@ -102,7 +102,7 @@ def deviations(
 def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str]) -> Figure:
     """k_sigma over the fixed joints and deviation against the data set length: mean over studies and how they scatter.
 
-    `studies`: robot and the columns of `table_schemas.repeated`. `printed`: the printed figures. `titles`: name of each robot
+    `studies`: robot and the columns of `repeated.repeated`. `printed`: the printed figures. `titles`: name of each robot
     to draw, by its key. `order`: strategies; one estimator under several names is drawn once, under the first of them.
     """
     figure, axes = panels(2, len(titles), 118, sharex=True, sharey="row")
@@ -294,7 +294,7 @@ def table2_samples(initial: Mapping[str, pd.DataFrame], reference: pd.DataFrame,
 def ladder(table: pd.DataFrame) -> Figure:
     """Error of one data set by number of link springs, for each noise and length, of the first robot with links.
 
-    `table`: from `question_tables.ladder_table`.
+    `table`: from `ladder.ladder_table`.
     """
     if table.empty:
         return note("no robot of this study has elastic links")
@@ -321,7 +321,7 @@ def ladder(table: pd.DataFrame) -> Figure:
 def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figure:
     """Error of one data set by set of measuring points, with as many configurations and with as many measurements.
 
-    `table`: from `budget_tables.budget_table`. `titles`: name of each robot to draw, by its key. `length`: configurations; the
+    `table`: from `points.budget_table`. `titles`: name of each robot to draw, by its key. `length`: configurations; the
     budget is twice as many measurements.
     """
     labels = list(dict.fromkeys(table.points))
@@ -350,7 +350,7 @@ def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figur
 def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) -> Figure:
     """Cost of an accuracy by each set of points over the first one, by the cost of a configuration.
 
-    `table`: from `costs.cost_table`. `titles`: name of each robot to draw, by its key.
+    `table`: from `points.cost_table`. `titles`: name of each robot to draw, by its key.
     """
     if not table.ratio.gt(0).any():
         return note(f"no set of points reaches {accuracy_um:g} µm with the configurations of this study")
@@ -376,7 +376,7 @@ def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) ->
 def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, joint_range: str) -> Figure:
     """Error that random and optimal configurations leave, by their number.
 
-    `table`: from `question_tables.designs_table`. `titles`: name of each robot to draw, by its key. `accuracy_um`: marked by a
+    `table`: from `designs.designs_table`. `titles`: name of each robot to draw, by its key. `accuracy_um`: marked by a
     line. `joint_range`: whose rows are drawn.
     """
     table = table[table.joint_range == joint_range]
@@ -402,7 +402,7 @@ def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, 
 def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, str]) -> Figure:
     """Scores of the strategies over those of the classical one, metric by metric.
 
-    `table`: from `ranks.ranks_table`. `titles`: name of each robot to draw, by its key. `names`: what each metric is called.
+    `table`: from `uses.ranks_table`. `titles`: name of each robot to draw, by its key. `names`: what each metric is called.
     Returns one estimator under several names is drawn once, under the first of them.
     """
     figure, axes = panels(1, len(titles), 26 + 8 * len(names), sharey=True, sharex=True)

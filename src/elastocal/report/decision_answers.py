@@ -174,7 +174,7 @@ def few_rows(
 
 
 def kind_rows(table: pd.DataFrame, length: int, titles: Mapping[str, str]) -> list[dict[str, str]]:
-    """Error by what is measured: in as many configurations and with as many scalars, from `question_tables.kinds_table`."""
+    """Error by what is measured: in as many configurations and with as many scalars, from `measurement_kinds.kinds_table`."""
     rows = []
     for kind in dict.fromkeys(table.kind):
         row: dict[str, str] = {"kind": str(kind)}
@@ -190,7 +190,7 @@ def kind_rows(table: pd.DataFrame, length: int, titles: Mapping[str, str]) -> li
 
 
 def stiffness_rows(table: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[str, str]]:
-    """What K_c changes, from `question_tables.stiffness_table`."""
+    """What K_c changes, from `stiffness.stiffness_table`."""
     names = ("first_order_percent", "by_k_c_percent", "loaded_percent", "bias_percent", "k_sigma_percent")
     rows: list[dict[Any, Any]] = table[table.robot.isin([*titles])].to_dict("records")
     return [

@@ -77,7 +77,7 @@ def strategy_rows(strategies: Sequence[Strategy]) -> list[dict[str, str]]:
 def ladder_rows(ladder: pd.DataFrame) -> list[dict[str, str]]:
     """What joints alone leave, what the best number of link springs would, and what cross-validation chooses.
 
-    `ladder`: from `question_tables.ladder_table`, of one robot. Returns noise, length, joints, best, springs, chosen.
+    `ladder`: from `ladder.ladder_table`, of one robot. Returns noise, length, joints, best, springs, chosen.
     """
     rows = []
     for (noise, length), cell in ladder.groupby(["noise_um", "length"]):
@@ -92,7 +92,7 @@ def ladder_rows(ladder: pd.DataFrame) -> list[dict[str, str]]:
 def budget_rows(budget: pd.DataFrame, pairs: pd.DataFrame, length: int, robots: Iterable[str]) -> list[dict[str, str]]:
     """Sets of points with as many configurations and with as many measurements, the latter against the end-effector alone.
 
-    `budget`, `pairs`: from `budget_tables`. `length`: configurations; the budget is twice as many measurements. Returns robot,
+    `budget`, `pairs`: from `points`. `length`: configurations; the budget is twice as many measurements. Returns robot,
     points, same, configurations, equal, ratio.
     """
     rows = []
@@ -113,7 +113,7 @@ def budget_rows(budget: pd.DataFrame, pairs: pd.DataFrame, length: int, robots: 
 def needed_rows(needed: pd.DataFrame, accuracy_um: float, robots: Iterable[str]) -> list[dict[str, str]]:
     """How many random configurations reach an accuracy.
 
-    `needed`: from `budget_tables.lengths_table`. Returns robot, points, configurations, bound, measurements.
+    `needed`: from `points.lengths_table`. Returns robot, points, configurations, bound, measurements.
     """
     rows = []
     for row in needed[(needed.accuracy_um == accuracy_um) & needed.robot.isin([*robots])].itertuples():
@@ -127,7 +127,7 @@ def needed_rows(needed: pd.DataFrame, accuracy_um: float, robots: Iterable[str])
 def design_facts(designs: pd.DataFrame, length: int, accuracy_um: float, titles: Mapping[str, str]) -> list[dict[str, str]]:
     """What chosen configurations are worth, a dictionary for each robot.
 
-    `designs`: from `question_tables.designs_table`. `length`: configurations at which designs are compared, where there is one
+    `designs`: from `designs.designs_table`. `length`: configurations at which designs are compared, where there is one
     of this size. Returns title, random, chosen and bound (µm) at the length, gain (a factor), efficiency (percent of the
     bound's variance), and chosen_needed: the smallest size of an I-optimal design within the accuracy.
     """
@@ -147,7 +147,7 @@ def design_facts(designs: pd.DataFrame, length: int, accuracy_um: float, titles:
 def observability_rows(observability: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
     """Rank correlations of the indices, a row for each index.
 
-    `observability`: from `question_tables.observability_table`. Returns index and, for each robot, its correlation with the
+    `observability`: from `designs.observability_table`. Returns index and, for each robot, its correlation with the
     bound and with the error.
     """
     rows = []
@@ -163,12 +163,12 @@ def observability_rows(observability: pd.DataFrame, robots: Iterable[str]) -> li
 
 
 def geometry_rows(geometry: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
-    """Estimators of geometry and compliances, from `question_tables.geometry_table`."""
+    """Estimators of geometry and compliances, from `assumptions.geometry_table`."""
     return worded(geometry[geometry.robot.isin([*robots])], _GEOMETRY)
 
 
 def weighting_rows(weighting: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
-    """What equal weights cost, from `question_tables.weighting_table`."""
+    """What equal weights cost, from `assumptions.weighting_table`."""
     return worded(weighting[weighting.robot.isin([*robots])], _WEIGHTING)
 
 
@@ -183,7 +183,7 @@ def stated(settings: Mapping[str, float | Sequence[float]]) -> dict[str, str]:
 def place_facts(places: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[str, str]]:
     """What a second target is worth on the arm, a dictionary for each robot.
 
-    `places`: from `question_tables.places_table`. Returns title, least and largest: ratios with their intervals and where;
+    `places`: from `arm_points.places_table`. Returns title, least and largest: ratios with their intervals and where;
     better: places significantly better than further configurations; turned and fixed: largest percentages of configurations in
     which a target on a link is seen.
     """
@@ -209,7 +209,7 @@ def place_facts(places: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[st
 def tube_rows(tubes: pd.DataFrame) -> list[dict[str, str]]:
     """Deflections and errors by the diameter of the tubes.
 
-    `tubes`: from `question_tables.tubes_table`. Returns diameter, mean, std, max, left.
+    `tubes`: from `assumptions.tubes_table`. Returns diameter, mean, std, max, left.
     """
     return [
         {
