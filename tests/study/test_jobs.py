@@ -8,9 +8,10 @@ import pytest
 
 from elastocal import study
 from elastocal.io.storage import TableSchema, read_provenance, write_table
+from elastocal.study.columns import ERROR, SET, table
 from elastocal.study.evaluation import accuracy, metrics
 from elastocal.study.identify import covariance_columns, design, identified
-from elastocal.study.jobs import ERROR, SET, frames, origin, table, write_csvs
+from elastocal.study.jobs import frames, origin, write_csvs
 from elastocal.study.repeated import expected, repeated
 from elastocal.study.simulation import experiments
 from elastocal.study.solvers import solvers

@@ -70,5 +70,5 @@ def test_solver_summary_pairs_the_strategies_that_are_the_same_estimator():
 
 def test_a_start_from_which_steps_do_not_settle_is_counted(kuka, strategies):
     # Springs so soft that the first step turns joints by radians.
-    found = start_columns(few_of(kuka), strategies["6DoF"], [1e-6, 1.0])
+    found = start_columns(few_of(kuka), [strategies["6DoF"]], [1e-6, 1.0])
     assert found["unsettled"][1] > 0 or np.nanmax(found["difference"]) > 1e-3

@@ -38,7 +38,7 @@ ASKED = {
     "map_arm": (
         "arm_points",
         ["places"],
-        {"study": AT_LENGTH, "tracker_m": QUESTIONS["tracker_m"], "arm_points": QUESTIONS["arm_points"]},
+        {"study": AT_LENGTH, "tracker_m": QUESTIONS["tracker_m"], "arm": QUESTIONS["arm_points"]},
     ),
     "judge_in_use": (
         "uses",
@@ -74,7 +74,7 @@ ASKED = {
         ["starts"],
         {
             "study": AT_LENGTH,
-            "strategy": STUDY.strategies[CLASSICAL],
+            "strategies": [STUDY.strategies[CLASSICAL]],
             "starts": [1e-6 * start for start in QUESTIONS["starts_urad_per_Nm"]],
         },
     ),

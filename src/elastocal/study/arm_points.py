@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.storage import write_table
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import corners, poses
-from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import SET, Job, frames, origin, real, rows_as_frame, table, text, whole, write_csvs
+from elastocal.study.columns import SET, real, table, text, whole
+from elastocal.study.in_memory import ask
+from elastocal.study.jobs import rows_as_frame, tabulate
 from elastocal.study.points import ratio_of_roots
 
 if TYPE_CHECKING:
@@ -190,12 +190,5 @@ def places_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return rows_as_frame(rows, (*head, "seen_turned_percent", "seen_fixed_percent"))
 
 
-def map_arm(job: Job) -> None:
-    """Places on the arm of one robot."""
-    columns = place_columns(study_of(job), job.params.tracker_m, job.params.arm_points)
-    write_table(job.output.places, PLACES, [columns], origin(job))
-
-
-def tabulate_places(job: Job) -> None:
-    """Of all robots."""
-    write_csvs(job, table=places_table(frames(job, job.input.places, PLACES)))
+map_arm = ask(PLACES, place_columns)
+tabulate_places = tabulate(PLACES, places_table)

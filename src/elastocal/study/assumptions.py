@@ -21,22 +21,10 @@ from elastocal.io.storage import write_table
 from elastocal.mechanics.chain import with_inserted
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.links import with_tube
+from elastocal.study.columns import SET, real, table, text
 from elastocal.study.equation_11 import estimate_compliance
-from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import (
-    MICRO,
-    MILLI,
-    SET,
-    Job,
-    below,
-    frames,
-    origin,
-    real,
-    rows_as_frame,
-    table,
-    text,
-    write_csvs,
-)
+from elastocal.study.in_memory import ask, study_of
+from elastocal.study.jobs import MICRO, MILLI, Job, below, frames, origin, rows_as_frame, tabulate, write_csvs
 from elastocal.study.points import root_mean
 from elastocal.study.simulation import bending, find_statistics, true_deflections
 from elastocal.study.strategies import all_at_once
@@ -281,11 +269,6 @@ def vary_assumptions(job: Job) -> None:
     write_table(job.output.weighting, WEIGHTING, [weighting_rows(study, **job.params.weighting)], origin(job))
 
 
-def vary_tubes(job: Job) -> None:
-    """Tubes of one robot."""
-    write_table(job.output.tubes, TUBES, tube_blocks(study_of(job), job.params.factors, job.params.length), origin(job))
-
-
 def tabulate_assumptions(job: Job) -> None:
     """Of all robots."""
     write_csvs(
@@ -295,6 +278,5 @@ def tabulate_assumptions(job: Job) -> None:
     )
 
 
-def tabulate_tubes(job: Job) -> None:
-    """Of all robots with links."""
-    write_csvs(job, table=tubes_table(frames(job, job.input.tubes, TUBES)))
+vary_tubes = ask(TUBES, tube_blocks)
+tabulate_tubes = tabulate(TUBES, tubes_table)

@@ -26,25 +26,11 @@ import numpy as np
 from elastocal.application.planning.bound import best_value
 from elastocal.application.planning.criteria import CRITERIA, Criterion, criterion, mean_squares
 from elastocal.application.planning.exchange import choose_greedily, exchange_candidates, matrix_of
-from elastocal.io.storage import write_table
 from elastocal.random_streams import stream
+from elastocal.study.columns import ON_TESTS, SET, real, table, text, whole
 from elastocal.study.equation_11 import estimate_compliance, prefix_information
-from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import (
-    MICRO,
-    ON_TESTS,
-    SET,
-    Job,
-    below,
-    frames,
-    origin,
-    real,
-    rows_as_frame,
-    table,
-    text,
-    whole,
-    write_csvs,
-)
+from elastocal.study.in_memory import ask
+from elastocal.study.jobs import MICRO, below, rows_as_frame, tabulate
 from elastocal.study.metrics import make_judge, mean_square_errors, squared_error_bounds
 from elastocal.study.strategies import all_at_once
 from elastocal.study.uses import iso_9283
@@ -122,7 +108,7 @@ def rate_designs(
 
 
 def design_columns(study: StudyInMemory, candidates: int, sizes: Sequence[int]) -> dict[str, np.ndarray]:
-    """Random against optimal configurations, measured at the end-effector; `candidates`: random ones among which is chosen."""
+    """Random against optimal ones of `candidates` random configurations, measured at the end-effector."""
     found = []
     for joint_range in _JOINT_RANGES:
         within = study.under(joint_range=joint_range)
@@ -151,21 +137,25 @@ class Candidates:
 
 
 def simulated_design_blocks(
-    study: StudyInMemory, count: int, sizes: Sequence[int], loads: Mapping[str, Sequence[float] | None], uses: Mapping[str, Any]
+    study: StudyInMemory,
+    candidates: int,
+    sizes: Sequence[int],
+    loads: Mapping[str, Sequence[float] | None],
+    uses: Mapping[str, Any],
 ) -> Iterator[dict[str, np.ndarray]]:
     """Errors that designs leave in simulated data sets of their configurations, kind of load by kind.
 
-    `count`: candidates. `loads`: direction of the force by the name of its kind, base axes; None for one that is random in each
-    configuration. `uses`: of which the cube and its weight give the test pose. Where the loads do not move a joint, it is left
-    out, and the test configurations have the loads of the candidates.
+    `candidates`: how many. `loads`: direction of the force by the name of its kind, base axes; None for one that is random in
+    each configuration. `uses`: of which the cube and its weight give the test pose. Where the loads do not move a joint, it is
+    left out, and the test configurations have the loads of the candidates.
     """
     for load, direction in loads.items():
-        candidates = _candidates(study, count, direction, uses)
-        of = candidates.observable
+        made = _candidates(study, candidates, direction, uses)
+        of = made.observable
         scale = study.robot.compliance[of]
-        rows = candidates.rows[..., of] * scale / study.size.noise
+        rows = made.rows[..., of] * scale / study.size.noise
         # Both forms are of the squared error in all compliances and 1.
-        weights = dict(zip(("I", TEST_POSE), candidates.forms, strict=True))
+        weights = dict(zip(("I", TEST_POSE), made.forms, strict=True))
         rules = {kind: Criterion(weights[kind][np.ix_(of, of)] * np.outer(scale, scale)) for kind in weights}
         rules |= {kind: criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"}
         found: list[tuple[str, int, Sequence[np.ndarray] | np.ndarray | list[int]]] = []
@@ -174,8 +164,8 @@ def simulated_design_blocks(
             longest = choose_greedily(rows, max(sizes), rule)
             found += [(kind, size, exchange_candidates(rows, longest[:size], rule)) for size in sizes]
         draws = stream(study.seed, study.key, f"random designs/{load}", 0)
-        found += [(RANDOM, size, [draws.choice(count, size, False) for _ in range(_SIMULATED)]) for size in sizes]
-        errors = np.array([_simulate(study, candidates, np.atleast_2d(chosen)) for _, _, chosen in found])
+        found += [(RANDOM, size, [draws.choice(candidates, size, False) for _ in range(_SIMULATED)]) for size in sizes]
+        errors = np.array([_simulate(study, made, np.atleast_2d(chosen)) for _, _, chosen in found])
         hidden = ", ".join(str(joint + 1) for joint in np.flatnonzero(~of))
         yield {
             "load": np.full(len(found), load, object),
@@ -293,34 +283,8 @@ def observability_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return rows_as_frame(rows)
 
 
-def choose_designs(job: Job) -> None:
-    """Designs of one robot by their bound."""
-    columns = design_columns(study_of(job), job.params.candidates, job.params.sizes)
-    write_table(job.output.designs, DESIGNS, [columns], origin(job))
-
-
-def simulate_designs(job: Job) -> None:
-    """Designs of one robot, simulated."""
-    asked = job.params
-    blocks = simulated_design_blocks(study_of(job), asked.candidates, asked.sizes, asked.loads, asked.uses)
-    write_table(job.output.designs, SIMULATED_DESIGNS, blocks, origin(job))
-
-
-def index_observability(job: Job) -> None:
-    """Observability of one robot's data sets."""
-    write_table(job.output.observability, OBSERVABILITY, [observability_columns(study_of(job))], origin(job))
-
-
-def tabulate_designs(job: Job) -> None:
-    """Of all robots."""
-    write_csvs(job, table=designs_table(frames(job, job.input.designs, DESIGNS)))
-
-
-def tabulate_simulated_designs(job: Job) -> None:
-    """Of all robots."""
-    write_csvs(job, table=simulated_designs_table(frames(job, job.input.designs, SIMULATED_DESIGNS)))
-
-
-def tabulate_observability(job: Job) -> None:
-    """Of all robots."""
-    write_csvs(job, table=observability_table(frames(job, job.input.observabilities, OBSERVABILITY)))
+choose_designs, tabulate_designs = ask(DESIGNS, design_columns), tabulate(DESIGNS, designs_table)
+simulate_designs = ask(SIMULATED_DESIGNS, simulated_design_blocks)
+tabulate_simulated_designs = tabulate(SIMULATED_DESIGNS, simulated_designs_table)
+index_observability = ask(OBSERVABILITY, observability_columns)
+tabulate_observability = tabulate(OBSERVABILITY, observability_table)

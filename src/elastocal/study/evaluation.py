@@ -14,9 +14,10 @@ import numpy as np
 
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import Column, TableSchema, read_blocks, read_table, write_table
+from elastocal.study.columns import LENGTH, group, real, table
 from elastocal.study.equation_11 import prefix_information
 from elastocal.study.identify import Design, identified, identified_blocks, read_measured
-from elastocal.study.jobs import LENGTH, Job, group, origin, real, robot_of, table
+from elastocal.study.jobs import Job, origin, robot_of
 from elastocal.study.metrics import (
     Judge,
     first_length_below,

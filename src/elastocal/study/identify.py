@@ -10,9 +10,10 @@ import numpy as np
 from elastocal.io.storage import Column, TableSchema, read_blocks, write_table
 from elastocal.mechanics.elastostatics import generalized_forces, loaded_point, regressor
 from elastocal.mechanics.kinematics import jacobians
+from elastocal.study.columns import LENGTH, SET, real, table
 from elastocal.study.equation_11 import Measurements, condition_numbers, covariance, estimate_compliance, undetermined
 from elastocal.study.gauss_newton import identify_exactly
-from elastocal.study.jobs import LENGTH, SET, Job, chain_of, origin, real, table
+from elastocal.study.jobs import Job, chain_of, origin
 from elastocal.study.simulation import (
     DEFLECTION_COLUMNS,
     DEFLECTIONS,

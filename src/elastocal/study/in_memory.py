@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.io.storage import write_table
 from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regressor
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot import Robot, with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.equation_11 import Measurements, estimate_compliance, first_solvable_length
 from elastocal.study.identify import Design, configuration_first
+from elastocal.study.jobs import origin, settings_of, strategies_of
 from elastocal.study.metrics import Judge, make_judge
 from elastocal.study.simulation import (
     Experiments,
@@ -28,8 +30,9 @@ from elastocal.study.simulation import (
 from elastocal.study.strategies import Strategy, drop_forgotten_stages
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from elastocal.io.storage import TableSchema
     from elastocal.mechanics.chain import MeasuringPoint
     from elastocal.study.jobs import Job
     from elastocal.study.strategies import Stage
@@ -198,3 +201,19 @@ def study_of(job: Job) -> StudyInMemory:
     robot = with_target_offset(robot_from_document(read["robot"]), read["tool_offset_m"])
     conventions = Interpretation(Loading(**read["loading"]), **read["interpretation"])
     return StudyInMemory(robot, job.wildcards.robot, read["seed"], conventions, Size(**read["size"]))
+
+
+def ask(schema: TableSchema, question: Callable[..., Any]) -> Callable[[Job], None]:
+    """A step of one robot, which fills one table: `question` has its study and, by their names, the rule's parameters.
+
+    Strategies come as documents. The question returns the columns of the table, or yields those of one block after the other.
+    """
+
+    def step(job: Job) -> None:
+        settings = settings_of(job, "study")
+        if "strategies" in settings:
+            settings["strategies"] = strategies_of(job)
+        found = question(study_of(job), **settings)
+        write_table(job.output[0], schema, [found] if isinstance(found, dict) else found, origin(job))
+
+    return step

@@ -1,4 +1,4 @@
-"""What jobs of the study share: the robot of a rule, how a table is declared, tables of every robot in frames, and rows in one.
+"""What jobs of the study share: the robot of a rule, tables of every robot in frames, and rows in one.
 
 Pandas is imported where a frame is made: most jobs make none.
 """
@@ -7,18 +7,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
-from elastocal.io.provenance import provenance
-from elastocal.io.storage import Column, TableSchema
+from elastocal.io.provenance import SOURCES_DIGEST, STEP, provenance
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.strategies import strategy_from_document
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     import pandas as pd
 
+    from elastocal.io.storage import TableSchema
     from elastocal.mechanics.chain import Chain
     from elastocal.mechanics.robot import Robot
     from elastocal.study.strategies import Strategy
@@ -57,39 +57,6 @@ def strategies_of(job: Job) -> list[Strategy]:
     return [strategy_from_document(document) for document in job.params.strategies]
 
 
-def table(name: str, *columns: Column) -> TableSchema:
-    """A table: its name and its columns with units and meanings, written down beside the function that fills it."""
-    return TableSchema(name, columns)
-
-
-def real(name: str, unit: str, meaning: str, missing: bool = False, minimum: float | None = None) -> Column:
-    """Numbers; `missing`: some may be not a number or infinite."""
-    return Column(name, "float64", unit, meaning, missing, minimum)
-
-
-def whole(name: str, meaning: str, minimum: int | None = None) -> Column:
-    """Counts and numbers of things."""
-    return Column(name, "int32", "", meaning, minimum=minimum)
-
-
-def group(name: str, meaning: str) -> Column:
-    """A word that is the same in a whole row group."""
-    return Column(name, "string", "", meaning)
-
-
-def text(name: str, meaning: str) -> Column:
-    """A word of its own in each row."""
-    return Column(name, "text", "", meaning)
-
-
-SET = whole("data_set", "number of the data set, from 0", 0)
-CONFIGURATION = whole("configuration", "number of the configuration in its data set, from 0", 0)
-LENGTH = whole("length", "data set length ds: how many configurations, from the first, were used", 1)
-STRATEGY = group("strategy", "name of the strategy; a row group holds one")
-ON_TESTS = "mean square end-effector error on test configurations"
-ERROR = real("mean_square", "m^2", ON_TESTS, missing=True)
-
-
 def frames(job: Job, files: Iterable[str], schema: TableSchema) -> dict[str, pd.DataFrame]:
     """The table of each robot of a rule."""
     from elastocal.io.data_frames import read_frame
@@ -109,6 +76,21 @@ def rows_as_frame(rows: Sequence[Any], columns: Sequence[str] = ()) -> pd.DataFr
     import pandas as pd
 
     return pd.DataFrame(rows, columns=[*columns] or None)
+
+
+def settings_of(job: Job, *others: str) -> dict[str, Any]:
+    """Parameters of a rule but for those that are of every rule, and others."""
+    return {name: value for name, value in job.params.items() if name not in (STEP, SOURCES_DIGEST, *others)}
+
+
+def tabulate(schema: TableSchema, make: Callable[..., pd.DataFrame]) -> Callable[[Job], None]:
+    """A step of all robots: `make` has the table of each, of the rule's first input, and by their names its parameters."""
+
+    def step(job: Job) -> None:
+        files = job.input[next(iter(job.input.keys()))]
+        write_csvs(job, table=make(frames(job, files, schema), **settings_of(job, "robots")))
+
+    return step
 
 
 def read_reference(path: str) -> pd.DataFrame:

@@ -17,25 +17,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.storage import Column, write_table
+from elastocal.io.storage import Column
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.links import beam_axes, extended_chain
-from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import (
-    LENGTH,
-    MICRO,
-    ON_TESTS,
-    SET,
-    Job,
-    frames,
-    origin,
-    real,
-    rows_as_frame,
-    table,
-    whole,
-    write_csvs,
-)
+from elastocal.study.columns import LENGTH, ON_TESTS, SET, real, table, whole
+from elastocal.study.in_memory import ask
+from elastocal.study.jobs import MICRO, rows_as_frame, tabulate
 from elastocal.study.points import root_mean
 
 if TYPE_CHECKING:
@@ -224,12 +212,5 @@ def ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return rows_as_frame(rows, (*head, "rms_um", "rms_um_std_error", "chosen_percent", "usual_link"))
 
 
-def climb_ladder(job: Job) -> None:
-    """Link springs on one robot."""
-    blocks = ladder_blocks(study_of(job), job.params.lengths, job.params.noises)
-    write_table(job.output.ladder, LADDER, blocks, origin(job))
-
-
-def tabulate_ladder(job: Job) -> None:
-    """Of all robots with links."""
-    write_csvs(job, table=ladder_table(frames(job, job.input.ladders, LADDER)))
+climb_ladder = ask(LADDER, ladder_blocks)
+tabulate_ladder = tabulate(LADDER, ladder_table)

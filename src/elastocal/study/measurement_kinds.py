@@ -12,29 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.storage import write_table
 from elastocal.mechanics.elastostatics import joint_torques, loaded_point
 from elastocal.random_streams import draw
+from elastocal.study.columns import ERROR, LENGTH, SET, STRATEGY, group, real, table, whole
 from elastocal.study.equation_11 import Measurements, Prior, condition_numbers, estimate_compliance
 from elastocal.study.identify import configuration_first
-from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import (
-    ERROR,
-    LENGTH,
-    MICRO,
-    SET,
-    STRATEGY,
-    Job,
-    frames,
-    group,
-    origin,
-    real,
-    rows_as_frame,
-    strategies_of,
-    table,
-    whole,
-    write_csvs,
-)
+from elastocal.study.in_memory import ask
+from elastocal.study.jobs import MICRO, rows_as_frame, tabulate
 from elastocal.study.points import root_mean
 from elastocal.study.simulation import Experiments, prefix_index_columns
 from elastocal.study.strategies import all_at_once
@@ -186,24 +170,5 @@ def few_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return rows_as_frame(rows, (*columns, "rms_um", "rms_um_std_error", "median_um"))
 
 
-def compare_kinds(job: Job) -> None:
-    """Kinds of measurement on one robot."""
-    write_table(
-        job.output.kinds, KINDS, kind_blocks(study_of(job), job.params.reflectors, job.params.encoders_rad), origin(job)
-    )
-
-
-def compare_few(job: Job) -> None:
-    """Few configurations of one robot."""
-    blocks = few_blocks(study_of(job), strategies_of(job), job.params.nominal_errors)
-    write_table(job.output.few, FEW, blocks, origin(job))
-
-
-def tabulate_kinds(job: Job) -> None:
-    """Of all robots."""
-    write_csvs(job, table=kinds_table(frames(job, job.input.kinds, KINDS), job.params.length))
-
-
-def tabulate_few(job: Job) -> None:
-    """Of all robots."""
-    write_csvs(job, table=few_table(frames(job, job.input.few, FEW)))
+compare_kinds, compare_few = ask(KINDS, kind_blocks), ask(FEW, few_blocks)
+tabulate_kinds, tabulate_few = tabulate(KINDS, kinds_table), tabulate(FEW, few_table)

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.io.storage import write_table
+from elastocal.study.columns import ERROR, LENGTH, SET, group, real, table
 from elastocal.study.equation_11 import prefix_information
-from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import ERROR, LENGTH, MICRO, SET, Job, frames, group, origin, real, rows_as_frame, table, write_csvs
+from elastocal.study.in_memory import ask
+from elastocal.study.jobs import MICRO, Job, frames, rows_as_frame, write_csvs
 from elastocal.study.metrics import squared_error_bounds
 from elastocal.study.simulation import bootstrap_weights, prefix_index_columns
 from elastocal.study.strategies import all_at_once
@@ -254,11 +254,6 @@ def _interval(values: np.ndarray) -> tuple[float, float, float]:
     return values[0], low, high
 
 
-def compare_point_sets(job: Job) -> None:
-    """Sets of points on one robot."""
-    write_table(job.output.budget, BUDGET, budget_blocks(study_of(job), job.params.point_sets), origin(job))
-
-
 def tabulate_budget(job: Job) -> None:
     """Of all robots: at an equal budget, paired, and how many configurations each set needs."""
     asked, found = job.params, frames(job, job.input.budgets, BUDGET)
@@ -282,3 +277,6 @@ def tabulate_costs(job: Job) -> None:
         costs=cost_table(found, asked.point_sets, asked.accuracies_um[0], weights),
         break_even=break_even_table(found, asked.point_sets, asked.accuracies_um, weights),
     )
+
+
+compare_point_sets = ask(BUDGET, budget_blocks)

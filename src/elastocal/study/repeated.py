@@ -17,10 +17,11 @@ import numpy as np
 from scipy.special import gammaln
 
 from elastocal.io.storage import Column, TableSchema, read_blocks, read_table, write_table
+from elastocal.study.columns import LENGTH, STRATEGY, real, table, whole
 from elastocal.study.evaluation import SCORES, average, judge_of, metrics, score_columns
 from elastocal.study.identify import covariance_columns, design
 from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import LENGTH, STRATEGY, Job, origin, real, robot_of, strategies_of, table, whole
+from elastocal.study.jobs import Job, origin, robot_of, strategies_of
 from elastocal.study.metrics import signed_deviation
 from elastocal.study.simulation import data_sets
 from elastocal.study.strategies import strategy_from_document

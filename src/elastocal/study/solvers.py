@@ -11,26 +11,14 @@ import numpy as np
 
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import TableSchema, write_table
+from elastocal.study.columns import SET, group, real, table
 from elastocal.study.equation_11 import estimate_compliance
 from elastocal.study.gauss_newton import identify_exactly
 from elastocal.study.identify import Design, Situation, configuration_first, read_measured
-from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import (
-    SET,
-    Job,
-    below,
-    chain_of,
-    frames,
-    group,
-    origin,
-    real,
-    rows_as_frame,
-    strategies_of,
-    table,
-    write_csvs,
-)
+from elastocal.study.in_memory import ask
+from elastocal.study.jobs import Job, below, chain_of, rows_as_frame, strategies_of, tabulate, write_csvs
 from elastocal.study.simulation import data_sets
-from elastocal.study.strategies import drop_forgotten_stages, strategy_from_document
+from elastocal.study.strategies import drop_forgotten_stages
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -116,8 +104,9 @@ def _largest(values: np.ndarray, others: np.ndarray) -> float:
     return float(np.abs(values / others - 1.0).max())
 
 
-def start_columns(study: StudyInMemory, strategy: Strategy, starts: Sequence[float]) -> dict[str, np.ndarray]:
-    """Whether Gauss-Newton comes to the same estimates from every start; `starts`: rad/(N m), the same for all joints."""
+def start_columns(study: StudyInMemory, strategies: Sequence[Strategy], starts: Sequence[float]) -> dict[str, np.ndarray]:
+    """Whether Gauss-Newton comes by the one strategy to the same estimates from every start, rad/(N m) for all joints."""
+    (strategy,) = strategies
     sets, read, chain = np.arange(study.size.data_sets), study.interpretation, study.robot.chain
     drawn = study.experiments(sets)
     design = Design(drawn, chain, strategy.points, read.rows, read.wrench_at)
@@ -135,6 +124,11 @@ def start_columns(study: StudyInMemory, strategy: Strategy, starts: Sequence[flo
     }
 
 
+def starts_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """The starts of all robots, whose names come last."""
+    return below(found)[[*(column.name for column in STARTS.columns), "robot"]]
+
+
 def compare_solvers(job: Job) -> None:
     """Both solvers on the data sets of one robot."""
     asked, chain, strategies = job.params, chain_of(job), strategies_of(job)
@@ -143,21 +137,13 @@ def compare_solvers(job: Job) -> None:
     write_table(job.output.solvers, solvers(chain.coordinates), solved, provenance(asked))
 
 
-def vary_starts(job: Job) -> None:
-    """The classical strategy from several starts."""
-    columns = start_columns(study_of(job), strategy_from_document(job.params.strategy), job.params.starts)
-    write_table(job.output.starts, STARTS, [columns], origin(job))
-
-
-def tabulate_starts(job: Job) -> None:
-    """Of all robots."""
-    found = below(frames(job, job.input.starts, STARTS))
-    write_csvs(job, table=found[[*(column.name for column in STARTS.columns), "robot"]])
-
-
 def tabulate_solvers(job: Job) -> None:
     """Of all robots."""
     from elastocal.io.data_frames import read_frame
 
     files = zip(job.params.robots, job.params.joints, job.input.solvers, strict=True)
     write_csvs(job, table=solver_summary({robot: read_frame(path, solvers(n)) for robot, n, path in files}))
+
+
+vary_starts = ask(STARTS, start_columns)
+tabulate_starts = tabulate(STARTS, starts_table)

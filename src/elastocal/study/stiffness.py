@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.storage import write_table
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, loaded_point
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import MICRO, Job, below, frames, origin, real, table, whole, write_csvs
+from elastocal.study.columns import real, table, whole
+from elastocal.study.in_memory import ask
+from elastocal.study.jobs import MICRO, below, tabulate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -130,11 +130,5 @@ def stiffness_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return part.join(frame[["offset_rank", "rank"]])
 
 
-def load_arm(job: Job) -> None:
-    """Equation 6 on one robot."""
-    write_table(job.output.stiffness, STIFFNESS, [stiffness_columns(study_of(job), job.params.forces_N)], origin(job))
-
-
-def tabulate_stiffness(job: Job) -> None:
-    """Of all robots."""
-    write_csvs(job, table=stiffness_table(frames(job, job.input.stiffness, STIFFNESS)))
+load_arm = ask(STIFFNESS, stiffness_columns)
+tabulate_stiffness = tabulate(STIFFNESS, stiffness_table)

@@ -22,22 +22,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits
-from elastocal.io.storage import write_table
+from elastocal.study.columns import SET, STRATEGY, real, table
 from elastocal.study.evaluation import REPLICATES, metrics
-from elastocal.study.in_memory import study_of
-from elastocal.study.jobs import (
-    MICRO,
-    SET,
-    STRATEGY,
-    Job,
-    frames,
-    origin,
-    real,
-    rows_as_frame,
-    strategies_of,
-    table,
-    write_csvs,
-)
+from elastocal.study.in_memory import ask
+from elastocal.study.jobs import MICRO, Job, frames, rows_as_frame, write_csvs
 from elastocal.study.metrics import make_judge, position_errors
 from elastocal.study.points import QUANTILE
 from elastocal.study.simulation import Experiments
@@ -259,11 +247,6 @@ def _round(values: np.ndarray) -> np.ndarray:
     return np.array([float(f"{value:.{_DIGITS}g}") for value in values])
 
 
-def judge_in_use(job: Job) -> None:
-    """Strategies on one robot, in use."""
-    write_table(job.output.uses, USES, use_blocks(study_of(job), strategies_of(job), job.params.uses), origin(job))
-
-
 def tabulate_uses(job: Job) -> None:
     """Of all robots."""
     from elastocal.io.data_frames import read_long
@@ -275,3 +258,6 @@ def tabulate_uses(job: Job) -> None:
         for robot, frame in frames(job, job.input.uses, USES).items()
     }
     write_csvs(job, scores=ranks_table(found, asked.classical), pairs=pairs_table(found))
+
+
+judge_in_use = ask(USES, use_blocks)
