@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import poses
-from elastocal.study.arm_points import BAR, FLANGE, _segment_distances, in_sight, place_columns, places, places_table
+from elastocal.study.arm_points import BAR, FLANGE, _segment_distances, in_sight, place_columns, places
 from elastocal.study.points import budget_blocks
 
 # Upright column, then an arm of a metre that a joint turns in the level plane, then one of half a metre.
@@ -83,12 +83,3 @@ def test_a_target_on_the_flange_is_the_end_effector_measured_twice(kuka, table):
 
 def test_a_reflector_that_stays_as_it_is_is_seen_less_often_than_one_that_is_turned(table):
     assert (table.fixed <= table.turned).all() and 0 < table.fixed.mean() < table.turned.mean() < 0.7
-
-
-def test_places_are_compared_by_the_ratio_of_root_mean_bounds_paired_by_data_set():
-    frame = pd.DataFrame({"joints": 2, "along": 1.2, "side": "+y", "data_set": range(4), "bound": [4.0, 8.0, 4.0, 8.0]})
-    frame = frame.assign(bound_end_effector=frame.bound / 4, turned=[0.5, 0.4, 0.5, 0.4], fixed=0.1)
-    (row,) = places_table({"arm": frame}).to_dict("records")
-    assert (row["ratio"], row["ratio_low"], row["ratio_high"]) == pytest.approx((2, 2, 2))
-    assert (row["robot"], row["joints"], row["side"]) == ("arm", 2, "+y")
-    assert (row["seen_turned_percent"], row["seen_fixed_percent"]) == pytest.approx((45, 10))

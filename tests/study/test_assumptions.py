@@ -23,13 +23,10 @@ from elastocal.study.assumptions import (
     expected_errors,
     geometry_columns,
     geometry_rows,
-    geometry_table,
     linear_estimators,
     noise_and_leak,
     tube_blocks,
-    tubes_table,
     weighting_rows,
-    weighting_table,
 )
 from elastocal.study.metrics import position_errors
 from elastocal.study.simulation import true_deflections
@@ -175,25 +172,3 @@ def test_the_diameter_of_the_file_gives_the_deflections_and_errors_of_the_pipeli
     np.testing.assert_allclose(block["mean"], size.mean(axis=1), rtol=1e-9)
     models = compliances(identified(kuka_extended, strategies["6DoF"], experiments, deflections), 20)
     np.testing.assert_allclose(block["left"], (position_errors(judge(kuka_extended), models) ** 2).mean(axis=1), rtol=1e-6)
-
-
-def test_noise_and_leak_add_as_squares_and_have_units_for_people():
-    names = ["noise", "leak", "compliance_noise", "compliance_leak", "zero_noise", "zero_leak"]
-    frame = pd.DataFrame([("at once", 3e-4, 4e-4, 8.0, 1.0, 3e-5, 1e-3)], columns=["estimator", *names])
-    found = geometry_table({"arm": frame}).iloc[0].tolist()
-    assert found[:2] == ["arm", "at once"] and found[2:] == pytest.approx([500, 300, 400, 8, 1, 30, 1000])
-
-
-def test_weights_are_compared_by_a_ratio():
-    frame = pd.DataFrame({"orientation_ratio": [3.0], "per_metre": [5e-5], "equal": [1.5e-4], "weighted": [1e-4]})
-    found = weighting_table({"arm": frame}).iloc[0].tolist()
-    assert found[0] == "arm" and found[1:] == pytest.approx([3, 50, 150, 100, 1.5])
-
-
-def test_tubes_show_single_data_sets_and_what_joints_leave():
-    frame = pd.DataFrame({"diameter": 0.25, "data_set": [0, 1], "mean": [1e-3, 3e-3], "mean_square": [2e-6, 10e-6]})
-    frame = frame.assign(maximum=[4e-3, 6e-3], left=[1e-8, 3e-8])
-    (row,) = tubes_table({"arm": frame}).to_dict("records")
-    assert (row["diameter_mm"], row["mean_mm"], row["mean_mm_between"]) == pytest.approx((250, 2, np.sqrt(2)))
-    assert (row["std_mm"], row["max_mm"], row["left_um"]) == pytest.approx((1, 5, 1e6 * np.sqrt(2e-8)))
-    assert tubes_table({}).empty

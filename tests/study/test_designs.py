@@ -9,13 +9,11 @@ from elastocal.study.designs import (
     CONTINUOUS,
     RANDOM,
     design_columns,
-    designs_table,
     observability,
     observability_columns,
     observability_table,
     rate_designs,
     simulated_design_blocks,
-    simulated_designs_table,
 )
 
 
@@ -84,12 +82,6 @@ def test_observability_stands_beside_bound_and_error_of_the_same_data_set(kuka):
     assert (table["bound"] > 0).all() and 0.1 < table["mean_square"].mean() / table["bound"].mean() < 4
 
 
-def test_designs_are_in_micrometres():
-    frame = pd.DataFrame({"design": ["D"], "configurations": [4], "rms": [8e-5], "low": [7e-5], "high": [9e-5]})
-    found = designs_table({"arm": frame.assign(joint_range="limits")}).iloc[0].tolist()
-    assert found == pytest.approx(["arm", "limits", "D", 4, 80.0, 70.0, 90.0])
-
-
 def test_an_index_that_orders_data_sets_as_the_bound_does_has_rank_correlation_one():
     rng = np.random.default_rng(1)
     bound = rng.uniform(1, 2, 400)
@@ -100,10 +92,3 @@ def test_an_index_that_orders_data_sets_as_the_bound_does_has_rank_correlation_o
     # Unrelated: within four standard errors of nothing.
     assert abs(table.rank_correlation_with_bound["O2"]) < 4 * table.rank_correlation_with_bound_std_error["O2"]
     assert table.rank_correlation_with_error["bound"] == pytest.approx(-table.rank_correlation_with_error["O1"])
-
-
-def test_the_gain_of_a_design_is_over_random_ones_of_its_size_and_load():
-    rows = [("a", "random", 5, 80e-6), ("a", "I", 5, 40e-6), ("b", "random", 5, 60e-6), ("b", "I", 5, 40e-6)]
-    frame = pd.DataFrame(rows, columns=["load", "design", "configurations", "rms"])
-    frame = frame.assign(unobservable="", std_error=1e-6, there=frame.rms)
-    assert simulated_designs_table({"arm": frame}).gain.tolist() == pytest.approx([1.0, 2.0, 1.0, 1.5])

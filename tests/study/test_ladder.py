@@ -9,7 +9,7 @@ from made_study_blocks import PAPER, compliances, deflections_of, experiments_of
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.links import extended_chain, spring_compliance
-from elastocal.study.ladder import CHOSEN, ladder, ladder_blocks, ladder_table, products_of, spring_columns
+from elastocal.study.ladder import ladder, ladder_blocks, products_of, spring_columns
 from elastocal.study.metrics import position_errors
 from elastocal.study.simulation import random_experiments, true_deflections
 
@@ -106,19 +106,3 @@ def test_joints_alone_leave_what_the_reduced_model_leaves(kuka_extended, strateg
     (block,) = ladder_blocks(few_of(kuka_extended), lengths=[20], noises=[0.0])
     # The judge predicts with exact kinematics, the ladder by the linear equation: percents of a percent.
     np.testing.assert_allclose(block["mean_square"][block["link_springs"] == 0], expected, rtol=0.02)
-
-
-def ladder_frame():
-    """Two data sets: errors of 4 and 2 µm without springs, 1 and 3 with one; the first stops at one, the second at none."""
-    rows = [(200e-6, 10, 0, 0, 0, False, 16e-12), (200e-6, 10, 0, 1, 3, True, 1e-12)]
-    rows += [(200e-6, 10, 1, 0, 0, True, 4e-12), (200e-6, 10, 1, 1, 3, False, 9e-12)]
-    return pd.DataFrame(rows, columns=["noise", "length", "data_set", "link_springs", "added_link", "chosen", "mean_square"])
-
-
-def test_the_ladder_has_a_row_for_each_number_of_springs_and_one_for_what_was_chosen():
-    table = ladder_table({"arm": ladder_frame()})
-    assert table.link_springs.tolist() == ["0", "1", CHOSEN]
-    assert table.rms_um.tolist() == pytest.approx([np.sqrt(10), np.sqrt(5), np.sqrt(2.5)])
-    assert table.chosen_percent.tolist()[:2] == [50, 50] and np.isnan(table.chosen_percent[2])
-    assert table.usual_link[1] == 3 and table.usual_link.isna().tolist() == [True, False, True]
-    assert table.noise_um.tolist() == [200.0] * 3

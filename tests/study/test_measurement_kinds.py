@@ -10,9 +10,7 @@ from made_studies import few_of
 from elastocal.random_streams import draw
 from elastocal.study.measurement_kinds import (
     few_blocks,
-    few_table,
     kind_blocks,
-    kinds_table,
     one_joint_at_a_time,
     simulate_encoders,
 )
@@ -89,18 +87,3 @@ def test_least_squares_do_not_look_at_nominal_values(kuka, both):
     blocks = list(few_blocks(few_of(kuka), both, [0.1, 1.0]))
     np.testing.assert_array_equal(blocks[0]["mean_square"], blocks[2]["mean_square"])
     assert (blocks[1]["mean_square"] != blocks[3]["mean_square"]).all()
-
-
-def test_few_configurations_are_given_by_strategy_and_error_of_the_nominal_values():
-    frame = pd.DataFrame({"nominal_error": 0.3, "strategy": "A", "length": [1, 1, 1, 2, 2, 2], "data_set": [0, 1, 2] * 2})
-    frame["mean_square"] = [1e-10, 4e-10, 13e-10, np.nan, 1e-10, 1e-10]
-    table = few_table({"arm": frame})
-    assert table.nominal_error_percent.tolist() == [30, 30] and table.rms_um[0] == pytest.approx(1e6 * np.sqrt(6e-10))
-    assert table.median_um[0] == pytest.approx(20.0) and np.isnan(table.rms_um[1])
-
-
-def test_kinds_are_given_at_as_many_configurations_and_at_as_many_scalars():
-    frame = pd.DataFrame({"kind": "one", "scalars": 3, "length": np.arange(1, 41), "data_set": 0, "mean_square": 1e-10})
-    table = kinds_table({"arm": pd.concat([frame, frame.assign(data_set=1)])}, 20)
-    assert table[["configurations", "scalars"]].to_numpy().tolist() == [[20, 60], [40, 120]]
-    assert table.rms_um.tolist() == pytest.approx([10.0, 10.0])

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_study_blocks import AT, WRENCH, compliances, deflections_of, experiments_of, identified, joined
+from made_study_blocks import AT, WRENCH, deflections_of, experiments_of, identified, joined
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 from support import OTHER_CHAINS, PinocchioPoint, random_loads, robot_of, without_tool
@@ -190,16 +190,6 @@ def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatc
         assert to_weights(tests).shape == (5, 7)
 
 
-def test_weights_of_a_table_written_by_hand():
-    columns = {
-        "number": np.array([4, 4, 4, 5, 5, 5]),
-        "replicate": np.array([1, 2, 3, 1, 2, 3]),
-        "count": np.array([0, 2, 1, 3, 0, 1]),
-    }
-    # Replicate 0 has every member once, the others their counts.
-    assert to_weights(columns).tolist() == [[1, 1], [0, 3], [2, 0], [1, 1]]
-
-
 def test_data_sets_count_once_on_average_and_independently_of_the_tests():
     sets, tests = (to_weights(block)[1:] for block in weight_blocks("kuka", 1, 400, 400, 50))
     # 20 000 Poisson counts of mean and variance one: five standard errors, a level of 1e-6 for each of two means and variances;
@@ -228,14 +218,3 @@ def test_numbers_do_not_depend_on_blocks(kuka, strategies, monkeypatch):
             np.testing.assert_allclose(other[1][name], tables[0][1][name], rtol=0, atol=1e-14)
         for name, values in tables[0][2].items():
             np.testing.assert_allclose(other[2][name], values, rtol=1e-6, atol=1e-12, err_msg=name)
-
-
-def test_links_bend_beyond_what_joints_explain(kuka_extended, strategies):
-    experiments = experiments_of(kuka_extended, key="kuka_extended")
-    reduced = replace(kuka_extended, links=())
-    stiff, elastic = (
-        compliances(identified(robot, strategies["6DoF"], experiments, deflections_of(robot, experiments)), 4)
-        for robot in (reduced, kuka_extended)
-    )
-    # What bends in the links is laid on the joints: the shoulder looks softer.
-    assert (elastic[:, 1] > 1.2 * stiff[:, 1]).all()

@@ -1,14 +1,13 @@
 """Equation 11 beside Gauss-Newton: both from the same measurements, one strategy after the other."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from made_studies import few_of
 from made_study_blocks import deflections_of, experiments_of, pinocchio_regressors
 
 from elastocal.study.identify import paired_blocks
 from elastocal.study.simulation import to_deflections
-from elastocal.study.solvers import solver_blocks, solver_summary, start_columns
+from elastocal.study.solvers import solver_blocks, start_columns
 
 
 def solve(robot, experiments, deflections, strategies, length, rows=6):
@@ -52,20 +51,6 @@ def test_the_solvers_differ_in_proportion_to_the_deflection(kuka, strategies, sh
         differences.append(np.abs(estimates(found, "equation_11") / estimates(found, "gauss_newton") - 1).max())
     assert differences[0] > 1e-5
     assert differences[1] / differences[0] == pytest.approx(share, rel=0.1)
-
-
-def test_solver_summary_pairs_the_strategies_that_are_the_same_estimator():
-    def block(strategy, factor):
-        columns = {"strategy": strategy, "data_set": [0, 1]}
-        for solver, shift in (("equation_11", 1.001), ("gauss_newton", 1.0)):
-            columns[f"{solver}_c1"] = np.array([1.0, 2.0]) * factor * shift
-        return pd.DataFrame(columns)
-
-    frame = pd.concat([block("A", 1.0), block("B", 1.5), block("C", 1.0)], ignore_index=True)
-    table = solver_summary({"arm": frame}).set_index("strategy")
-    assert table.closest_strategy[["A", "C"]].tolist() == ["C", "A"]
-    assert table.gauss_newton_difference["A"] == 0 and table.gauss_newton_difference["B"] == pytest.approx(0.5)
-    assert table.between_solvers.to_numpy() == pytest.approx(0.001)
 
 
 def test_a_start_from_which_steps_do_not_settle_is_counted(kuka, strategies):

@@ -1,7 +1,6 @@
 """Equation 6 against finite differences and against the equilibrium of the loaded arm."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from made_studies import few_of
 from made_study_blocks import experiments_of
@@ -9,7 +8,7 @@ from made_study_blocks import experiments_of
 from elastocal.mechanics.elastostatics import generalized_forces, joint_torques
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.study.simulation import to_experiments
-from elastocal.study.stiffness import equilibrium, stiffness_columns, stiffness_table, torque_gradient
+from elastocal.study.stiffness import equilibrium, stiffness_columns, torque_gradient
 
 
 @pytest.fixture
@@ -48,9 +47,3 @@ def test_the_effect_of_the_loaded_arm_grows_with_the_load(kuka):
         assert 2.9 < found[name][1] / found[name][0] < 3.1, name
         assert 0 < found[name][0] < 1.0
     assert found["offset_rank"].tolist() == [5, 5] and found["rank"].tolist() == [6, 6]
-
-
-def test_stiffness_is_given_in_newtons_per_micrometre():
-    frame = pd.DataFrame([{"force": 1000.0, "softest": 8e5, "first_order": 0.1, "loaded": 0.2, "by_k_c": 0.3, "bias": 0.4}])
-    table = stiffness_table({"arm": frame.assign(k_sigma=0.5, offset_rank=5, rank=6)})
-    assert table.softest_N_per_um[0] == pytest.approx(0.8) and table.by_k_c_percent[0] == 0.3 and table["rank"][0] == 6

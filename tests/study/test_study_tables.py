@@ -6,7 +6,7 @@ import pytest
 from made_studies import studies_of
 
 from elastocal.study.printed import predict_scatter
-from elastocal.study.study_tables import expectations_table, interpretations_table, measured_table
+from elastocal.study.study_tables import expectations_table, interpretations_table
 
 PRINTED = pd.DataFrame(
     [
@@ -62,20 +62,3 @@ def test_the_error_of_a_likelihood_is_the_jackknife_over_studies_of():
         densities = [predict_scatter(frame, "arm", "A", "dev_20", 20).log_density(1.0) for frame in some]
         left.append(densities[0] - densities[1])
     assert found.log_likelihood_std_error == pytest.approx(np.sqrt(2 / 3 * ((left - np.mean(left)) ** 2).sum()))
-
-
-def test_table_4_over_studies_gives_medians_by_what_is_measured_and_averaged():
-    studies = studies_of(biases=(20.0, 22.0, 60.0))
-    for name in ("k_sigma", "k_sigma_fixed_joints", "deviation"):
-        studies[f"{name}_mean_compliance"] = 0.1 * studies[name]
-    studies["mean_square"] = 4e-10
-    table = measured_table({"pose": studies, "one reflector": studies}, 20, {"k_sigma": 1.0, "deviation": 2.0})
-    assert table[["measured", "average"]].to_numpy().tolist() == [
-        [kind, average] for kind in ("pose", "one reflector") for average in ("stiffness", "compliance")
-    ]
-    row = table.iloc[0]
-    assert row.k_sigma_20_percent == pytest.approx(1.1) and row.k_sigma_fixed_joints_20_percent == pytest.approx(0.55)
-    # The third study is an outlier that a robust deviation does not see: deviations 0.1, 0 and 1.9.
-    assert row.dev_20_um == pytest.approx(1.1) and row.dev_20_um_std == pytest.approx(1.4826 * 0.1)
-    assert (row.n_k_sigma_1_percent, row.n_dev_2_um) == (22, 11) and row.rms_20_um == pytest.approx(20.0)
-    assert table.dev_20_um[1] == pytest.approx(0.11)

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from made_metrics import metrics_of, replicates_of
 
-from elastocal.study.tables import merge_errors, per_dataset_table, table2, table4, word_value
+from elastocal.study.tables import merge_errors, per_dataset_table, table4, word_value
 
 
 def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law_it_follows():
@@ -21,27 +21,6 @@ def test_lengths_of_table4_are_those_of_its_own_limits_each_between_two_lengths(
     # Replicates of 36, 40 and 44 %.
     assert table.n_k_sigma_3_percent_std_error == pytest.approx(np.std([12, 14, 15], ddof=1))
     assert table.n_dev_7_um_std_error == pytest.approx(np.std([6, 6, 7], ddof=1))
-
-
-def test_table2_is_the_statistics_of_all_configurations_together():
-    rng = np.random.default_rng(1)
-    data = rng.gamma(2.0, 1e-3, (50, 40))
-    initial = pd.DataFrame(
-        {
-            "data_set": range(50),
-            "configurations": 40,
-            "mean": data.mean(axis=1),
-            "mean_square": (data**2).mean(axis=1),
-            "maximum": data.max(axis=1),
-        }
-    )
-    weights = np.vstack([np.ones(50), rng.poisson(1.0, (400, 50))])
-    row = table2({"arm": initial}, {"arm": weights}).iloc[0]
-    assert row.mean_mm == pytest.approx(1e3 * data.mean()) and row.std_mm == pytest.approx(1e3 * data.std())
-    assert row.max_mm == pytest.approx(1e3 * data.max())
-    # A standard deviation of 400 replicates is known to 3.5 %: 12 % at 3.4 standard errors; 20 % is seen with a power of 0.97.
-    assert row.mean_mm_std_error == pytest.approx(1e3 * data.mean(axis=1).std() / np.sqrt(50), rel=0.12)
-    assert row.mean_mm_one_set_std == pytest.approx(1e3 * data.mean(axis=1).std(ddof=1))
 
 
 def test_efficiency_is_the_squared_ratio_of_bound_and_error_and_is_empty_without_noise():
