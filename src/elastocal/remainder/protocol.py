@@ -52,16 +52,27 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Part:
-    """One fold of the training poses: a regression is fitted to some and judged by the others.
+class Folds:
+    """Training poses in K folds, and what models leave of them that were fitted without each.
 
-    `fitted_residual`, `judged_residual` (M, 3): of a model that was fitted without the poses that judge, m, base axes.
+    `inputs`: of M observations. `configuration`, `fold` (M,): of each, 0 .. G-1 and 0 .. K-1; a configuration has one fold.
+    `whole` (M, 3): residuals of the model fitted to all of them, m, base axes. `residual` (K, M, 3): without each fold.
     """
 
-    fitted: Inputs
-    fitted_residual: np.ndarray
-    judged: Inputs
-    judged_residual: np.ndarray
+    inputs: Inputs
+    configuration: np.ndarray
+    fold: np.ndarray
+    whole: np.ndarray
+    residual: np.ndarray
+
+    @property
+    def left_out(self) -> np.ndarray:
+        """Residuals of each observation by the model without its fold, ndarray (M, 3)."""
+        return self.residual[self.fold, np.arange(len(self.fold))]
+
+    def without(self, one: int, other: int) -> np.ndarray:
+        """Residuals of a model without both folds, to first order of what each of them does to it, ndarray (M, 3)."""
+        return self.residual[one] + self.residual[other] - self.whole
 
 
 class Predictor(Protocol):

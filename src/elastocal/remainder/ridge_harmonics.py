@@ -41,7 +41,7 @@ class _Predictor:
 
     def __call__(self, inputs: Inputs) -> Prediction:
         parts = [
-            _harmonics(part, self._orders) @ self._coefficients + part.jacobian @ self._geometry for part in _parts(inputs)
+            by_harmonics(part, self._orders) @ self._coefficients + part.jacobian @ self._geometry for part in _parts(inputs)
         ]
         return Prediction(np.concatenate(parts))
 
@@ -55,7 +55,7 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
     harmonics, coordinates = 2 * most * joints, inputs.jacobian.shape[2]
     gram, right, start = np.zeros((harmonics + coordinates,) * 2), np.zeros(harmonics + coordinates), 0
     for part in _parts(inputs):
-        columns = np.concatenate([_harmonics(part, most), part.jacobian], axis=2).reshape(3 * len(part), -1)
+        columns = np.concatenate([by_harmonics(part, most), part.jacobian], axis=2).reshape(3 * len(part), -1)
         gram += columns.T @ columns
         right += columns.T @ residual[start : start + len(part)].ravel()
         start += len(part)
@@ -81,7 +81,7 @@ def _parts(inputs: Inputs) -> list[Inputs]:
     return [inputs.select(np.arange(len(inputs))[start : start + _AT_ONCE]) for start in range(0, len(inputs), _AT_ONCE)]
 
 
-def _harmonics(inputs: Inputs, orders: int) -> np.ndarray:
+def by_harmonics(inputs: Inputs, orders: int) -> np.ndarray:
     """Displacement of the target by one radian of each harmonic, (M, 3, 2 n orders), lower orders first."""
     phase = np.arange(1, orders + 1)[:, None] * inputs.joint_angles[:, None, :]
     harmonics = np.stack([np.sin(phase), np.cos(phase)], axis=2)
