@@ -7,11 +7,10 @@ Its variance far from all of them is that of the residuals themselves, so that w
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import blas, lapack
+from scipy.linalg import lapack
 from scipy.optimize import Bounds, minimize
 
 from elastocal.remainder.protocol import Prediction
@@ -27,8 +26,8 @@ SETTINGS: Sequence[Setting] = ({},)
 # Hyperparameters come from so many observations: a step towards them costs the third power of their number, and 800 take eight
 # times as long for errors that differ by 2 % either way (UR5 and UR10).
 _MOST_FOR_HYPERPARAMETERS = 300
-# Of so many the covariance matrix takes 1.2 GB; of more, so many are drawn.
-_MOST = 12_000
+# Of more observations so many, drawn at random, are those that the process knows: their covariance takes 32 MB.
+_MOST = 2_000
 # Variance of the process, lengths in standard deviations of each input, from wiggles between neighbours to one trend across all
 # poses, and variance of the noise: where the search starts, and its bounds.
 _VARIANCE, _LENGTH, _NOISE = (1.0, 1e-3, 1e3), (1.0, 0.05, 100.0), (0.5, 1e-4, 10.0)
@@ -39,40 +38,8 @@ _LAST_GAIN = 1e-11
 _JITTER = 1e-10
 # An input that differs by less than this over all poses says nothing: rad, N, m, s, degC.
 _STILL = 1e-10
-# Rows of a covariance matrix that are made at once.
+# Predictions that are made at once.
 _AT_ONCE = 500
-
-
-@dataclass(frozen=True)
-class _Process:
-    """A process with the observations that it was fitted to.
-
-    `logarithms`: of variance, lengths and noise. `taken`, `middle`, `spread`: inputs that count, their means and standard
-    deviations. `scaled` (N, k): inputs over their lengths. `mean`, `size` (3,): of the residuals. `lower` (N, N): Cholesky
-    factor of the covariance. `along` (N, 3): inverse of the covariance times residuals of mean 0 and size 1.
-    """
-
-    logarithms: np.ndarray
-    taken: np.ndarray
-    middle: np.ndarray
-    spread: np.ndarray
-    scaled: np.ndarray
-    mean: np.ndarray
-    size: np.ndarray
-    lower: np.ndarray
-    along: np.ndarray
-
-    def __call__(self, inputs: Inputs) -> Prediction:
-        variance, lengths, noise = _parted(self.logarithms)
-        scaled = (inputs.columns[:, self.taken] - self.middle) / self.spread / lengths
-        mean, left = np.empty((len(scaled), 3)), np.empty(len(scaled))
-        for first in range(0, len(scaled), _AT_ONCE):
-            some = slice(first, first + _AT_ONCE)
-            across = variance * _matern(scaled[some], self.scaled)[0]
-            mean[some] = across @ self.along
-            explained = blas.dtrsm(1.0, self.lower, across.T, lower=1, overwrite_b=1)
-            left[some] = variance + noise - (explained**2).sum(axis=0)
-        return Prediction(mean * self.size + self.mean, np.sqrt(np.maximum(left, 0.0))[:, None] * self.size)
 
 
 def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
@@ -86,27 +53,32 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
     scaled = (columns[:, taken] - middle) / spread
     few, many = (np.sort(draws.permutation(len(scaled))[:most]) for most in (_MOST_FOR_HYPERPARAMETERS, _MOST))
     ranges = np.log([_VARIANCE, *[_LENGTH] * len(taken), _NOISE])
-    for _ in settings:
-        of_few = _standardized(residual[few])[0]
-        # A length at its bound is an input without influence, not a failure.
-        found = minimize(
-            _surprise,
-            ranges[:, 0],
-            args=(scaled[few], of_few),
-            method="L-BFGS-B",
-            jac=True,
-            bounds=Bounds(*ranges[:, 1:].T),
-            options={"ftol": _LAST_GAIN},
-        ).x
-        variance, lengths, noise = _parted(found)
-        places, (standard, mean, size) = scaled[many] / lengths, _standardized(residual[many])
-        covariance = np.empty((len(many),) * 2, order="F")
-        for first in range(0, len(many), _AT_ONCE):
-            covariance[:, first : first + _AT_ONCE] = variance * _matern(places, places[first : first + _AT_ONCE])[0]
-        np.einsum("ii->i", covariance)[:] += noise + _JITTER
-        lower = lapack.dpotrf(covariance, lower=1, overwrite_a=1)[0]
-        along = lapack.dpotrs(lower, standard, lower=1)[0]
-        yield _Process(found, taken, middle, spread, places, mean, size, lower, along)
+    # A length at its bound is an input without influence, not a failure.
+    found = minimize(
+        _surprise,
+        ranges[:, 0],
+        args=(scaled[few], _standardized(residual[few])[0]),
+        method="L-BFGS-B",
+        jac=True,
+        bounds=Bounds(*ranges[:, 1:].T),
+        options={"ftol": _LAST_GAIN},
+    ).x
+    variance, lengths, noise = _parted(found)
+    places, (standard, mean, size) = scaled[many] / lengths, _standardized(residual[many])
+    covariance = variance * _matern(places, places)[0] + (noise + _JITTER) * np.eye(len(many))
+    lower = lapack.dpotrf(covariance.T, lower=1, overwrite_a=1)[0]
+    along = lapack.dpotrs(lower, standard, lower=1)[0]
+
+    def predictor(there: Inputs) -> Prediction:
+        means, left = np.empty((len(there), 3)), np.empty(len(there))
+        for first in range(0, len(there), _AT_ONCE):
+            some = slice(first, first + _AT_ONCE)
+            across = variance * _matern((there.columns[some, taken] - middle) / spread / lengths, places)[0]
+            means[some] = across @ along * size + mean
+            left[some] = variance + noise - (lapack.dtrtrs(lower, across.T, lower=1)[0] ** 2).sum(axis=0)
+        return Prediction(means, np.sqrt(np.maximum(left, 0.0))[:, None] * size)
+
+    yield from (predictor for _ in settings)
 
 
 def _standardized(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -123,21 +95,10 @@ def _parted(logarithms: np.ndarray) -> tuple[float, np.ndarray, float]:
 
 def _matern(some: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Matérn's correlation of order 5/2, and the slope by which it falls with half of a squared distance: ndarray (N, M)."""
-    square = some @ others.T
-    square *= -2.0
-    square += (some**2).sum(axis=1)[:, None]
-    square += (others**2).sum(axis=1)
-    square *= 5.0
-    np.maximum(square, 0.0, out=square)
-    root = np.sqrt(square)
-    falling = np.exp(-root)
-    root += 1.0
-    root *= falling
-    square *= falling
-    square /= 3.0
-    square += root
-    root *= 5.0 / 3.0
-    return square, root
+    square = (some**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2.0 * some @ others.T
+    root = np.sqrt(np.maximum(5.0 * square, 0.0))
+    slope = (1.0 + root) * np.exp(-root)
+    return slope + root**2 / 3.0 * np.exp(-root), 5.0 / 3.0 * slope
 
 
 def _surprise(logarithms: np.ndarray, inputs: np.ndarray, standard: np.ndarray) -> tuple[float, np.ndarray]:

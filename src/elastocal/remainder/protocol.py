@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     Setting = Mapping[str, Any]
+    # A fitted regression, which predicts residuals of other observations.
+    Predictor = Callable[["Inputs"], "Prediction"]
 
 
 @dataclass(frozen=True)
@@ -64,23 +66,6 @@ class Folds:
     fold: np.ndarray
     whole: np.ndarray
     residual: np.ndarray
-
-    @property
-    def left_out(self) -> np.ndarray:
-        """Residuals of each observation by the model without its fold, ndarray (M, 3)."""
-        return self.residual[self.fold, np.arange(len(self.fold))]
-
-    def without(self, one: int, other: int) -> np.ndarray:
-        """Residuals of a model without both folds, to first order of what each of them does to it, ndarray (M, 3)."""
-        return self.residual[one] + self.residual[other] - self.whole
-
-
-class Predictor(Protocol):
-    """A fitted regression."""
-
-    def __call__(self, inputs: Inputs) -> Prediction:
-        """Predict the residuals of other observations."""
-        ...
 
 
 class Regression(Protocol):

@@ -1,8 +1,8 @@
 """A regression and its setting, chosen by poses that it has not seen, or none: nested cross-validation judges the choice too.
 
 The best of many settings is a winner by luck. So each outer fold of the training poses is predicted by what the others choose
-among themselves and fit (nested cross-validation [1]), and those predictions decide: whether anything is corrected, by one test
-over configurations, and how much of the correction is kept, by a slope below one.
+among themselves and fit (nested cross-validation [1]), and those predictions decide whether anything is corrected, by one test
+over configurations, and how much of the correction is kept, by a slope of at most one.
 
 [1] Varma, S. and Simon, R., Bias in error estimation when using cross-validation for model selection, BMC Bioinformatics 7,
     2006.
@@ -43,16 +43,16 @@ class Gain:
     m: what is predictable of each position.
     """
 
-    factor: float
-    statistic: float
-    p_value: float
-    rms_m: float
-    rms_std_error_m: float
+    factor: float = 0.0
+    statistic: float = 0.0
+    p_value: float = 1.0
+    rms_m: float = 0.0
+    rms_std_error_m: float = 0.0
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """A regression with the setting that poses chose; neither where no correction is used.
+    """A regression with the setting that poses chose; neither where nothing is corrected.
 
     `gain`: of the outer folds; None where there are too few configurations. `level`: of the test that it had to pass.
     """
@@ -73,21 +73,19 @@ def tuned(regressions: Sequence[Regression], folds: Folds, inputs: Inputs, resid
     if count < FEWEST_CONFIGURATIONS:
         return Tuned(no_correction)
     pairs = [(regression, setting) for regression in regressions for setting in regression.SETTINGS]
-    gains = _gains_without(regressions, folds, seed)
-    predicted, std = np.zeros_like(folds.whole), np.full_like(folds.whole, np.nan)
+    products = _products_without(regressions, folds, seed)
+    off = folds.residual[folds.fold, np.arange(len(folds.fold))]
+    predicted, std = np.zeros_like(off), np.full_like(off, np.nan)
     for number, left in enumerate(folds.residual):
-        best = _best(gains[number].sum(axis=0))
+        best = _best(products[number].sum(axis=0))
         if best is not None:
-            regression, setting = pairs[best]
-            mine = folds.fold == number
+            (regression, setting), mine = pairs[best], folds.fold == number
             predictor = next(iter(regression.fitted(folds.inputs.select(~mine), left[~mine], [setting], seed)))
             found = predictor(folds.inputs.select(mine))
-            predicted[mine] = found.mean
-            std[mine] = np.nan if found.std is None else found.std
-    off = folds.left_out
-    gain = gain_of(folds.configuration, off, predicted, len(folds.residual))
-    level = _LEVEL if count >= _FEW else _LEVEL_OF_FEW
-    chosen = _best(gains.sum(axis=(0, 1)))
+            predicted[mine], std[mine] = found.mean, np.nan if found.std is None else found.std
+    along, square = (np.bincount(folds.configuration, (rows * predicted).sum(axis=1)) for rows in (off, predicted))
+    gain, level = gain_of(along, square, len(off), len(folds.residual)), _LEVEL if count >= _FEW else _LEVEL_OF_FEW
+    chosen = _best(products.sum(axis=(0, 1)))
     if gain.p_value > level or chosen is None:
         return Tuned(no_correction, gain=gain, level=level)
     regression, setting = pairs[chosen]
@@ -96,54 +94,63 @@ def tuned(regressions: Sequence[Regression], folds: Folds, inputs: Inputs, resid
     return Tuned(calibrated(predictor, scores[np.isfinite(scores)], gain.factor), regression, setting, gain, level)
 
 
-def gain_of(configuration: np.ndarray, off: np.ndarray, predicted: np.ndarray, folds: int) -> Gain:
-    """What predictions gain on configurations that they were made without, M rows of G configurations.
+def gain_of(along: np.ndarray, square: np.ndarray, rows: int, folds: int) -> Gain:
+    """What predictions gain on configurations that they were made without.
 
     Their slope on the residuals is less than one where a regression follows noise; it is shrunk once more as a mean is by James
     and Stein [1]. Folds share most of the configurations that they are fitted to, which leaves the mean of their errors more
     variance than independent ones would have, by 1 + k / (k - 1) of k folds [2].
 
-    `configuration` (M,): 0 .. G-1. `off`, `predicted` (M, 3): m. `folds`: their number.
+    `along`, `square` (G,): of each configuration the products of predictions with residuals and with themselves, m². `rows`:
+    positions predicted. `folds`: their number.
 
     [1] James, W. and Stein, C., Estimation with quadratic loss, Fourth Berkeley Symposium 1, 1961.
     [2] Nadeau, C. and Bengio, Y., Inference for the generalization error, Machine Learning 52, 2003.
     """
-    along, square = (np.bincount(configuration, (rows * predicted).sum(axis=1)) for rows in (off, predicted))
     count = len(along)
     shared = (1.0 + folds / (folds - 1.0)) * count / (count - 1.0)
     slope = along.sum() / square.sum() if square.any() else 0.0
     if slope <= 0.0:
-        return Gain(0.0, 0.0, 1.0, 0.0, 0.0)
+        return Gain()
     error = np.sqrt(shared * ((along - slope * square) ** 2).sum()) / square.sum()
     factor = float(np.clip(slope - error**2 / slope, 0.0, 1.0))
     falls = factor * (2.0 * along - factor * square)
-    total, std_error = falls.sum(), np.sqrt(shared * ((falls - falls.mean()) ** 2).sum())
-    if total <= 0.0:
-        return Gain(factor, 0.0, 1.0, 0.0, 0.0)
-    statistic, rms = float(total / std_error), float(np.sqrt(total / len(off)))
+    if falls.sum() <= 0.0:
+        return Gain(factor)
+    statistic = float(falls.sum() / np.sqrt(shared * ((falls - falls.mean()) ** 2).sum()))
+    rms = float(np.sqrt(falls.sum() / rows))
     return Gain(factor, statistic, float(stdtr(count - 1.0, -statistic)), rms, 0.5 * rms / statistic)
 
 
-def _best(gains: np.ndarray) -> int | None:
+def _best(products: np.ndarray) -> int | None:
+    """The setting whose predictions gain most, shrunk as they need but by no more than half; None where none gains.
+
+    `products` (settings, 2).
+    """
+    along, square = products.T
+    factor = np.clip(along / np.maximum(square, np.finfo(float).tiny), 0.5, 1.0)
+    gains = factor * (2.0 * along - factor * square)
     best = int(np.argmax(gains))
     return best if gains[best] > 0.0 else None
 
 
-def _gains_without(regressions: Sequence[Regression], folds: Folds, seed: int) -> np.ndarray:
-    """By how much each setting lowers the sum of squares of one fold, fitted without it and without another, m².
+def _products_without(regressions: Sequence[Regression], folds: Folds, seed: int) -> np.ndarray:
+    """Of predictions of one fold, fitted without it and without another: with the residuals, and with themselves, m².
 
-    Returns (K, K, settings): the other fold first; zero where both are one.
+    Returns (K, K, settings, 2): the other fold first; zero where both are one.
     """
     count = len(folds.residual)
-    found = np.zeros((count, count, sum(len(regression.SETTINGS) for regression in regressions)))
+    found = np.zeros((count, count, sum(len(regression.SETTINGS) for regression in regressions), 2))
     for pair in combinations(range(count), 2):
-        left, rest = folds.without(*pair), ~np.isin(folds.fold, pair)
-        judged = [(folds.inputs.select(folds.fold == number), left[folds.fold == number]) for number in pair]
+        # Of a model without both, to first order of what leaving out each of them does to it.
+        left, rest = folds.residual[list(pair)].sum(axis=0) - folds.whole, ~np.isin(folds.fold, pair)
         some, number = folds.inputs.select(rest), 0
+        there = [(*ends, folds.fold == ends[1], folds.inputs.select(folds.fold == ends[1])) for ends in (pair[::-1], pair)]
         for regression in regressions:
             for predictor in regression.fitted(some, left[rest], regression.SETTINGS, seed):
-                gain = [(off**2).sum() - ((off - predictor(there).mean) ** 2).sum() for there, off in judged]
-                found[pair[1], pair[0], number], found[pair[0], pair[1], number] = gain
+                for other, one, mine, inputs in there:
+                    mean = predictor(inputs).mean
+                    found[other, one, number] = (left[mine] * mean).sum(), (mean**2).sum()
                 number += 1
     return found
 
