@@ -32,11 +32,8 @@ if TYPE_CHECKING:
     from elastocal.remainder.protocol import Regression
     from elastocal.remainder.tuning import Tuned
 
-_FOLDS = 5
-# By so many observations at most a regression is chosen and its intervals are scaled: by a quantile, which they fix to two per
-# cent.
-_MOST_TO_CHOOSE = 2_000
-_REPLICATES = 1000
+# A regression is chosen by so many observations at most; the quantile that scales its intervals they fix to two per cent.
+_FOLDS, _MOST_TO_CHOOSE, _REPLICATES = 5, 2_000, 1000
 
 
 @cache
@@ -49,9 +46,9 @@ def regressions() -> dict[str, Regression]:
 class Plan:
     """How a remainder is to be regressed.
 
-    `regression`: its name; `BEST_REMAINDER` for that which cross-validation chooses, or none. `blocks`: whether
-    settings and intervals come from blocks of joint space, as for poses far from those fitted; else from random folds.
-    `within_range`: whether nothing is corrected at poses outside the range of those fitted.
+    `regression`: its name; `BEST_REMAINDER` for that which left-out poses choose. `blocks`: whether folds are blocks of joint
+    space, as for poses far from those fitted; else they are random. `within_range`: whether nothing is corrected outside the
+    range of the poses fitted.
     """
 
     regression: str
@@ -78,33 +75,26 @@ class Corrected:
 def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case, beyond: np.ndarray) -> Corrected:
     """Predict held-out poses by a model and a regression on what it leaves of the training poses.
 
-    Whether there is one, its setting, size and the width of its intervals come from cross-validation of the training poses,
-    with the model fitted anew without each fold. Poses of another campaign have their frames and targets fitted to what both
-    leave of them.
+    Whether there is one, its setting, size and intervals come from cross-validation of the training poses, with the model
+    fitted anew without each fold. Poses of another campaign have their frames and targets fitted to what both leave of them.
 
     `fitted`: to the training poses. `case`: of the training poses. `beyond` (P,) of bool: held-out poses outside the range of
     those fitted, as of `fitted_range.outside_poses`.
     """
-    there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
-    outside, elsewhere = beyond[there.cluster], not same_campaign(case, held_out)
-    found = _regression(plan, fitted, case, elsewhere)
-    prediction = found.predictor(inputs_of(model, estimate, there, elsewhere))
-    mean = np.where(outside[:, None], 0.0, prediction.mean) if plan.within_range else prediction.mean
+    seen, there, elsewhere = case.observations, held_out.observations, not same_campaign(case, held_out)
+    model, estimate = placed(fitted, case, held_out)
+    among = [each for name, each in regressions().items() if plan.regression in (name, BEST_REMAINDER)]
+    folds = _folds(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
+    inputs, left = inputs_of(fitted.model, fitted.estimate, seen, elsewhere), fitted.residual[:, :3]
+    found = tuned(among, folds, inputs, left, plan.seed)
+    prediction, outside = found.predictor(inputs_of(model, estimate, there, elsewhere)), beyond[there.cluster]
+    mean = np.where(outside[:, None] & plan.within_range, 0.0, prediction.mean)
     if elsewhere:
         session = np.searchsorted(estimate.sessions, there.states.session[there.state])
         moved = there.position - (estimate.frame_rotation[session] @ mean[..., None])[..., 0]
         known = replace(fitted, model=model, estimate=estimate)
         estimate = fit_frames(known, model, replace(there, position=moved))
-    residual = position_residuals(model, estimate, there) - mean
-    return Corrected(residual, prediction.std, outside, found)
-
-
-def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> Tuned:
-    seen, all_of_them = case.observations, regressions()
-    among = list(all_of_them.values()) if plan.regression == BEST_REMAINDER else [all_of_them[plan.regression]]
-    folds = _folds(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
-    inputs = inputs_of(fitted.model, fitted.estimate, seen, elsewhere)
-    return tuned(among, folds, inputs, position_residuals(fitted.model, fitted.estimate, seen), plan.seed)
+    return Corrected(position_residuals(model, estimate, there) - mean, prediction.std, outside, found)
 
 
 def _folds(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Folds:
@@ -122,13 +112,8 @@ def _folds(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool)
         mine = refit.within[observations.state]
         residual[number, ~mine] = position_residuals(model, refit.estimate, refit.rest)
         residual[number, mine] = position_residuals(model, refit.there, refit.left_out)
-    return Folds(
-        inputs_of(model, fitted.estimate, observations, elsewhere),
-        configuration[observations.cluster],
-        fold[observations.cluster],
-        position_residuals(model, fitted.estimate, observations),
-        residual,
-    )
+    each, inputs = observations.cluster, inputs_of(model, fitted.estimate, observations, elsewhere)
+    return Folds(inputs, configuration[each], fold[each], position_residuals(model, fitted.estimate, observations), residual)
 
 
 def inputs_of(model: Model, estimate: Estimate, observations: Observations, elsewhere: bool) -> Inputs:
@@ -171,8 +156,13 @@ def remainder_facts(
     with_it = Errors(np.linalg.norm(found.residual, axis=1), before.cluster)
     limits, reductions = intervals([after, with_it], _REPLICATES, draws)
     squares = [float((errors.distance**2).mean()) for errors in (before, after, with_it)]
-    regression, gain = found.chosen.regression, found.chosen.gain
-    facts: dict[str, Any] = {
+    regression, gain, covered, half_width = found.chosen.regression, found.chosen.gain, None, None
+    if found.std is not None:
+        width = NORMAL_WIDTH * found.std
+        covered = float((np.abs(found.residual) < width).mean())
+        each = {"within": width[~found.outside], "outside": width[found.outside]}
+        half_width = {name: float(np.median(part)) if part.size else None for name, part in each.items()}
+    return {
         "regression": regression.NAME if regression else "",
         "words": regression.WORDS if regression else "",
         "left_out": None if gain is None else asdict(gain) | {"level": found.chosen.level},
@@ -184,12 +174,6 @@ def remainder_facts(
         "left": squares[2] / squares[0],
         "outside": len(np.unique(before.cluster[found.outside])),
         "confidence": CONFIDENCE,
-    }
-    if found.std is None:
-        return facts | {"covered": None, "half_width_m": None}
-    width = NORMAL_WIDTH * found.std
-    each = {"within": width[~found.outside], "outside": width[found.outside]}
-    return facts | {
-        "covered": float((np.abs(found.residual) < width).mean()),
-        "half_width_m": {name: float(np.median(part)) if part.size else None for name, part in each.items()},
+        "covered": covered,
+        "half_width_m": half_width,
     }

@@ -52,22 +52,25 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
     middle, spread = columns[:, taken].mean(axis=0), columns[:, taken].std(axis=0)
     scaled = (columns[:, taken] - middle) / spread
     few, many = (np.sort(draws.permutation(len(scaled))[:most]) for most in (_MOST_FOR_HYPERPARAMETERS, _MOST))
+    mean, size = residual.mean(axis=0), residual.std(axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    standard = (residual - mean) / size
     ranges = np.log([_VARIANCE, *[_LENGTH] * len(taken), _NOISE])
     # A length at its bound is an input without influence, not a failure.
     found = minimize(
         _surprise,
         ranges[:, 0],
-        args=(scaled[few], _standardized(residual[few])[0]),
+        args=(scaled[few], standard[few]),
         method="L-BFGS-B",
         jac=True,
         bounds=Bounds(*ranges[:, 1:].T),
         options={"ftol": _LAST_GAIN},
     ).x
     variance, lengths, noise = _parted(found)
-    places, (standard, mean, size) = scaled[many] / lengths, _standardized(residual[many])
+    places = scaled[many] / lengths
     covariance = variance * _matern(places, places)[0] + (noise + _JITTER) * np.eye(len(many))
     lower = lapack.dpotrf(covariance.T, lower=1, overwrite_a=1)[0]
-    along = lapack.dpotrs(lower, standard, lower=1)[0]
+    along = lapack.dpotrs(lower, standard[many], lower=1)[0]
 
     def predictor(there: Inputs) -> Prediction:
         means, left = np.empty((len(there), 3)), np.empty(len(there))
@@ -79,12 +82,6 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
         return Prediction(means, np.sqrt(np.maximum(left, 0.0))[:, None] * size)
 
     yield from (predictor for _ in settings)
-
-
-def _standardized(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    mean, size = residual.mean(axis=0), residual.std(axis=0)
-    size = np.where(size > 0.0, size, 1.0)
-    return (residual - mean) / size, mean, size
 
 
 def _parted(logarithms: np.ndarray) -> tuple[float, np.ndarray, float]:
