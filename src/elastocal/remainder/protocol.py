@@ -36,7 +36,7 @@ class Inputs:
         """ndarray (M, n + k): joint angles, then the others."""
         return np.hstack([self.joint_angles, self.others])
 
-    def select(self, chosen: np.ndarray) -> Inputs:
+    def select(self, chosen: np.ndarray | slice) -> Inputs:
         """The inputs of some observations."""
         return Inputs(self.joint_angles[chosen], self.others[chosen], self.jacobian[chosen])
 

@@ -80,26 +80,26 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
         return None
     fold, inputs = draws.permutation(count) % _FOLDS, inputs_of(fitted.model, fitted.estimate, some, elsewhere=True)
     kinds = _kinds(inputs, int(np.clip(count, _FEWEST, _MOST)), draws)
-    alongs, grams, acrosses = ([0.0] * len(kinds) for _ in range(3))
-    followed, leverage = np.zeros((count, len(fitted.held))), np.zeros(count)
+    sizes, parameters = [kind(inputs.select(np.arange(1))).shape[2] for kind in kinds], len(fitted.held)
+    alongs, grams = [np.zeros((count, size)) for size in sizes], [np.zeros((_FOLDS, size, size)) for size in sizes]
+    acrosses = [np.zeros((_FOLDS, size, parameters)) for size in sizes]
+    followed, leverage = np.zeros((count, parameters)), np.zeros(count)
     white_residual, weight = fitted.whitened(fitted.residual), np.sqrt(fitted.weights)[:, None, None]
     for seen, plain, white in fitted.sensitivities(some):
         mine, w = group[seen], weight[seen]
         np.add.at(followed, mine, np.einsum("mrp,mr->mp", white, white_residual[seen]))
         np.add.at(leverage, mine, ((white @ fitted.covariance) * white).sum(axis=2).mean(axis=1))
-        known = [(w * plain[:, :3])[fold[mine] == k].reshape(-1, len(fitted.held)) for k in range(_FOLDS)]
-        for number, kind in enumerate(kinds):
+        for kind, along, gram, across in zip(kinds, alongs, grams, acrosses, strict=True):
             functions = w * kind(inputs.select(seen))
-            along = np.zeros((count, functions.shape[2]))
             np.add.at(along, mine, (functions * w * fitted.residual[seen, :3, None]).sum(axis=1))
-            rows = [functions[fold[mine] == k].reshape(-1, functions.shape[2]).T for k in range(_FOLDS)]
-            alongs[number] = alongs[number] + along
-            grams[number] = grams[number] + np.stack([each @ each.T for each in rows])
-            acrosses[number] = acrosses[number] + np.stack([a @ b for a, b in zip(rows, known, strict=True)])
+            for k in range(_FOLDS):
+                rows = functions[fold[mine] == k].reshape(-1, functions.shape[2]).T
+                gram[k] += rows @ rows.T
+                across[k] += rows @ (w * plain[:, :3])[fold[mine] == k].reshape(-1, parameters)
     # A configuration that the fit follows has errors larger than its residuals.
     free = np.maximum(1.0 - leverage / np.bincount(group), 1.0 / count)
     signs = draws.choice([-1.0, 1.0], (_DRAWS, count)) / np.sqrt(free)
-    held_back = draws.normal(size=(_DRAWS, len(fitted.held))) / fitted.prior_std
+    held_back = draws.normal(size=(_DRAWS, parameters)) / fitted.prior_std
     moved = (held_back - signs @ followed) @ fitted.covariance
     judged = []
     for along, gram, across in zip(alongs, grams, acrosses, strict=True):
@@ -110,8 +110,8 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
             judged.append((score, (along * coefficients[fold]).sum(axis=1), np.full(count, square)))
     scores = np.stack([score for score, *_ in judged])
     scores = (scores - scores[:, 1:].mean(axis=1, keepdims=True)) / scores[:, 1:].std(axis=1, keepdims=True)
-    best, (_, *products) = scores.max(axis=0), judged[np.argmax(scores[:, 0])]
-    p_value, gain = float((best >= best[0]).mean()), gain_of(*products, len(some), _FOLDS)
+    best, (_, of_residual, of_itself) = scores.max(axis=0), judged[np.argmax(scores[:, 0])]
+    p_value, gain = float((best >= best[0]).mean()), gain_of(of_residual, of_itself, len(some), _FOLDS)
     return Repeatable(float(best[0]), p_value, p_value <= LEVEL, LEVEL, gain.rms_m, gain.rms_std_error_m, count)
 
 
@@ -151,10 +151,10 @@ def _left_out(gram: np.ndarray, right: np.ndarray) -> Iterator[tuple[np.ndarray,
     """
     rest = [(*np.linalg.eigh(gram.sum(axis=0) - mine), right.sum(axis=0) - own) for mine, own in zip(gram, right, strict=True)]
     for penalty in _PENALTIES:
-        along, square, coefficients = 0.0, 0.0, []
+        (along, square), coefficients = np.zeros((2, right.shape[1])), []
         for (values, vectors, others), own in zip(rest, right, strict=True):
             shrunk = others @ vectors / (np.maximum(values, 0.0) + penalty * values.mean())
-            along = along + ((own @ vectors) * shrunk).sum(axis=1)
-            square = square + (np.maximum(values, 0.0) * shrunk**2).sum(axis=1)
+            along += ((own @ vectors) * shrunk).sum(axis=1)
+            square += (np.maximum(values, 0.0) * shrunk**2).sum(axis=1)
             coefficients.append(vectors @ shrunk[0])
         yield along / np.sqrt(square), np.stack(coefficients)

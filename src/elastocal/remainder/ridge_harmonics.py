@@ -35,10 +35,12 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
     `inputs`, `residual`, `settings`, `seed`: as in `protocol.Regression`; nothing is drawn.
     """
     most, joints = max(setting["orders"] for setting in settings), inputs.joint_angles.shape[1]
-    gram, right = 0.0, 0.0
+    size = inputs.jacobian.shape[2] + 2 * most * joints
+    gram, right = np.zeros((size, size)), np.zeros(size)
     for part in _parts(inputs):
-        columns = _columns(inputs.select(part), most).reshape(-1, inputs.jacobian.shape[2] + 2 * most * joints)
-        gram, right = gram + columns.T @ columns, right + columns.T @ residual[part].ravel()
+        columns = _columns(inputs.select(part), most).reshape(-1, size)
+        gram += columns.T @ columns
+        right += columns.T @ residual[part].ravel()
     eigen: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     for setting in settings:
         orders = setting["orders"]

@@ -39,8 +39,8 @@ class Gain:
     """What predictions of left-out configurations gain.
 
     `factor`: in [0, 1], by which they are to be multiplied. `statistic`: Student's t of the mean fall of the squared error by
-    these, over configurations; `p_value`: that chance alone makes it so large. `rms_m`, `rms_std_error_m`: root of the fall,
-    m: what is predictable of each position.
+    these, over configurations; `p_value`: that chance alone makes it so large. `rms_m`, `rms_std_error_m`: what is predictable
+    of each position, m: root of the mean fall before the second shrinkage.
     """
 
     factor: float = 0.0
@@ -113,13 +113,13 @@ def gain_of(along: np.ndarray, square: np.ndarray, rows: int, folds: int) -> Gai
     if slope <= 0.0:
         return Gain()
     error = np.sqrt(shared * ((along - slope * square) ** 2).sum()) / square.sum()
-    factor = float(np.clip(slope - error**2 / slope, 0.0, 1.0))
-    falls = factor * (2.0 * along - factor * square)
-    if falls.sum() <= 0.0:
-        return Gain(factor)
-    statistic = float(falls.sum() / np.sqrt(shared * ((falls - falls.mean()) ** 2).sum()))
-    rms = float(np.sqrt(falls.sum() / rows))
-    return Gain(factor, statistic, float(stdtr(count - 1.0, -statistic)), rms, 0.5 * rms / statistic)
+    kept = np.array([np.clip(slope - error**2 / slope, 0.0, 1.0), min(slope, 1.0)])[:, None]
+    falls = kept * (2.0 * along - kept * square)
+    spread = np.sqrt(shared * ((falls - falls.mean(axis=1, keepdims=True)) ** 2).sum(axis=1))
+    statistic = float(falls[0].sum() / spread[0]) if spread[0] > 0.0 else 0.0
+    rms = float(np.sqrt(falls[1].sum() / rows))
+    std_error = 0.5 * rms * float(spread[1] / falls[1].sum())
+    return Gain(float(kept[0, 0]), statistic, float(stdtr(count - 1.0, -statistic)), rms, std_error)
 
 
 def _best(products: np.ndarray) -> int | None:
@@ -160,30 +160,24 @@ def no_correction(inputs: Inputs) -> Prediction:
     return Prediction(np.zeros((len(inputs), 3)))
 
 
-def calibrated(predictor: Predictor, scores: np.ndarray, factor: float = 1.0) -> Predictor:
+def calibrated(predictor: Predictor, scores: np.ndarray, factor: float) -> Predictor:
     """A predictor shrunk by a factor, with standard deviations scaled by what left-out training poses say of them.
 
-    Locally weighted conformal prediction [1] with the residuals of a cross-validation [2]: a regression's own standard
-    deviations say where it is less sure, residuals of poses left out say how large these must be. What the physical model errs
-    by beyond its training poses is in those residuals too.
+    Locally weighted conformal prediction [1] by cross-validation: a regression's own standard deviations say where it is less
+    sure, residuals of poses left out, with what the physical model errs by beyond its training poses, how large these must be.
 
     `predictor`: fitted to all training poses. `scores`: of poses left out, errors over the standard deviations stated for them;
-    empty where none are stated.
+    empty where no fold states any, nor does then what is returned.
 
     [1] Lei, J., G'Sell, M., Rinaldo, A., Tibshirani, R. J. and Wasserman, L., Distribution-free predictive inference for
         regression, Journal of the American Statistical Association 113, 2018.
-    [2] Barber, R. F., Candès, E. J., Ramdas, A. and Tibshirani, R. J., Predictive inference with the jackknife+, Annals of
-        Statistics 49, 2021.
     """
-    widened = 1.0
-    if scores.size:
-        # The quantile with conformal prediction's correction for a finite sample; the largest where that asks for more.
-        share = min(CONFIDENCE * (1.0 + 1.0 / scores.size), 1.0)
-        widened = float(np.quantile(scores, share, method="higher")) / NORMAL_WIDTH
+    # The quantile with conformal prediction's correction for a finite sample; the largest where that asks for more.
+    share = min(CONFIDENCE * (1.0 + 1.0 / max(scores.size, 1)), 1.0)
+    widened = float(np.quantile(scores, share, method="higher")) / NORMAL_WIDTH if scores.size else None
 
     def scaled(inputs: Inputs) -> Prediction:
         found = predictor(inputs)
-        # Trees state none, and folds may have chosen these while all together chose a process: then it is not calibrated.
-        return Prediction(factor * found.mean, widened * found.std if found.std is not None and scores.size else None)
+        return Prediction(factor * found.mean, None if found.std is None or widened is None else widened * found.std)
 
     return scaled
