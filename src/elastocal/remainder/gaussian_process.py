@@ -1,8 +1,9 @@
 """A Gaussian process: smooth in all inputs, with intervals that grow away from the poses that were measured.
 
-Its variance far from all of them is that of the residuals themselves, so that what it has not seen it calls unknown [1].
+Its variance far from all of them is that of the residuals themselves, so that what it has not seen it calls unknown [1]. With
+many observations it is projected onto its values at some of them (section 8.3.4 of [1]), which is exact where these are all.
 
-[1] Rasmussen, C. E. and Williams, C. K. I., Gaussian Processes for Machine Learning, chapters 2, 4 and 5, MIT Press, 2006.
+[1] Rasmussen, C. E. and Williams, C. K. I., Gaussian Processes for Machine Learning, chapters 2, 4, 5 and 8, MIT Press, 2006.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ SETTINGS: Sequence[Setting] = ({},)
 # Hyperparameters come from so many observations: a step towards them costs the third power of their number, and 800 take eight
 # times as long for errors that differ by 2 % either way (UR5 and UR10).
 _MOST_FOR_HYPERPARAMETERS = 300
-# Of more observations so many, drawn at random, are those that the process knows: their covariance takes 32 MB.
+# Observations at which the process has values, drawn at random; their covariance takes 32 MB. Held-out RMS of UR10 A (8,350
+# observations) after geometry: 0.169 mm with 1,000 in 0.5 s, 0.141 with 2,000 in 1.7 s, 0.122 with all in 14 s and 0.56 GB.
 _MOST = 2_000
 # Variance of the process, lengths in standard deviations of each input, from wiggles between neighbours to one trend across all
 # poses, and variance of the noise: where the search starts, and its bounds.
@@ -34,8 +36,8 @@ _VARIANCE, _LENGTH, _NOISE = (1.0, 1e-3, 1e3), (1.0, 0.05, 100.0), (0.5, 1e-4, 1
 # By which share of the likelihood's logarithm the last steps of the search raise it: scipy's own 2e-9 stops on a plateau, whose
 # way out changes of the residuals by 1e-8 decided (the simulated KUKA: a regression or none).
 _LAST_GAIN = 1e-11
-# Of the variances: added to the diagonal, so that rounding leaves it positive definite.
-_JITTER = 1e-10
+# Of the variance: added to the diagonal, so that rounding leaves it positive definite.
+_JITTER = 1e-8
 # An input that differs by less than this over all poses says nothing: rad, N, m, s, degC.
 _STILL = 1e-10
 # Predictions that are made at once.
@@ -68,17 +70,27 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
     ).x
     variance, lengths, noise = _parted(found)
     places = scaled[many] / lengths
-    covariance = variance * _matern(places, places)[0] + (noise + _JITTER) * np.eye(len(many))
-    lower = lapack.dpotrf(covariance.T, lower=1, overwrite_a=1)[0]
-    along = lapack.dpotrs(lower, standard[many], lower=1)[0]
+    lower = lapack.dpotrf(variance * (_matern(places, places)[0] + _JITTER * np.eye(len(many))), lower=1)[0]
+
+    def features(inputs: np.ndarray) -> np.ndarray:
+        return lapack.dtrtrs(lower, variance * _matern(places, inputs / lengths)[0], lower=1)[0]
+
+    gram, right = noise * np.eye(len(many)), np.zeros((len(many), 3))
+    for first in range(0, len(scaled), _AT_ONCE):
+        known = features(scaled[first : first + _AT_ONCE])
+        gram += known @ known.T
+        right += known @ standard[first : first + _AT_ONCE]
+    factor = lapack.dpotrf(gram, lower=1)[0]
+    along = lapack.dpotrs(factor, right, lower=1)[0]
 
     def predictor(there: Inputs) -> Prediction:
         means, left = np.empty((len(there), 3)), np.empty(len(there))
         for first in range(0, len(there), _AT_ONCE):
             some = slice(first, first + _AT_ONCE)
-            across = variance * _matern((there.columns[some, taken] - middle) / spread / lengths, places)[0]
-            means[some] = across @ along * size + mean
-            left[some] = variance + noise - (lapack.dtrtrs(lower, across.T, lower=1)[0] ** 2).sum(axis=0)
+            asked = features((there.columns[some, taken] - middle) / spread)
+            means[some] = asked.T @ along * size + mean
+            unsure = noise * (lapack.dtrtrs(factor, asked, lower=1)[0] ** 2).sum(axis=0)
+            left[some] = variance + noise - (asked**2).sum(axis=0) + unsure
         return Prediction(means, np.sqrt(np.maximum(left, 0.0))[:, None] * size)
 
     yield from (predictor for _ in settings)
