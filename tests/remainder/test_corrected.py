@@ -142,7 +142,7 @@ def one_more(tmp_path, monkeypatch):
 
 
 def test_the_catalogue_has_every_module_with_a_name():
-    assert set(regressions()) == {"extra_trees", "gaussian_process", "ridge_harmonics"}
+    assert set(regressions()) == {"extra_trees", "gaussian_process", "ridge_harmonics", "two_joints"}
 
 
 def test_a_file_more_is_a_regression_more(one_more):

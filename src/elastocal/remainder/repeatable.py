@@ -27,6 +27,7 @@ from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.remainder.corrected import inputs_of
 from elastocal.remainder.ridge_harmonics import by_harmonics
 from elastocal.remainder.tuning import FEWEST_CONFIGURATIONS, gain_of
+from elastocal.remainder.two_joints import of_two
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -130,17 +131,8 @@ def _kinds(inputs: Inputs, most: int, draws: np.random.Generator) -> list[Functi
     return [
         lambda some: by_harmonics(some, max(1, most // (2 * joints))),
         lambda some: axes * np.cos(some.joint_angles @ turns + phases)[:, None],
-        *(partial(_of_two, pair=pair, moved=moved) for pair in combinations(range(joints), 2)),
+        *(partial(of_two, pair=pair, moved=moved) for pair in combinations(range(joints), 2)),
     ]
-
-
-def _of_two(inputs: Inputs, pair: tuple[int, int], moved: np.ndarray) -> np.ndarray:
-    """Deviations of some joints by products of the first waves of two joints' angles, and by each one's second wave."""
-    angles = inputs.joint_angles[:, pair]
-    first = np.stack([np.ones_like(angles), np.sin(angles), np.cos(angles)], axis=1)
-    products = (first[:, :, None, 0] * first[:, None, :, 1]).reshape(len(inputs), -1)
-    functions = np.hstack([products, np.sin(2.0 * angles), np.cos(2.0 * angles)])
-    return (inputs.jacobian[:, :, moved, None] * functions[:, None, None]).reshape(len(inputs), 3, -1)
 
 
 def _left_out(gram: np.ndarray, right: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
