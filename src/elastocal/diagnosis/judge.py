@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan, remainder_facts
+from elastocal.remainder.repeatable import repeatable_part
 from elastocal.validation.fitted_range import outside_poses, repeat_warnings
 from elastocal.validation.held_out import (
     METRICS,
@@ -88,6 +89,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
         "effects": effects,
         "heldout": heldout,
         "remainder": _remainder(diagnosis, part, outside, seed),
+        "repeatable": _repeatable(diagnosis, seed),
         "gross_errors": [*diagnosis.document["gross_errors"], *left_out],
         "warnings": [*diagnosis.document["warnings"], *warnings_of(left_out), *warnings],
     }
@@ -125,6 +127,14 @@ def _remainder(diagnosis: Diagnosis, held_out: Case, outside: np.ndarray, seed: 
     plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
     draws = stream(seed, campaign.name, "remainder", 0)
     return remainder_facts(plan, diagnosis.declared, diagnosis.final, diagnosis.case, held_out, outside, draws)
+
+
+def _repeatable(diagnosis: Diagnosis, seed: int) -> dict[str, Any] | None:
+    """Whether what the final model leaves of the training poses is a function of the joints; None with too few of them."""
+    if data_at_fault(diagnosis.document):
+        return None
+    found = repeatable_part(diagnosis.final, diagnosis.case.observations, seed)
+    return None if found is None else asdict(found)
 
 
 def _gains(rows: Iterable[Mapping[str, Any]]) -> dict[str, float]:

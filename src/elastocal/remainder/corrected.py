@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, cast
 
@@ -16,29 +16,24 @@ from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.fitting.prediction import target_points
 from elastocal.io.modules import modules_with
 from elastocal.mechanics.kinematics import poses_and_jacobians
-from elastocal.remainder.protocol import Inputs, Part
+from elastocal.remainder.protocol import Folds, Inputs
 from elastocal.remainder.tuning import CONFIDENCE, NORMAL_WIDTH, tuned
 from elastocal.validation.held_out import Errors, intervals, position_errors, position_residuals, summary
 from elastocal.validation.left_out import refits
 from elastocal.validation.placing import placed, same_campaign
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from typing import Any
 
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
-    from elastocal.remainder.protocol import Regression, Setting
+    from elastocal.remainder.protocol import Regression
     from elastocal.remainder.tuning import Tuned
 
-# As many folds choose a setting as judge the method.
-_INNER_FOLDS = 5
-# By so many observations at most a regression is chosen and its intervals are scaled: by a quantile, which they fix to two per
-# cent.
-_MOST_TO_CHOOSE = 2_000
-_REPLICATES = 1000
+# A regression is chosen by so many observations at most; the quantile that scales its intervals they fix to two per cent.
+_FOLDS, _MOST_TO_CHOOSE, _REPLICATES = 5, 2_000, 1000
 
 
 @cache
@@ -51,9 +46,9 @@ def regressions() -> dict[str, Regression]:
 class Plan:
     """How a remainder is to be regressed.
 
-    `regression`: its name; `BEST_REMAINDER` for that which cross-validation chooses, or none. `blocks`: whether
-    settings and intervals come from blocks of joint space, as for poses far from those fitted; else from random folds.
-    `within_range`: whether nothing is corrected at poses outside the range of those fitted.
+    `regression`: its name; `BEST_REMAINDER` for that which left-out poses choose. `blocks`: whether folds are blocks of joint
+    space, as for poses far from those fitted; else they are random. `within_range`: whether nothing is corrected outside the
+    range of the poses fitted.
     """
 
     regression: str
@@ -68,68 +63,57 @@ class Corrected:
 
     `residual` (M, 3): measured less predicted positions, m, base axes. `std` (M, 3): standard deviation stated for them, m;
     None where the regression states none. `outside` (M,) of bool: whether the pose lies outside the range of those fitted.
-    `regression`, `setting`: as chosen; None where no correction was best.
+    `chosen`: regression and setting, and what they gain on left-out training poses; none of them where nothing is corrected.
     """
 
     residual: np.ndarray
     std: np.ndarray | None
     outside: np.ndarray
-    regression: Regression | None
-    setting: Setting | None
+    chosen: Tuned
 
 
 def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case, beyond: np.ndarray) -> Corrected:
     """Predict held-out poses by a model and a regression on what it leaves of the training poses.
 
-    The regression's setting and the width of its intervals come from cross-validation of the training poses, with the model
-    fitted anew to each of its parts: nested cross-validation [1]. Poses of another campaign have their frames and targets
-    fitted to what both leave of them.
+    Whether there is one, its setting, size and intervals come from cross-validation of the training poses, with the model
+    fitted anew without each fold. Poses of another campaign have their frames and targets fitted to what both leave of them.
 
     `fitted`: to the training poses. `case`: of the training poses. `beyond` (P,) of bool: held-out poses outside the range of
     those fitted, as of `fitted_range.outside_poses`.
-
-    [1] Varma, S. and Simon, R., Bias in error estimation when using cross-validation for model selection, BMC Bioinformatics 7,
-        2006.
     """
-    there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
-    outside, elsewhere = beyond[there.cluster], not same_campaign(case, held_out)
-    found = _regression(plan, fitted, case, elsewhere)
-    prediction = found.predictor(inputs_of(model, estimate, there, elsewhere))
-    mean = np.where(outside[:, None], 0.0, prediction.mean) if plan.within_range else prediction.mean
+    seen, there, elsewhere = case.observations, held_out.observations, not same_campaign(case, held_out)
+    model, estimate = placed(fitted, case, held_out)
+    among = [each for name, each in regressions().items() if plan.regression in (name, BEST_REMAINDER)]
+    folds = _folds(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
+    inputs, left = inputs_of(fitted.model, fitted.estimate, seen, elsewhere), fitted.residual[:, :3]
+    found = tuned(among, folds, inputs, left, plan.seed)
+    prediction, outside = found.predictor(inputs_of(model, estimate, there, elsewhere)), beyond[there.cluster]
+    mean = np.where(outside[:, None] & plan.within_range, 0.0, prediction.mean)
     if elsewhere:
         session = np.searchsorted(estimate.sessions, there.states.session[there.state])
         moved = there.position - (estimate.frame_rotation[session] @ mean[..., None])[..., 0]
         known = replace(fitted, model=model, estimate=estimate)
         estimate = fit_frames(known, model, replace(there, position=moved))
-    residual = position_residuals(model, estimate, there) - mean
-    return Corrected(residual, prediction.std, outside, found.regression, found.setting)
+    return Corrected(position_residuals(model, estimate, there) - mean, prediction.std, outside, found)
 
 
-def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> Tuned:
-    seen, all_of_them = case.observations, regressions()
-    among = list(all_of_them.values()) if plan.regression == BEST_REMAINDER else [all_of_them[plan.regression]]
-    parts = _inner_parts(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
-    inputs = inputs_of(fitted.model, fitted.estimate, seen, elsewhere)
-    return tuned(among, parts, inputs, position_residuals(fitted.model, fitted.estimate, seen), plan.seed)
-
-
-def _inner_parts(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Iterator[Part]:
+def _folds(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Folds:
     """Training poses in folds, the model fitted anew without each."""
     states, model = observations.states, fitted.model
     pose = state_clusters(states)
     configuration = configurations(states.joint_angles, pose)
-    count = min(_INNER_FOLDS, configuration.max() + 1)
+    count = min(_FOLDS, configuration.max() + 1)
     if plan.blocks:
         fold = blocks_of_poses(states.joint_angles, pose, count)
     else:
         fold = np.random.default_rng(plan.seed).permutation(configuration.max() + 1)[configuration] % count
-    for refit in refits(fitted, observations, fold[pose]):
-        yield Part(
-            inputs_of(model, refit.estimate, refit.rest, elsewhere),
-            position_residuals(model, refit.estimate, refit.rest),
-            inputs_of(model, refit.there, refit.left_out, elsewhere),
-            position_residuals(model, refit.there, refit.left_out),
-        )
+    residual = np.empty((count, len(observations), 3))
+    for number, refit in enumerate(refits(fitted, observations, fold[pose])):
+        mine = refit.within[observations.state]
+        residual[number, ~mine] = position_residuals(model, refit.estimate, refit.rest)
+        residual[number, mine] = position_residuals(model, refit.there, refit.left_out)
+    each, inputs = observations.cluster, inputs_of(model, fitted.estimate, observations, elsewhere)
+    return Folds(inputs, configuration[each], fold[each], position_residuals(model, fitted.estimate, observations), residual)
 
 
 def inputs_of(model: Model, estimate: Estimate, observations: Observations, elsewhere: bool) -> Inputs:
@@ -159,8 +143,9 @@ def remainder_facts(
     """Held-out errors with a regression on what the final model leaves, beside those without.
 
     `declared`, `final`: to the training poses. `case`: of the training poses. `beyond`: as in `corrected`. `draws`: of the
-    bootstrap over poses. Returns ``regression``, empty where none helps, and its ``words``; ``errors``, the summary of
-    `held_out.summary` with it; ``rms_ci95_m``; of the squared error that the declared model leaves the shares that effects
+    bootstrap over poses. Returns ``regression``, empty where none is used, and its ``words``; ``left_out``, the `Gain` on
+    training poses by which it is used or not, with the ``level`` of that test; ``errors``, the summary of `held_out.summary`
+    with it; ``rms_ci95_m``; of the squared error that the declared model leaves the shares that effects
     (``physics``) and the regression (``regression_share``) explain and that is ``left``; ``reduction_ci95`` of the RMS by the
     regression alone; ``covered``, the share of coordinates inside the stated 95 % intervals, and ``half_width_m``, half of
     their median width within and outside the range; ``outside``, poses outside the range of those fitted, at which nothing is
@@ -171,10 +156,16 @@ def remainder_facts(
     with_it = Errors(np.linalg.norm(found.residual, axis=1), before.cluster)
     limits, reductions = intervals([after, with_it], _REPLICATES, draws)
     squares = [float((errors.distance**2).mean()) for errors in (before, after, with_it)]
-    name, words = (found.regression.NAME, found.regression.WORDS) if found.regression else ("", "")
-    facts: dict[str, Any] = {
-        "regression": name,
-        "words": words,
+    regression, gain, covered, half_width = found.chosen.regression, found.chosen.gain, None, None
+    if found.std is not None:
+        width = NORMAL_WIDTH * found.std
+        covered = float((np.abs(found.residual) < width).mean())
+        each = {"within": width[~found.outside], "outside": width[found.outside]}
+        half_width = {name: float(np.median(part)) if part.size else None for name, part in each.items()}
+    return {
+        "regression": regression.NAME if regression else "",
+        "words": regression.WORDS if regression else "",
+        "left_out": None if gain is None else asdict(gain) | {"level": found.chosen.level},
         "errors": {name: float(value) for name, value in summary(with_it.distance).items()},
         "rms_ci95_m": [float(end) for end in limits[1]["rms_m"]],
         "reduction_ci95": [reductions[1].low, reductions[1].high],
@@ -183,12 +174,6 @@ def remainder_facts(
         "left": squares[2] / squares[0],
         "outside": len(np.unique(before.cluster[found.outside])),
         "confidence": CONFIDENCE,
-    }
-    if found.std is None:
-        return facts | {"covered": None, "half_width_m": None}
-    width = NORMAL_WIDTH * found.std
-    each = {"within": width[~found.outside], "outside": width[found.outside]}
-    return facts | {
-        "covered": float((np.abs(found.residual) < width).mean()),
-        "half_width_m": {name: float(np.median(part)) if part.size else None for name, part in each.items()},
+        "covered": covered,
+        "half_width_m": half_width,
     }

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,25 +14,12 @@ from elastocal.remainder.protocol import Prediction
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from sklearn.tree import ExtraTreeRegressor
-
     from elastocal.remainder.protocol import Inputs, Predictor, Setting
 
 NAME, WORDS = "extra_trees", "forest of extremely randomized trees"
 _TREES = 100
-# Observations in a leaf, and the share of the inputs among which each node chooses: the two that the method's authors tune.
-SETTINGS: Sequence[Setting] = tuple(
-    {"min_samples_leaf": leaf, "max_features": share} for leaf in (1, 5) for share in (0.5, 1.0)
-)
-
-
-@dataclass(frozen=True)
-class _Forest:
-    trees: list[ExtraTreeRegressor]
-
-    def __call__(self, inputs: Inputs) -> Prediction:
-        columns = inputs.columns.astype(np.float32)
-        return Prediction(np.mean([tree.predict(columns, check_input=False) for tree in self.trees], axis=0))
+# What the method's authors use for regression: all inputs at each node, and no node of fewer observations is split.
+SETTINGS: Sequence[Setting] = ({"min_samples_split": 5, "max_features": 1.0},)
 
 
 def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
@@ -49,5 +35,10 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
         # One by one: a forest would look at the same inputs again for each of its trees.
         draws = np.random.RandomState(seed)
         seeds = [draws.randint(np.iinfo(np.int32).max) for _ in range(_TREES)]
-        grown = [ExtraTreeRegressor(random_state=each, **setting) for each in seeds]
-        yield _Forest([tree.fit(columns, target, check_input=False) for tree in grown])
+        grown = [ExtraTreeRegressor(random_state=each, **setting).fit(columns, target, check_input=False) for each in seeds]
+
+        def predictor(there: Inputs, trees: Sequence[ExtraTreeRegressor] = grown) -> Prediction:
+            asked = there.columns.astype(np.float32)
+            return Prediction(np.mean([tree.predict(asked, check_input=False) for tree in trees], axis=0))
+
+        yield predictor

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     Setting = Mapping[str, Any]
+    # A fitted regression, which predicts residuals of other observations.
+    Predictor = Callable[["Inputs"], "Prediction"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Inputs:
         """ndarray (M, n + k): joint angles, then the others."""
         return np.hstack([self.joint_angles, self.others])
 
-    def select(self, chosen: np.ndarray) -> Inputs:
+    def select(self, chosen: np.ndarray | slice) -> Inputs:
         """The inputs of some observations."""
         return Inputs(self.joint_angles[chosen], self.others[chosen], self.jacobian[chosen])
 
@@ -52,24 +54,18 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Part:
-    """One fold of the training poses: a regression is fitted to some and judged by the others.
+class Folds:
+    """Training poses in K folds, and what models leave of them that were fitted without each.
 
-    `fitted_residual`, `judged_residual` (M, 3): of a model that was fitted without the poses that judge, m, base axes.
+    `inputs`: of M observations. `configuration`, `fold` (M,): of each, 0 .. G-1 and 0 .. K-1; a configuration has one fold.
+    `whole` (M, 3): residuals of the model fitted to all of them, m, base axes. `residual` (K, M, 3): without each fold.
     """
 
-    fitted: Inputs
-    fitted_residual: np.ndarray
-    judged: Inputs
-    judged_residual: np.ndarray
-
-
-class Predictor(Protocol):
-    """A fitted regression."""
-
-    def __call__(self, inputs: Inputs) -> Prediction:
-        """Predict the residuals of other observations."""
-        ...
+    inputs: Inputs
+    configuration: np.ndarray
+    fold: np.ndarray
+    whole: np.ndarray
+    residual: np.ndarray
 
 
 class Regression(Protocol):

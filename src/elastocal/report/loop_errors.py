@@ -106,8 +106,8 @@ def remainder_sentence(remainder: Mapping[str, Any] | None, heldout: Mapping[str
         return ""
     if not remainder["regression"]:
         return (
-            "What the final model leaves shows no pattern: no regression on it predicts fitted poses that it has not seen "
-            "better than the model alone, beyond a standard error, and none is used."
+            "No regression on what the final model leaves is used: none predicts fitted poses that it has not seen better "
+            "than the model alone beyond chance."
         )
     low, high = (length(end) for end in remainder["rms_ci95_m"])
     fall = [minus(f"{-100 * end:+.0f}") for end in reversed(remainder["reduction_ci95"])]

@@ -95,7 +95,7 @@ def entered(method: Method, fitted: Fit, case: Case, held_out: Case, split: str,
         plan = Plan(method.regression, blocks=split != RANDOM, within_range=method.within_range, seed=seed)
         found = corrected(plan, fitted, case, held_out, beyond)
         std = np.full_like(found.residual, np.nan) if found.std is None else found.std
-        return Entry(held_out.observations, found.residual, std, found.outside, found.setting)
+        return Entry(held_out.observations, found.residual, std, found.outside, found.chosen.setting)
     there = held_out.observations
     residual = position_residuals(*placed(fitted, case, held_out), there)
     return Entry(there, residual, np.full_like(residual, np.nan), beyond[there.cluster], None)
