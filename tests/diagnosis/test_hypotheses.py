@@ -9,7 +9,7 @@ from support import UR10, robot_of
 from synthetic import equipped
 
 from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
-from elastocal.diagnosis.other import FORCE, NEIGHBOURS, OWN, PLACE, SHIFT, TURN, Competitor
+from elastocal.diagnosis.other import FORCE, NEIGHBOURS, OWN, Law
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
 
@@ -75,23 +75,17 @@ def catalogue():
 def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(catalogue):
     tried = [(c, (value,)) for c in catalogue for shape in c.shapes for value in shape.values(3)]
     tried += [(c, ()) for c in catalogue if not c.shapes]
-    features = [
-        (Competitor((1,), OWN), 40),
-        (Competitor((1,), NEIGHBOURS), 40),
-        (Competitor((), FORCE, SHIFT), 24),
-        (Competitor((), FORCE, TURN), 24),
-        (Competitor((), PLACE, TURN), 24),
-    ]
-    units = units_of(tried, features, SETTINGS)
+    laws = [Law((1,), OWN, 1.0, (), 40), Law((1,), NEIGHBOURS, 1.0, (), 40), Law((), f"{FORCE} shift", 1.0, (), 24)]
+    units = units_of(tried, laws, SETTINGS)
     columns = np.concatenate([unit.columns for unit in units])
     np.testing.assert_array_equal(np.sort(columns), np.arange(len(columns)))
     against = [unit for unit in units if unit.mechanism == OTHER]
-    assert [(unit.competitor, len(unit.columns)) for unit in against] == features
-    assert not any(unit.competitor for unit in units if unit.candidate)
+    assert [(unit.law, len(unit.columns)) for unit in against] == [(law, law.features) for law in laws]
+    assert not any(unit.law for unit in units if unit.candidate)
     # Laws and shapes at one location share its probability; laws of the competitor have places of their own.
     for place in {unit.place for unit in units}:
         assert np.exp([unit.log_prior for unit in units if unit.place == place]).sum() == pytest.approx(1.0), place
-    assert len({unit.place for unit in against}) == len(features)
+    assert len({unit.place for unit in against}) == len(laws)
     assert len({unit.key for unit in units}) == len(units)
 
 
