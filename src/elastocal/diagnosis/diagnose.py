@@ -13,13 +13,21 @@ from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained
-from elastocal.diagnosis.contradictions import contradictions, pose_error_warnings, scatter_warnings
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
-from elastocal.diagnosis.verdict import ADEQUATE, NAMED, SEVERAL, UNEXPLAINED, concluded
+from elastocal.diagnosis.verdict import (
+    ADEQUATE,
+    NAMED,
+    SEVERAL,
+    UNEXPLAINED,
+    concluded,
+    contradictions,
+    pose_error_warnings,
+    scatter_warnings,
+)
 from elastocal.diagnosis.words import hypothesis_words
 from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
