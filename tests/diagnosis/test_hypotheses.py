@@ -16,55 +16,33 @@ from elastocal.effects.catalogue import candidates_on
 SETTINGS = Settings()
 
 
-def every_model(units):
-    """All sets of units with one variant at a place at most, "nothing" among them."""
-    for size in range(len(units) + 1):
-        for chosen in combinations(units, size):
-            if len({unit.place for unit in chosen}) == size:
-                yield chosen
-
-
-def made_units():
-    """Three mechanisms: at three locations, one of which has three laws; at two; and at one. Two laws of the competitor."""
-    third = float(np.log(1 / 3))
-    return (
-        made_unit("harmonic", (1,), 0),
-        made_unit("harmonic", (2,), 1),
-        *(made_unit("harmonic", (3,), column, log_prior=third) for column in (2, 3, 4)),
-        made_unit("offset", (1,), 5),
-        made_unit("offset", (2,), 6),
-        made_unit("link_weight", (), 7),
-        made_unit(OTHER, (1,), 8),
-        made_unit(OTHER, (1,), 9, law=NEIGHBOURS),
-    )
+THIRD = float(np.log(1 / 3))
+# A mechanism at three locations, one of which has three laws.
+UNITS = (
+    made_unit("harmonic", (1,), 0),
+    made_unit("harmonic", (2,), 1),
+    *(made_unit("harmonic", (3,), column, log_prior=THIRD) for column in (2, 3, 4)),
+)
 
 
 def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equally_likely():
-    units = made_units()[:5]
-    prior = prior_of(units, SETTINGS)
-    by_places = {}
-    for model in every_model(units):
-        places = tuple(sorted(unit.location for unit in model))
-        by_places[places] = by_places.get(places, 0.0) + np.exp(prior.log_odds_of(model))
-    odds = SETTINGS.mechanism_probability / (1 - SETTINGS.mechanism_probability)
-    counts = [sum(value for places, value in by_places.items() if len(places) == size) / odds for size in (1, 2, 3)]
-    np.testing.assert_allclose(counts, np.array([4, 2, 1]) / 7)
-    for size in (1, 2, 3):
-        np.testing.assert_allclose(
-            [v for p, v in by_places.items() if len(p) == size], counts[size - 1] * odds / [3, 3, 1][size - 1]
-        )
-
-
-def test_adding_a_unit_changes_the_log_odds_by_what_added_says():
-    units = made_units()
-    prior = prior_of(units, SETTINGS)
-    for model in every_model(units):
-        for unit in units:
-            if (unit.mechanism, unit.location) in {(one.mechanism, one.location) for one in model}:
-                continue
-            count = sum(one.mechanism == unit.mechanism for one in model)
-            change = prior.log_odds_of((*model, unit)) - prior.log_odds_of(model)
-            assert prior.added(unit, count) == pytest.approx(change)
+    """Given that a mechanism is there; laws share a location. And what a unit adds is the difference of both models."""
+    prior, by_places = prior_of([*UNITS, made_unit(OTHER, (1,), 5), made_unit(OTHER, (1,), 6, law=NEIGHBOURS)], SETTINGS), {}
+    for size in range(1, 4):
+        for model in combinations(UNITS, size):
+            places = tuple(sorted({unit.location for unit in model}))
+            if len(places) == size:
+                odds = prior.log_odds_of(model)
+                by_places[places] = by_places.get(places, 0.0) + np.exp(odds)
+                smaller = prior.log_odds_of(model[:-1])
+                assert prior.added(model[-1], size - 1) == pytest.approx(odds - smaller)
+    there = SETTINGS.mechanism_probability / (1 - SETTINGS.mechanism_probability)
+    expected = {places: there * {1: 4 / 7 / 3, 2: 2 / 7 / 3, 3: 1 / 7}[len(places)] for places in by_places}
+    assert len(by_places) == 7 and by_places == pytest.approx(expected)
+    # Laws of the competitor have places of their own, and its own probability.
+    other = [made_unit(OTHER, (1,), 5), made_unit(OTHER, (1,), 6, law=NEIGHBOURS)]
+    odds = SETTINGS.other_probability / (1 - SETTINGS.other_probability)
+    assert np.exp(prior.log_odds_of(other)) == pytest.approx(odds / 3)
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from open_alternatives import ELASTIC, LADDER, SETTINGS, diagnosed, keys_like, limits, pieces
 from planted import planted, two_loads_a_pose
-from scipy.stats import binom
-from synthetic import seen_exactly, with_noise
 
 from elastocal.diagnosis import new_states, next_experiment, verdict
 from elastocal.diagnosis.alternatives import Promise
@@ -25,33 +23,6 @@ from elastocal.diagnosis.next_experiment import (
     table_of,
 )
 from elastocal.diagnosis.verdict import mechanisms_of_models
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.observations import Observations, States
-from elastocal.fitting.parameters import stepped
-
-
-@pytest.mark.slow
-def test_resolved_as_often_as_promised_by_the_whole_engine(ambiguous, proposal, kuka):
-    """Exact kinematics, a new fit and a new posterior for 50 experiments.
-
-    At 1 %; a share that is lower by 0.3 than promised is seen with a power of 0.9.
-    """
-    diagnosis, campaign = ambiguous
-    models, instrument, _ = pieces(diagnosis, kuka, LADDER)
-    promise = Promise([model for model in models if model.name not in proposal.indistinguishable], np.random.default_rng(2))
-    rng, count, resolved = np.random.default_rng(1), 50, []
-    for number in rng.choice(len(promise.models), count, p=np.exp(promise.log_weights)):
-        seen = carried_out(diagnosis, campaign, proposal, promise.models[number], instrument, rng)
-        declared = fit(campaign.declared.model, seen, campaign.declared.noise, campaign.declared.estimate)
-        anew = diagnosed(replace(campaign, declared=declared, observations=seen), kuka, keys_like(campaign, *ELASTIC))
-        found = {h.mechanisms: h.probability for h in anew.evidence.conclusion.hypotheses}
-        right = promise.models[number].name
-        resolved.append(found.get(right, 0.0) >= 0.95 * sum(found.get(name, 0.0) for name in promise.names))
-    promised = proposal.resolved[-1]
-    assert 0.3 < promised < 0.9
-    fewest, most = binom.ppf([0.005, 0.995], count, promised)
-    assert binom.cdf(fewest - 1, count, promised - 0.3) > 0.9
-    assert fewest <= np.sum(resolved) <= most, (np.mean(resolved), promised)
 
 
 def test_proposal_separates_half_as_much_again_as_random_poses_and_resolves_more(ambiguous, proposal, kuka):
@@ -120,45 +91,6 @@ def test_nothing_is_proposed_where_nothing_is_ambiguous(kuka):
     assert propose(diagnosis, limits(kuka), SETTINGS, np.random.default_rng(0)).reason == NOTHING_AMBIGUOUS
     quiet = SimpleNamespace(**vars(diagnosis) | {"evidence": None})
     assert propose(quiet, limits(kuka), SETTINGS, np.random.default_rng(0)).reason == DATA_AT_FAULT
-
-
-def carried_out(diagnosis, campaign, proposal, model, instrument, rng):
-    """The campaign with measurements of what was proposed, from coefficients that the posterior of one model allows."""
-    line, (truth,) = diagnosis.evidence.linearized, model.drawn(1, rng)
-    products, declared = line.products, line.products.declared
-    contributions = truth[declared:]
-    step = products.into_basis @ (truth[:declared] - products.projected[:, instrument.columns] @ contributions)
-    estimate = stepped(line.about.model, line.about.estimate, step)
-    values = contributions * instrument.sizes
-    start = np.cumsum([0, *(len(candidate.parameters) for candidate, _ in instrument.laws)])
-    there = [n for n in range(len(instrument.laws)) if values[start[n] : start[n + 1]].any()]
-    effects = [instrument.laws[n][0] for n in there]
-    true = estimate.with_effects(effects)
-    for place, n in enumerate(there, len(estimate.coefficients)):
-        true.coefficients[place][:] = values[start[n] : start[n + 1]]
-    states = instrument.observations(entries_of(proposal), range(len(campaign.declared.model.targets))).states
-    seen = with_noise(seen_exactly(line.about.model.with_effects(effects), true, states), rng)
-    return together(campaign.observations, seen)
-
-
-def together(first, more):
-    """Two sets of observations as one; the poses of the second are others."""
-    rows = first.states.row.max() + 1 + np.arange(len(more.states))
-    moved = replace(more.states, pose=more.states.pose + first.states.pose.max() + 1, row=rows)
-    pairs = zip(vars(first.states).items(), vars(moved).values(), strict=True)
-    states = States(**{name: None if mine is None else np.concatenate([mine, new]) for (name, mine), new in pairs})
-    return Observations(
-        states,
-        np.concatenate([first.state, more.state + len(first.states)]),
-        np.concatenate([first.target, more.target]),
-        np.concatenate([first.position, more.position]),
-        None,
-    )
-
-
-def entries_of(proposal):
-    shape = len(proposal), len(proposal.shares), proposal.entries.joint_angles.shape[1]
-    return replace(proposal.entries, approach=np.ones(shape))
 
 
 def made(weighed=(False, True), **changes):

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import lapack, solve_triangular
@@ -110,18 +110,6 @@ def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
     return -0.5 * freedom * np.log(variance) - 0.5 * squares / variance
 
 
-class Block(NamedTuple):
-    """U units of d columns each, decomposed for any size: G_uu = V diag(values) V'.
-
-    `members` (U,) of int: numbers of the units. `values` (T, U, d), `vectors` (T, U, d, d), `columns` (U, d) of int.
-    """
-
-    members: np.ndarray
-    values: np.ndarray
-    vectors: np.ndarray
-    columns: np.ndarray
-
-
 @dataclass(frozen=True)
 class Conditioned:
     """Statistics given that some columns are in the model with given sizes.
@@ -137,8 +125,13 @@ class Conditioned:
     squares: np.ndarray
     log_occam: np.ndarray
 
-    def blocks_of(self, units: Sequence[Unit], chosen: Sequence[int]) -> Iterator[Block]:
-        """Decompose W'MW given these columns, of which only the blocks of some units are made; for each width of these."""
+    def blocks_of(
+        self, units: Sequence[Unit], chosen: Sequence[int]
+    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Decompose W'MW given these columns, of which only the blocks of some units are made: G_uu = V diag(values) V'.
+
+        For each width d of U of the units yields their numbers (U,), values (T, U, d), V (T, U, d, d) and columns (U, d).
+        """
         numbers, width = np.asarray(chosen, int), np.array([len(units[number].columns) for number in chosen], int)
         for size in np.unique(width):
             members = numbers[width == size]
@@ -148,7 +141,7 @@ class Conditioned:
                 mine = self.cross[:, :, at].transpose(0, 2, 1, 3)
                 part -= mine.transpose(0, 1, 3, 2) @ mine
             values, vectors = np.linalg.eigh(part) if size > 1 else (part[..., 0], np.ones_like(part))
-            yield Block(members, np.clip(values, 0.0, None), vectors, at)
+            yield members, np.clip(values, 0.0, None), vectors, at
 
 
 def _with_priors(gram: np.ndarray, columns: np.ndarray, deviations: np.ndarray) -> np.ndarray:
