@@ -113,6 +113,24 @@ def test_coefficients_are_averaged_over_the_models_that_have_them(made):
     assert {owner for owner, _ in averaged(line, both, both.models[1], OWNERS).shift} == {"declared", "a", "b"}
 
 
+def test_a_parameter_is_of_its_prior_where_the_measurements_leave_half_its_variance(made):
+    """As that of b where its column is one that the declared model makes as well, or where many models differ in it."""
+    rows, line = made
+    best = posterior_of(((0, 1), [0.3, 1.0], 0.0, 1.0))
+    assert averaged(line, best, best.models[0], OWNERS).of_prior == frozenset()
+    candidates = rows.candidates.copy()
+    candidates[:, 2] = rows.declared[:, 0] + 0.05 * candidates[:, 2]
+    problem, products = made_problem(replace(rows, candidates=candidates, prior_std=np.full(4, 1e6)), UNITS, tau=TAU)
+    blind = SimpleNamespace(problem=problem, products=products)
+    found = averaged(blind, best, best.models[0], OWNERS)
+    assert found.of_prior == {("b", "0")}
+    share = (found.std_error["b", "0"] / problem.grid.root_mean_square(UNITS[1])) ** 2
+    for setting, told in ((share * 1.01, frozenset()), (share * 0.99, {("b", "0")})):
+        problem = replace(problem, settings=replace(problem.settings, prior_share=setting))
+        stricter = SimpleNamespace(problem=problem, products=products)
+        assert averaged(stricter, best, best.models[0], OWNERS).of_prior - {("a", "0"), ("a", "1")} == told
+
+
 def most_probable(rows, problem, model):
     """Coefficients of a model, dense: at its sizes, and at the pose error that is then most probable."""
     columns = np.concatenate([np.zeros(0, int), *(problem.units[number].columns for number in model.units)])

@@ -37,10 +37,12 @@ class Averaged:
     """Corrections to the exact fit of the most probable model.
 
     `shift` (str, str): by owner and name of a parameter: what the other models add to its estimate. `std_error` (str, str).
+    `of_prior`: parameters of effects of which the prior says more than the measurements do.
     """
 
     shift: dict[tuple[str, str], float]
     std_error: dict[tuple[str, str], float]
+    of_prior: frozenset[tuple[str, str]] = frozenset()
 
 
 def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: Sequence[tuple[str, str]]) -> Averaged:
@@ -67,7 +69,15 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
         center = weight @ mean
         shift[name] = float(center - estimate)
         std_error[name] = float(np.sqrt(weight @ (variance + (mean - center) ** 2)))
-    return Averaged(shift, std_error)
+    least = np.sqrt(problem.settings.prior_share)
+    of_prior = frozenset(
+        (unit.candidate.key, parameter.name)
+        for unit in (problem.units[number] for number in best.units)
+        if unit.candidate
+        for parameter, size in zip(unit.candidate.parameters, unit.sizes * problem.grid.root_mean_square(unit), strict=True)
+        if std_error[unit.candidate.key, parameter.name] > least * size
+    )
+    return Averaged(shift, std_error, of_prior)
 
 
 def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bool:

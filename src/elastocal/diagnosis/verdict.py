@@ -66,7 +66,8 @@ class Conclusion:
 
     `hypotheses`: the most probable first; "nothing" among them. `best`: the most probable in accordance with the alarm:
     "nothing" without one. `alternatives`: for each mechanism of the best hypothesis what may be meant instead. `mechanisms`:
-    probability that each mechanism is there, in falling order.
+    probability that each mechanism is there, in falling order. `probability`: that one of the hypotheses which the verdict
+    leaves open is right; None where nothing was tested.
     """
 
     verdict: str
@@ -74,6 +75,7 @@ class Conclusion:
     best: Hypothesis
     alternatives: dict[str, tuple[str, ...]]
     mechanisms: dict[str, float]
+    probability: float | None
 
 
 def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusion:
@@ -93,9 +95,9 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
     mechanisms = dict(sorted(mechanisms.items(), key=lambda entry: -entry[1]))
     families = {unit.candidate.family for unit in problem.units if unit.candidate}
     if not families or not (families - {_OF_THE_SETUP} or alarm.raised):
-        return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)
+        return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms, None)
     if not alarm.raised:
-        return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms)
+        return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms, nothing.probability)
     # The alarm has decided that something is missing; the posterior says what: first how many mechanisms, then which.
     there = [h for h in hypotheses if h.mechanisms]
     kinds = (UNEXPLAINED, CLASS, SEVERAL)
@@ -103,10 +105,12 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
     best = next((h for h in there if h.kind == kind), nothing)
     sure, stated = _least_expected_loss([best, *(h for h in there if h != best)], problem.settings)
     if not stated or kind == UNEXPLAINED:
-        return Conclusion(UNEXPLAINED, hypotheses, best if stated else nothing, {}, mechanisms)
+        unknown = sum(h.probability for h in there if h.kind == UNEXPLAINED) + (0.0 if stated else nothing.probability)
+        return Conclusion(UNEXPLAINED, hypotheses, best if stated else nothing, {}, mechanisms, unknown)
     named = sure and kind == CLASS and OTHER not in best.mechanisms
     alternatives = {name: () if named else _instead_of(name, best, stated) for name in best.named}
-    return Conclusion(NAMED if named else kind, hypotheses, best, alternatives, mechanisms)
+    probability = best.probability if named else sum(h.probability for h in stated)
+    return Conclusion(NAMED if named else kind, hypotheses, best, alternatives, mechanisms, probability)
 
 
 def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tuple[bool, Sequence[Hypothesis]]:
