@@ -187,6 +187,8 @@ def test_models_of_one_hypothesis_count_together_by_their_weights():
     # 600 draws of two models with 1/4 and 3/4: 5 standard errors are 0.09.
     assert abs((promise.truths[promise.source == 0, 0] > 0).mean() - 0.25) < 5 * np.sqrt(0.25 * 0.75 / PROMISE_DRAWS)
     assert promise.resolved(promise.log_factors(1e4 * np.eye(2))) == pytest.approx(1.0)
+    # What tells nothing has no factor, however probable each hypothesis was.
+    np.testing.assert_allclose(promise.log_factors(np.zeros((2, 2))), 0.0, atol=1e-9)
 
 
 def test_separation_resolved_solves_its_equation_and_is_none_where_nothing_is_resolved():

@@ -222,3 +222,15 @@ def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():
     assert expected < brute_log_bayes_factor(rows, [unit]) - 1.0
     # Without it the model is the smaller one all the same.
     assert found.without[0] == pytest.approx(evaluated(rows, ()).log_evidence, abs=1e-8)
+
+
+def test_moments_have_the_noise_that_a_model_leaves_where_that_is_more_than_was_taken():
+    rows = quiet(1, SIGNALS["b"])
+    rows = replace(rows, residual=rows.expected + 9.0 * (rows.residual - rows.expected))
+    one, scale = statistics_of(rows.products, [0.3]), 0.3
+    joint = Joint(one, UNITS[:1], Grid(np.array([scale]), np.zeros(1)), np.zeros(1), np.zeros(1, int))
+    ((_, variance),) = joint.moments()
+    inner = one.gram[0][:2, :2] + np.eye(2) / scale**2
+    left = one.squares[0] - one.along[0, :2] @ np.linalg.solve(inner, one.along[0, :2])
+    assert left > 2.0 * one.freedom
+    np.testing.assert_allclose(variance, left / one.freedom * np.diag(np.linalg.inv(inner)))

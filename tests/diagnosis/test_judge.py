@@ -117,9 +117,19 @@ def test_figures_before_and_after(made):
     # No joint errs, and a mean of two measurements has half the square of the noise of one.
     repeats = held_out.observations.states.repeats[held_out.observations.state]
     assert found.document["heldout"]["noise_floor_rms_m"] == pytest.approx(6e-5 * np.sqrt((3 / repeats).mean()))
+    (gained,) = (effect["heldout_gain"] for effect in found.document["effects"])
+    assert gained == pytest.approx(1 - after["rms_m"] / before["rms_m"])
     assert about_errors(found) == []
     again = judged(steps, case, held_out)
     assert again.document["heldout"] == found.document["heldout"]
+
+
+def test_a_step_that_makes_predictions_worse_is_a_warning(made):
+    case, held_out, (bare, declared, final) = made
+    worse = bare, replace(declared, fitted=final.fitted), replace(final, fitted=declared.fitted)
+    said = about_errors(judged(worse, case, held_out))
+    assert any(warning.startswith("the RMS error of the validation poses grew from") for warning in said)
+    assert said[-1] == "the step 'with joint_offset' raised the RMS error of the validation poses"
 
 
 def with_first_pose_turned(case, held_out, turn):
@@ -151,6 +161,10 @@ def test_a_row_far_off_outside_the_fitted_range_is_a_gross_error_too(made, off_m
     found = judged(steps, case, away)
     assert [error["rows"] for error in found.document["gross_errors"]] == ([[measurements.row[row]]] if named else [])
     assert found.document["heldout"]["after"]["rms_m"] < 1e-3
+    if named:
+        whole = found.document["heldout"]["with_gross_errors"]
+        of_all = [row["heldout_rms_all_rows_m"] for row in found.rows]
+        assert [whole["before"]["rms_m"], whole["after"]["rms_m"]] == of_all[1:]
 
 
 def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):

@@ -90,6 +90,13 @@ VERDICTS = {
         1.0,
         [((OFFSET_3, OTHER_2), 0.9), ((OFFSET_3,), 0.1)],
     ),
+    "a related mechanism instead of it alone": (
+        CLASS,
+        ("offset",),
+        {"offset": (OTHER,)},
+        1.0,
+        [((OFFSET_3,), 0.55), ((OFFSET_3, OTHER_2), 0.45)],
+    ),
     "several, each with what is meant instead": (
         SEVERAL,
         ("offset", "payload"),
