@@ -5,7 +5,8 @@ import pytest
 from made_folders import made_folder
 
 from elastocal.campaigns.reading import read_campaign
-from elastocal.diagnosis.proposal import Proposal
+from elastocal.diagnosis.new_states import Entries
+from elastocal.diagnosis.next_experiment import Proposal
 from elastocal_proof.blind import proposed as module
 from elastocal_proof.blind.proposed import proposed
 
@@ -15,8 +16,16 @@ def made_proposal(joints, poses, ladder, draws):
     count = np.arange(poses, dtype=float)
     wrench = np.tile([0.0, 0.0, -500.0, 0.0, 0.0, 0.0], (poses, 1))
     angles = draws.uniform(-1, 1, (poses, joints))
+    entries = Entries(angles, wrench, None, np.zeros(poses, bool))
     return Proposal(
-        angles, wrench, None, np.zeros(poses, bool), ladder, ("6DoF",), count, count, 1.0, 9, ("a",), ("b",), (), ""
+        ("a",),
+        nearest=("b",),
+        entries=entries,
+        shares=ladder,
+        points=("6DoF",),
+        separation=count,
+        resolved=count,
+        poses_needed=9,
     )
 
 

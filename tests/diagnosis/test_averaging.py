@@ -28,11 +28,6 @@ UNITS = (
 )
 
 
-def on_the_mean(problem):
-    """A problem in which a gain need not be sure."""
-    return replace(problem, settings=replace(problem.settings, useful=0.0))
-
-
 @pytest.fixture(scope="module")
 def made():
     """Quiet rows with something of each unit in them, so that the size of the noise is at its floor, and their problem."""
@@ -118,6 +113,24 @@ def test_coefficients_are_averaged_over_the_models_that_have_them(made):
     assert {owner for owner, _ in averaged(line, both, both.models[1], OWNERS).shift} == {"declared", "a", "b"}
 
 
+def test_a_parameter_is_of_its_prior_where_the_measurements_leave_half_its_variance(made):
+    """As that of b where its column is one that the declared model makes as well, or where many models differ in it."""
+    rows, line = made
+    best = posterior_of(((0, 1), [0.3, 1.0], 0.0, 1.0))
+    assert averaged(line, best, best.models[0], OWNERS).of_prior == frozenset()
+    candidates = rows.candidates.copy()
+    candidates[:, 2] = rows.declared[:, 0] + 0.05 * candidates[:, 2]
+    problem, products = made_problem(replace(rows, candidates=candidates, prior_std=np.full(4, 1e6)), UNITS, tau=TAU)
+    blind = SimpleNamespace(problem=problem, products=products)
+    found = averaged(blind, best, best.models[0], OWNERS)
+    assert found.of_prior == {("b", "0")}
+    share = (found.std_error["b", "0"] / problem.grid.root_mean_square(UNITS[1])) ** 2
+    for setting, told in ((share * 1.01, frozenset()), (share * 0.99, {("b", "0")})):
+        problem = replace(problem, settings=replace(problem.settings, prior_share=setting))
+        stricter = SimpleNamespace(problem=problem, products=products)
+        assert averaged(stricter, best, best.models[0], OWNERS).of_prior - {("a", "0"), ("a", "1")} == told
+
+
 def most_probable(rows, problem, model):
     """Coefficients of a model, dense: at its sizes, and at the pose error that is then most probable."""
     columns = np.concatenate([np.zeros(0, int), *(problem.units[number].columns for number in model.units)])
@@ -137,36 +150,18 @@ def projected_gram(rows):
     return rows.candidates.T @ np.linalg.solve(rows.marginal_covariance(0.0), rows.candidates)
 
 
-def expected_square(rows, problem, found, model):
-    """Of the error of predictions with a model's displacement, in expectation over all models: written out."""
-    gram = projected_gram(rows)
-    mine = most_probable(rows, problem, model) if model else np.zeros(len(gram))
-    errors = [most_probable(rows, problem, other) - mine for other in found.models]
-    return sum(p * error @ gram @ error for p, error in zip(found.probabilities, errors, strict=True))
-
-
+@pytest.mark.parametrize("beside", [(), (1,), (1, 2), (0, 1)])
 @pytest.mark.parametrize("best", [0.25, 0.45, 0.55, 0.9])
-@pytest.mark.parametrize("beside", [(), (1,), (1, 2), (2,)])
 def test_a_model_is_expected_to_help_where_the_expected_square_of_the_error_falls(made, best, beside):
+    """What others predict as well helps, however improbable it is by itself."""
     rows, line = made
-    rest = [(beside, [0.3, 1.0][: len(beside)], 0.0, 0.6 * (1 - best)), ((0, 1), [0.3, 0.3], 0.0, 0.4 * (1 - best))]
-    found = posterior_of(((0,), [0.3], 0.0, best), *rest)
-    for model in found.models:
-        falls = expected_square(rows, line.problem, found, model) < expected_square(rows, line.problem, found, None)
-        assert expected_to_help(on_the_mean(line.problem), found, model) == (falls and len(model.units) > 0)
-
-
-def test_what_other_models_predict_as_well_helps_however_improbable_it_is_by_itself():
-    """Two names of one displacement: either may be adopted, as the measurements at hand cannot tell between them."""
-    rows = made_rows(1, poses=12)
-    candidates = rows.candidates.copy()
-    candidates[:, 2] = candidates[:, 0]
-    rows = replace(rows, candidates=candidates, residual=rows.residual + 0.5 * candidates[:, 0])
-    problem = on_the_mean(made_problem(rows, (made_unit("a", (1,), 0), made_unit("b", (1,), 2)), tau=TAU)[0])
-    found = posterior_of(((0,), [0.3], 0.0, 0.3), ((1,), [0.3], 0.0, 0.3), ((), [], 0.0, 0.4))
-    assert expected_to_help(problem, found, found.models[0]) and expected_to_help(problem, found, found.models[1])
-    apart = posterior_of(((0,), [0.3], 0.0, 0.3), ((), [], 0.0, 0.7))
-    assert not expected_to_help(problem, apart, apart.models[0])
+    problem = replace(line.problem, settings=replace(line.problem.settings, useful=0.0))
+    found, gram = posterior_of(((0,), [0.3], 0.0, best), (beside, [0.3] * len(beside), 0.0, 1 - best)), projected_gram(rows)
+    mine, other = (most_probable(rows, problem, model) for model in found.models)
+    squares = [
+        best * (mine - kept) @ gram @ (mine - kept) + (1 - best) * (other - kept) @ gram @ (other - kept) for kept in (mine, 0)
+    ]
+    assert expected_to_help(problem, found, found.models[0]) == (squares[0] < squares[1])
 
 
 @pytest.mark.parametrize(("times", "helps"), [(1.05, True), (0.95, False)])
@@ -218,15 +213,10 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
 
 
 def test_other_models_predict_otherwise_by_their_probability_and_unknown_causes_are_in_none_that_is_kept(made):
-    _, line = made
-    gram = line.problem.statistics.gram[0]
-    alone = posterior_of(((0,), [0.3], 0.0, 1.0))
-    assert other_predictions(line.problem, alone, alone.models[0]) == 0.0
-    found = posterior_of(((0,), [0.3], 0.0, 0.75), ((1,), [0.3], 0.0, 0.25))
-    mine = squares_explained(line.problem, found.models[0])["a"]
-    whole = other_predictions(line.problem, posterior_of(((0,), [0.3], 0.0, 1.0), ((), [], 0.0, 1.0)), found.models[0])
-    assert whole == pytest.approx(mine)
-    assert 0.0 < other_predictions(line.problem, found, found.models[0]) < mine + gram[2, 2]
-    # A smooth error of unknown cause explains something that no command has.
-    beside = posterior_of(((0, 2), [0.3, 0.3], 0.0, 1.0))
-    assert other_predictions(line.problem, beside, beside.models[0]) > 0.0
+    rows, line = made
+    gram = projected_gram(rows)
+    found = posterior_of(((0, 2), [0.3, 0.3], 0.0, 0.75), ((1,), [0.3], 0.0, 0.25))
+    mine, other = (most_probable(rows, line.problem, model) for model in found.models)
+    kept = np.where(np.isin(np.arange(len(mine)), UNITS[0].columns), mine, 0.0)
+    expected = 0.75 * (mine - kept) @ gram @ (mine - kept) + 0.25 * (other - kept) @ gram @ (other - kept)
+    assert other_predictions(line.problem, found, found.models[0]) == pytest.approx(expected, rel=1e-6)

@@ -13,7 +13,7 @@ from made_folders import PLAN, made_folder, made_table
 
 from elastocal.diagnosis import judge as judging
 from elastocal.diagnosis.judge import judge
-from elastocal.diagnosis.proposal import NOTHING_AMBIGUOUS, without_poses
+from elastocal.diagnosis.next_experiment import NOTHING_AMBIGUOUS, Proposal
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop import whole
 from elastocal.loop.whole import cases_in, diagnosed
@@ -179,7 +179,7 @@ def test_follow_ups_write_the_verdict_of_the_one_call(folder, expected, tmp_path
 
 def test_next_experiment_is_proposed_for_the_same_diagnosis(folder, monkeypatch):
     asked = []
-    none = without_poses(6, (), (), NOTHING_AMBIGUOUS)
+    none = Proposal((), reason=NOTHING_AMBIGUOUS)
     monkeypatch.setattr(proposed, "diagnose", lambda *parts: asked.append(parts) or "the diagnosis")
     monkeypatch.setattr(proposed, "propose", lambda diagnosis, *rest: asked.append(diagnosis) or none)
     proposed.proposed(folder, ROBOTS, 2, (0.0, 1.0), SEED)

@@ -139,6 +139,9 @@ def test_compliances_before_and_after_are_those_of_the_fits_in_microradians(foun
     # What is averaged over the models is within its own standard error of the one that is fitted.
     after = 1e6 * joint_compliances(final.model, final.estimate)
     assert (np.abs(facts["after"] - after) <= error).all() and (error > 0).all()
+    # With a prior of ten times what such a joint has: of some the loads of a pull tell nothing.
+    usual = np.array([final.parameters[n][1].plausible for n in final.places_of("joint_compliance")])
+    assert facts["identifiable"] == (error < 1e6 * usual).tolist() and any(facts["identifiable"])
 
 
 def faults(*decisive):

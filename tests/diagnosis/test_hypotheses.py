@@ -9,62 +9,40 @@ from support import UR10, robot_of
 from synthetic import equipped
 
 from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
-from elastocal.diagnosis.other import FORCE, NEIGHBOURS, OWN, PLACE, SHIFT, TURN, Competitor
+from elastocal.diagnosis.other import FORCE, NEIGHBOURS, OWN, Law
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
 
 SETTINGS = Settings()
 
 
-def every_model(units):
-    """All sets of units with one variant at a place at most, "nothing" among them."""
-    for size in range(len(units) + 1):
-        for chosen in combinations(units, size):
-            if len({unit.place for unit in chosen}) == size:
-                yield chosen
-
-
-def made_units():
-    """Three mechanisms: at three locations, one of which has three laws; at two; and at one. Two laws of the competitor."""
-    third = float(np.log(1 / 3))
-    return (
-        made_unit("harmonic", (1,), 0),
-        made_unit("harmonic", (2,), 1),
-        *(made_unit("harmonic", (3,), column, log_prior=third) for column in (2, 3, 4)),
-        made_unit("offset", (1,), 5),
-        made_unit("offset", (2,), 6),
-        made_unit("link_weight", (), 7),
-        made_unit(OTHER, (1,), 8),
-        made_unit(OTHER, (1,), 9, law=NEIGHBOURS),
-    )
+THIRD = float(np.log(1 / 3))
+# A mechanism at three locations, one of which has three laws.
+UNITS = (
+    made_unit("harmonic", (1,), 0),
+    made_unit("harmonic", (2,), 1),
+    *(made_unit("harmonic", (3,), column, log_prior=THIRD) for column in (2, 3, 4)),
+)
 
 
 def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equally_likely():
-    units = made_units()[:5]
-    prior = prior_of(units, SETTINGS)
-    by_places = {}
-    for model in every_model(units):
-        places = tuple(sorted(unit.location for unit in model))
-        by_places[places] = by_places.get(places, 0.0) + np.exp(prior.log_odds_of(model))
-    odds = SETTINGS.mechanism_probability / (1 - SETTINGS.mechanism_probability)
-    counts = [sum(value for places, value in by_places.items() if len(places) == size) / odds for size in (1, 2, 3)]
-    np.testing.assert_allclose(counts, np.array([4, 2, 1]) / 7)
-    for size in (1, 2, 3):
-        np.testing.assert_allclose(
-            [v for p, v in by_places.items() if len(p) == size], counts[size - 1] * odds / [3, 3, 1][size - 1]
-        )
-
-
-def test_adding_a_unit_changes_the_log_odds_by_what_added_says():
-    units = made_units()
-    prior = prior_of(units, SETTINGS)
-    for model in every_model(units):
-        for unit in units:
-            if (unit.mechanism, unit.location) in {(one.mechanism, one.location) for one in model}:
-                continue
-            count = sum(one.mechanism == unit.mechanism for one in model)
-            change = prior.log_odds_of((*model, unit)) - prior.log_odds_of(model)
-            assert prior.added(unit, count) == pytest.approx(change)
+    """Given that a mechanism is there; laws share a location. And what a unit adds is the difference of both models."""
+    prior, by_places = prior_of([*UNITS, made_unit(OTHER, (1,), 5), made_unit(OTHER, (1,), 6, law=NEIGHBOURS)], SETTINGS), {}
+    for size in range(1, 4):
+        for model in combinations(UNITS, size):
+            places = tuple(sorted({unit.location for unit in model}))
+            if len(places) == size:
+                odds = prior.log_odds_of(model)
+                by_places[places] = by_places.get(places, 0.0) + np.exp(odds)
+                smaller = prior.log_odds_of(model[:-1])
+                assert prior.added(model[-1], size - 1) == pytest.approx(odds - smaller)
+    there = SETTINGS.mechanism_probability / (1 - SETTINGS.mechanism_probability)
+    expected = {places: there * {1: 4 / 7 / 3, 2: 2 / 7 / 3, 3: 1 / 7}[len(places)] for places in by_places}
+    assert len(by_places) == 7 and by_places == pytest.approx(expected)
+    # Laws of the competitor have places of their own, and its own probability.
+    other = [made_unit(OTHER, (1,), 5), made_unit(OTHER, (1,), 6, law=NEIGHBOURS)]
+    odds = SETTINGS.other_probability / (1 - SETTINGS.other_probability)
+    assert np.exp(prior.log_odds_of(other)) == pytest.approx(odds / 3)
 
 
 @pytest.fixture(scope="module")
@@ -75,23 +53,17 @@ def catalogue():
 def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(catalogue):
     tried = [(c, (value,)) for c in catalogue for shape in c.shapes for value in shape.values(3)]
     tried += [(c, ()) for c in catalogue if not c.shapes]
-    features = [
-        (Competitor((1,), OWN), 40),
-        (Competitor((1,), NEIGHBOURS), 40),
-        (Competitor((), FORCE, SHIFT), 24),
-        (Competitor((), FORCE, TURN), 24),
-        (Competitor((), PLACE, TURN), 24),
-    ]
-    units = units_of(tried, features, SETTINGS)
+    laws = [Law((1,), OWN, 1.0, (), 40), Law((1,), NEIGHBOURS, 1.0, (), 40), Law((), f"{FORCE} shift", 1.0, (), 24)]
+    units = units_of(tried, laws, SETTINGS)
     columns = np.concatenate([unit.columns for unit in units])
     np.testing.assert_array_equal(np.sort(columns), np.arange(len(columns)))
     against = [unit for unit in units if unit.mechanism == OTHER]
-    assert [(unit.competitor, len(unit.columns)) for unit in against] == features
-    assert not any(unit.competitor for unit in units if unit.candidate)
+    assert [(unit.law, len(unit.columns)) for unit in against] == [(law, law.features) for law in laws]
+    assert not any(unit.law for unit in units if unit.candidate)
     # Laws and shapes at one location share its probability; laws of the competitor have places of their own.
     for place in {unit.place for unit in units}:
         assert np.exp([unit.log_prior for unit in units if unit.place == place]).sum() == pytest.approx(1.0), place
-    assert len({unit.place for unit in against}) == len(features)
+    assert len({unit.place for unit in against}) == len(laws)
     assert len({unit.key for unit in units}) == len(units)
 
 

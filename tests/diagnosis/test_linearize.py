@@ -12,7 +12,7 @@ from synthetic import NOISE, conditions_on, made_states
 
 from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
 from elastocal.diagnosis.linearize import lacking, linearized, shapes_looked_at_closely, shapes_tried, smallest_shown
-from elastocal.diagnosis.other import competitors
+from elastocal.diagnosis.other import laws_of
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
@@ -92,8 +92,9 @@ def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_an
     quiet = replace(campaign.declared, noise=campaign.declared.noise.scaled(0.01))
     found = problem_of(campaign, quiet, KEYS[:1])
     assert loud < {unit.key for unit in found.problem.units}
-    against = [unit.competitor for unit in found.problem.units if unit.mechanism == OTHER]
-    assert against == competitors(campaign.declared.conditions)
+    against = [unit.law for unit in found.problem.units if unit.mechanism == OTHER]
+    laws = laws_of(campaign.declared.conditions, SETTINGS.other_features)
+    assert [(law.location, law.name) for law in against] == [(law.location, law.name) for law in laws]
     assert {each.location for each in against} == {(1,), (2,), (3,), (4,), (5,), (6,), ()}
     columns = [len(unit.columns) for unit in found.problem.units if unit.mechanism == OTHER and unit.location]
     assert set(columns) == {SETTINGS.other_features}
@@ -194,7 +195,7 @@ def test_names_of_all_that_is_tested_are_unique_wherever_a_step_was_fitted(campa
     fitted = campaign.declared if when is None else fitted_at(campaign, "setup_step", when)
     model = replace(fitted.model, sites=around.sites)
     candidates = [c for c in candidates_on(around.sites).values() if not lacking(c, model, states)]
-    laws = [(each, 1) for each in competitors(around)]
+    laws = laws_of(around, 1)
     tested = [(c, shapes) for c in candidates for shapes in shapes_tried(c, fitted)]
     units = units_of(tested, laws, SETTINGS)
     problem = SimpleNamespace(units=units, prior=prior_of(units, SETTINGS))

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made_problems import made_problem, made_rows, made_unit
+from planted import planted
 
 from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.averaging import squares_beyond
@@ -17,10 +18,19 @@ from elastocal.diagnosis.verdict import (
     CLASS,
     NAMED,
     NOT_TESTABLE,
+    SEVERAL,
     UNEXPLAINED,
     concluded,
+    contradictions,
     hypotheses_of,
+    location_probabilities,
+    pose_error_warnings,
+    scatter_warnings,
 )
+from elastocal.fitting.displacement import joint_compliances
+from elastocal.fitting.noise import Noise
+
+SETTINGS = Settings()
 
 OF_THE_ROBOT, OF_THE_SETUP = SimpleNamespace(family="geometry"), SimpleNamespace(family="drift")
 UNITS = (
@@ -48,37 +58,77 @@ def conclusion(*pairs, alarm=RAISED):
     return concluded(PROBLEM, made_posterior(*pairs), alarm)
 
 
-def test_without_an_alarm_the_model_is_adequate_whatever_the_posterior_prefers():
-    found = conclusion(((OFFSET_2,), 0.9), alarm=SILENT)
-    assert found.verdict == ADEQUATE and found.best.mechanisms == () and found.alternatives == {}
-    assert found.mechanisms == pytest.approx({"offset": 0.9})
+# Verdict, best hypothesis, what is meant instead, probability of what is left open; models with theirs.
+VERDICTS = {
+    "adequate without an alarm, whatever the posterior prefers": (ADEQUATE, (), {}, 0.1, [((OFFSET_2,), 0.9)]),
+    "named with enough of the probability": (
+        NAMED,
+        ("offset",),
+        {"offset": ()},
+        0.85,
+        [((OFFSET_2,), 0.6), ((OFFSET_3,), 0.25), ((PAYLOAD,), 0.1)],
+    ),
+    # A name needs the probability that is asked for, of which "nothing" has its part, too.
+    "the alarm decides that something is missing": (
+        CLASS,
+        ("offset",),
+        {"offset": ()},
+        0.12,
+        [((OFFSET_2,), 0.12), ((PAYLOAD,), 0.02)],
+    ),
+    "a class of those worth a line": (
+        CLASS,
+        ("offset",),
+        {"offset": ("payload", "tilt")},
+        0.99,
+        [((OFFSET_2,), 0.5), ((PAYLOAD,), 0.3), ((TILT,), 0.19), ((TILT, PAYLOAD), 0.001)],
+    ),
+    "a related mechanism beside it": (
+        CLASS,
+        ("offset", OTHER),
+        {"offset": (OTHER,)},
+        1.0,
+        [((OFFSET_3, OTHER_2), 0.9), ((OFFSET_3,), 0.1)],
+    ),
+    "a related mechanism instead of it alone": (
+        CLASS,
+        ("offset",),
+        {"offset": (OTHER,)},
+        1.0,
+        [((OFFSET_3,), 0.55), ((OFFSET_3, OTHER_2), 0.45)],
+    ),
+    "several, each with what is meant instead": (
+        SEVERAL,
+        ("offset", "payload"),
+        {"offset": (), "payload": ("tilt",)},
+        0.99,
+        [((OFFSET_2, PAYLOAD), 0.7), ((OFFSET_2, TILT), 0.29)],
+    ),
+    "unexplained by the competitor alone": (
+        UNEXPLAINED,
+        (OTHER,),
+        {},
+        0.7,
+        [((OTHER_1,), 0.4), ((OTHER_1, OTHER_2), 0.3), ((OFFSET_2,), 0.3)],
+    ),
+    "unexplained where nothing is better": (UNEXPLAINED, (), {}, 0.99, [((OFFSET_2,), 0.01)]),
+}
 
 
-def test_one_mechanism_with_enough_of_the_probability_is_named():
-    found = conclusion(((OFFSET_2,), 0.6), ((OFFSET_3,), 0.25), ((PAYLOAD,), 0.1))
-    assert found.verdict == NAMED and found.best.mechanisms == ("offset",)
-    assert found.best.probability == pytest.approx(0.85) and found.best.model == 0
-    # One that is named has no alternatives.
-    assert found.alternatives == {"offset": ()}
-    assert list(found.mechanisms) == ["offset", "payload"]
-
-
-def test_the_alarm_decides_that_something_is_missing_and_the_posterior_what():
-    """A name needs the probability that is asked for, of which "nothing" has its part, too."""
-    found = conclusion(((OFFSET_2,), 0.12), ((PAYLOAD,), 0.02))
-    assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
-
-
-def test_an_ambiguous_mechanism_is_a_class_of_those_worth_a_line():
-    found = conclusion(((OFFSET_2,), 0.5), ((PAYLOAD,), 0.3), ((TILT,), 0.19), ((TILT, PAYLOAD), 0.001))
-    assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
-    assert found.alternatives == {"offset": ("payload", "tilt")}
-
-
-def test_a_mechanism_beside_the_competitor_is_a_class_with_a_related_one():
-    found = conclusion(((OFFSET_3, OTHER_2), 0.9), ((OFFSET_3,), 0.1))
-    assert found.verdict == CLASS and found.best.named == ("offset",)
-    assert found.alternatives == {"offset": (OTHER,)}
+@pytest.mark.parametrize("case", VERDICTS)
+def test_the_verdict_is_that_of_least_loss_once_an_alarm_is_raised(case):
+    verdict, best, alternatives, probability, models = VERDICTS[case]
+    found = conclusion(*models, alarm=SILENT if verdict == ADEQUATE else RAISED)
+    assert (found.verdict, found.best.mechanisms) == (verdict, best)
+    assert {name: tuple(there) for name, there in found.alternatives.items()} == alternatives
+    # Without which no headline says how sure it is.
+    assert found.probability == pytest.approx(probability)
+    inclusion = {}
+    for units, probability in models:
+        for name in {UNITS[number].mechanism for number in units}:
+            inclusion[name] = inclusion.get(name, 0.0) + probability
+    assert found.mechanisms == pytest.approx(inclusion)
+    assert list(found.mechanisms.values()) == sorted(found.mechanisms.values(), reverse=True)
 
 
 @pytest.mark.parametrize(
@@ -88,15 +138,9 @@ def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_oth
     """Little is what laws are allowed to be off: of squares, that part which the other cannot make, whatever its size."""
     posterior = Posterior((Model((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1))
     (law, law_alone), (unknown, unknown_alone) = squares_beyond(PROBLEM, posterior.models[0], {"offset"})
-    small = Settings().law_tolerance ** 2
+    small = SETTINGS.law_tolerance**2
     assert (unknown_alone < small * law, law_alone < small * unknown) == (OTHER not in mechanisms, "offset" not in mechanisms)
     assert hypotheses_of(PROBLEM, posterior)[0].mechanisms == mechanisms
-
-
-def test_the_competitor_alone_means_unexplained():
-    found = conclusion(((OTHER_1,), 0.4), ((OTHER_1, OTHER_2), 0.3), ((OFFSET_2,), 0.3))
-    assert found.verdict == UNEXPLAINED and found.best.mechanisms == (OTHER,) and found.best.named == ()
-    assert found.alternatives == {}
 
 
 def test_nothing_is_testable_where_only_the_competitor_is_left():
@@ -124,4 +168,65 @@ def test_hypotheses_gather_locations_laws_and_sum_to_one():
     ]
     # The most probable of its models stands for each.
     assert [h.model for h in found] == [0, 2, 4]
-    assert sum(h.probability for h in found) == pytest.approx(1.0)
+    where = location_probabilities(PROBLEM, posterior, "offset")
+    assert where == pytest.approx({(2,): 4 / 7, (3,): 4 / 7})
+
+
+@pytest.fixture(scope="module")
+def fitted(kuka):
+    return planted(kuka, {}, seed=6, poses=8).declared
+
+
+def with_noise(fitted, **changes):
+    return replace(fitted, noise=replace(fitted.noise, **changes))
+
+
+@pytest.mark.parametrize(("factor", "count"), [(4.9, 0), (5.1, 1), (270.0, 1)])
+def test_scatter_far_beyond_the_noise_measured_is_one(fitted, factor, count):
+    left, repeats = with_noise(fitted, position_m=factor * fitted.noise.position_m), replace(fitted.noise, source="repeats")
+    found = contradictions(left, repeats, SETTINGS)
+    assert len(found) == count
+    assert all("scatter about the model" in sentence for sentence in found)
+    assert contradictions(left, replace(repeats, source="declared"), SETTINGS) == []
+
+
+@pytest.mark.parametrize(("pose_rad", "count"), [(4e-4, 0), (1e-3, 1)])
+def test_an_error_of_a_pose_beyond_that_of_drives_is_one(fitted, pose_rad, count):
+    found = contradictions(with_noise(fitted, pose_rad=pose_rad), fitted.noise, SETTINGS)
+    assert len(found) == count
+    assert all("1000 µrad" in sentence for sentence in found)
+
+
+@pytest.mark.parametrize(
+    ("errors", "named"), [(2.5, []), (4.5, ["the compliance of joint 3 is negative by 4.5 standard errors"])]
+)
+def test_a_compliance_that_is_negative_beyond_chance_is_one(fitted, errors, named):
+    mine = np.array([owner == "joint_compliance" for owner, _ in fitted.parameters])
+    values = joint_compliances(fitted.model, fitted.estimate).copy()
+    values[2] = -errors * np.sqrt(np.diag(fitted.covariance))[mine][2]
+    coefficients = tuple(
+        values if effect.effect == "joint_compliance" else each
+        for effect, each in zip(fitted.model.effects, fitted.estimate.coefficients, strict=True)
+    )
+    off = replace(fitted, estimate=replace(fitted.estimate, coefficients=coefficients))
+    assert contradictions(off, fitted.noise, SETTINGS) == named
+
+
+@pytest.mark.parametrize(
+    ("factor", "source", "words"),
+    [
+        (1.49, "repeats", None),
+        (2.04, "repeats", "2.0 times as much as their repeats about each other"),
+        (11.6, "declared", "12 times as much as the noise that is declared for them"),
+    ],
+)
+def test_noise_that_is_much_larger_than_it_was_taken_is_a_warning_from_one_and_a_half_times_on(factor, source, words):
+    taken = Noise(source, 6e-5, 6e-5, np.zeros(6))
+    found = scatter_warnings(taken.scaled(factor), taken, SETTINGS.relinearize_noise)
+    assert found == ([f"measurements scatter about the model {words}"] if words else [])
+
+
+def test_a_pose_error_is_a_warning_from_the_size_that_repeats_of_a_pose_could_show():
+    noise = Noise("declared", 6e-5, 6e-5, np.zeros(6))
+    below, above = (pose_error_warnings(replace(noise, pose_rad=size), 2e-5) for size in (1.9e-5, 3.4e-5))
+    assert below == [] and len(above) == 1 and "every joint were 34 µrad off" in above[0]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.diagnosis.hypotheses import OTHER, Unit, prior_of
-from elastocal.diagnosis.other import OWN, Competitor
+from elastocal.diagnosis.other import OWN, Law
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import products_of, statistics_of
@@ -91,8 +91,8 @@ def made_unit(mechanism, location, columns, signs=0, log_prior=0.0, candidate=No
     """A unit of some columns, each of plausible size one."""
     columns = np.atleast_1d(columns)
     signs = np.full(len(columns), signs, int)
-    competitor = Competitor(location, law) if mechanism == OTHER else None
-    return Unit(mechanism, location, candidate, shapes, columns, np.ones(len(columns)), signs, log_prior, competitor, smallest)
+    other = Law(location, law, 1.0, (), len(columns)) if mechanism == OTHER else None
+    return Unit(mechanism, location, candidate, shapes, columns, np.ones(len(columns)), signs, log_prior, other, smallest)
 
 
 def made_problem(rows, units, settings=None, tau=None):

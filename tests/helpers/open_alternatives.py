@@ -7,7 +7,7 @@ import numpy as np
 
 from elastocal.diagnosis import new_states, next_experiment
 from elastocal.diagnosis.alarm import Alarm
-from elastocal.diagnosis.alternatives import members_of
+from elastocal.diagnosis.alternatives import alternatives_of
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
@@ -46,7 +46,7 @@ def pieces(diagnosis, robot, ladder=None):
     noise = replace(evidence.linearized.about.noise, pose_rad=lead.pose_error_rad)
     made = evidence.linearized, diagnosis.final, numbers, noise, states, reach, ladder is None
     instrument = new_states.instrument_of(*made)
-    return members_of(evidence, kept, instrument, lead, 1.0), instrument, reach
+    return alternatives_of(evidence, kept, instrument, lead, 1.0), instrument, reach
 
 
 def keys_like(campaign, *starts):

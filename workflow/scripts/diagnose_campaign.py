@@ -6,8 +6,7 @@ from dataclasses import replace
 from job import Job, run
 
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.next_experiment import propose
-from elastocal.diagnosis.proposal import facts_of, table_of
+from elastocal.diagnosis.next_experiment import facts_of, propose, table_of
 from elastocal.diagnosis.settings import Settings
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import write_json

@@ -25,7 +25,6 @@ from elastocal.diagnosis.statistics import normal_equations
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Model, Posterior, Problem
 
@@ -38,10 +37,12 @@ class Averaged:
     """Corrections to the exact fit of the most probable model.
 
     `shift` (str, str): by owner and name of a parameter: what the other models add to its estimate. `std_error` (str, str).
+    `of_prior`: parameters of effects of which the prior says more than the measurements do.
     """
 
     shift: dict[tuple[str, str], float]
     std_error: dict[tuple[str, str], float]
+    of_prior: frozenset[tuple[str, str]] = frozenset()
 
 
 def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: Sequence[tuple[str, str]]) -> Averaged:
@@ -49,9 +50,15 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
 
     `best`: of which there is an exact fit. `owners` (str, str): owner and name of each parameter of the declared block.
     """
-    likely = _likely(posterior, best)
-    equations = {tau: normal_equations(linearized.products, tau)[0] for tau in {model.pose_error_rad for model, _ in likely}}
-    kept = _likely_pose_errors(linearized.problem, best, [model.pose_error_rad for model, _ in likely])
+    likely, problem = _likely(posterior, best), linearized.problem
+    sizes = {model.pose_error_rad for model, _ in likely}
+    equations = {tau: normal_equations(linearized.products, tau)[0] for tau in sizes}
+    # Sizes of the pose error that the best model makes likely, and those of the models that count.
+    kept = np.arange(len(problem.log_pose))
+    if best.units:
+        density = _joint(problem, best, kept).by_pose_error
+        of_models = np.isin(problem.statistics.pose_error_rad, list(sizes))
+        kept = np.flatnonzero((density > density.max() + UNLIKELY) | of_models)
     each = [(p, _moments(linearized, model, equations[model.pose_error_rad], owners, kept)) for model, p in likely]
     exact = next(found for (model, _), (_, found) in zip(likely, each, strict=True) if model is best)
     shift: dict[tuple[str, str], float] = {}
@@ -62,7 +69,15 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
         center = weight @ mean
         shift[name] = float(center - estimate)
         std_error[name] = float(np.sqrt(weight @ (variance + (mean - center) ** 2)))
-    return Averaged(shift, std_error)
+    least = np.sqrt(problem.settings.prior_share)
+    of_prior = frozenset(
+        (unit.candidate.key, parameter.name)
+        for unit in (problem.units[number] for number in best.units)
+        if unit.candidate
+        for parameter, size in zip(unit.candidate.parameters, unit.sizes * problem.grid.root_mean_square(unit), strict=True)
+        if std_error[unit.candidate.key, parameter.name] > least * size
+    )
+    return Averaged(shift, std_error, of_prior)
 
 
 def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bool:
@@ -103,24 +118,14 @@ def _likely(posterior: Posterior, best: Model) -> list[tuple[Model, float]]:
     return [(model, probability) for model, probability in pairs if probability >= _LEAST_PROBABILITY or model is best]
 
 
-def _likely_pose_errors(problem: Problem, best: Model, of_models: Sequence[float]) -> np.ndarray:
-    """Places of the sizes of the pose error that the best model makes likely, and of those of the models that count."""
-    sizes = problem.statistics.pose_error_rad
-    if not best.units:
-        return np.arange(len(sizes))
-    density = _joint(problem, [problem.units[number] for number in best.units], best).by_pose_error
-    return np.flatnonzero((density > density.max() + UNLIKELY) | np.isin(sizes, of_models))
-
-
 def squares_explained(problem: Problem, model: Model) -> dict[str, float]:
     """Sum of squares of the whitened displacements that each mechanism of a model makes, dict of str to float."""
     coefficients, gram = _predicted(problem, model), problem.statistics.gram[0]
-    found: dict[str, float] = {}
-    for mechanism in {problem.units[number].mechanism for number in model.units}:
-        units = [problem.units[number] for number in model.units if problem.units[number].mechanism == mechanism]
-        columns = np.concatenate([unit.columns for unit in units])
-        found[mechanism] = float(coefficients[columns] @ gram[np.ix_(columns, columns)] @ coefficients[columns])
-    return found
+    columns: dict[str, list[np.ndarray]] = {}
+    for unit in (problem.units[number] for number in model.units):
+        columns.setdefault(unit.mechanism, []).append(unit.columns)
+    found = {mechanism: np.concatenate(mine) for mechanism, mine in columns.items()}
+    return {mechanism: float(coefficients[at] @ gram[np.ix_(at, at)] @ coefficients[at]) for mechanism, at in found.items()}
 
 
 def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) -> list[tuple[float, float]]:
@@ -132,7 +137,7 @@ def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) 
     coefficients, gram = _predicted(problem, model), problem.statistics.gram[0]
     columns, deviations = problem.columns_of(model.units, model.scales)
     units = [problem.units[number] for number in model.units]
-    mine = np.repeat([unit.mechanism in mechanisms for unit in units], [len(unit.columns) for unit in units])
+    _, mine = problem.columns_of(model.units, [unit.mechanism in mechanisms for unit in units])
     found = []
     for inside in (mine, ~mine):
         ours, rest = columns[inside], columns[~inside]
@@ -155,29 +160,28 @@ def _moments(
     linearized: Linearized, model: Model, equations: np.ndarray, owners: Sequence[tuple[str, str]], kept: np.ndarray
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Mean and variance of every parameter of one model, by owner and name; declared ones up to a constant in the mean."""
-    products, units = linearized.products, [linearized.problem.units[number] for number in model.units]
-    declared, (columns, deviations) = products.declared, linearized.problem.columns_of(model.units, model.scales)
+    products, problem = linearized.products, linearized.problem
+    declared, (columns, deviations) = products.declared, problem.columns_of(model.units, model.scales)
     chosen = np.concatenate([np.arange(declared), declared + columns])
     information = equations[np.ix_(chosen, chosen)].copy()
     places = np.arange(declared, len(chosen))
     information[places, places] += deviations**-2.0
     (inverse,), _ = inverses(information[None])
-    covariance, mean = inverse * max(mean_square_left(linearized.problem, model), 1.0), inverse @ equations[chosen, -1]
+    covariance, mean = inverse * max(mean_square_left(problem, model), 1.0), inverse @ equations[chosen, -1]
     # Declared parameters from the orthonormal basis, less what the candidates' columns have in it.
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)
     variance = ((back @ covariance) * back).sum(axis=1)
     found = dict(zip(owners, zip(back @ mean, variance, strict=True), strict=True))
-    coefficients = _joint(linearized.problem, units, model, kept).moments() if units else []
-    for unit, (value, spread) in zip(units, coefficients, strict=True):
-        if unit.candidate is None:
-            continue
-        for index, parameter in enumerate(unit.candidate.parameters):
-            found[unit.candidate.key, parameter.name] = unit.sizes[index] * value[index], unit.sizes[index] ** 2 * spread[index]
+    for number, (value, spread) in zip(model.units, _joint(problem, model, kept).moments(), strict=True):
+        unit = problem.units[number]
+        if unit.candidate:
+            names = [(unit.candidate.key, parameter.name) for parameter in unit.candidate.parameters]
+            found |= dict(zip(names, zip(unit.sizes * value, unit.sizes**2 * spread, strict=True), strict=True))
     return found
 
 
-def _joint(problem: Problem, units: Sequence[Unit], model: Model, kept: np.ndarray | slice = slice(None)) -> Joint:
-    """Density under a model, at some sizes of the pose error, all without."""
-    places = np.searchsorted(problem.grid.scales, model.scales)
+def _joint(problem: Problem, model: Model, kept: np.ndarray) -> Joint:
+    """Density under a model, at some sizes of the pose error."""
+    places, units = np.searchsorted(problem.grid.scales, model.scales), [problem.units[number] for number in model.units]
     base = (problem.statistics.log_likelihood + problem.log_pose)[kept]
     return Joint(problem.statistics.at(kept), units, problem.grid, base, places)

@@ -21,47 +21,25 @@ if TYPE_CHECKING:
 _ROUNDING = 1e-6
 
 
-def angles_between(problem: Problem, numbers: Sequence[int]) -> np.ndarray:
-    """Smallest angle between each two of some units.
-
-    Returns (N, N): degrees.
-    """
-    gram = problem.statistics.gram[0]
-    bases = [_orthonormal(gram, problem.units[number].columns) for number in numbers]
-    starts = np.concatenate([[0], np.cumsum([basis.shape[1] for basis in bases])]).astype(int)
-    together = np.zeros((len(gram), starts[-1]))
-    for number, basis, start in zip(numbers, bases, starts, strict=False):
-        together[problem.units[number].columns, start : start + basis.shape[1]] = basis
-    products = together.T @ gram @ together
-    cosines = np.eye(len(bases))
-    for one in range(len(bases)):
-        for other in range(one):
-            block = products[starts[one] : starts[one + 1], starts[other] : starts[other + 1]]
-            cosines[one, other] = cosines[other, one] = np.linalg.norm(block, 2) if block.size else 0.0
-    return np.degrees(np.arccos(np.clip(cosines, 0.0, 1.0)))
+def angles_between(problem: Problem, numbers: Sequence[int], others: Sequence[int] | None = None) -> np.ndarray:
+    """Smallest angle of each of some units to each of others, or to each of them, ndarray (N, M), degrees."""
+    gram, units, others = problem.statistics.gram[0], problem.units, numbers if others is None else others
+    bases = [_orthonormal(gram, units[other].columns) for other in others]
+    widths, cosines = np.array([len(units[number].columns) for number in numbers]), np.empty((len(numbers), len(others)))
+    for width in np.unique(widths):
+        places = np.flatnonzero(widths == width)
+        columns = np.array([units[numbers[place]].columns for place in places.tolist()])
+        across = _orthonormal(gram, columns).swapaxes(1, 2)
+        for number, (other, there) in enumerate(zip(others, bases, strict=True)):
+            inner = across @ gram[columns[..., None], units[other].columns] @ there
+            cosines[places, number] = np.linalg.norm(inner, 2, axis=(1, 2))
+    return np.degrees(np.arccos(np.minimum(cosines, 1.0)))
 
 
 def nearest_angles(problem: Problem, found: Sequence[int]) -> np.ndarray:
-    """Angle of each unit to the nearest of those found.
-
-    Returns (number of units,): degrees; not a number where nothing was found.
-    """
-    nearest = np.full(len(problem.units), np.nan)
-    if not len(found):
-        return nearest
-    gram, units = problem.statistics.gram[0], problem.units
-    mine = [_orthonormal(gram, units[number].columns) for number in found]
-    widths = np.array([len(unit.columns) for unit in units])
-    for width in np.unique(widths):
-        numbers = np.flatnonzero(widths == width)
-        columns = np.array([units[number].columns for number in numbers])
-        across = _orthonormal(gram, columns).swapaxes(1, 2)
-        cosines = [
-            np.linalg.norm(across @ gram[columns[..., None], units[other].columns] @ there, 2, axis=(1, 2))
-            for other, there in zip(found, mine, strict=True)
-        ]
-        nearest[numbers] = np.degrees(np.arccos(np.minimum(np.max(cosines, axis=0), 1.0)))
-    return nearest
+    """Angle of each unit to the nearest of those found, (number of units,), degrees; not a number where nothing was found."""
+    every = range(len(problem.units))
+    return angles_between(problem, every, found).min(axis=1) if len(found) else np.full(len(every), np.nan)
 
 
 def _orthonormal(gram: np.ndarray, columns: np.ndarray) -> np.ndarray:

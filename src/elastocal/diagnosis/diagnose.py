@@ -13,13 +13,21 @@ from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained
-from elastocal.diagnosis.contradictions import contradictions, pose_error_warnings, scatter_warnings
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
-from elastocal.diagnosis.verdict import ADEQUATE, NAMED, SEVERAL, UNEXPLAINED, concluded
+from elastocal.diagnosis.verdict import (
+    ADEQUATE,
+    NAMED,
+    SEVERAL,
+    UNEXPLAINED,
+    concluded,
+    contradictions,
+    pose_error_warnings,
+    scatter_warnings,
+)
 from elastocal.diagnosis.words import hypothesis_words
 from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
@@ -325,7 +333,7 @@ def _document(
         "other_models_m": other_m,
         "heldout": None,
         "kept": steps[-1].kind.replace("kept", "frames"),
-        "compliance_urad_per_Nm": _compliances(declared, final, springs),
+        "compliance_urad_per_Nm": _compliances(declared, final, springs, settings.prior_share),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),
         "untestable": untestable,
@@ -349,14 +357,18 @@ def _averages(declared: Fit, found: Evidence, best: Hypothesis | None) -> Averag
     return averaged(found.linearized, found.posterior, model, owners)
 
 
-def _compliances(declared: Fit, final: Fit, springs: Averaged) -> dict[str, list[float]]:
+def _compliances(declared: Fit, final: Fit, springs: Averaged, prior_share: float) -> dict[str, list[float]]:
     joints = final.model.sites.joints
     after, deviations = joint_compliances(final.model, final.estimate).copy(), np.zeros(joints)
+    told = np.zeros(joints, bool)
     if final.model.identifies_compliance:
         mine = final.places_of("joint_compliance")
         names = [("joint_compliance", final.parameters[index][1].name) for index in mine]
         alone = np.sqrt(np.diag(final.covariance))[mine]
         after += [springs.shift.get(name, 0.0) for name in names]
         deviations = np.array([springs.std_error.get(name, error) for name, error in zip(names, alone, strict=True)])
+        # With a prior of the size that such a spring reaches, of which that share would be left.
+        plausible = np.array([final.parameters[index][1].plausible for index in mine])
+        told = ~final.held[mine] & (deviations**2 < prior_share * (deviations**2 + plausible**2))
     found = {"before": joint_compliances(declared.model, declared.estimate), "after": after, "std_error": deviations}
-    return {name: (1e6 * values).tolist() for name, values in found.items()}
+    return {name: (1e6 * values).tolist() for name, values in found.items()} | {"identifiable": told.tolist()}

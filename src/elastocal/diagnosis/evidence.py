@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import lapack, solve_triangular
@@ -110,18 +110,6 @@ def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
     return -0.5 * freedom * np.log(variance) - 0.5 * squares / variance
 
 
-class Block(NamedTuple):
-    """U units of d columns each, decomposed for any size: G_uu = V diag(values) V'.
-
-    `members` (U,) of int: numbers of the units. `values` (T, U, d), `vectors` (T, U, d, d), `columns` (U, d) of int.
-    """
-
-    members: np.ndarray
-    values: np.ndarray
-    vectors: np.ndarray
-    columns: np.ndarray
-
-
 @dataclass(frozen=True)
 class Conditioned:
     """Statistics given that some columns are in the model with given sizes.
@@ -137,25 +125,23 @@ class Conditioned:
     squares: np.ndarray
     log_occam: np.ndarray
 
-    def blocks_of(self, units: Sequence[Unit], chosen: Sequence[int]) -> list[Block]:
-        """Decompose W'MW given these columns, of which only the blocks of some units are made; for each width of these."""
-        numbers = np.asarray(chosen, int)
-        width = np.array([len(units[number].columns) for number in numbers], int)
-        found = []
+    def blocks_of(
+        self, units: Sequence[Unit], chosen: Sequence[int]
+    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Decompose W'MW given these columns, of which only the blocks of some units are made: G_uu = V diag(values) V'.
+
+        For each width d of U of the units yields their numbers (U,), values (T, U, d), V (T, U, d, d) and columns (U, d).
+        """
+        numbers, width = np.asarray(chosen, int), np.array([len(units[number].columns) for number in chosen], int)
         for size in np.unique(width):
             members = numbers[width == size]
-            columns = np.array([units[number].columns for number in members])
-            part = self._part(columns)
+            at = np.array([units[number].columns for number in members])
+            part = self.free[:, at[:, :, None], at[:, None, :]]
+            if self.cross.shape[1]:
+                mine = self.cross[:, :, at].transpose(0, 2, 1, 3)
+                part -= mine.transpose(0, 1, 3, 2) @ mine
             values, vectors = np.linalg.eigh(part) if size > 1 else (part[..., 0], np.ones_like(part))
-            found.append(Block(members, np.clip(values, 0.0, None), vectors, columns))
-        return found
-
-    def _part(self, at: np.ndarray) -> np.ndarray:
-        part = self.free[:, at[:, :, None], at[:, None, :]]
-        if not self.cross.shape[1]:
-            return part
-        mine = self.cross[:, :, at].transpose(0, 2, 1, 3)
-        return part - mine.transpose(0, 1, 3, 2) @ mine
+            yield members, np.clip(values, 0.0, None), vectors, at
 
 
 def _with_priors(gram: np.ndarray, columns: np.ndarray, deviations: np.ndarray) -> np.ndarray:
@@ -239,19 +225,16 @@ def evaluate(
 
     [1] Besag, J., On the statistical analysis of dirty pictures, Journal of the Royal Statistical Society B 48, 1986.
     """
-    base = statistics.log_likelihood + log_pose
-    if not units:
-        values = base + log_likelihood(statistics.squares, statistics.freedom)
-        return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values), np.zeros(0))
     off = [np.where(np.isfinite(grid.of(u)), np.abs(grid.scales - size), np.inf) for size, u in zip(start, units, strict=True)]
-    nearest = [int(np.argmin(distances)) for distances in off]
-    present = Joint(statistics, units, grid, base, np.array(nearest))
+    places = np.array([np.argmin(distances) for distances in off], int)
+    present = Joint(statistics, units, grid, statistics.log_likelihood + log_pose, places)
     profiles = present.profiles()
     while (moved := _ascended(statistics, present, profiles)) is not None:
         present, profiles = moved, moved.profiles()
-    sums = np.array([log_sum_exp(p[1:]) - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
-    without = np.array([profile[0] for profile in profiles]) - sums + sums.sum()
+    numbers = np.arange(len(units))
+    sums = log_sum_exp(profiles[:, 1:], axis=1) - profiles[numbers, 1 + present.places]
     log_posterior = present.by_pose_error - log_sum_exp(present.by_pose_error)
+    without = profiles[:, 0] - sums + sums.sum()
     return Evaluated(float(present.log_density + sums.sum()), present.scales, log_posterior, without)
 
 
@@ -261,13 +244,13 @@ _NO_GAIN = 1e-9
 _FEWER = 4
 
 
-def _ascended(statistics: Statistics, present: Joint, profiles: Sequence[np.ndarray]) -> Joint | None:
+def _ascended(statistics: Statistics, present: Joint, profiles: np.ndarray) -> Joint | None:
     """A step of the ascent: as many units as raise the density, those that gain most first; None at the mode.
 
     Sizes lie on a grid and the density rises, so that steps end.
     """
-    best = np.array([int(np.argmax(profile[1:])) for profile in profiles])
-    gains = np.array([p[1:].max() - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
+    best = profiles[:, 1:].argmax(axis=1)
+    gains = profiles[:, 1:].max(axis=1) - profiles[np.arange(len(best)), 1 + present.places]
     order, count = np.argsort(-gains), int((gains > _NO_GAIN).sum())
     while count:
         places = present.places.copy()
@@ -313,17 +296,17 @@ class Joint:
     def __init__(self, statistics: Statistics, units: Sequence[Unit], grid: Grid, base: np.ndarray, places: np.ndarray) -> None:
         self.units, self.grid, self.base, self.places = units, grid, base, places
         self.freedom = statistics.freedom
-        self.scales, self.weights = grid.scales[places], [grid.of(unit) for unit in units]
-        self.log_weights = np.array([weights[place] for weights, place in zip(self.weights, places, strict=True)])
-        columns = np.concatenate([unit.columns for unit in units])
-        self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units])])
+        self.weights = np.array([grid.of(unit) for unit in units]).reshape(len(units), len(grid.scales))
+        self.scales, self.log_weights = grid.scales[places], self.weights[np.arange(len(units)), places]
+        columns = np.concatenate([np.zeros(0, int), *(unit.columns for unit in units)])
+        signs = np.concatenate([np.zeros(0, int), *(unit.signs for unit in units)])
+        self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units], dtype=int)])
         deviations = np.repeat(self.scales, np.diff(self.starts))
         self.covariance, self.log_det = inverses(_with_priors(statistics.gram, columns, deviations))
         along = deviations * statistics.along[:, columns]
         self.mean = (self.covariance @ along[..., None])[..., 0]
         self.squares = statistics.squares - (along * self.mean).sum(axis=1)
         values = self.base - 0.5 * self.log_det + log_likelihood(self.squares, self.freedom)
-        signs = np.concatenate([unit.signs for unit in units])
         self.sign_factors = np.zeros((len(units), len(base)))
         for number in np.flatnonzero([unit.signs.any() for unit in units]):
             mine = slice(self.starts[number], self.starts[number + 1])
@@ -332,76 +315,51 @@ class Joint:
         self.by_pose_error = values + self.sign_factors.sum(axis=0)
         self.log_density = float(log_sum_exp(self.by_pose_error) + self.log_weights.sum())
 
-    def profiles(self) -> list[np.ndarray]:
-        """Log density over the sizes of each unit, the others as they are, for size zero first; list of ndarray (1 + S,)."""
-        found: dict[int, np.ndarray] = {}
-        for numbers, *seen in self._given_the_others():
-            density, _, _, _ = self._profile(numbers, *seen)
-            total = log_sum_exp(density, axis=1)
-            found |= {number: total[:, place] + self._log_weights_of(number) for place, number in enumerate(numbers.tolist())}
-        return [found[number] for number in range(len(self.units))]
+    def profiles(self) -> np.ndarray:
+        """Log density over the sizes of each unit, the others as they are, for size zero first, ndarray (m, 1 + S)."""
+        found = np.empty((len(self.units), 1 + len(self.grid.scales)))
+        for numbers, density, _, _ in self._over_sizes():
+            found[numbers] = log_sum_exp(density, axis=1).T
+        return found
 
     def moments(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Mean and variance of the coefficients of each unit, averaged over its sizes and tau; list of two ndarray (d,)."""
         found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        for numbers, *seen in self._given_the_others():
-            density, means, variances, widths = self._profile(numbers, *seen)
-            for place, number in enumerate(numbers.tolist()):
-                log_weights = density[1:, :, place] + self._log_weights_of(number)[1:, None]
-                weights = np.exp(log_weights - log_sum_exp(log_weights))[..., None]
-                mean, variance = means[:, :, place], variances[:, :, place] * widths[:, :, place, None]
-                center = (weights * mean).sum(axis=(0, 1))
-                found[number] = center, (weights * (variance + (mean - center) ** 2)).sum(axis=(0, 1))
+        for numbers, density, means, variances in self._over_sizes():
+            weights = np.exp(density[1:] - log_sum_exp(density[1:], axis=(0, 1)))[..., None]
+            centers = (weights * means).sum(axis=(0, 1))
+            spreads = (weights * (variances + (means - centers) ** 2)).sum(axis=(0, 1))
+            found |= dict(zip(numbers.tolist(), zip(centers, spreads, strict=True), strict=True))
         return [found[number] for number in range(len(self.units))]
 
-    def _log_weights_of(self, number: int) -> np.ndarray:
-        """Prior weights of all sizes as they are, but for those of one unit: none for size zero, and all of its grid."""
-        others = self.log_weights.sum() - self.log_weights[number]
-        return np.concatenate([[0.0], self.weights[number]]) + others
-
-    def _given_the_others(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-        """What the u units of one width d see with the others integrated out: numbers, and eigenvalues (T, u, d) and
-        eigenvectors of their Gram matrices, products with the measurements along these (T, u, d), squares and
-        ln |I + D^1/2 G D^1/2| (T, u) without them."""
-        widths = np.diff(self.starts)
+    def _over_sizes(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """What the u units of one width d say at every size, the others at theirs: numbers; log density (1 + S, T, u), for
+        size zero first; mean and variance (S, T, u, d) of their coefficients."""
+        widths, sizes = np.diff(self.starts), np.concatenate([[0.0], self.grid.scales**2])[:, None, None, None]
         for width in np.unique(widths):
             numbers = np.flatnonzero(widths == width)
-            mine = self.starts[numbers][:, None] + np.arange(width)
+            mine, scales = self.starts[numbers][:, None] + np.arange(width), self.scales[numbers][:, None]
+            # With the others integrated out: the precision is I + s^2 G.
             precision = np.linalg.inv(self.covariance[:, mine[:, :, None], mine[:, None, :]])
             mean = self.mean[:, mine]
-            scales = self.scales[numbers][:, None]
             along = (precision @ mean[..., None])[..., 0] / scales
             squares = self.squares[:, None] + (mean * along).sum(axis=-1) * scales[:, 0]
             log_det = self.log_det[:, None] - np.linalg.slogdet(precision)[1]
             values, vectors = np.linalg.eigh((precision - np.eye(width)) / scales[..., None] ** 2)
-            turned = (vectors.swapaxes(-1, -2) @ along[..., None])[..., 0]
-            yield numbers, np.clip(values, 0.0, None), vectors, turned, squares, log_det
-
-    def _profile(
-        self,
-        numbers: np.ndarray,
-        values: np.ndarray,
-        vectors: np.ndarray,
-        turned: np.ndarray,
-        squares: np.ndarray,
-        log_det: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Log density (1 + S, T, u) over the sizes of units of one width, zero first; mean and variance (S, T, u, d) of their
-        coefficients, the latter at unit noise, and the variance of the noise (S, T, u)."""
-        variances = np.concatenate([[0.0], self.grid.scales**2])[:, None, None, None]
-        widened = 1.0 + variances * values
-        left = squares - (variances * turned**2 / widened).sum(axis=-1)
-        occam = -0.5 * (log_det + np.log(widened).sum(axis=-1))
-        density = self.base[:, None] + occam + log_likelihood(left, self.freedom)
-        density += (self.sign_factors.sum(axis=0) - self.sign_factors[numbers]).T
-        mean = (vectors @ (variances * turned / widened)[1:, ..., None])[..., 0]
-        variance = (vectors**2 @ (variances / widened)[1:, ..., None])[..., 0]
-        for place, number in enumerate(numbers.tolist()):
-            signs = self.units[number].signs
-            if signs.any():
-                seen = mean[:, :, place], variance[:, :, place], signs, left[1:, :, place]
-                density[1:, :, place] += _log_sign_factor(*seen, self.freedom)
-        return density, mean, variance, np.maximum(left[1:] / self.freedom, 1.0)
+            turned, widened = (vectors.swapaxes(-1, -2) @ along[..., None])[..., 0], 1.0 + sizes * np.clip(values, 0.0, None)
+            left = squares - (sizes * turned**2 / widened).sum(axis=-1)
+            density = self.base[:, None] - 0.5 * (log_det + np.log(widened).sum(axis=-1)) + log_likelihood(left, self.freedom)
+            density += (self.sign_factors.sum(axis=0) - self.sign_factors[numbers]).T
+            means = (vectors @ (sizes * turned / widened)[1:, ..., None])[..., 0]
+            variances = (vectors**2 @ (sizes / widened)[1:, ..., None])[..., 0]
+            for place, number in enumerate(numbers.tolist()):
+                signs = self.units[number].signs
+                if signs.any():
+                    seen = means[:, :, place], variances[:, :, place], signs, left[1:, :, place]
+                    density[1:, :, place] += _log_sign_factor(*seen, self.freedom)
+            density[1:] += self.weights[numbers].T[:, None]
+            density += self.log_weights.sum() - self.log_weights[numbers]
+            yield numbers, density, means, variances * np.maximum(left[1:] / self.freedom, 1.0)[..., None]
 
 
 def _log_sign_factor(

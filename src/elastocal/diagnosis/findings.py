@@ -51,8 +51,8 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
 def probability_facts(found: Evidence) -> dict[str, Any]:
     """Probabilities as they stand in verdict.json.
 
-    Returns ``nothing``, ``alarm_p_value``, ``mechanisms`` by name, and ``sets`` of mechanisms with the locations of their most
-    probable model.
+    Returns ``nothing``, ``stated``: that of what the verdict leaves open, ``alarm_p_value``, ``mechanisms`` by name, and
+    ``sets`` of mechanisms with the locations of their most probable model.
     """
     sets, problem, hypotheses = [], found.linearized.problem, found.conclusion.hypotheses
     for hypothesis in hypotheses:
@@ -65,6 +65,7 @@ def probability_facts(found: Evidence) -> dict[str, Any]:
         sets.append({"mechanisms": list(hypothesis.mechanisms), "probability": hypothesis.probability, "locations": where})
     return {
         "nothing": next(h.probability for h in hypotheses if not h.mechanisms),
+        "stated": found.conclusion.probability,
         "alarm_p_value": found.alarm.p_value,
         "mechanisms": {name: value for name, value in found.conclusion.mechanisms.items() if value >= _LEAST_LISTED},
         "sets": sets,
@@ -131,9 +132,10 @@ def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list
             "unit": parameter.unit,
             "prior_std": getattr(parameter, "prior_std", None),
             "held": bool(final.held[index]),
+            "identifiable": not final.held[index] and (member.key, parameter.name) not in averages.of_prior,
         }
         # Where a shape has no slope, such as the row of a step, a search has chosen it.
-        | ({"shape": True} if isinstance(parameter, Shape) else {})
+        | ({"shape": True, "identifiable": True} if isinstance(parameter, Shape) else {})
         for parameter, value, index in zip(unknowns, values, mine, strict=True)
     ]
     as_masses = final.model.identifies_compliance or member.family != "gravity"
@@ -170,7 +172,8 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
     size = float(np.linalg.norm(sag[most]))
     along = sag[most] @ columns[most] / max(size, np.finfo(float).tiny)
     error = float(np.sqrt(along @ final.covariance[np.ix_(mine, mine)] @ along))
-    return [{"name": f"{name} largest_sag", "value": size, "std_error": error, "unit": "m", "prior_std": None, "held": False}]
+    found = {"name": f"{name} largest_sag", "value": size, "std_error": error, "unit": "m", "prior_std": None}
+    return [found | {"held": False, "identifiable": True}]
 
 
 def fault_entry(fault: Fault) -> dict[str, Any]:

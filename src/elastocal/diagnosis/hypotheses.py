@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln, logit, logsumexp
 
 from elastocal.effects.protocol import at_shapes, require_unique
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from elastocal.diagnosis.other import Competitor
+    from elastocal.diagnosis.other import Law
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.protocol import Candidate
 
@@ -33,7 +33,7 @@ class Unit:
     `mechanism`: name of the effect, or `OTHER`. `location`: where it acts; equal for variants of one mechanism at one location.
     `candidate`: None for `OTHER`. `columns` (d,) of int: its columns in the sufficient statistics. `sizes` (d,): plausible size
     of each parameter: a column is the sensitivity times this. `signs` (d,) of int: sign that physics gives each parameter, 0
-    where it may have either. `log_prior`: logarithm of its share among the variants at its location. `competitor`: of `OTHER`.
+    where it may have either. `log_prior`: logarithm of its share among the variants at its location. `law`: of `OTHER`.
     `smallest`: place in the grid of sizes of the smallest that the measurements could show. `largest`: of the largest that such
     an effect may have; -1 for the last.
     """
@@ -46,18 +46,14 @@ class Unit:
     sizes: np.ndarray
     signs: np.ndarray
     log_prior: float = 0.0
-    competitor: Competitor | None = None
+    law: Law | None = None
     smallest: int = 0
     largest: int = -1
 
     @property
     def key(self) -> str:
         """Unique name: key of the candidate, with the shape values."""
-        if self.candidate:
-            name = self.candidate.key
-        else:
-            assert self.competitor is not None
-            name = f"{OTHER}{list(self.location)} {self.competitor.name}"
+        name = self.candidate.key if self.candidate else f"{OTHER}{list(self.location)} {self.law.name if self.law else ''}"
         return at_shapes(name, self.shapes)
 
     @property
@@ -68,7 +64,7 @@ class Unit:
     @property
     def place(self) -> tuple[str, tuple[int | str, ...], str]:
         """What no two units of a model share: variants at one location exclude each other, laws of `OTHER` do not."""
-        return self.mechanism, self.location, self.competitor.name if self.competitor else ""
+        return self.mechanism, self.location, self.law.name if self.law else ""
 
 
 @dataclass(frozen=True)
@@ -109,58 +105,48 @@ def prior_of(units: Sequence[Unit], settings: Settings) -> Prior:
     counts: dict[str, np.ndarray] = {}
     special = {"link_weight": settings.gravity_probability, OTHER: settings.other_probability}
     for mechanism in dict.fromkeys(unit.mechanism for unit in units):
-        probability = special.get(mechanism, settings.mechanism_probability)
-        odds[mechanism] = float(np.log(probability / (1.0 - probability)))
+        odds[mechanism] = float(logit(special.get(mechanism, settings.mechanism_probability)))
         locations = len({unit.place for unit in units if unit.mechanism == mechanism})
         numbers = np.arange(1, locations + 1)
         geometric = numbers * np.log(settings.further_location)
-        geometric -= logsumexp(geometric)
         sets = gammaln(locations + 1) - gammaln(numbers + 1) - gammaln(locations - numbers + 1)
-        counts[mechanism] = np.concatenate([[0.0], geometric - sets])
+        counts[mechanism] = np.concatenate([[0.0], geometric - logsumexp(geometric) - sets])
     return Prior(odds, counts)
 
 
-def units_of(
-    tested: Sequence[tuple[Candidate, Sequence[float]]], features: Sequence[tuple[Competitor, int]], settings: Settings
-) -> tuple[Unit, ...]:
-    """Units of candidates and of the competitor, numbered in the order of their columns.
+def units_of(tested: Sequence[tuple[Candidate, Sequence[float]]], laws: Sequence[Law], settings: Settings) -> tuple[Unit, ...]:
+    """Units of candidates and of the competitor's laws, numbered in the order of their columns.
 
-    `tested` (Candidate, sequence of float): with shape values. `features` (Competitor, int): laws of `OTHER`, with their
-    numbers of columns.
+    `tested` (Candidate, sequence of float): with shape values.
     """
     start = 0
     units: list[Unit] = []
-    laws: dict[tuple[str, tuple[int | str, ...]], set[str]] = {}
-    for candidate, _ in tested:
-        laws.setdefault((candidate.effect, candidate.location), set()).add(candidate.key)
-    shares = _shares_of_shapes(tested)
+    tried: dict[str, tuple[Candidate, list[tuple[float, ...]]]] = {}
     for candidate, shapes in tested:
-        share = 1.0 / len(laws[candidate.effect, candidate.location]) * shares[candidate.key, tuple(shapes)]
-        columns = np.arange(start, start + len(candidate.parameters))
+        tried.setdefault(candidate.key, (candidate, []))[1].append(tuple(float(shape) for shape in shapes))
+    variants = Counter((candidate.effect, candidate.location) for candidate, _ in tried.values())
+    shares = {key: _shares_of_shapes(*values) for key, values in tried.items()}
+    for candidate, shapes in tested:
         values = tuple(float(shape) for shape in shapes)
+        log_share = float(np.log(shares[candidate.key][values] / variants[candidate.effect, candidate.location]))
+        columns = np.arange(start, start + len(candidate.parameters))
         sizes = np.array([p.plausible * p.order**-settings.harmonic_decay for p in candidate.parameters])
         signs = np.array([parameter.sign for parameter in candidate.parameters])
-        log_share = float(np.log(share))
         largest = bisect_right(settings.scales, min((p.most for p in candidate.parameters), default=np.inf)) - 1
         units.append(
             Unit(candidate.effect, candidate.location, candidate, values, columns, sizes, signs, log_share, largest=largest)
         )
         start += len(columns)
-    for each, count in features:
+    for law in laws:
+        count = law.features
         whole = np.arange(start, start + count), np.ones(count), np.zeros(count, int)
-        units.append(Unit(OTHER, each.location, None, (), *whole, competitor=each, largest=len(settings.scales) - 1))
+        units.append(Unit(OTHER, law.location, None, (), *whole, law=law, largest=len(settings.scales) - 1))
         start += count
     require_unique([unit.key for unit in units])
     return tuple(units)
 
 
-def _shares_of_shapes(tested: Iterable[tuple[Candidate, Sequence[float]]]) -> dict[tuple[str, tuple[float, ...]], float]:
+def _shares_of_shapes(candidate: Candidate, values: Sequence[tuple[float, ...]]) -> dict[tuple[float, ...], float]:
     """Prior share of each shape of a candidate: of the range of what bends it, the part nearest to it."""
-    tried: dict[str, tuple[Candidate, list[tuple[float, ...]]]] = {}
-    for candidate, shapes in tested:
-        tried.setdefault(candidate.key, (candidate, []))[1].append(tuple(shapes))
-    found: dict[tuple[str, tuple[float, ...]], float] = {}
-    for key, (candidate, values) in tried.items():
-        shares = np.ones(1) if len(values) == 1 else candidate.shapes[0].shares([value for (value,) in values])
-        found |= {(key, value): share for value, share in zip(values, shares, strict=True)}
-    return found
+    shares = np.ones(1) if len(values) == 1 else candidate.shapes[0].shares([value for (value,) in values])
+    return dict(zip(values, shares.tolist(), strict=True))

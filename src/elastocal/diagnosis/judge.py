@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,7 +37,7 @@ from elastocal.validation.placing import placed
 from elastocal.validation.span import count_configurations, joint_ranges
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis, Step
@@ -81,17 +82,29 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
         whole = [_summary(error) for error in _errors(steps, case, held_out)[1]]
         of_all = [error["rms_m"] for error in whole]
         heldout["with_gross_errors"] = {"before": whole[_declared(steps)], "after": whole[-1]}
-        warnings.append(_with_gross_errors(heldout, len(left_out)))
+        without, with_them, count = 1e3 * heldout["after"]["rms_m"], 1e3 * of_all[-1], counted(len(left_out), "gross error")
+        warnings.append(
+            f"held-out errors are without {count}: with all rows the RMS is {with_them:.3g} mm instead of {without:.3g} mm"
+        )
     rows = [row | {"heldout_rms_all_rows_m": rms} for row, rms in zip(rows, of_all, strict=True)]
-    gains = _gains(rows)
-    effects = [entry | {"heldout_gain": gains.get(entry["name"])} for entry in diagnosis.document["effects"]]
-    document = diagnosis.document | {
-        "effects": effects,
+    # By what share each step lowers the held-out RMS.
+    pairs = [(last, row) for last, row in pairwise(rows) if row["kind"] == "effect"]
+    gains = {row["step"].removeprefix("with "): float(1 - row["heldout_rms_m"] / last["heldout_rms_m"]) for last, row in pairs}
+    found, campaign, remainder = diagnosis.document, case.campaign, None
+    repeatable = None if data_at_fault(found) else repeatable_part(diagnosis.final, case.observations, seed)
+    if campaign.remainder != NO_REMAINDER and not data_at_fault(found):
+        # Poses held out at random have neighbours among those fitted; others have none, nor may those that set the intervals.
+        plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
+        draws = stream(seed, campaign.name, "remainder", 0)
+        remainder = remainder_facts(plan, diagnosis.declared, diagnosis.final, case, part, outside, draws)
+    document = found | {
+        "effects": [entry | {"heldout_gain": gains.get(entry["name"])} for entry in found["effects"]],
         "heldout": heldout,
-        "remainder": _remainder(diagnosis, part, outside, seed),
-        "repeatable": _repeatable(diagnosis, seed),
-        "gross_errors": [*diagnosis.document["gross_errors"], *left_out],
-        "warnings": [*diagnosis.document["warnings"], *warnings_of(left_out), *warnings],
+        "remainder": remainder,
+        # Whether what the final model leaves of the training poses is a function of the joints; none with too few of them.
+        "repeatable": repeatable and asdict(repeatable),
+        "gross_errors": [*found["gross_errors"], *left_out],
+        "warnings": [*found["warnings"], *warnings_of(left_out), *warnings],
     }
     return Verdict(document, rows, part, held_out.campaign.measurements.select(errors.gross), outside)
 
@@ -118,37 +131,6 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
     return errors, part, np.bincount(state_clusters(part.campaign.measurements), outside[~errors.gross]) > 0
 
 
-def _remainder(diagnosis: Diagnosis, held_out: Case, outside: np.ndarray, seed: int) -> dict[str, Any] | None:
-    """What a regression on the remainder of the final model adds on held-out poses, where the campaign asks for one."""
-    campaign = diagnosis.case.campaign
-    if campaign.remainder == NO_REMAINDER or data_at_fault(diagnosis.document):
-        return None
-    # Poses held out at random have neighbours among those fitted; others have not, and nor may those that set the intervals.
-    plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
-    draws = stream(seed, campaign.name, "remainder", 0)
-    return remainder_facts(plan, diagnosis.declared, diagnosis.final, diagnosis.case, held_out, outside, draws)
-
-
-def _repeatable(diagnosis: Diagnosis, seed: int) -> dict[str, Any] | None:
-    """Whether what the final model leaves of the training poses is a function of the joints; None with too few of them."""
-    if data_at_fault(diagnosis.document):
-        return None
-    found = repeatable_part(diagnosis.final, diagnosis.case.observations, seed)
-    return None if found is None else asdict(found)
-
-
-def _gains(rows: Iterable[Mapping[str, Any]]) -> dict[str, float]:
-    """Share by which each step lowers the held-out RMS."""
-    gains: dict[str, float] = {}
-    last = None
-    for row in rows:
-        if row["kind"] == "effect":
-            gains[row["step"].removeprefix("with ")] = float(1 - row["heldout_rms_m"] / last)
-        if row["kind"] in ("declared", "effect"):
-            last = row["heldout_rms_m"]
-    return gains
-
-
 def heldout_errors(
     steps: Sequence[Step], case: Case, held_out: Case, outside: np.ndarray, seed: int
 ) -> tuple[list[dict[str, Any]], dict[str, Any], list[str]]:
@@ -163,10 +145,9 @@ def heldout_errors(
     limits, reductions = intervals(errors, _REPLICATES, draws, before)
     of_calibration = intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
     floor = noise_floor(steps[after].fitted, held_out.observations, *there[after])
-    rows = []
+    rows, warnings = [], []
     for step, error, limit in zip(steps, errors, limits, strict=True):
-        training = summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1))
-        tested = summary(error.distance)
+        training, tested = summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1)), summary(error.distance)
         row: dict[str, Any] = {"step": step.name, "kind": step.kind, "parameters": int((~step.fitted.held).sum())}
         row |= {f"train_{name}": training[name] for name in METRICS}
         for name in METRICS:
@@ -174,6 +155,12 @@ def heldout_errors(
             row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
         row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
         rows.append(row)
+    for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
+        low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
+        warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
+    for last, row in pairwise(rows[before:]):
+        if row["heldout_rms_m"] > last["heldout_rms_m"]:
+            warnings.append(f"the step '{row['step']}' raised the RMS error {ABOUT_ERRORS}")
     ends = [_summary(errors[number]) for number in (0, before, after)]
     by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
@@ -189,8 +176,10 @@ def heldout_errors(
         "share_below_max": share_below_largest(errors[0].poses),
         "outside_range": by_range,
     }
-    again = repeat_warnings(case.observations.states, held_out.observations.states)
-    return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside)) + again
+    if count := by_range["poses"]:
+        lie = f"{count} of {counted(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
+        warnings.append(f"{lie} outside the range of the fitted poses: errors there are extrapolated")
+    return rows, heldout, warnings + repeat_warnings(case.observations.states, held_out.observations.states)
 
 
 def _errors(steps: Sequence[Step], case: Case, held_out: Case) -> tuple[list[tuple[Model, Estimate]], list[Errors]]:
@@ -236,33 +225,3 @@ def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str
             }
             position = measured_in_base(there[-1][1], observations)[0]
             yield residual_columns(some, unseen, some is left_out, beyond, position, off)
-
-
-def _with_gross_errors(heldout: Mapping[str, Any], count: int) -> str:
-    without, whole = (1e3 * part["after"]["rms_m"] for part in (heldout, heldout["with_gross_errors"]))
-    left_out = counted(count, "gross error")
-    return f"held-out errors are without {left_out}: with all rows the RMS is {whole:.3g} mm instead of {without:.3g} mm"
-
-
-def _range_warnings(by_range: Mapping[str, Any], poses: int) -> list[str]:
-    count = by_range["poses"]
-    if not count:
-        return []
-    lie = f"{count} of {counted(poses, 'validation pose')} {'lies' if count == 1 else 'lie'}"
-    return [f"{lie} outside the range of the fitted poses: errors there are extrapolated"]
-
-
-def _warnings(
-    steps: Sequence[Step], rows: Sequence[Mapping[str, Any]], errors: Sequence[Errors], before: int, after: int
-) -> list[str]:
-    if before == after:
-        return []
-    found = []
-    for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
-        low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
-        found.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
-    pairs = [(steps[n], rows[n - 1], rows[n]) for n in range(before + 1, after + 1)]
-    for step, last, row in pairs:
-        if row["heldout_rms_m"] > last["heldout_rms_m"]:
-            found.append(f"the step '{step.name}' raised the RMS error {ABOUT_ERRORS}")
-    return found

@@ -100,9 +100,8 @@ def linearized(
     untestable = {c.key: reason for c in candidates if (reason := lacking(c, fitted.model, observations.states))}
     tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
     tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
-    against = other.competitors(around)
-    laws = before.laws if before else [other.law_of(each, around, settings.other_features) for each in against]
-    units = units_of(tested, [(each, law.features) for each, law in zip(against, laws, strict=True)], settings)
+    laws = before.laws if before else other.laws_of(around, settings.other_features)
+    units = units_of(tested, laws, settings)
     owners = np.array([owner for owner, _ in fitted.parameters])
     keys = frozenset(candidate.key for candidate in candidates)
     found = np.isin(owners, list(keys))

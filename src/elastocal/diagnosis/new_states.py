@@ -17,7 +17,6 @@ from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import NOT_TURNED, Target
-from elastocal.diagnosis import other
 from elastocal.diagnosis.statistics import rows_alike
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import effect_columns, linearize
@@ -307,11 +306,9 @@ def instrument_of(
     problem = linearized.problem
     units = [problem.units[number] for number in numbers]
     for unit in units:
-        if unit.candidate:
-            laws.append((unit.candidate, unit.shapes))
-        else:
-            assert unit.competitor is not None
-            laws.append((other.law_of(unit.competitor, linearized.around, problem.settings.other_features), unit.shapes))
+        law = unit.candidate or unit.law
+        assert law is not None
+        laws.append((law, unit.shapes))
     columns, of_load_cell = problem.columns_of(numbers, [unit.of_load_cell for unit in units])
     return Instrument(
         model,

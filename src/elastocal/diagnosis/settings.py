@@ -69,6 +69,11 @@ class Settings:
     useful: float = _setting(
         1.96, "standard errors by which the expected gain of what was found exceeds nothing where it enters the model (95 %)"
     )
+    prior_share: float = _setting(
+        0.5,
+        "part of a parameter's prior variance that is left with the measurements, from which on the parameter counts as not"
+        " identifiable: the prior says more of it than the measurements do",
+    )
     law_tolerance: float = _setting(
         0.2,
         "part of a mechanism's displacements, root mean square, by which a machine may depart from its law: the laws of the"

@@ -19,6 +19,7 @@ import numpy as np
 
 from elastocal.diagnosis.averaging import squares_beyond
 from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.fitting.displacement import joint_compliances
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.search import Model, Posterior, Problem
     from elastocal.diagnosis.settings import Settings
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.noise import Noise
 
 ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
 UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
@@ -63,7 +66,8 @@ class Conclusion:
 
     `hypotheses`: the most probable first; "nothing" among them. `best`: the most probable in accordance with the alarm:
     "nothing" without one. `alternatives`: for each mechanism of the best hypothesis what may be meant instead. `mechanisms`:
-    probability that each mechanism is there, in falling order.
+    probability that each mechanism is there, in falling order. `probability`: that one of the hypotheses which the verdict
+    leaves open is right; None where nothing was tested.
     """
 
     verdict: str
@@ -71,6 +75,7 @@ class Conclusion:
     best: Hypothesis
     alternatives: dict[str, tuple[str, ...]]
     mechanisms: dict[str, float]
+    probability: float | None
 
 
 def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusion:
@@ -81,27 +86,31 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
     have, or that no model explains better than "nothing" does. not_testable: the measurements can test no mechanism of the
     robot, and nothing of the set-up shows.
     """
-    settings = problem.settings
     hypotheses = hypotheses_of(problem, posterior)
     nothing = next(h for h in hypotheses if not h.mechanisms)
-    mechanisms = _marginal(hypotheses)
-    tested = [unit for unit in problem.units if unit.mechanism != OTHER]
-    of_the_robot = [unit for unit in tested if unit.candidate and unit.candidate.family != _OF_THE_SETUP]
-    if not tested or not (of_the_robot or alarm.raised):
-        return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)
+    mechanisms: dict[str, float] = {}
+    for name, probability in [(name, h.probability) for h in hypotheses for name in h.mechanisms]:
+        # Their sum may exceed one by rounding.
+        mechanisms[name] = min(mechanisms.get(name, 0.0) + probability, 1.0)
+    mechanisms = dict(sorted(mechanisms.items(), key=lambda entry: -entry[1]))
+    families = {unit.candidate.family for unit in problem.units if unit.candidate}
+    if not families or not (families - {_OF_THE_SETUP} or alarm.raised):
+        return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms, None)
     if not alarm.raised:
-        return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms)
+        return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms, nothing.probability)
     # The alarm has decided that something is missing; the posterior says what: first how many mechanisms, then which.
     there = [h for h in hypotheses if h.mechanisms]
-    weights = [sum(h.probability for h in there if h.kind == kind) for kind in (UNEXPLAINED, CLASS, SEVERAL)]
-    kind = (UNEXPLAINED, CLASS, SEVERAL)[int(np.argmax(weights))]
+    kinds = (UNEXPLAINED, CLASS, SEVERAL)
+    kind = max(kinds, key=lambda kind: sum(h.probability for h in there if h.kind == kind))
     best = next((h for h in there if h.kind == kind), nothing)
-    sure, stated = _least_expected_loss([best, *(h for h in there if h != best)], settings)
+    sure, stated = _least_expected_loss([best, *(h for h in there if h != best)], problem.settings)
     if not stated or kind == UNEXPLAINED:
-        return Conclusion(UNEXPLAINED, hypotheses, best if stated else nothing, {}, mechanisms)
+        unknown = sum(h.probability for h in there if h.kind == UNEXPLAINED) + (0.0 if stated else nothing.probability)
+        return Conclusion(UNEXPLAINED, hypotheses, best if stated else nothing, {}, mechanisms, unknown)
     named = sure and kind == CLASS and OTHER not in best.mechanisms
     alternatives = {name: () if named else _instead_of(name, best, stated) for name in best.named}
-    return Conclusion(NAMED if named else kind, hypotheses, best, alternatives, mechanisms)
+    probability = best.probability if named else sum(h.probability for h in stated)
+    return Conclusion(NAMED if named else kind, hypotheses, best, alternatives, mechanisms, probability)
 
 
 def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tuple[bool, Sequence[Hypothesis]]:
@@ -116,16 +125,6 @@ def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tu
     none, alone = settings.missed_loss * probability.sum(), 1.0 - probability[0]
     worth = ranked[: int(np.argmin(classes)) + 1]
     return alone < classes.min(), worth if none > min(alone, classes.min()) else ()
-
-
-def _marginal(hypotheses: Iterable[Hypothesis]) -> dict[str, float]:
-    """Probability of each mechanism, in falling order."""
-    present: dict[str, float] = {}
-    for hypothesis in hypotheses:
-        for mechanism in hypothesis.mechanisms:
-            # Their sum may exceed one by rounding.
-            present[mechanism] = min(present.get(mechanism, 0.0) + hypothesis.probability, 1.0)
-    return dict(sorted(present.items(), key=lambda entry: -entry[1]))
 
 
 def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, ...]:
@@ -143,26 +142,24 @@ def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, .
 
 
 def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[str, ...]]:
-    """What each model says that acts, in the order of the names; empty for "nothing"."""
-    pairs = zip(posterior.models, posterior.probabilities, strict=True)
-    return [tuple(sorted(_mechanisms_of(problem, model, probability))) for model, probability in pairs]
+    """What each model says that acts, in the order of the names; empty for "nothing".
 
-
-def _mechanisms_of(problem: Problem, model: Model, probability: float) -> set[str]:
-    """What a model says that acts: its mechanisms, and something unknown where it has a smooth error beside them.
-
-    Neither a law nor the smooth error is quite what the machine does. So of the two that counts as a part of the other which
-    makes displacements that the other cannot make, but within the tolerance of laws.
+    Its mechanisms, and something unknown where it has a smooth error beside them. Neither a law nor the smooth error is quite
+    what the machine does. So of the two that counts as a part of the other which makes displacements that the other cannot
+    make, but within the tolerance of laws.
     """
-    names = {problem.units[unit].mechanism for unit in model.units}
-    known = names - {OTHER}
-    if OTHER not in names or not known or probability <= _TELLING:
-        return names
-    (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(problem, model, known)
-    tolerance = problem.settings.law_tolerance**2
-    if beyond_laws < tolerance * by_laws:
-        return known
-    return {OTHER} if beyond_unknown < tolerance * by_unknown else names
+    found, tolerance = [], problem.settings.law_tolerance**2
+    for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
+        names = {problem.units[unit].mechanism for unit in model.units}
+        known = names - {OTHER}
+        if known and known != names and probability > _TELLING:
+            (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(problem, model, known)
+            if beyond_laws < tolerance * by_laws:
+                names = known
+            elif beyond_unknown < tolerance * by_unknown:
+                names = {OTHER}
+        found.append(tuple(sorted(names)))
+    return found
 
 
 def locations_of(problem: Problem, model: Model, mechanism: str) -> list[tuple[int | str, ...]]:
@@ -172,11 +169,10 @@ def locations_of(problem: Problem, model: Model, mechanism: str) -> list[tuple[i
 
 def location_probabilities(problem: Problem, posterior: Posterior, mechanism: str) -> dict[tuple[int | str, ...], float]:
     """Probability of each location of a mechanism, given that it is there."""
-    total = 0.0
+    where = [locations_of(problem, model, mechanism) for model in posterior.models]
+    total = sum(p for p, locations in zip(posterior.probabilities, where, strict=True) if locations)
     found: dict[tuple[int | str, ...], float] = {}
-    for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
-        locations = locations_of(problem, model, mechanism)
-        total += probability if locations else 0.0
+    for probability, locations in zip(posterior.probabilities, where, strict=True):
         for location in locations:
             found[location] = found.get(location, 0.0) + float(probability)
     return {location: value / total for location, value in sorted(found.items(), key=lambda entry: -entry[1])}
@@ -195,3 +191,42 @@ def _instead_of(name: str, best: Hypothesis, credible: Iterable[Hypothesis]) -> 
     if OTHER in best.mechanisms and OTHER not in found:
         found.append(OTHER)
     return tuple(found)
+
+
+def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]:
+    """What forbids to call a declared model adequate, although no alarm is raised against it; a sentence for each.
+
+    The alarm asks whether a mechanism explains the measurements better than noise does. Noise that is estimated along with the
+    model may swallow a misfit, and a parameter may do so at a value that no robot has. `measured`: the noise as repeats or the
+    sensor have it, before the model was fitted.
+    """
+    # Noise that somebody declared may be a guess, and a warning says that it is far off.
+    found = scatter_warnings(final.noise, measured, settings.largest_scatter) if measured.source == "repeats" else []
+    found += pose_error_warnings(final.noise, settings.largest_pose_error_rad)
+    if final.model.identifies_compliance:
+        compliance = joint_compliances(final.model, final.estimate)
+        deviation = np.sqrt(np.diag(final.covariance))[final.places_of("joint_compliance")]
+        found += [
+            f"the compliance of joint {joint + 1} is negative by {-compliance[joint] / deviation[joint]:.1f} standard errors"
+            for joint in np.flatnonzero(compliance < -settings.negative_compliance * deviation)
+        ]
+    return found
+
+
+def scatter_warnings(left: Noise, measured: Noise, least: float) -> list[str]:
+    """A sentence where a model leaves at least so many times the noise that was measured or declared."""
+    factor = left.position_m / measured.position_m
+    if factor < least:
+        return []
+    reference = "their repeats about each other" if measured.source == "repeats" else "the noise that is declared for them"
+    return [f"measurements scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {reference}"]
+
+
+def pose_error_warnings(left: Noise, least_rad: float) -> list[str]:
+    """A sentence where measurements of a pose have at least such an error in common."""
+    if left.pose_rad < least_rad:
+        return []
+    return [
+        f"measurements of a pose err together as if every joint were {1e6 * left.pose_rad:.0f} µrad off, which repeats of a"
+        " pose do not show: new poses will err as much"
+    ]
