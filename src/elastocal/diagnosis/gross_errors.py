@@ -23,8 +23,7 @@ from scipy.linalg import lapack, solve_triangular
 from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
-from elastocal.diagnosis.linearize import prior_deviations
-from elastocal.diagnosis.statistics import Products
+from elastocal.diagnosis.evidence import scale_weights
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.settings import Settings
+    from elastocal.diagnosis.statistics import WhiteRows
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.linearization import Linearization
@@ -247,24 +247,19 @@ def held_out_gross_errors(
     return Deviations(residual, distance, gross & (far | ~outside))
 
 
-def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
+def improbable(line: Linearized) -> np.ndarray:
     """Which observations all candidates together do not explain, ndarray of bool (M,).
 
     The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those
     of all candidates and S their mean square sizes. Observations are taken out, the worst first, until what is left agrees;
     then those come back that it predicts.
     """
-    products, about = problem.products, problem.about
-    observed, own = about.residual.shape
+    rows, settings = line.rows, line.settings
+    observed, own = rows.residual.shape
     kept = np.ones(observed, bool)
-    if not isinstance(products, Products):
-        return ~kept
-    rows = products.rows
-    deviation = prior_deviations([parameter for owner, parameter in about.parameters if owner not in problem.candidates])
-    grid = problem.problem.grid
-    sizes = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
-    declared = (rows.declared * deviation).reshape(about.residual.size, -1)
-    columns = (sizes * rows.candidates.dense()).reshape(about.residual.size, -1)
+    sizes = np.sqrt(np.exp(scale_weights(settings)) @ np.array(settings.scales) ** 2)
+    declared = (rows.declared * line.priors[0]).reshape(rows.residual.size, -1)
+    columns = (sizes * rows.candidates.dense()).reshape(rows.residual.size, -1)
     covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
     precision, limit = _precision(covariance, declared), _limit(observed, own, settings)
     while kept.mean() > 1.0 - settings.gross_error_share:
@@ -275,7 +270,7 @@ def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
         kept[worst] = False
         precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
     if not kept.all():
-        covariance = covariance + _pose_error(problem, covariance, declared, np.repeat(kept, own))
+        covariance = covariance + _pose_error(rows, line.pose_errors_rad, covariance, declared, np.repeat(kept, own))
     whole = _precision(covariance, declared)
     while not kept.all():
         out = np.flatnonzero(np.repeat(~kept, own))
@@ -323,15 +318,15 @@ def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
     return left
 
 
-def _pose_error(problem: Linearized, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray) -> np.ndarray:
+def _pose_error(
+    rows: WhiteRows, pose_errors_rad: np.ndarray, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray
+) -> np.ndarray:
     """Covariance of the error common to a pose, at the size that makes the rows known most probable."""
-    assert isinstance(problem.products, Products)
-    rows = problem.products.rows
     residual, own = rows.residual.ravel()[known], rows.residual.shape[1]
     jacobian, pose = rows.jacobian.reshape(len(known), -1), np.repeat(rows.pose, own)
     common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
     best = (-np.inf, 0.0)
-    for tau in problem.problem.statistics.pose_error_rad:
+    for tau in pose_errors_rad:
         likely = _log_likelihood((covariance + tau**2 * common)[np.ix_(known, known)], declared[known], residual)
         best = max(best, (likely, float(tau)))
     return best[1] ** 2 * common

@@ -79,7 +79,7 @@ def first_kept(case: Case, settings: Settings) -> Kept:
     few[observations.state[measured_in(observations, measurements, pulling)]] = False
     some = select_states(observations, few)
     about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
-    taken = improbable(linearized(about, some, candidates, settings), settings)
+    taken = improbable(linearized(about, some, candidates, settings))
     # A repeat far from its others is in no average, and stays what the declared model says of it.
     looked_at = measured_in(measurements, some, np.ones(len(some), bool))
     looked_at &= np.isin(measurements.row, without_outlying_repeats(measurements).row)

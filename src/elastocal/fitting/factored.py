@@ -13,7 +13,7 @@ they have in common times the rounding of one, as differences of squares do: 1e-
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -57,6 +57,12 @@ class Displacements:
             np.multiply(laws[column][coordinate], sizes[column], out=place)
         return cls(len(laws), values, *np.array(entries, int).reshape(-1, 3).T[1:])
 
+    def of_columns(self, kept: np.ndarray) -> Displacements:
+        """The same of some of the columns, ndarray of bool (K,), which are numbered anew."""
+        mine = kept[self.column]
+        column = (np.cumsum(kept) - 1)[self.column[mine]]
+        return Displacements(int(kept.sum()), self.values[mine], self.coordinate[mine], column)
+
     @cached_property
     def spans(self) -> list[tuple[int, slice]]:
         """Coordinates that are displaced, and the entries of each."""
@@ -91,6 +97,16 @@ class Factored:
         """K."""
         return self.displacements.columns
 
+    def of_columns(self, kept: np.ndarray) -> Factored:
+        """The same of some of the columns, ndarray of bool (K,)."""
+        return replace(self, displacements=self.displacements.of_columns(kept))
+
+    def at(self, seen: np.ndarray) -> Factored:
+        """The same of some of the observations, ndarray of bool (M,), whose states are numbered anew."""
+        states, state = np.unique(self.state[seen], return_inverse=True)
+        displacements = replace(self.displacements, values=self.displacements.values[:, states])
+        return Factored(displacements, self.jacobian[seen], state)
+
     @cached_property
     def _by_state(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """For each number of observations in a state, these and their rows for the coordinates used, (G, k rows, C')."""
@@ -111,11 +127,7 @@ class Factored:
         return found
 
     def gram(self) -> np.ndarray:
-        """Products of the columns with each other, ndarray (K, K)."""
-        return self.folded_gram(self.gram_of_entries())
-
-    def gram_of_entries(self) -> np.ndarray:
-        """The same of the entries, ndarray (E, E): what adds up over parts of the measurements before it is folded."""
+        """Products of the columns with each other, ndarray (K, K): of their entries first, then folded."""
         values, spans = self.displacements.values, self.displacements.spans
         pairs = np.ascontiguousarray(self._products_by_state().transpose(0, 2, 1))
         place = np.repeat(np.arange(len(spans)), [span.stop - span.start for _, span in spans])
@@ -129,12 +141,8 @@ class Factored:
             rest = slice(spans[max(number, large)][1].start if max(number, large) < len(spans) else len(values), None)
             found[span, rest] = values[span] @ (values[rest] * pairs[number][place[rest]]).T
             found[span.start :, span] = found[span, span.start :].T
-        return found
-
-    def folded_gram(self, gram_of_entries: np.ndarray) -> np.ndarray:
-        """Products of columns from those of entries, ndarray (K, K)."""
         fold = self.displacements.folded
-        return fold(fold(gram_of_entries).T)
+        return fold(fold(found).T)
 
     def times(self, right: np.ndarray) -> np.ndarray:
         """Products of the columns with other rows.
