@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 # Entries of a coordinate that make a product of their own worth its call.
 _MANY_ENTRIES = 16
+# Products of coordinates with each other, in as many states as are looked at at once.
+_AT_ONCE = 3_000_000
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,14 @@ class Factored:
         return found
 
     def gram(self) -> np.ndarray:
-        """Products of the columns with each other, ndarray (K, K): of their entries first, then folded."""
+        """Products of the columns with each other, ndarray (K, K): of their entries first, some states at a time, then folded."""
+        states, fold = self.displacements.values.shape[1], self.displacements.folded
+        step = max(_AT_ONCE // max(len(self.displacements.spans), 1) ** 2, 1)
+        starts = range(0, states, step)
+        parts = (self.at((self.state >= start) & (self.state < start + step)) if len(starts) > 1 else self for start in starts)
+        return fold(fold(sum(part._gram_of_entries() for part in parts)).T)
+
+    def _gram_of_entries(self) -> np.ndarray:
         values, spans = self.displacements.values, self.displacements.spans
         pairs = np.ascontiguousarray(self._products_by_state().transpose(0, 2, 1))
         place = np.repeat(np.arange(len(spans)), [span.stop - span.start for _, span in spans])
@@ -141,8 +150,7 @@ class Factored:
             rest = slice(spans[max(number, large)][1].start if max(number, large) < len(spans) else len(values), None)
             found[span, rest] = values[span] @ (values[rest] * pairs[number][place[rest]]).T
             found[span.start :, span] = found[span, span.start :].T
-        fold = self.displacements.folded
-        return fold(fold(found).T)
+        return found
 
     def times(self, right: np.ndarray) -> np.ndarray:
         """Products of the columns with other rows.
