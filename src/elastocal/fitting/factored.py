@@ -24,12 +24,12 @@ from scipy.sparse import csr_array
 from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
 
 # Entries of a coordinate that make a product of their own worth its call.
 _MANY_ENTRIES = 16
-# Products of coordinates with each other, in as many states as are looked at at once.
+# Numbers of products by state that are in memory at once.
 _AT_ONCE = 3_000_000
 
 
@@ -129,12 +129,22 @@ class Factored:
         return found
 
     def gram(self) -> np.ndarray:
-        """Products of the columns with each other, ndarray (K, K): of their entries first, some states at a time, then folded."""
-        states, fold = self.displacements.values.shape[1], self.displacements.folded
-        step = max(_AT_ONCE // max(len(self.displacements.spans), 1) ** 2, 1)
-        starts = range(0, states, step)
-        parts = (self.at((self.state >= start) & (self.state < start + step)) if len(starts) > 1 else self for start in starts)
-        return fold(fold(sum(part._gram_of_entries() for part in parts)).T)
+        """Products of the columns with each other, ndarray (K, K)."""
+        fold = self.displacements.folded
+        entries = np.zeros((len(self.displacements.values),) * 2)
+        for _, part in self._parts(len(self.displacements.spans)):
+            entries += part._gram_of_entries()
+        return fold(fold(entries).T)
+
+    def _parts(self, width: int) -> Iterator[tuple[np.ndarray | slice, Factored]]:
+        """Some states at a time, whose products with so many other columns take no more memory than is given to them."""
+        step, states = max(_AT_ONCE // max(len(self.displacements.spans) * width, 1), 1), self.displacements.values.shape[1]
+        if states <= step:
+            yield slice(None), self
+            return
+        for start in range(0, states, step):
+            seen = (self.state >= start) & (self.state < start + step)
+            yield seen, self.at(seen)
 
     def _gram_of_entries(self) -> np.ndarray:
         values, spans = self.displacements.values, self.displacements.spans
@@ -157,10 +167,11 @@ class Factored:
 
         `right` (M, rows, q). Returns (K, q).
         """
-        values, seen = self.displacements.values, self._products_by_state(right)
-        found = np.empty((len(values), right.shape[2]))
-        for number, (_, span) in enumerate(self.displacements.spans):
-            np.matmul(values[span], seen[number], out=found[span])
+        found = np.zeros((len(self.displacements.values), right.shape[2]))
+        for chosen, part in self._parts(right.shape[2]):
+            seen = part._products_by_state(right[chosen])
+            for number, (_, span) in enumerate(self.displacements.spans):
+                found[span] += part.displacements.values[span] @ seen[number]
         return self.displacements.folded(found)
 
     def times_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
