@@ -22,9 +22,8 @@ import numpy as np
 from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
-from elastocal.fitting.displacement import conditions
+from elastocal.fitting.displacement import conditions, observations_at_once
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.noise import measurement_covariances
 from elastocal.fitting.observations import part_at, parts_of, select_states, single_observations, spread_poses
 from elastocal.fitting.parameters import parameters

@@ -6,7 +6,7 @@ look at some shapes adds their columns, averages and proposals take its products
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -52,7 +52,7 @@ _NEAR_THE_BEST, _WORTH_A_LOOK = 10.0, 5.0
 # well posed what the measurements do not determine.
 _WIDE = 10.0
 # Beyond so many rows a sample tells which sizes of the pose error are out of question: several for each parameter.
-_MANY_ROWS, _SAMPLE_ROWS = 8000, 3000
+_MANY_ROWS, _SAMPLE_ROWS = 8000, 1500
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,6 @@ class Linearized:
     lacking: dict[str, str]
     candidates: frozenset[str]
     against: list[tuple[other.Competitor, other.Law]]
-    _laws: dict[tuple[str, Shapes], list[dict[int, np.ndarray]]] = field(default_factory=dict, repr=False)
 
     def with_shapes(self, closer: dict[str, list[Shapes]]) -> Linearized:
         """The same with other values of the shapes of some candidates, by their keys, such as of a closer look."""
@@ -130,13 +129,10 @@ class Linearized:
     def rows(self) -> WhiteRows:
         """Whitened rows, candidates in the order of the units."""
         rows, conditions = self._fitted
-        effects: list[tuple[str, Displacing, Shapes]] = []
-        effects += [(key, candidate, each) for key, (candidate, shapes) in self.tried.items() for each in shapes]
-        effects += [(f"{each.location} {each.name}", law, ()) for each, law in self.against]
-        for key, effect, shapes in effects:
-            if (key, shapes) not in self._laws:
-                self._laws[key, shapes] = effect.displacement(conditions, *shapes)
-        laws = [law for key, _, shapes in effects for law in self._laws[key, shapes]]
+        effects: list[tuple[Displacing, Shapes]] = []
+        effects += [(candidate, each) for candidate, shapes in self.tried.values() for each in shapes]
+        effects += [(law, ()) for _, law in self.against]
+        laws = [law for effect, shapes in effects for law in effect.displacement(conditions, *shapes)]
         sizes = np.concatenate([unit.sizes for unit in self.units])
         displacements = Displacements.of(laws, sizes, len(self.observations.states))
         return replace(rows, candidates=replace(rows.candidates, displacements=displacements))

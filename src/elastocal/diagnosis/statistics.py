@@ -17,8 +17,8 @@ rows: the condition number of X is not squared. Marginalising beta gives W'MW, W
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.factored import Factored
 
 # Products of one pose with all columns that are in memory at once.
-_AT_ONCE = 3_000_000
+_AT_ONCE = 1_000_000
 # Of a square from which another one was taken, less than this share is rounding.
 _INSIDE = 1e-12
 
@@ -67,7 +67,7 @@ class Products:
     P. `gram` (P + K + 1, P + K + 1): Z'Z of Z = [X W y], with the rows of the declared parameters' priors. `freedom`: numbers
     measured less what the declared model fits. `into_basis` (P, P): turns declared columns into orthonormal ones. `projected`
     (P, K + 1): what these have in the candidates' columns and the residual. `inside` (K,) of bool: columns of which these leave
-    nothing.
+    nothing. `met`: by the sizes of the pose error of which there are statistics, what leads back to the normal equations.
     """
 
     rows: WhiteRows
@@ -78,13 +78,19 @@ class Products:
     into_basis: np.ndarray
     projected: np.ndarray
     inside: np.ndarray
+    met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=dict, repr=False)
 
     @property
     def without_candidates(self) -> Products:
         """Of the declared model alone."""
         kept = np.append(np.arange(self.declared), self.gram.shape[0] - 1)
         rows = replace(self.rows, candidates=self.rows.candidates.of_columns(np.zeros(len(self.inside), bool)))
-        few = {"gram": self.gram[np.ix_(kept, kept)], "projected": self.projected[:, -1:], "inside": self.inside[:0]}
+        few: dict[str, Any] = {
+            "met": {},
+            "gram": self.gram[np.ix_(kept, kept)],
+            "projected": self.projected[:, -1:],
+            "inside": self.inside[:0],
+        }
         return replace(self, rows=rows, **few)
 
     def by_pose(self) -> Iterator[tuple[np.ndarray, WhiteRows, np.ndarray, np.ndarray]]:
@@ -189,9 +195,10 @@ def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
     """Sufficient statistics at some sizes of the pose error (T,)."""
     count, (totals, log_dets) = products.declared, _at(products, pose_error_rad)
     factors = np.linalg.cholesky(totals[:, :count, :count])
-    for total, factor in zip(totals, factors, strict=True):
+    for tau, total, factor, log_det in zip(pose_error_rad, totals, factors, log_dets, strict=True):
         taken = solve_triangular(factor, total[:count, count:], lower=True)
         total[count:, count:] -= taken.T @ taken
+        products.met[float(tau)] = factor, taken, total[count:, count:], float(log_det)
     rest = totals[:, count:, count:]
     logs = -0.5 * log_dets - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
     sizes = np.asarray(pose_error_rad)
@@ -200,12 +207,15 @@ def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
 
 def normal_equations(products: Products, tau: float) -> tuple[np.ndarray, float]:
     """Z'Sigma(tau)^-1 Z, (P + K + 1, P + K + 1), and ln |Sigma| beyond that of white noise."""
-    totals, log_dets = _at(products, np.array([tau]))
-    return totals[0], float(log_dets[0])
+    if tau not in products.met:
+        statistics_of(products, np.array([tau]))
+    factor, taken, rest, log_det = products.met[tau]
+    across = factor @ taken
+    return np.block([[factor @ factor.T, across], [across.T, rest + taken.T @ taken]]), log_det
 
 
 def _at(products: Products, pose_error_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both of them at T sizes of the pose error."""
+    """Z'Sigma(tau)^-1 Z (T, P + K + 1, P + K + 1), and ln |Sigma| beyond that of white noise (T,)."""
     totals, log_dets = np.tile(products.gram, (len(pose_error_rad), 1, 1)), np.zeros(len(pose_error_rad))
     for _, _, rows, values in products.by_pose() if np.any(pose_error_rad) else ():
         for number, tau in enumerate(pose_error_rad):

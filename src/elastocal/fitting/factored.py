@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # Entries of a coordinate that make a product of their own worth its call.
 _MANY_ENTRIES = 16
 # Numbers of products by state that are in memory at once.
-_AT_ONCE = 3_000_000
+_AT_ONCE = 1_500_000
 
 
 @dataclass(frozen=True)
