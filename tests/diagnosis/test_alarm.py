@@ -39,9 +39,9 @@ def p_values(drawn):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "tau"), [("poses of unequal size", 0.0), ("joints that repeat badly", 0.5)])
-def test_alarms_come_as_often_as_the_level_says(kind, tau):
-    rows = made_rows(2, poses=10, candidates=8, joint_rad=0.3 * (kind == "joints that repeat badly"))
+@pytest.mark.parametrize("tau", [0.0, 0.5])
+def test_alarms_come_as_often_as_the_level_says(tau):
+    rows = made_rows(2, poses=10, candidates=8)
     found = p_values(lambda rng: rows.drawn(rng, tau))
     assert FEWEST <= (found <= LEVEL).sum() <= MOST, (found <= LEVEL).mean()
 

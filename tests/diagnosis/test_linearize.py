@@ -121,7 +121,7 @@ def test_too_few_angles_of_a_joint_test_no_law_that_goes_by_them(kuka, key, join
     states = made_states(6, 30, seed=4)
     states.joint_angles[:, joint - 1] = np.arange(30) % angles * 0.4
     campaign = planted(kuka, {}, states=states, targets=HAND)
-    told = lacking(campaign.candidates[key], campaign.declared.model, states)
+    told = lacking(campaign.candidates[key], campaign.declared.model.offered(states), states.joint_angles)
     assert told == ("" if angles == 8 else f"{angles} angles of joint {joint} where 8 are needed")
 
 
@@ -194,7 +194,7 @@ def test_names_of_all_that_is_tested_are_unique_wherever_a_step_was_fitted(campa
     around = conditions_on(chain_of(UR10), states if dated else replace(states, time_s=None, temperature_c=None))
     fitted = campaign.declared if when is None else fitted_at(campaign, "setup_step", when)
     model = replace(fitted.model, sites=around.sites)
-    candidates = [c for c in candidates_on(around.sites).values() if not lacking(c, model, states)]
+    candidates = [c for c in candidates_on(around.sites).values() if not lacking(c, model.offered(states), states.joint_angles)]
     laws = laws_of(around, 1)
     tested = [(c, shapes) for c in candidates for shapes in shapes_tried(c, fitted)]
     units = units_of(tested, laws, SETTINGS)
@@ -265,7 +265,7 @@ def test_other_shapes_of_a_winning_candidate_and_all_other_candidates_stay_units
     candidates = [campaign.candidates[key] for key in keys]
     first = linearized(campaign.declared, campaign.observations, candidates, SETTINGS).problem
     closer = {"setup_step": [(0.25,), (0.3,), (1 / 3,)]}
-    then = linearized(campaign.declared, campaign.observations, candidates, SETTINGS, closer).problem
+    then = linearized(campaign.declared, campaign.observations, candidates, SETTINGS).with_shapes(closer).problem
 
     def shapes(problem):
         named = [unit for unit in problem.units if unit.candidate]
@@ -293,7 +293,7 @@ def test_a_step_is_found_closer_to_where_it_was_by_a_closer_look(kuka):
     first = linearized(fitted, observations, candidates, SETTINGS).problem
     alone = initial_screening(first)[1]
     closer = shapes_looked_at_closely(first, alone)
-    then = linearized(fitted, observations, candidates, SETTINGS, closer).problem
+    then = linearized(fitted, observations, candidates, SETTINGS).with_shapes(closer).problem
     again = initial_screening(then)[1]
     best = []
     for problem, found in ((first, alone), (then, again)):

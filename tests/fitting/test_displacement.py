@@ -3,12 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
+from fitted_models import TARGETS, model_of
+from planted import two_loads_a_pose
 from scipy.optimize import root
-from synthetic import made_estimate, made_model, made_states, seen_exactly
+from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.displacement import conditions, displaced_coordinates
+from elastocal.fitting.least_squares import fit
 from elastocal.fitting.prediction import predict
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
 from elastocal.mechanics.kinematics import poses
@@ -74,3 +78,27 @@ def test_effects_add_up_on_the_coordinates_of_the_sites(fanuc):
     np.testing.assert_allclose(at_base[:, :2], estimate.coefficients[2][0] * states.wrench[:, :2], rtol=1e-9, atol=1e-18)
     used = {*range(6), *model.sites.base}
     assert not np.delete(found, list(used), axis=1).any()
+
+
+@pytest.mark.parametrize("joint_rad", [0.0, 2e-5])
+def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(fanuc, monkeypatch, joint_rad):
+    model = model_of(fanuc, "joint_offset@3", "stiffening@2", targets=TARGETS)
+    seen = with_noise(
+        seen_exactly(model, made_estimate(model, seed=64), two_loads_a_pose(6, 20, seed=65)), np.random.default_rng(66)
+    )
+    noise = replace(NOISE, joint_rad=np.full(6, joint_rad))
+    kept = fit(model, seen, noise)
+    monkeypatch.setattr("elastocal.fitting.displacement._MOST_STATES", 10)
+    monkeypatch.setattr("elastocal.fitting.displacement._MOST_AT_ONCE", 16)
+    monkeypatch.setattr("elastocal.fitting.displacement._MOST_HELD", 16 * 180)
+    found = fit(model, seen, noise)
+    assert kept.joint_jacobian is not None and found.joint_jacobian is None and found.conditions is None
+    deviation = np.sqrt(np.diag(kept.covariance))
+    values = [np.concatenate(each.estimate.coefficients) for each in (kept, found)]
+    assert (np.abs(values[0] - values[1]) < 2e-3 * deviation[-len(values[0]) :]).all()
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=1e-4)
+    parts = [list(each.sensitivities(seen)) for each in (kept, found)]
+    assert len(parts[1]) > 1
+    for number in (1, 2):
+        one, other = (np.concatenate([part[number] for part in each]) for each in parts)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-5 * np.abs(one).max())

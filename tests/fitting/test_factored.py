@@ -1,12 +1,14 @@
 """Columns in two factors: products as of the columns written out, whatever states, targets and coordinates there are."""
 
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from elastocal.fitting import factored
 from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.linearization import effect_columns
 
@@ -51,13 +53,15 @@ def test_written_out_they_are_the_columns_that_effects_make(given_columns):
 
 
 @settings(deadline=None)
-@given(MADE)
-def test_products_are_those_of_the_columns_written_out(given_columns):
+@given(MADE, st.sampled_from([1, 20, 10**6]))
+def test_products_are_those_of_the_columns_written_out_however_many_states_are_taken_at_once(given_columns, at_once):
     columns, _, _ = given_columns
     dense = columns.dense()
-    np.testing.assert_allclose(columns.gram(), np.tensordot(dense, dense, ((0, 1), (0, 1))), atol=1e-10)
     right = np.random.default_rng(1).standard_normal((*dense.shape[:2], 2))
-    np.testing.assert_allclose(columns.times(right), np.tensordot(dense, right, ((0, 1), (0, 1))), atol=1e-10)
+    with mock.patch.object(factored, "_AT_ONCE", at_once):
+        gram, products = columns.gram(), columns.times(right)
+    np.testing.assert_allclose(gram, np.tensordot(dense, dense, ((0, 1), (0, 1))), atol=1e-10)
+    np.testing.assert_allclose(products, np.tensordot(dense, right, ((0, 1), (0, 1))), atol=1e-10)
     # States of one pose one after the other, not all poses of one size.
     pose = columns.state // 2
     expected = [np.einsum("mrk,mrn->nk", dense[pose == p], right[pose == p]) for p in range(pose.max() + 1)]

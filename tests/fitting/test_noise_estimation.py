@@ -77,8 +77,8 @@ def peak_bytes(robot, poses):
 
 def test_a_measurement_more_takes_no_more_than_its_residual(fanuc, monkeypatch):
     """A million measurements took 19.8 GB here once; held at once, each takes 13 kB."""
-    monkeypatch.setattr("elastocal.fitting.memory._MOST_STATES", 40)
-    monkeypatch.setattr("elastocal.fitting.memory._MOST_AT_ONCE", 40)
-    monkeypatch.setattr("elastocal.fitting.memory._MOST_HELD", 40 * 6 * 60)
+    monkeypatch.setattr("elastocal.fitting.displacement._MOST_STATES", 40)
+    monkeypatch.setattr("elastocal.fitting.displacement._MOST_AT_ONCE", 40)
+    monkeypatch.setattr("elastocal.fitting.displacement._MOST_HELD", 40 * 6 * 60)
     few, more = peak_bytes(fanuc, 24), peak_bytes(fanuc, 96)
     assert more - few < 400 * 12 * (96 - 24)

@@ -49,7 +49,7 @@ def test_a_step_goes_by_the_slope_of_what_it_is_judged_by(fanuc, rows):
 @pytest.mark.parametrize("held", [4_000_000, 100])
 def test_a_copy_that_goes_elsewhere_leaves_the_original_where_it_is(fanuc, held, monkeypatch):
     """Whitening and loads of a place that is only tried must not stay; whole and in parts."""
-    monkeypatch.setattr("elastocal.fitting.memory._MOST_HELD", held)
+    monkeypatch.setattr("elastocal.fitting.displacement._MOST_HELD", held)
     model = model_of(fanuc, "joint_offset@2", "link_geometry@3")
     estimate = made_estimate(model, seed=84)
     seen = with_noise(seen_exactly(model, estimate, made_states(6, 12, seed=85)), np.random.default_rng(86))
@@ -99,8 +99,8 @@ def test_products_by_factors_are_those_of_the_columns_written_out(fanuc, offset,
 def test_normal_equations_of_a_linear_problem_are_those_written_out(kind, at_once, monkeypatch):
     """Weights come before the covariance is divided out; in parts of whole poses as in one."""
     if at_once:
-        monkeypatch.setattr("elastocal.fitting.memory._MOST_HELD", 100)
-        monkeypatch.setattr("elastocal.fitting.memory._MOST_AT_ONCE", at_once)
+        monkeypatch.setattr("elastocal.fitting.displacement._MOST_HELD", 100)
+        monkeypatch.setattr("elastocal.fitting.displacement._MOST_AT_ONCE", at_once)
         monkeypatch.setattr("elastocal.fitting.normal_equations.observations_at_once", lambda rows, columns: at_once)
     noise, states, plausible = GANTRY_NOISES[kind], gantry_states(20, 8), np.array([0.1, 2.0, 0.5])
     rng = np.random.default_rng(98)

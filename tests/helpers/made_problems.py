@@ -8,8 +8,7 @@ from elastocal.diagnosis.hypotheses import OTHER, Unit, prior_of
 from elastocal.diagnosis.other import OWN, Law
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.statistics import products_of, statistics_of
-from elastocal.diagnosis.summed import WhiteRows
+from elastocal.diagnosis.statistics import WhiteRows, products_of, statistics_of
 from elastocal.fitting.factored import Displacements, Factored
 
 
@@ -18,7 +17,7 @@ class Rows:
     """Whitened rows of a made campaign; `white` has them as `products_of` takes them.
 
     `declared`, `candidates` (R, P), (R, K), `residual` (R,), `jacobian` (R, n), `pose` (R,) of int, `prior_std`, `present`
-    (P,), `joint_rad` (n,).
+    (P,).
     """
 
     declared: np.ndarray
@@ -28,29 +27,24 @@ class Rows:
     pose: np.ndarray
     prior_std: np.ndarray
     present: np.ndarray
-    joint_rad: np.ndarray
 
-    def white(self, chosen=slice(None), by_pose=False):
-        """Some of them as observations of one row: every column displaces a coordinate of its own, by one in every state.
-
-        States are the rows themselves, or the poses.
-        """
-        _, pose = np.unique(self.pose[chosen], return_inverse=True)
-        state, columns = pose if by_pose else np.arange(len(pose)), self.candidates.shape[1]
-        laws = [{column: np.ones(int(state.max()) + 1)} for column in range(columns)]
-        displacements = Displacements.of(laws, np.ones(columns), int(state.max()) + 1)
-        declared, jacobian, candidates = (part[chosen][:, None] for part in (self.declared, self.jacobian, self.candidates))
-        candidates = Factored(displacements, candidates, state)
-        return WhiteRows(declared, candidates, self.residual[chosen][:, None], jacobian, pose)
+    def white(self):
+        """Observations of one row and one state each: every column displaces a coordinate of its own, by one."""
+        rows, columns = self.candidates.shape
+        displacements = Displacements.of([{column: np.ones(rows)} for column in range(columns)], np.ones(columns), rows)
+        declared, jacobian, candidates = (part[:, None] for part in (self.declared, self.jacobian, self.candidates))
+        return WhiteRows(
+            declared, Factored(displacements, candidates, np.arange(rows)), self.residual[:, None], jacobian, self.pose
+        )
 
     @property
     def products(self):
-        return products_of(self.white(), self.prior_std, self.present, self.joint_rad)
+        return products_of(self.white(), self.prior_std, self.present)
 
     def covariance(self, tau):
-        """Sigma = I + J Lambda J', dense."""
+        """Sigma = I + tau^2 J J', dense."""
         together = self.pose[:, None] == self.pose
-        return np.eye(len(self.pose)) + (self.jacobian * (tau**2 + self.joint_rad**2)) @ self.jacobian.T * together
+        return np.eye(len(self.pose)) + tau**2 * self.jacobian @ self.jacobian.T * together
 
     def marginal_covariance(self, tau):
         """The same with the declared parameters integrated over their prior."""
@@ -63,12 +57,12 @@ class Rows:
 
     def drawn(self, rng, tau=0.0):
         """The same with a residual drawn anew: nothing is missing, and declared parameters are at their prior means."""
-        common = np.sqrt(tau**2 + self.joint_rad**2) * rng.standard_normal((self.pose.max() + 1, self.jacobian.shape[1]))
+        common = tau * rng.standard_normal((self.pose.max() + 1, self.jacobian.shape[1]))
         noise = rng.standard_normal(len(self.pose)) + (self.jacobian * common[self.pose]).sum(axis=1)
         return replace(self, residual=self.expected + noise)
 
 
-def made_rows(seed=0, poses=8, size=(3, 9), declared=4, candidates=6, joints=2, joint_rad=0.0, prior=10.0):
+def made_rows(seed=0, poses=8, size=(3, 9), declared=4, candidates=6, joints=2, prior=10.0):
     """Rows of poses of unequal sizes, in no order."""
     rng = np.random.default_rng(seed)
     pose = np.repeat(np.arange(poses), rng.integers(size[0], size[1], poses, endpoint=True))
@@ -82,7 +76,6 @@ def made_rows(seed=0, poses=8, size=(3, 9), declared=4, candidates=6, joints=2, 
         pose=pose,
         prior_std=prior * rng.uniform(0.5, 2.0, declared),
         present=rng.standard_normal(declared),
-        joint_rad=joint_rad * rng.uniform(0.5, 2.0, joints),
     )
     return rows.drawn(rng)
 
@@ -100,7 +93,7 @@ def made_problem(rows, units, settings=None, tau=None):
     settings, products = settings or Settings(), rows.products
     if tau is None:
         # In standard errors with which the measurements of one pose determine a joint angle.
-        information = np.median(np.trace(products.pose_gram, axis1=1, axis2=2)) / products.pose_gram.shape[1]
+        information = np.median(np.bincount(rows.pose, (rows.jacobian**2).sum(axis=1))) / rows.jacobian.shape[1]
         tau = np.array(settings.pose_steps) / np.sqrt(information)
     tau = np.asarray(tau, float)
     return Problem(statistics_of(products, tau), tuple(units), prior_of(units, settings), settings), products

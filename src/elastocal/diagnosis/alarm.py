@@ -25,7 +25,6 @@ import numpy as np
 from elastocal.diagnosis.evidence import condition, log_likelihood, log_sum_exp
 from elastocal.diagnosis.search import REACH
 from elastocal.diagnosis.statistics import null_draws
-from elastocal.diagnosis.summed import Sums
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.hypotheses import Unit
@@ -49,16 +48,15 @@ class Alarm:
     raised: bool
 
 
-def alarm_of(problem: Problem, products: Products | Sums, pose_error_rad: float, stream: np.random.Generator) -> Alarm:
+def alarm_of(problem: Problem, products: Products, pose_error_rad: float, stream: np.random.Generator) -> Alarm:
     """Test whether the declared model lacks anything.
 
     `pose_error_rad`: pose error of the declared model at which measurements are simulated.
     """
     settings, statistics = problem.settings, problem.statistics
-    # Of measurements that are summed, the size of the pose error is known to a step of its grid.
-    reach, place = 0 if isinstance(products, Sums) else REACH, statistics.nearest(pose_error_rad)
     # Sizes that draws of the fitted one can make likely: its own, and some to either side.
-    chosen = slice(max(place - reach, 0), place + reach + 1)
+    place = statistics.nearest(pose_error_rad)
+    chosen = slice(max(place - REACH, 0), place + REACH + 1)
     statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
     own = statistics.along[..., None], statistics.squares[:, None]
     statistic = float(_average_bayes_factors(problem, statistics, log_pose, *own)[0])

@@ -239,9 +239,8 @@ def _explained(
         draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
         alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
         # The alarm comes before the measurements choose at which shapes to look more closely: it would no longer be exact.
-        closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
-        if closer:
-            problem = linearized(about, searched, candidates, settings, closer, problem)
+        if alarm.raised:
+            problem = problem.with_shapes(shapes_looked_at_closely(problem.problem, alone))
         found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise

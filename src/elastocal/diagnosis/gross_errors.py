@@ -19,29 +19,24 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import lapack, solve_triangular
 from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
-from elastocal.diagnosis.linearize import prior_deviations
-from elastocal.diagnosis.statistics import Products
-from elastocal.fitting.displacement import conditions
+from elastocal.fitting.displacement import conditions, observations_at_once
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.noise import measurement_covariances
 from elastocal.fitting.observations import part_at, parts_of, select_states, single_observations, spread_poses
+from elastocal.fitting.parameters import parameters
 from elastocal.fitting.prediction import residuals
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
-    from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
-    from elastocal.fitting.observations import Observations
 
 # Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
 _SCALE_QUANTILES = (0.5, 0.75)
@@ -83,6 +78,94 @@ class Yardstick:
     covariance: np.ndarray | None
 
 
+@dataclass(frozen=True)
+class _Beside:
+    """Rows of measurements beside a model, of which a sample and all that lie far off are looked at closely.
+
+    `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor, no less than that in those of a row.
+    `sample`, `closely` (N,) of bool: poses spread over those kept; these, and what is as far off as a quarter of all. `parts`:
+    which of the latter; their linearisation; variance (m, rows, rows) of each, and that of a radian in each joint.
+    """
+
+    residual: np.ndarray
+    far: np.ndarray
+    sample: np.ndarray
+    closely: np.ndarray
+    parts: list[tuple[slice, Linearization, np.ndarray, np.ndarray]]
+
+    @classmethod
+    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray) -> _Beside:
+        single, sample = single_observations(measurements), kept.copy()
+        sample[kept] = spread_poses(select_states(single, kept), _MOST)
+        near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
+        if near.all():
+            closely, far = near, np.zeros(len(single))
+        else:
+            for states, seen in parts_of(single, observations_at_once(model.rows, 0)):
+                part = part_at(single, states, seen)
+                residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
+            far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
+            closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
+        some, parts = select_states(single, closely), []
+        for edges in parts_of(some, observations_at_once(model.rows, len(parameters(model, estimate)))):
+            part = part_at(some, *edges)
+            line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
+            jacobian = line.coordinate_jacobian[..., : model.sites.joints]
+            own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
+            parts.append((edges[1], line, own, jacobian @ jacobian.transpose(0, 2, 1)))
+        residual[closely] = np.concatenate([line.residual for _, line, _, _ in parts])
+        return cls(residual, far, sample, closely, parts)
+
+    def yardstick(self, fitted: Fit, noise: Noise, kept: np.ndarray) -> Yardstick:
+        """As `yardstick_of`, by the rows that were fitted, (N,) of bool."""
+        free, mine = ~fitted.held, self.sample[self.closely]
+        negligible = self.sample.sum() < kept.sum() or not free.any()
+        sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
+        best = (np.inf, Yardstick(noise, None))
+        for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
+            pose_rad, covariance = share * fitted.noise.pose_rad, None
+            white = [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
+            if not negligible:
+                information = np.diag((sizes / fitted.prior_std[free]) ** 2)
+                for (seen, line, _, _), each in zip(self.parts, white, strict=True):
+                    rows = (each @ (line.sensitivities[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
+                    information += rows.T @ rows
+                covariance = np.zeros((len(free), len(free)))
+                covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
+            distance = self._distances(white, covariance, np.ones(len(mine), bool))[mine]
+            volume = -np.concatenate([np.log(np.diagonal(each, axis1=1, axis2=2)).sum(axis=1) for each in white])[mine].mean()
+            rows = fitted.model.rows
+            # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
+            spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0))
+            best = min(best, (spread, Yardstick(replace(noise, pose_rad=pose_rad), covariance)), key=lambda each: each[0])
+        return best[1]
+
+    def distances(self, yardstick: Yardstick, fitted: np.ndarray) -> np.ndarray:
+        """From the prediction by the other rows, in standard deviations, (N,); `far` where nothing looks closely.
+
+        ``fitted`` says which rows the parameters were fitted to, (N,): residuals of these are smaller, those of others larger.
+        """
+        found, pose_rad = self.far.copy(), yardstick.noise.pose_rad
+        white = [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
+        found[self.closely] = self._distances(white, yardstick.covariance, fitted[self.closely])
+        return found
+
+    def _distances(self, white: list[np.ndarray], covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
+        found = np.empty(len(fitted))
+        for (seen, line, _, _), each in zip(self.parts, white, strict=True):
+            off = each @ line.residual[..., None]
+            matrix = np.tile(np.eye(each.shape[1]), (len(each), 1, 1))
+            if covariance is not None:
+                rows = each @ line.sensitivities
+                share = (rows.reshape(-1, len(covariance)) @ covariance).reshape(rows.shape) @ rows.transpose(0, 2, 1)
+                matrix += np.where(fitted[seen], -1.0, 1.0)[:, None, None] * share
+                own = fitted[seen] & (np.trace(share, axis1=1, axis2=2) > 1.0 - _LEAST_OWN)
+                values, axes = np.linalg.eigh(matrix[own])
+                matrix[own] = (axes * np.maximum(values, _LEAST_OWN)[:, None]) @ axes.transpose(0, 2, 1)
+            found[seen] = np.sqrt((off * np.linalg.solve(matrix, off)).sum(axis=(1, 2)))
+        return found
+
+
 def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yardstick:
     """What the rows that a model was fitted to say of themselves, beside the noise that was declared or repeats show.
 
@@ -92,101 +175,8 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     [1] Davies, P. L., Asymptotic behaviour of S-estimates of multivariate location parameters and dispersion matrices, Annals
         of Statistics 15, 1987.
     """
-    single = single_observations(measurements)
-    some = select_states(single, spread_poses(single, _MOST))
-    free = ~fitted.held
-    negligible = len(some) < len(single) or not free.any()
-    priors = fitted.prior_std[free]
-    sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
-    parts = parts_of(some, observations_at_once(fitted.model.rows, len(free)))
-    lines = [_Line.of(fitted.model, fitted.estimate, part_at(some, *edges), noise) for edges in parts]
-    best = (np.inf, Yardstick(noise, None))
-    for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
-        pose_rad, covariance = share * fitted.noise.pose_rad, None
-        if not negligible:
-            information = np.diag((sizes / priors) ** 2)
-            for line in lines:
-                seen = line.white(line.about.sensitivities[..., free] * sizes, pose_rad).reshape(-1, len(sizes))
-                information += seen.T @ seen
-            covariance = np.zeros((len(free), len(free)))
-            covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
-        distance = np.concatenate([line.distance(pose_rad, covariance, np.ones(len(line.own), bool)) for line in lines])
-        volume = np.concatenate([line.log_volume(pose_rad) for line in lines]).mean()
-        rows = fitted.model.rows
-        # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
-        spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0))
-        best = min(best, (spread, Yardstick(replace(noise, pose_rad=pose_rad), covariance)), key=lambda each: each[0])
-    return best[1]
-
-
-@dataclass(frozen=True)
-class _Line:
-    """Rows about an estimate: their linearisation, own variance (M, rows, rows), and that of a radian in each joint."""
-
-    about: Linearization
-    own: np.ndarray
-    common: np.ndarray
-
-    @classmethod
-    def of(cls, model: Model, estimate: Estimate, some: Observations, noise: Noise) -> _Line:
-        line = linearize(model, estimate, some, conditions(model, estimate, some.states))
-        spread, jacobian = noise.spread(some), line.coordinate_jacobian[..., : model.sites.joints]
-        own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
-        return cls(line, own, jacobian @ jacobian.transpose(0, 2, 1))
-
-    def root(self, pose_rad: float) -> np.ndarray:
-        """Cholesky factor of the variance of each row."""
-        return np.linalg.cholesky(self.own + pose_rad**2 * self.common)
-
-    def white(self, values: np.ndarray, pose_rad: float) -> np.ndarray:
-        """Whitened values (M, rows, k)."""
-        return np.linalg.inv(self.root(pose_rad)) @ values
-
-    def log_volume(self, pose_rad: float) -> np.ndarray:
-        """Half the logarithm of the determinant of each variance, (M,)."""
-        return np.log(np.diagonal(self.root(pose_rad), axis1=1, axis2=2)).sum(axis=1)
-
-    def distance(self, pose_rad: float, covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
-        """From the prediction by the other rows, in standard deviations, (M,)."""
-        white = self.white(self.about.residual[..., None], pose_rad)[..., 0]
-        if covariance is None:
-            return np.linalg.norm(white, axis=1)
-        seen = self.white(self.about.sensitivities, pose_rad)
-        along = (seen.reshape(-1, seen.shape[2]) @ covariance).reshape(seen.shape)
-        share, axes = np.linalg.eigh(along @ seen.transpose(0, 2, 1))
-        own = np.where(fitted[:, None], np.maximum(1.0 - share, _LEAST_OWN), 1.0 + share)
-        along = (axes.transpose(0, 2, 1) @ white[..., None])[..., 0]
-        return np.sqrt((along**2 / own).sum(axis=1))
-
-
-def deviations(
-    model: Model, estimate: Estimate, measurements: Measurements, yardstick: Yardstick, fitted: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals of rows and their distances from the prediction, in standard deviations.
-
-    ``fitted`` says which rows the parameters were fitted to, (N,): their residuals are smaller by it, those of others larger.
-    """
-    single, noise = single_observations(measurements), yardstick.noise
-    near = spread_poses(single, _MOST)
-    residual, distance = np.empty((len(single), model.rows)), np.empty(len(single))
-    sensor = np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows]
-    for states, seen in parts_of(single, observations_at_once(model.rows, 0)):
-        part = part_at(single, states, seen)
-        residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
-        # No less than the whole distance, as the sensor is only a part of the variance.
-        distance[seen] = np.linalg.norm(residual[seen] / sensor, axis=1)
-    closely = near | (distance > np.quantile(distance[near], _SCALE_QUANTILES[-1]))
-    some = select_states(single, closely)
-    parts = parts_of(some, observations_at_once(model.rows, 0 if yardstick.covariance is None else len(yardstick.covariance)))
-    distance[closely] = np.concatenate(
-        [
-            _Line.of(model, estimate, part_at(some, *edges), noise).distance(
-                noise.pose_rad, yardstick.covariance, fitted[closely][edges[1]]
-            )
-            for edges in parts
-        ]
-    )
-    return residual, distance
+    every = np.ones(len(measurements), bool)
+    return _Beside.of(fitted.model, fitted.estimate, measurements, noise, every).yardstick(fitted, noise, every)
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -201,15 +191,15 @@ def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: S
     scale = np.max(
         usual[np.isfinite(usual)] / np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))[np.isfinite(usual)], initial=1.0
     )
-    inside = distance <= scale * _limit(len(distance), rows, settings)
+    inside = distance <= scale * most_by_chance(len(distance), rows, settings)
     if inside.mean() < 1.0 - settings.gross_error_share:
         return distance / scale, np.zeros(len(distance), bool)
     scale = max(1.0, float(np.sqrt((distance[inside] ** 2).mean() / rows)))
-    gross = distance > scale * _limit(len(distance), rows, settings, inside.sum() * rows)
+    gross = distance > scale * most_by_chance(len(distance), rows, settings, inside.sum() * rows)
     return distance / scale, gross if gross.mean() <= settings.gross_error_share else np.zeros(len(gross), bool)
 
 
-def _limit(count: int, rows: int, settings: Settings, freedom: float = np.inf) -> float:
+def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = np.inf) -> float:
     """Standard deviations that the largest of so many good rows exceeds with the probability of the settings.
 
     ``freedom`` is that of the scale: infinite where it is known.
@@ -220,9 +210,9 @@ def _limit(count: int, rows: int, settings: Settings, freedom: float = np.inf) -
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    yardstick = yardstick_of(fitted, noise, measurements.select(kept))
-    found = deviations(fitted.model, fitted.estimate, measurements, yardstick, kept)
-    return Deviations(found[0], *beyond_chance(found[1], fitted.model.rows, kept, settings))
+    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
+    distance = rows.distances(rows.yardstick(fitted, noise, kept), kept)
+    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 
 
 def held_out_gross_errors(
@@ -237,118 +227,14 @@ def held_out_gross_errors(
     measurements = held_out.campaign.measurements
     if model is not fitted.model or estimate is not fitted.estimate:
         yardstick = replace(yardstick, covariance=None)
-    unseen, every = np.zeros(len(measurements), bool), np.ones(len(measurements), bool)
-    residual, distance = deviations(model, estimate, measurements, yardstick, unseen)
-    distance, gross = beyond_chance(distance, model.rows, every, settings)
+    every = np.ones(len(measurements), bool)
+    rows = _Beside.of(model, estimate, measurements, yardstick.noise, every)
+    distance, gross = beyond_chance(rows.distances(yardstick, ~every), model.rows, every, settings)
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
         least = max(least, float(np.median(distance[outside])) / np.sqrt(2 * gammaincinv(model.rows / 2, 0.5)))
-    far = distance > least * _limit(len(distance), model.rows, settings)
-    return Deviations(residual, distance, gross & (far | ~outside))
-
-
-def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
-    """Which observations all candidates together do not explain, ndarray of bool (M,).
-
-    The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those
-    of all candidates and S their mean square sizes. Observations are taken out, the worst first, until what is left agrees;
-    then those come back that it predicts.
-    """
-    products, about = problem.products, problem.about
-    observed, own = about.residual.shape
-    kept = np.ones(observed, bool)
-    if not isinstance(products, Products):
-        return ~kept
-    rows = products.rows
-    deviation = prior_deviations([parameter for owner, parameter in about.parameters if owner not in problem.candidates])
-    grid = problem.problem.grid
-    sizes = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
-    declared = (rows.declared * deviation).reshape(about.residual.size, -1)
-    columns = (sizes * rows.candidates.dense()).reshape(about.residual.size, -1)
-    covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
-    precision, limit = _precision(covariance, declared), _limit(observed, own, settings)
-    while kept.mean() > 1.0 - settings.gross_error_share:
-        distance = _deletion_distances(precision, residual, kept, own)
-        worst = int(np.argmax(distance))
-        if distance[worst] <= limit:
-            break
-        kept[worst] = False
-        precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
-    if not kept.all():
-        covariance = covariance + _pose_error(problem, covariance, declared, np.repeat(kept, own))
-    whole = _precision(covariance, declared)
-    while not kept.all():
-        out = np.flatnonzero(np.repeat(~kept, own))
-        distance = _deletion_distances(_without(whole, out), residual, kept, own)
-        variance = np.linalg.inv(whole[np.ix_(out, out)])
-        rest = (variance @ (whole @ residual)[out]).reshape(-1, own, 1)
-        distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(variance, own), rest)).sum(axis=(1, 2)))
-        back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
-        if not back.any():
-            break
-        kept |= back
-    return ~kept
-
-
-def _precision(covariance: np.ndarray, declared: np.ndarray) -> np.ndarray:
-    """Inverse of a covariance to which that of declared columns of unit size is added (Woodbury's identity)."""
-    root = np.linalg.cholesky(covariance)
-    basis, _ = _declared_basis(root, declared)
-    inverse = lapack.dpotri(root, lower=1)[0]
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
-    beside = solve_triangular(root, basis, lower=True, trans="T")
-    return inverse - beside @ beside.T
-
-
-def _log_likelihood(covariance: np.ndarray, declared: np.ndarray, residual: np.ndarray) -> float:
-    """Logarithm of the density of a residual of zero mean under that sum, but for a constant."""
-    root = np.linalg.cholesky(covariance)
-    basis, log_size = _declared_basis(root, declared)
-    white = solve_triangular(root, residual, lower=True)
-    squares = white @ white - ((basis.T @ white) ** 2).sum()
-    return float(-0.5 * squares - np.log(np.diag(root)).sum() - log_size)
-
-
-def _declared_basis(root: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
-    """Whitened declared columns beside their priors, made orthonormal, (n, P) without the latter; half the log determinant."""
-    white = solve_triangular(root, declared, lower=True)
-    basis, triangle = np.linalg.qr(np.concatenate([white, np.eye(declared.shape[1])]))
-    return basis[: len(declared)], float(np.log(np.abs(np.diag(triangle))).sum())
-
-
-def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
-    """The inverse covariance of the rows without some, in whose place it is zero."""
-    left = precision - precision[:, out] @ np.linalg.solve(precision[np.ix_(out, out)], precision[out])
-    left[out], left[:, out] = 0.0, 0.0
-    return left
-
-
-def _pose_error(problem: Linearized, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Covariance of the error common to a pose, at the size that makes the rows known most probable."""
-    assert isinstance(problem.products, Products)
-    rows = problem.products.rows
-    residual, own = rows.residual.ravel()[known], rows.residual.shape[1]
-    jacobian, pose = rows.jacobian.reshape(len(known), -1), np.repeat(rows.pose, own)
-    common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
-    best = (-np.inf, 0.0)
-    for tau in problem.problem.statistics.pose_error_rad:
-        likely = _log_likelihood((covariance + tau**2 * common)[np.ix_(known, known)], declared[known], residual)
-        best = max(best, (likely, float(tau)))
-    return best[1] ** 2 * common
-
-
-def _deletion_distances(precision: np.ndarray, residual: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:
-    """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
-    blocks = np.where(kept[:, None, None], _blocks(precision, own), np.eye(own))
-    along = (precision @ residual).reshape(-1, own, 1)
-    squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
-    return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
-
-
-def _blocks(matrix: np.ndarray, own: int) -> np.ndarray:
-    """Blocks on the diagonal, ndarray (M, own, own)."""
-    every = np.arange(len(matrix) // own)
-    return matrix.reshape(len(every), own, len(every), own)[every, :, every]
+    far = distance > least * most_by_chance(len(distance), model.rows, settings)
+    return Deviations(rows.residual, distance, gross & (far | ~outside))
 
 
 def entries_of(found: Deviations, campaign: Campaign, held_out: bool) -> list[dict[str, Any]]:

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import lapack, solve_triangular
 
-from elastocal.diagnosis.gross_errors import gross_errors, improbable
+from elastocal.diagnosis.evidence import scale_weights
+from elastocal.diagnosis.gross_errors import beyond_chance, gross_errors, most_by_chance
 from elastocal.diagnosis.linearize import linearized
 from elastocal.fitting.least_squares import evaluated, fit
 from elastocal.fitting.noise_estimation import estimated_noise
@@ -16,7 +18,9 @@ from elastocal.fitting.tolerances import fit_declared
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
+    from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.settings import Settings
+    from elastocal.diagnosis.statistics import WhiteRows
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
@@ -79,7 +83,7 @@ def first_kept(case: Case, settings: Settings) -> Kept:
     few[observations.state[measured_in(observations, measurements, pulling)]] = False
     some = select_states(observations, few)
     about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
-    taken = improbable(linearized(about, some, candidates, settings), settings)
+    taken = improbable(linearized(about, some, candidates, settings))
     # A repeat far from its others is in no average, and stays what the declared model says of it.
     looked_at = measured_in(measurements, some, np.ones(len(some), bool))
     looked_at &= np.isin(measurements.row, without_outlying_repeats(measurements).row)
@@ -93,3 +97,102 @@ def extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
         return np.zeros(len(force), bool)
     far = force > settings.extreme_load * np.quantile(force[force > 0], 0.75)
     return far if far.mean() <= settings.gross_error_share else np.zeros(len(far), bool)
+
+
+def improbable(line: Linearized) -> np.ndarray:
+    """Which observations all candidates together do not explain, ndarray of bool (M,).
+
+    The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those
+    of all candidates and S their mean square sizes. Observations are taken out, the worst first, until what is left agrees;
+    then those come back that it predicts.
+    """
+    rows, settings = line.rows, line.settings
+    observed, own = rows.residual.shape
+    kept = np.ones(observed, bool)
+    sizes = np.sqrt(np.exp(scale_weights(settings)) @ np.array(settings.scales) ** 2)
+    declared = (rows.declared * line.priors[0]).reshape(rows.residual.size, -1)
+    columns = (sizes * rows.candidates.dense()).reshape(rows.residual.size, -1)
+    covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
+    precision, limit = _precision(covariance, declared), most_by_chance(observed, own, settings)
+    while kept.mean() > 1.0 - settings.gross_error_share:
+        distance = _deletion_distances(precision, residual, kept, own)
+        worst = int(np.argmax(distance))
+        if distance[worst] <= limit:
+            break
+        kept[worst] = False
+        precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
+    if not kept.all():
+        covariance = covariance + _pose_error(rows, line.pose_errors_rad, covariance, declared, np.repeat(kept, own))
+    whole = _precision(covariance, declared)
+    while not kept.all():
+        out = np.flatnonzero(np.repeat(~kept, own))
+        distance = _deletion_distances(_without(whole, out), residual, kept, own)
+        variance = np.linalg.inv(whole[np.ix_(out, out)])
+        rest = (variance @ (whole @ residual)[out]).reshape(-1, own, 1)
+        distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(variance, own), rest)).sum(axis=(1, 2)))
+        back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
+        if not back.any():
+            break
+        kept |= back
+    return ~kept
+
+
+def _precision(covariance: np.ndarray, declared: np.ndarray) -> np.ndarray:
+    """Inverse of a covariance to which that of declared columns of unit size is added (Woodbury's identity)."""
+    root = np.linalg.cholesky(covariance)
+    basis, _ = _declared_basis(root, declared)
+    inverse = lapack.dpotri(root, lower=1)[0]
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    beside = solve_triangular(root, basis, lower=True, trans="T")
+    return inverse - beside @ beside.T
+
+
+def _log_likelihood(covariance: np.ndarray, declared: np.ndarray, residual: np.ndarray) -> float:
+    """Logarithm of the density of a residual of zero mean under that sum, but for a constant."""
+    root = np.linalg.cholesky(covariance)
+    basis, log_size = _declared_basis(root, declared)
+    white = solve_triangular(root, residual, lower=True)
+    squares = white @ white - ((basis.T @ white) ** 2).sum()
+    return float(-0.5 * squares - np.log(np.diag(root)).sum() - log_size)
+
+
+def _declared_basis(root: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
+    """Whitened declared columns beside their priors, made orthonormal, (n, P) without the latter; half the log determinant."""
+    white = solve_triangular(root, declared, lower=True)
+    basis, triangle = np.linalg.qr(np.concatenate([white, np.eye(declared.shape[1])]))
+    return basis[: len(declared)], float(np.log(np.abs(np.diag(triangle))).sum())
+
+
+def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """The inverse covariance of the rows without some, in whose place it is zero."""
+    left = precision - precision[:, out] @ np.linalg.solve(precision[np.ix_(out, out)], precision[out])
+    left[out], left[:, out] = 0.0, 0.0
+    return left
+
+
+def _pose_error(
+    rows: WhiteRows, pose_errors_rad: np.ndarray, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray
+) -> np.ndarray:
+    """Covariance of the error common to a pose, at the size that makes the rows known most probable."""
+    residual, own = rows.residual.ravel()[known], rows.residual.shape[1]
+    jacobian, pose = rows.jacobian.reshape(len(known), -1), np.repeat(rows.pose, own)
+    common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
+    best = (-np.inf, 0.0)
+    for tau in pose_errors_rad:
+        likely = _log_likelihood((covariance + tau**2 * common)[np.ix_(known, known)], declared[known], residual)
+        best = max(best, (likely, float(tau)))
+    return best[1] ** 2 * common
+
+
+def _deletion_distances(precision: np.ndarray, residual: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:
+    """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
+    blocks = np.where(kept[:, None, None], _blocks(precision, own), np.eye(own))
+    along = (precision @ residual).reshape(-1, own, 1)
+    squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
+    return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
+
+
+def _blocks(matrix: np.ndarray, own: int) -> np.ndarray:
+    """Blocks on the diagonal, ndarray (M, own, own)."""
+    every = np.arange(len(matrix) // own)
+    return matrix.reshape(len(every), own, len(every), own)[every, :, every]

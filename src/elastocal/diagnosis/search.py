@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from bisect import bisect
 from collections import Counter
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from heapq import nlargest
@@ -74,6 +75,11 @@ class Problem:
         """Logarithm of the prior weight of each size of the pose error, ndarray (T,)."""
         return pose_weights(self.statistics.pose_error_rad, self.settings)
 
+    @cached_property
+    def started(self) -> _Searcher:
+        """A search that has met the declared model and each unit alone."""
+        return _Searcher(self)
+
     def columns_of(self, numbers: Sequence[int], scales: Sequence[float] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Columns of some units of given sizes, (D,), and the prior standard deviation of each, in plausible sizes."""
         columns = [self.units[number].columns for number in numbers]
@@ -126,10 +132,9 @@ def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:
 
     Returns `log_bayes_factors` (number of units,).
     """
-    searcher, prior = _Searcher(problem), problem.prior
-    met = searcher.met
+    met, prior = problem.started.met, problem.prior
     single = [met[(number,)] - prior.log_odds_of([unit]) for number, unit in enumerate(problem.units)]
-    return searcher.measure(()), np.array(single)
+    return problem.started.measured[()], np.array(single)
 
 
 def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
@@ -137,8 +142,7 @@ def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
 
     `known`: keys of the candidates of a good model, from which the search starts, too.
     """
-    searcher = _Searcher(problem)
-    searcher.measure(())
+    searcher = problem.started.copy()
     searcher.start_from_whole_mechanisms()
     searcher.start_from(known)
     searcher.grow()
@@ -192,6 +196,14 @@ class _Searcher:
         self.measured: dict[tuple[int, ...], Model] = {}
         self.extended: set[tuple[int, ...]] = set()
         self.extend(())
+        self.measure(())
+
+    def copy(self) -> _Searcher:
+        """The same, which goes its own way from here."""
+        other = copy(self)
+        other.met, other.sizes, other.measured = self.met.copy(), self.sizes.copy(), self.measured.copy()
+        other.extended = self.extended.copy()
+        return other
 
     def evaluated(self, model: tuple[int, ...], start: Iterable[float]) -> Evaluated:
         """Evidence of a model in full."""

@@ -2,13 +2,12 @@
 
 Measurements y = X beta + W gamma + e, with X the declared model's sensitivities and W those of all candidates, both whitened by
 the noise of the measurements. The measurements of a pose may have an error in common as well: that of the joints when the pose
-was taken, of variance Lambda(tau) = tau^2 I (+ Sigma_q where one approach serves a whole pose), seen through the Jacobian. By
-the matrix inversion lemma (Woodbury's identity [1])
+was taken, of variance tau^2 I, seen through the Jacobian. By the matrix inversion lemma (Woodbury's identity [1])
 
-    Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (Lambda^-1 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
+    Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (I / tau^2 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
 
-so that one pass over the measurements serves every tau. Columns are first made orthogonal to X by a QR decomposition of the
-scaled rows: the condition number of X is not squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X
+so that one pass over the poses serves every tau. Columns are first made orthogonal to X by a QR decomposition of the scaled
+rows: the condition number of X is not squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X
 (X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML [2]).
 
 [1] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
@@ -18,17 +17,153 @@ scaled rows: the condition number of X is not squared. Marginalising beta gives 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.diagnosis.summed import Sums, nothing_left, null_draws_of
 from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
-    from elastocal.diagnosis.summed import WhiteRows
+    from collections.abc import Iterator
+
+    from elastocal.fitting.factored import Factored
+
+# Products of one pose with all columns that are in memory at once.
+_AT_ONCE = 1_000_000
+# Of a square from which another one was taken, less than this share is rounding.
+_INSIDE = 1e-12
+
+
+@dataclass(frozen=True)
+class WhiteRows:
+    """Whitened rows of M observations in some whole poses.
+
+    `declared` (M, rows, P): sensitivities to the declared parameters. `candidates`: sensitivities to the K columns of all
+    candidates, in units of their plausible sizes. `residual` (M, rows). `jacobian` (M, rows, n): with respect to the joints.
+    `pose` (M,) of int: from 0.
+    """
+
+    declared: np.ndarray
+    candidates: Factored
+    residual: np.ndarray
+    jacobian: np.ndarray
+    pose: np.ndarray
+
+    def at(self, seen: np.ndarray) -> WhiteRows:
+        """Those of some whole poses, ndarray of bool (M,), which are numbered anew."""
+        if seen.all():
+            return self
+        pose = np.unique(self.pose[seen], return_inverse=True)[1]
+        return WhiteRows(self.declared[seen], self.candidates.at(seen), self.residual[seen], self.jacobian[seen], pose)
+
+
+@dataclass(frozen=True)
+class Products:
+    """What `statistics_of` makes `Statistics` of, at any size of the pose error, and `null_draws` simulated ones.
+
+    `rows`: of which they are. `beside` (M, rows, P + 1): their declared columns made orthonormal, and the residual. `declared`:
+    P. `gram` (P + K + 1, P + K + 1): Z'Z of Z = [X W y], with the rows of the declared parameters' priors. `freedom`: numbers
+    measured less what the declared model fits. `into_basis` (P, P): turns declared columns into orthonormal ones. `projected`
+    (P, K + 1): what these have in the candidates' columns and the residual. `inside` (K,) of bool: columns of which these leave
+    nothing. `met`: by the sizes of the pose error of which there are statistics, what leads back to the normal equations.
+    """
+
+    rows: WhiteRows
+    beside: np.ndarray
+    declared: int
+    gram: np.ndarray
+    freedom: int
+    into_basis: np.ndarray
+    projected: np.ndarray
+    inside: np.ndarray
+    met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=dict, repr=False)
+
+    @property
+    def without_candidates(self) -> Products:
+        """Of the declared model alone."""
+        kept = np.append(np.arange(self.declared), self.gram.shape[0] - 1)
+        rows = replace(self.rows, candidates=self.rows.candidates.of_columns(np.zeros(len(self.inside), bool)))
+        few: dict[str, Any] = {
+            "met": {},
+            "gram": self.gram[np.ix_(kept, kept)],
+            "projected": self.projected[:, -1:],
+            "inside": self.inside[:0],
+        }
+        return replace(self, rows=rows, **few)
+
+    def by_pose(self) -> Iterator[tuple[np.ndarray, WhiteRows, np.ndarray, np.ndarray]]:
+        """B_p (G, n, P + K + 1) along the principal axes of C_p, and its eigenvalues (G, n), of some poses at a time.
+
+        With which of all rows are theirs, and these, their Jacobian along the same axes.
+        """
+        rows, count = self.rows, self.declared
+        width, joints, poses = self.gram.shape[0], rows.jacobian.shape[2], int(rows.pose.max()) + 1
+        step = max(_AT_ONCE // (width * joints), 1)
+        for start in range(0, poses, step):
+            seen = (rows.pose >= start) & (rows.pose < start + step)
+            part, beside = rows.at(seen), self.beside if poses <= step else self.beside[seen]
+            groups, jacobian = groups_by_size(part.pose), np.empty(part.jacobian.shape)
+            found, values = np.empty((min(step, poses - start), joints, width)), np.empty((min(step, poses - start), joints))
+            for members in groups:
+                mine, flat = part.pose[members[:, 0]], (len(members), members.shape[1] * beside.shape[1], -1)
+                each = part.jacobian[members].reshape(flat)
+                values[mine], axes = np.linalg.eigh(each.transpose(0, 2, 1) @ each)
+                turned = each @ axes
+                jacobian[members] = turned.reshape(*members.shape, *part.jacobian.shape[1:])
+                together = turned.transpose(0, 2, 1) @ beside[members].reshape(flat)
+                found[mine, :, :count], found[mine, :, -1] = together[..., :-1], together[..., -1]
+            found[..., count:-1] = part.candidates.times_by_pose(jacobian, part.pose)
+            found[..., count:] -= found[..., :count] @ self.projected
+            found[..., count:-1][..., self.inside] = 0.0
+            yield seen, replace(part, jacobian=jacobian), found, np.maximum(values, 0.0)
+
+
+def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray) -> Products:
+    """Gather the products of whitened rows.
+
+    `prior_std` (P,): standard deviation of the prior of each declared parameter; wide ones keep the problem well posed.
+    `present` (P,): present value of each less the mean of its prior.
+
+    The declared columns are made orthonormal by QR of the scaled rows, so that no condition number is squared; what candidates
+    have in them is taken off their products by Pythagoras' theorem, which costs 1e-16 of the square of a candidate: nothing
+    beside noise of one. What the declared model fits are its effective degrees of freedom, the trace of its hat matrix [1].
+
+    [1] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
+    """
+    observed, components, count = rows.declared.shape
+    declared = rows.declared.reshape(observed * components, count)
+    scaled = np.concatenate([declared, np.diag(1.0 / prior_std)])
+    norms = np.linalg.norm(scaled, axis=0)
+    basis, triangle = np.linalg.qr(scaled / norms)
+    seen = basis[: len(declared)]
+    residual = np.concatenate([rows.residual.ravel(), -present / prior_std])
+    beside = np.concatenate([seen, rows.residual.reshape(-1, 1)], axis=1).reshape(observed, components, count + 1)
+    products = rows.candidates.times(beside)
+    projected = np.concatenate([products[:, :-1].T, (basis.T @ residual)[:, None]], axis=1)
+    left = residual - basis @ projected[:, -1]
+    left -= basis @ (basis.T @ left)
+    gram, squares = np.eye(projected.shape[1] + count), rows.candidates.gram()
+    own, along = gram[count:-1, count:-1], products[:, -1] - projected[:, :-1].T @ projected[:, -1]
+    np.subtract(squares, projected[:, :-1].T @ projected[:, :-1], out=own)
+    inside = np.diag(own) <= _INSIDE * np.diag(squares)
+    own[inside], own[:, inside], along[inside] = 0.0, 0.0, 0.0
+    gram[count:-1, -1] = gram[-1, count:-1] = along
+    gram[-1, -1] = left @ left
+    freedom = max(round(len(declared) - (seen**2).sum()), 1)
+    into_basis = np.linalg.inv(triangle) / norms[:, None]
+    return Products(rows, beside, count, gram, freedom, into_basis, projected, inside)
+
+
+def rows_alike(products: Products, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Whitened rows at other states in the parameters of some products.
+
+    `declared` (..., P). `candidates` (..., U): sensitivities to some of the candidates, in units of their plausible sizes.
+    `columns` (U,) of int: which of them. Returns (..., P + U).
+    """
+    basis = declared @ products.into_basis
+    return np.concatenate([basis, candidates - basis @ products.projected[:, columns]], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -56,195 +191,86 @@ class Statistics:
         return int(np.argmin(np.abs(self.pose_error_rad - pose_error_rad)))
 
 
-@dataclass(frozen=True)
-class Products:
-    """What one pass over the measurements gathers; `statistics_of` makes `Statistics` of it, `null_draws` simulated ones.
-
-    `declared`: P, columns of the declared model; orthonormal. `gram` (P + K + 1, P + K + 1): Z'Z of Z = [X W y]. `pose_rows`
-    (G, n, P + K + 1): B_p of each of G poses. `pose_gram` (G, n, n): C_p. `joint_rad` (n,): repeatability of the joints, where
-    the measurements of a pose share one approach; else zero. `rows`: of which they are. `freedom`: measurements' components
-    less what the declared model fits. `into_basis` (P, P): turns declared columns into orthonormal ones. `projected` (P, K +
-    1): what the orthonormal columns have in those of the candidates and the residual.
-    """
-
-    declared: int
-    gram: np.ndarray
-    pose_rows: np.ndarray
-    pose_gram: np.ndarray
-    joint_rad: np.ndarray
-    rows: WhiteRows
-    freedom: int
-    into_basis: np.ndarray
-    projected: np.ndarray
-
-    @property
-    def without_candidates(self) -> Products:
-        """Of the declared model alone."""
-        kept = np.append(np.arange(self.declared), self.gram.shape[0] - 1)
-        return replace(
-            self, gram=self.gram[np.ix_(kept, kept)], pose_rows=self.pose_rows[..., kept], projected=self.projected[:, -1:]
-        )
+def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
+    """Sufficient statistics at some sizes of the pose error (T,)."""
+    count, (totals, log_dets) = products.declared, _at(products, pose_error_rad)
+    factors = np.linalg.cholesky(totals[:, :count, :count])
+    for tau, total, factor, log_det in zip(pose_error_rad, totals, factors, log_dets, strict=True):
+        taken = solve_triangular(factor, total[:count, count:], lower=True)
+        total[count:, count:] -= taken.T @ taken
+        products.met[float(tau)] = factor, taken, total[count:, count:], float(log_det)
+    rest = totals[:, count:, count:]
+    logs = -0.5 * log_dets - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+    sizes = np.asarray(pose_error_rad)
+    return Statistics(sizes, rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom)
 
 
-def rows_alike(products: Products | Sums, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Whitened rows at other states in the parameters of some products.
-
-    `declared` (..., P). `candidates` (..., U): sensitivities to some of the candidates, in units of their plausible sizes.
-    `columns` (U,) of int: which of them. Returns (..., P + U).
-    """
-    basis = declared @ products.into_basis
-    return np.concatenate([basis, candidates - basis @ products.projected[:, columns]], axis=-1)
-
-
-def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray, joint_rad: np.ndarray) -> Products:
-    """Gather the products of whitened rows.
-
-    `prior_std` (P,): standard deviation of the prior of each declared parameter; wide ones keep the problem well posed.
-    `present` (P,): present value of each less the mean of its prior. `joint_rad` (n,): as in `Products`.
-
-    The declared columns are made orthonormal by QR of the scaled rows, so that no condition number is squared; what candidates
-    have in them is taken off their products by Pythagoras' theorem, which costs 1e-16 of the square of a candidate: nothing
-    beside noise of one. What the declared model fits are its effective degrees of freedom, the trace of its hat matrix [1].
-
-    [1] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
-    """
-    observed, components, count = rows.declared.shape
-    declared = rows.declared.reshape(observed * components, count)
-    scaled = np.concatenate([declared, np.diag(1.0 / prior_std)])
-    norms = np.linalg.norm(scaled, axis=0)
-    basis, triangle = np.linalg.qr(scaled / norms)
-    seen = basis[: len(declared)]
-    residual = np.concatenate([rows.residual.ravel(), -present / prior_std])
-    beside = np.concatenate([seen, rows.residual.reshape(-1, 1)], axis=1).reshape(observed, components, count + 1)
-    products = rows.candidates.times(beside)
-    projected = np.concatenate([products[:, :-1].T, (basis.T @ residual)[:, None]], axis=1)
-    left = residual - basis @ projected[:, -1]
-    left -= basis @ (basis.T @ left)
-    width = projected.shape[1] + count
-    gram, squares = np.eye(width), rows.candidates.gram()
-    own, along = gram[count:-1, count:-1], products[:, -1] - projected[:, :-1].T @ projected[:, -1]
-    np.subtract(squares, projected[:, :-1].T @ projected[:, :-1], out=own)
-    inside = nothing_left(squares, own)
-    own[inside], own[:, inside], along[inside] = 0.0, 0.0, 0.0
-    gram[count:-1, -1] = gram[-1, count:-1] = along
-    gram[-1, -1] = left @ left
-    pose_rows, pose_gram = rows.products_by_pose(beside)
-    pose_rows[..., count:] -= pose_rows[..., :count] @ projected
-    pose_rows[..., count:-1][..., inside] = 0.0
-    freedom = max(round(len(declared) - (seen**2).sum()), 1)
-    into_basis = np.linalg.inv(triangle) / norms[:, None]
-    return Products(count, gram, pose_rows, pose_gram, joint_rad, rows, freedom, into_basis, projected)
+def normal_equations(products: Products, tau: float) -> tuple[np.ndarray, float]:
+    """Z'Sigma(tau)^-1 Z, (P + K + 1, P + K + 1), and ln |Sigma| beyond that of white noise."""
+    if tau not in products.met:
+        statistics_of(products, np.array([tau]))
+    factor, taken, rest, log_det = products.met[tau]
+    across = factor @ taken
+    return np.block([[factor @ factor.T, across], [across.T, rest + taken.T @ taken]]), log_det
 
 
-def statistics_of(products: Products | Sums, pose_error_rad: np.ndarray) -> Statistics:
-    """Sufficient statistics at some sizes of the pose error.
-
-    `pose_error_rad` (T,).
-    """
-    declared = products.declared
-    count = products.gram.shape[0] - declared
-    rest, logs = np.empty((len(pose_error_rad), count, count)), np.empty(len(pose_error_rad))
-    for number, tau in enumerate(pose_error_rad):
-        if isinstance(products, Sums):
-            total, log_det = normal_equations(products, tau)
-            known, rows = total[:declared], np.zeros((0, len(total)))
-        else:
-            total = products.gram
-            rows, log_det = _pose_factor(products, tau)
-            known = total[:declared] - rows[:, :declared].T @ rows
-        factor = np.linalg.cholesky(known[:, :declared])
-        # The Schur complement of the declared columns, and what the pose error takes, at once.
-        taken = np.concatenate([rows[:, declared:], solve_triangular(factor, known[:, declared:], lower=True)])
-        np.matmul(taken.T, taken, out=rest[number])
-        np.subtract(total[declared:, declared:], rest[number], out=rest[number])
-        logs[number] = -0.5 * log_det - np.log(np.diag(factor)).sum()
-    return Statistics(np.asarray(pose_error_rad), rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom)
-
-
-def normal_equations(products: Products | Sums, tau: float) -> tuple[np.ndarray, float]:
-    """Z'Sigma(tau)^-1 Z, and ln |Sigma| beyond that of white noise.
-
-    `tau`: rad; of sums, the nearest of their sizes counts. Returns (P + K + 1, P + K + 1).
-    """
-    if isinstance(products, Sums):
-        place = int(np.argmin(np.abs(products.pose_error_rad - tau)))
-        return products.totals[place], products.log_dets[place]
-    rows, log_det = _pose_factor(products, tau)
-    return (products.gram - rows.T @ rows if len(rows) else products.gram), log_det
+def _at(products: Products, pose_error_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Z'Sigma(tau)^-1 Z (T, P + K + 1, P + K + 1), and ln |Sigma| beyond that of white noise (T,)."""
+    totals, log_dets = np.tile(products.gram, (len(pose_error_rad), 1, 1)), np.zeros(len(pose_error_rad))
+    for _, _, rows, values in products.by_pose() if np.any(pose_error_rad) else ():
+        for number, tau in enumerate(pose_error_rad):
+            if tau:
+                taken = (rows * (tau / np.sqrt(1.0 + tau**2 * values))[..., None]).reshape(-1, rows.shape[2])
+                totals[number] -= taken.T @ taken
+                log_dets[number] += np.log1p(tau**2 * values).sum()
+    return totals, log_dets
 
 
 def null_draws(
-    products: Products | Sums, tau: float, pose_error_rad: np.ndarray, count: int, stream: np.random.Generator
+    products: Products, tau: float, pose_error_rad: np.ndarray, count: int, stream: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Statistics of simulated measurements of the declared model, in which nothing is missing.
+    """Statistics of simulated measurements of the declared model, in which nothing is missing: a parametric bootstrap [1].
 
-    A parametric bootstrap [1]; of sums, which have no measurements any more, of the statistics themselves.
-
-    `tau`: pose error with which to simulate, rad. `pose_error_rad` (T,): at which the statistics are wanted; of sums, that with
-    which they are simulated alone. Returns `along` (T, K, N); `squares` (T, N): as in `Statistics`, for N draws of unit
-    variance.
+    `tau`: pose error with which to simulate, rad. `pose_error_rad` (T,): at which the statistics are wanted. Returns `along`
+    (T, K, N); `squares` (T, N): as in `Statistics`, for N draws of unit variance.
 
     [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press,
         1997.
     """
-    if isinstance(products, Sums):
-        gram = statistics_of(products, np.array([tau])).gram[0]
-        along, squares = null_draws_of(products, gram, count, stream)
-        return along[None], squares[None]
-    rows, (poses, joints, width) = products.rows, products.pose_rows.shape
-    flat = products.pose_rows.reshape(poses * joints, width)[:, :-1]
+    rows, declared = products.rows, products.declared
+    joints, sizes = rows.jacobian.shape[2], np.asarray(pose_error_rad)
     white = stream.standard_normal((*rows.residual.shape, count))
-    fitted = np.tensordot(rows.declared @ products.into_basis, white, ((0, 1), (0, 1)))
+    fitted = np.tensordot(products.beside[..., :-1], white, ((0, 1), (0, 1)))
     along = np.concatenate([fitted, rows.candidates.times(white) - products.projected[:, :-1].T @ fitted])
-    seen = np.empty((poses, joints, count))
-    for members in groups_by_size(rows.pose):
-        turned = rows.jacobian[members].reshape(len(members), -1, joints).transpose(0, 2, 1)
-        seen[rows.pose[members[:, 0]]] = turned @ white[members].reshape(len(members), -1, count)
     squares = (white**2).sum(axis=(0, 1))
-    deviation = _joint_deviations(products, tau)
-    if deviation.any():
-        common = deviation[:, None] * stream.standard_normal((poses, joints, count))
-        moved = products.pose_gram @ common
-        squares += (common * (2 * seen + moved)).sum(axis=(0, 1))
-        along += flat.T @ common.reshape(-1, count)
-        seen += moved
-    found_along = np.empty((len(pose_error_rad), flat.shape[1] - products.declared, count))
-    found_squares = np.empty((len(pose_error_rad), count))
-    for number, size_rad in enumerate(pose_error_rad):
-        these, left = along, squares
-        if _joint_deviations(products, size_rad).any():
-            solved = _pose_inverse(products, size_rad) @ seen
-            these = along - flat.T @ solved.reshape(-1, count)
-            left = squares - (seen * solved).sum(axis=(0, 1))
-        factor_rows, _ = _pose_factor(products, size_rad)
-        total = products.gram[: products.declared, :-1] - factor_rows[:, : products.declared].T @ factor_rows[:, :-1]
-        factor = np.linalg.cholesky(total[:, : products.declared])
-        fitted = solve_triangular(factor, these[: products.declared], lower=True)
-        cross = solve_triangular(factor, total[:, products.declared :], lower=True)
-        np.subtract(these[products.declared :], cross.T @ fitted, out=found_along[number])
-        found_squares[number] = left - (fitted**2).sum(axis=0)
+    known, taken = np.tile(products.gram[:declared, :-1], (len(sizes), 1, 1)), np.zeros((len(sizes), *along.shape))
+    off = np.zeros((len(sizes), count))
+    for chosen, part, each, values in products.by_pose():
+        flat, values, drawn = each.reshape(-1, each.shape[2])[:, :-1], values.reshape(-1, 1), white[chosen]
+        by_pose = np.empty((len(each), joints, count))
+        for members in groups_by_size(part.pose):
+            turned = part.jacobian[members].reshape(len(members), -1, joints).transpose(0, 2, 1)
+            by_pose[part.pose[members[:, 0]]] = turned @ drawn[members].reshape(len(members), -1, count)
+        seen = by_pose.reshape(-1, count)
+        if tau:
+            # Along the principal axes of a pose the errors of its joints are as independent as they are themselves.
+            common = tau * stream.standard_normal(seen.shape)
+            squares += (common * (2 * seen + values * common)).sum(axis=0)
+            along += flat.T @ common
+            seen += values * common
+        for number, size in enumerate(sizes):
+            if size:
+                share = size**2 / (1.0 + size**2 * values)
+                solved = share * seen
+                taken[number] += flat.T @ solved
+                off[number] += (seen * solved).sum(axis=0)
+                known[number] -= flat[:, :declared].T @ (share * flat)
+    found_along, found_squares = np.empty((len(sizes), len(along) - declared, count)), squares - off
+    for number, total in enumerate(known):
+        these = along - taken[number]
+        factor = np.linalg.cholesky(total[:, :declared])
+        fitted = solve_triangular(factor, these[:declared], lower=True)
+        cross = solve_triangular(factor, total[:, declared:], lower=True)
+        np.subtract(these[declared:], cross.T @ fitted, out=found_along[number])
+        found_squares[number] -= (fitted**2).sum(axis=0)
     return found_along, found_squares
-
-
-def _joint_deviations(products: Products, tau: float) -> np.ndarray:
-    return np.sqrt(tau**2 + products.joint_rad**2)
-
-
-def _pose_inverse(products: Products, tau: float) -> np.ndarray:
-    """(Lambda^-1 + C_p)^-1 = Lambda^1/2 (I + Lambda^1/2 C_p Lambda^1/2)^-1 Lambda^1/2, ndarray (G, n, n)."""
-    deviation = _joint_deviations(products, tau)
-    inner = np.eye(len(deviation)) + deviation[:, None] * products.pose_gram * deviation
-    return deviation[:, None] * np.linalg.inv(inner) * deviation
-
-
-def _pose_factor(products: Products, tau: float) -> tuple[np.ndarray, float]:
-    """Rows whose squares are what the pose error takes from Z'Z, and ln |Sigma| beyond that of white noise."""
-    deviation = _joint_deviations(products, tau)
-    width = products.pose_rows.shape[2]
-    if not deviation.any():
-        return np.zeros((0, width)), 0.0
-    inner = np.eye(len(deviation)) + deviation[:, None] * products.pose_gram * deviation
-    factor = np.linalg.cholesky(inner)
-    rows = np.linalg.solve(factor, deviation[:, None] * products.pose_rows)
-    log_det = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()
-    return rows.reshape(-1, width), float(log_det)

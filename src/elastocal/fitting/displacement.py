@@ -1,4 +1,4 @@
-"""Where the robot yields to under its loads and effects, as coordinates of its sites."""
+"""Where the robot yields to under its loads and effects, as coordinates of its sites; and of how many states that is kept."""
 
 from __future__ import annotations
 
@@ -15,11 +15,19 @@ if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.fitting.observations import States
+    from elastocal.fitting.observations import Observations, States
 
 # Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by deflection over reach, some 1 / 500 at
 # 3 kN, from ten micrometres at the commanded pose.
 _PASSES = 2
+# Values of sensitivities that a fit holds at once, of which there are five copies: observations beyond come in parts, which are
+# linearised again in each step.
+_MOST_HELD = 4_000_000
+# Observations of a part: what it makes stays in the processor's cache and is not asked of the system again and again.
+_MOST_AT_ONCE = 4000
+# States beyond which conditions are not kept from step to step, and with a fit, but found again: they take some ten kilobytes
+# each, and there is one fit after another.
+_MOST_STATES, _MOST_STATES_OF_A_FIT = 20_000, 2_000
 
 
 def conditions(model: Model, estimate: Estimate, states: States, coordinates: np.ndarray | None = None) -> Conditions:
@@ -110,3 +118,23 @@ def _fixed(effect: Candidate, around: Conditions) -> dict[int, tuple[np.ndarray,
         found = {c: (some, np.array([laws[number][c] for number in some])) for c, some in numbers.items()}
         around.of_angles[effect.key] = found
     return around.of_angles[effect.key]
+
+
+def observations_at_once(rows: int, columns: int) -> int:
+    """How many observations are linearised at once; what a linearisation makes beside parameters is as 60 of them."""
+    return max(min(_MOST_HELD // (rows * max(columns, 60)), _MOST_AT_ONCE), 1)
+
+
+def held_at_once(observations: Observations, columns: int) -> bool:
+    """Whether the sensitivities of all observations to so many parameters are held at once."""
+    return observations.rows * len(observations) * max(columns, 60) <= _MOST_HELD
+
+
+def keeps_conditions(observations: Observations) -> bool:
+    """Whether the conditions of all states stay with a fit."""
+    return len(observations.states) <= min(_MOST_STATES, _MOST_STATES_OF_A_FIT)
+
+
+def kept_conditions(model: Model, estimate: Estimate, observations: Observations) -> Conditions | None:
+    """Conditions of all states, or None where these are too many to keep them."""
+    return conditions(model, estimate, observations.states) if len(observations.states) <= _MOST_STATES else None

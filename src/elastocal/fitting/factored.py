@@ -13,7 +13,7 @@ they have in common times the rounding of one, as differences of squares do: 1e-
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -24,11 +24,13 @@ from scipy.sparse import csr_array
 from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
 
 # Entries of a coordinate that make a product of their own worth its call.
 _MANY_ENTRIES = 16
+# Numbers of products by state that are in memory at once.
+_AT_ONCE = 1_500_000
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,12 @@ class Displacements:
         for place, (_, coordinate, column) in zip(values, entries, strict=True):
             np.multiply(laws[column][coordinate], sizes[column], out=place)
         return cls(len(laws), values, *np.array(entries, int).reshape(-1, 3).T[1:])
+
+    def of_columns(self, kept: np.ndarray) -> Displacements:
+        """The same of some of the columns, ndarray of bool (K,), which are numbered anew."""
+        mine = kept[self.column]
+        column = (np.cumsum(kept) - 1)[self.column[mine]]
+        return Displacements(int(kept.sum()), self.values[mine], self.coordinate[mine], column)
 
     @cached_property
     def spans(self) -> list[tuple[int, slice]]:
@@ -91,6 +99,16 @@ class Factored:
         """K."""
         return self.displacements.columns
 
+    def of_columns(self, kept: np.ndarray) -> Factored:
+        """The same of some of the columns, ndarray of bool (K,)."""
+        return replace(self, displacements=self.displacements.of_columns(kept))
+
+    def at(self, seen: np.ndarray) -> Factored:
+        """The same of some of the observations, ndarray of bool (M,), whose states are numbered anew."""
+        states, state = np.unique(self.state[seen], return_inverse=True)
+        displacements = replace(self.displacements, values=self.displacements.values[:, states])
+        return Factored(displacements, self.jacobian[seen], state)
+
     @cached_property
     def _by_state(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """For each number of observations in a state, these and their rows for the coordinates used, (G, k rows, C')."""
@@ -112,10 +130,23 @@ class Factored:
 
     def gram(self) -> np.ndarray:
         """Products of the columns with each other, ndarray (K, K)."""
-        return self.folded_gram(self.gram_of_entries())
+        fold = self.displacements.folded
+        entries = np.zeros((len(self.displacements.values),) * 2)
+        for _, part in self._parts(len(self.displacements.spans)):
+            entries += part._gram_of_entries()
+        return fold(fold(entries).T)
 
-    def gram_of_entries(self) -> np.ndarray:
-        """The same of the entries, ndarray (E, E): what adds up over parts of the measurements before it is folded."""
+    def _parts(self, width: int) -> Iterator[tuple[np.ndarray | slice, Factored]]:
+        """Some states at a time, whose products with so many other columns take no more memory than is given to them."""
+        step, states = max(_AT_ONCE // max(len(self.displacements.spans) * width, 1), 1), self.displacements.values.shape[1]
+        if states <= step:
+            yield slice(None), self
+            return
+        for start in range(0, states, step):
+            seen = (self.state >= start) & (self.state < start + step)
+            yield seen, self.at(seen)
+
+    def _gram_of_entries(self) -> np.ndarray:
         values, spans = self.displacements.values, self.displacements.spans
         pairs = np.ascontiguousarray(self._products_by_state().transpose(0, 2, 1))
         place = np.repeat(np.arange(len(spans)), [span.stop - span.start for _, span in spans])
@@ -131,20 +162,16 @@ class Factored:
             found[span.start :, span] = found[span, span.start :].T
         return found
 
-    def folded_gram(self, gram_of_entries: np.ndarray) -> np.ndarray:
-        """Products of columns from those of entries, ndarray (K, K)."""
-        fold = self.displacements.folded
-        return fold(fold(gram_of_entries).T)
-
     def times(self, right: np.ndarray) -> np.ndarray:
         """Products of the columns with other rows.
 
         `right` (M, rows, q). Returns (K, q).
         """
-        values, seen = self.displacements.values, self._products_by_state(right)
-        found = np.empty((len(values), right.shape[2]))
-        for number, (_, span) in enumerate(self.displacements.spans):
-            np.matmul(values[span], seen[number], out=found[span])
+        found = np.zeros((len(self.displacements.values), right.shape[2]))
+        for chosen, part in self._parts(right.shape[2]):
+            seen = part._products_by_state(right[chosen])
+            for number, (_, span) in enumerate(self.displacements.spans):
+                found[span] += part.displacements.values[span] @ seen[number]
         return self.displacements.folded(found)
 
     def times_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import at_states
-from elastocal.fitting.displacement import conditions
+from elastocal.fitting.displacement import conditions, observations_at_once
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import part_at, parts_of
 from elastocal.fitting.parameters import parameters

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.campaign import NOT_TURNED
-from elastocal.fitting.memory import kept_conditions
+from elastocal.fitting.displacement import kept_conditions
 from elastocal.fitting.observations import sample_of
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.registration import registered

@@ -58,9 +58,21 @@ class Linearization:
     @cached_property
     def sensitivities(self) -> np.ndarray:
         """With respect to `parameters`, ndarray (M, rows, P)."""
-        found = Factored(self.displacements, self.coordinate_jacobian, self.state).dense()
-        found[..., self.of_targets] = self.target_columns
+        return self.sensitivities_to(np.ones(self.displacements.columns, bool))
+
+    def sensitivities_to(self, kept: np.ndarray) -> np.ndarray:
+        """With respect to some of the parameters, ndarray of bool (P,)."""
+        found = Factored(self.displacements.of_columns(kept), self.coordinate_jacobian, self.state).dense()
+        mine = kept[self.of_targets]
+        found[..., (np.cumsum(kept) - 1)[self.of_targets[mine]]] = self.target_columns[..., mine]
         return found
+
+    def moved_by(self, values: np.ndarray) -> np.ndarray:
+        """By how much predictions move where parameters grow by some values (P,), those of targets left out; (M, rows)."""
+        displacements = self.displacements
+        moved = np.zeros((self.coordinate_jacobian.shape[2], displacements.values.shape[1]))
+        np.add.at(moved, displacements.coordinate, values[displacements.column, None] * displacements.values)
+        return (self.coordinate_jacobian @ moved.T[self.state, :, None])[..., 0]
 
 
 def linearize(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> Linearization:

@@ -8,11 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import at_states, with_springs
-from elastocal.fitting.displacement import conditions, displaced_coordinates, joint_compliances, mass_corrections
+from elastocal.fitting.displacement import (
+    conditions,
+    displaced_coordinates,
+    held_at_once,
+    joint_compliances,
+    keeps_conditions,
+    kept_conditions,
+    mass_corrections,
+    observations_at_once,
+)
 from elastocal.fitting.factored import Factored
 from elastocal.fitting.fit_result import Fit
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.memory import held_at_once, keeps_conditions, kept_conditions, observations_at_once
 from elastocal.fitting.observations import part_at, parts_of
 from elastocal.fitting.prediction import residuals
 from elastocal.fitting.whitening import joined, whitening

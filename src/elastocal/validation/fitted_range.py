@@ -9,9 +9,8 @@ from scipy.linalg import blas
 
 from elastocal.campaigns.joint_space import beyond_range, find_repeated
 from elastocal.counting import counted
-from elastocal.fitting.displacement import conditions
+from elastocal.fitting.displacement import conditions, observations_at_once
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.observations import part_at, parts_of, state_clusters
 from elastocal.validation.placing import carried_over, placed, same_campaign
 

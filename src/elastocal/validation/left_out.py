@@ -24,9 +24,9 @@ import numpy as np
 
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
+from elastocal.fitting.displacement import kept_conditions
 from elastocal.fitting.identifiability import solve_normal
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
-from elastocal.fitting.memory import kept_conditions
 from elastocal.fitting.observations import select_states, state_clusters
 from elastocal.fitting.parameters import nonlinear_parameters, parameter_values, stepped
 from elastocal.fitting.registration import registered
