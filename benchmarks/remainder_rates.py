@@ -1,8 +1,8 @@
 """How often a regression on the remainder is used, what it gains, and how often something repeatable is said to remain.
 
 Simulated campaigns of the KUKA: all of its geometry declared, one target of unknown place, a tracker of 50 µm, 20 µrad of pose
-error in each joint; and a deviation of joint 2 or 3 by two joints' angles at once, which no catalogue has, of some size or none.
-`python benchmarks/remainder_rates.py POSES CAMPAIGNS SIZE...` prints a row for each size in rad, with `--check` of the test alone.
+error in each joint; and a deviation of joint 2 or 3 by two joints' angles at once, which no catalogue has.
+`python benchmarks/remainder_rates.py POSES CAMPAIGNS SIZE...` prints a row for each size in rad; `--check` of the test alone.
 """
 
 import argparse
