@@ -81,12 +81,8 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case, beyond: np.nd
     `fitted`: to the training poses. `case`: of the training poses. `beyond` (P,) of bool: held-out poses outside the range of
     those fitted, as of `fitted_range.outside_poses`.
     """
-    seen, there, elsewhere = case.observations, held_out.observations, not same_campaign(case, held_out)
-    model, estimate = placed(fitted, case, held_out)
-    among = [each for name, each in regressions().items() if plan.regression in (name, BEST_REMAINDER)]
-    folds = _folds(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
-    inputs, left = inputs_of(fitted.model, fitted.estimate, seen, elsewhere), fitted.residual[:, :3]
-    found = tuned(among, folds, inputs, left, plan.seed)
+    there, elsewhere = held_out.observations, not same_campaign(case, held_out)
+    (model, estimate), found = placed(fitted, case, held_out), chosen(plan, fitted, case.observations, elsewhere)
     prediction, outside = found.predictor(inputs_of(model, estimate, there, elsewhere)), beyond[there.cluster]
     mean = np.where(outside[:, None] & plan.within_range, 0.0, prediction.mean)
     if elsewhere:
@@ -95,6 +91,17 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case, beyond: np.nd
         known = replace(fitted, model=model, estimate=estimate)
         estimate = fit_frames(known, model, replace(there, position=moved))
     return Corrected(position_residuals(model, estimate, there) - mean, prediction.std, outside, found)
+
+
+def chosen(plan: Plan, fitted: Fit, seen: Observations, elsewhere: bool) -> Tuned:
+    """The regression on what a model leaves of the observations that it was fitted to, or none.
+
+    `elsewhere`: as of `inputs_of`.
+    """
+    among = [each for name, each in regressions().items() if plan.regression in (name, BEST_REMAINDER)]
+    folds = _folds(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
+    inputs = inputs_of(fitted.model, fitted.estimate, seen, elsewhere)
+    return tuned(among, folds, inputs, fitted.residual[:, :3], plan.seed)
 
 
 def _folds(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Folds:
