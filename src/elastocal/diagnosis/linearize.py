@@ -64,7 +64,8 @@ class Linearized:
 
     `about`: of the declared model, or with effects found already, about which the problem is then linear. `around`: of the
     states looked at. `tried`: candidates that can be tested at all, each with values of its shape. `lacking`: why not others.
-    `candidates`: keys of all: parameters of the fit that they own are coefficients of units here. `against`: laws of the competitor.
+    `candidates`: keys of all: parameters of the fit that they own are coefficients of units here. `against`: laws
+    of the competitor.
     """
 
     about: Fit

@@ -96,7 +96,7 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
             for k in range(_FOLDS):
                 rows = functions[fold[mine] == k].reshape(-1, functions.shape[2]).T
                 gram[k] += rows @ rows.T
-                across[k] += rows @ (w * plain[:, :3])[fold[mine] == k].reshape(-1, parameters)
+                across[k] += rows @ (w * plain[:, :3])[fold[mine] == k].reshape(rows.shape[1], parameters)
     # A configuration that the fit follows has errors larger than its residuals.
     free = np.maximum(1.0 - leverage / np.bincount(group), 1.0 / count)
     signs = draws.choice([-1.0, 1.0], (_DRAWS, count)) / np.sqrt(free)
