@@ -325,16 +325,18 @@ class Joint:
     def moments(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Mean and variance of the coefficients of each unit, averaged over its sizes and tau; list of two ndarray (d,)."""
         found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        for numbers, density, means, variances in self._over_sizes():
+        for numbers, density, coefficients, noise in self._over_sizes():
             weights = np.exp(density[1:] - log_sum_exp(density[1:], axis=(0, 1)))[..., None]
+            means, variances = _turned_back(*coefficients)
+            variances *= noise[..., None]
             centers = (weights * means).sum(axis=(0, 1))
             spreads = (weights * (variances + (means - centers) ** 2)).sum(axis=(0, 1))
             found |= dict(zip(numbers.tolist(), zip(centers, spreads, strict=True), strict=True))
         return [found[number] for number in range(len(self.units))]
 
-    def _over_sizes(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    def _over_sizes(self) -> Iterator[tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray], np.ndarray]]:
         """What the u units of one width d say at every size, the others at theirs: numbers; log density (1 + S, T, u), for
-        size zero first; mean and variance (S, T, u, d) of their coefficients."""
+        size zero first; their coefficients, as `_turned_back` takes them; variance (S, T, u) of the noise."""
         widths, sizes = np.diff(self.starts), np.concatenate([[0.0], self.grid.scales**2])[:, None, None, None]
         for width in np.unique(widths):
             numbers = np.flatnonzero(widths == width)
@@ -350,16 +352,20 @@ class Joint:
             left = squares - (sizes * turned**2 / widened).sum(axis=-1)
             density = self.base[:, None] - 0.5 * (log_det + np.log(widened).sum(axis=-1)) + log_likelihood(left, self.freedom)
             density += (self.sign_factors.sum(axis=0) - self.sign_factors[numbers]).T
-            means = (vectors @ (sizes * turned / widened)[1:, ..., None])[..., 0]
-            variances = (vectors**2 @ (sizes / widened)[1:, ..., None])[..., 0]
+            along, widths_left = (sizes * turned / widened)[1:], (sizes / widened)[1:]
             for place, number in enumerate(numbers.tolist()):
                 signs = self.units[number].signs
                 if signs.any():
-                    seen = means[:, :, place], variances[:, :, place], signs, left[1:, :, place]
-                    density[1:, :, place] += _log_sign_factor(*seen, self.freedom)
+                    seen = _turned_back(vectors[:, place], along[:, :, place], widths_left[:, :, place])
+                    density[1:, :, place] += _log_sign_factor(*seen, signs, left[1:, :, place], self.freedom)
             density[1:] += self.weights[numbers].T[:, None]
             density += self.log_weights.sum() - self.log_weights[numbers]
-            yield numbers, density, means, variances * np.maximum(left[1:] / self.freedom, 1.0)[..., None]
+            yield numbers, density, (vectors, along, widths_left), np.maximum(left[1:] / self.freedom, 1.0)
+
+
+def _turned_back(vectors: np.ndarray, mean: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variance (S, ..., d) of coefficients, from those along eigenvectors (..., d, d)."""
+    return (vectors @ mean[..., None])[..., 0], (vectors**2 @ variance[..., None])[..., 0]
 
 
 def _log_sign_factor(
