@@ -88,10 +88,10 @@ def table_schemas(module: str) -> list[TableSchema]:
     package = import_module(module)
     if hasattr(package, "__path__"):
         names = sorted(each.name for each in iter_modules(package.__path__, f"{module}."))
-        return [schema for name in names for schema in table_schemas(name)]
+        return [*{schema.name: schema for name in names for schema in table_schemas(name)}.values()]
     found = []
     for name, thing in vars(package).items():
-        if isinstance(thing, TableSchema) and thing.name.upper() == name:
+        if isinstance(thing, TableSchema):
             found.append(thing)
         elif isfunction(thing) and thing.__module__ == module and not name.startswith("_"):
             made_of = list(signature(thing).parameters), thing.__annotations__.get("return")

@@ -101,6 +101,8 @@ def test_the_length_is_where_the_curve_crosses_the_accuracy():
     assert configurations_needed(squares, 60.0) == pytest.approx(25.0)
     assert configurations_needed(squares, 59.0) == pytest.approx((300 / 59) ** 2, rel=1e-3)
     assert configurations_needed(squares, 1.0) == np.inf and configurations_needed(squares, 400.0) == 1.0
+    # From no estimate at all to one that is better: the first that there is.
+    assert configurations_needed(np.array([np.nan, 50.0**2, 40.0**2]), 60.0) == pytest.approx(2.0)
 
 
 def test_a_set_pays_from_the_cost_on_at_which_both_cost_the_same(weights):

@@ -188,4 +188,7 @@ def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
     for each, loaded in (line.split(" ", 1) for line in done.stdout.splitlines()):
         script, _, step = each.partition(":")
         found = closure(unstarted.path("workflow/scripts") / script, unstarted.path("src"), *([step] if step else []))
-        assert [file.relative_to(unstarted.folder).as_posix() for file in found] == json.loads(loaded), each
+        names = [file.relative_to(unstarted.folder).as_posix() for file in found]
+        # Steps load what reads tables into frames when they are called.
+        later = {"src/elastocal/io/data_frames.py"} if step else set()
+        assert sorted({*json.loads(loaded)} | (later & {*names})) == names, each

@@ -60,6 +60,10 @@ def table_of(name, category, caption=None, shows=None):
     return shown(file, caption, category, shows=shows, kind="table") if caption else file
 
 
+# Tables of the study: of each rule the module of its step, inputs, outputs and parameters; tables.smk makes the rules.
+STUDY_TABLES = {}
+REFERENCE = {"reference": f"{CONFIG}/paper/reference.csv"}
+
 # What Snakemake and we have imported by now stays to the end; to look through it for garbage, again and again while the jobs are
 # laid out, took a fifth of a rerun with nothing to do.
 gc.freeze()
@@ -252,6 +256,10 @@ def study_in_memory(**size):
 def cells(kind, robots, noise, strategies=config["strategies"]):
     """Results of one kind for robots, noise levels and strategies."""
     return expand(f"results/{kind}/{{robot}}/{{noise}}um/{{strategy}}.parquet", robot=robots, noise=noise, strategy=strategies)
+
+
+def all_cells(robots):
+    return {kind: cells(kind, robots, TABLE_NOISE) for kind in ("metrics", "replicates")}
 
 
 def folder_of(campaign):

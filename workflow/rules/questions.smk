@@ -165,33 +165,12 @@ for question, (module, folders, settings) in ASKED.items():
 
 
 for question, (module, given, made, settings) in TABULATED.items():
-    step = f"elastocal.study.{module}.{question}"
     # What links alone have is asked of robots with links.
     of = EXTENDED if question in ("tabulate_ladder", "tabulate_tubes") else REDUCED
-
-    rule:
-        name:
-            question
-        input:
-            **{name: expand(f"results/{folder}/{{robot}}.parquet", robot=of) for name, folder in given.items()},
-            **(
-                {kind: cells(kind, of, TABLE_NOISE) for kind in ("metrics", "replicates")}
-                if question == "tabulate_uses"
-                else {}
-            ),
-            sources=sources(step),
-        output:
-            **{name: table_of(file, ABOUT, *shows) for name, (file, *shows) in made.items()},
-        log:
-            f"results/logs/{question}.log",
-        benchmark:
-            f"results/timings/{question}.tsv"
-        params:
-            **settings,
-            step=step,
-            robots=of,
-        script:
-            "../scripts/run_step.py"
+    given = {name: expand(f"results/{folder}/{{robot}}.parquet", robot=of) for name, folder in given.items()}
+    given |= all_cells(of) if question == "tabulate_uses" else {}
+    made = {name: table_of(file, ABOUT, *shows) for name, (file, *shows) in made.items()}
+    STUDY_TABLES[question] = module, given, made, {"robots": of} | settings
 
 
 rule simulate_designs:

@@ -63,64 +63,37 @@ rule expect:
         "../scripts/run_step.py"
 
 
-rule tabulate_expectations:
-    input:
-        studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
-        expected=cells("expected", REDUCED, TABLE_NOISE),
-        reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("elastocal.study.study_tables.tabulate_expectations"),
-    output:
-        table=table_of("expectations", PAPER, "expectations", "Expectations in closed form"),
-    log:
-        "results/logs/tabulate_expectations.log",
-    benchmark:
-        "results/timings/tabulate_expectations.tsv"
-    params:
-        step="elastocal.study.study_tables.tabulate_expectations",
-        length=config["tables"]["length"],
-        strategies=list(NAMES.values()),
-    script:
-        "../scripts/run_step.py"
-
-
-rule tabulate_studies:
-    input:
-        studies=expand(rules.repeat_studies.output.repeated, interpretation=MEASURED.values(), robot=REDUCED),
-        reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("elastocal.study.study_tables.tabulate_studies"),
-    output:
-        table=table_of("table4_studies", PAPER, "table4_studies", "Table 4 over studies, by what is measured"),
-        joint="reports/tables/joint_test.csv",
-    log:
-        "results/logs/tabulate_studies.log",
-    benchmark:
-        "results/timings/tabulate_studies.tsv"
-    params:
-        step="elastocal.study.study_tables.tabulate_studies",
-        measured={name: kind for kind, name in MEASURED.items()},
-        usual=USUAL,
-        slugs={name: key for key, name in NAMES.items()},
-        length=config["tables"]["length"],
-        limits={"k_sigma": config["tables"]["k_sigma_limit_percent"], "deviation": config["tables"]["deviation_limit_um"]},
-    script:
-        "../scripts/run_step.py"
-
-
-rule tabulate_interpretations:
-    input:
-        studies=expand(rules.repeat_studies.output.repeated, interpretation=[USUAL, *config["switched"]], robot=REDUCED),
-        reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("elastocal.study.study_tables.tabulate_interpretations"),
-    output:
-        table=table_of("interpretations", PAPER, "interpretations", "Other interpretations of the paper"),
-    log:
-        "results/logs/tabulate_interpretations.log",
-    benchmark:
-        "results/timings/tabulate_interpretations.tsv"
-    params:
-        step="elastocal.study.study_tables.tabulate_interpretations",
-        length=config["tables"]["length"],
-        usual=USUAL,
-        classical=NAMES[CLASSICAL],
-    script:
-        "../scripts/run_step.py"
+ONE_STUDY = {"studies": expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED)}
+STUDY_TABLES |= {
+    "tabulate_expectations": (
+        "study_tables",
+        ONE_STUDY | {"expected": cells("expected", REDUCED, TABLE_NOISE)} | REFERENCE,
+        {"table": table_of("expectations", PAPER, "expectations", "Expectations in closed form")},
+        {"length": config["tables"]["length"], "strategies": list(NAMES.values())},
+    ),
+    "tabulate_studies": (
+        "study_tables",
+        {"studies": expand(rules.repeat_studies.output.repeated, interpretation=MEASURED.values(), robot=REDUCED)} | REFERENCE,
+        {
+            "table": table_of("table4_studies", PAPER, "table4_studies", "Table 4 over studies, by what is measured"),
+            "joint": table_of("joint_test", PAPER),
+        },
+        {
+            "measured": {name: kind for kind, name in MEASURED.items()},
+            "usual": USUAL,
+            "slugs": {name: key for key, name in NAMES.items()},
+            "length": config["tables"]["length"],
+            "limits": {
+                "k_sigma": config["tables"]["k_sigma_limit_percent"],
+                "deviation": config["tables"]["deviation_limit_um"],
+            },
+        },
+    ),
+    "tabulate_interpretations": (
+        "study_tables",
+        {"studies": expand(rules.repeat_studies.output.repeated, interpretation=[USUAL, *config["switched"]], robot=REDUCED)}
+        | REFERENCE,
+        {"table": table_of("interpretations", PAPER, "interpretations", "Other interpretations of the paper")},
+        {"length": config["tables"]["length"], "usual": USUAL, "classical": NAMES[CLASSICAL]},
+    ),
+}
