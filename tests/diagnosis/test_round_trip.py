@@ -104,9 +104,10 @@ def test_a_diagnosis_comes_back_and_is_judged_the_same(kind, request, tmp_path):
     for name in ("before", "after"):
         assert one.document["heldout"][name] == pytest.approx(other.document["heldout"][name], rel=1e-3)
     same = [
-        {key: document[key] for key in document if key not in ("heldout", "effects")}
+        {key: document[key] for key in document if key not in ("heldout", "effects", "repeatable")}
         for document in (one.document, other.document)
     ]
+    assert (one.document["repeatable"] or {}) == pytest.approx(other.document["repeatable"] or {}, rel=1e-3)
     assert json.loads(json.dumps(same[0])) == json.loads(json.dumps(same[1]))
     assert [row["step"] for row in one.rows] == [row["step"] for row in other.rows]
 

@@ -42,7 +42,9 @@ UNITS = (
     made_unit(OTHER, (2,), 5),
 )
 OFFSET_2, OFFSET_3, PAYLOAD, TILT, OTHER_1, OTHER_2 = range(6)
-PROBLEM = made_problem(made_rows(), UNITS)[0]
+ROWS = made_rows()
+# An offset of joint 3 and a smooth error of joint 2, each of its plausible size.
+PROBLEM = made_problem(replace(ROWS, residual=ROWS.expected + ROWS.candidates[:, [OFFSET_3, OTHER_2]].sum(axis=1)), UNITS)[0]
 RAISED, SILENT = Alarm(0.002, 9.0, True), Alarm(0.4, -1.0, False)
 
 
@@ -132,7 +134,7 @@ def test_the_verdict_is_that_of_least_loss_once_an_alarm_is_raised(case):
 
 
 @pytest.mark.parametrize(
-    ("sizes", "mechanisms"), [((1.0, 0.1), ("offset",)), ((1.0, 1.0), ("offset", OTHER)), ((0.01, 1.0), (OTHER,))]
+    ("sizes", "mechanisms"), [((1.0, 0.03), ("offset",)), ((1.0, 1.0), ("offset", OTHER)), ((0.03, 1.0), (OTHER,))]
 )
 def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_other(sizes, mechanisms):
     """Little is what laws are allowed to be off: of squares, that part which the other cannot make, whatever its size."""
