@@ -10,9 +10,9 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from elastocal.diagnosis.words import candidate_words, hypotheses_words
 from elastocal.effects.protocol import at_shapes
 from elastocal.figures.style import PALETTE, ink_on, note, panels, styled
+from elastocal.report.words import candidate_words, hypotheses_words
 
 FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
 # Hypotheses and candidates with a bar of their own.

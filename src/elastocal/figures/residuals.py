@@ -14,9 +14,9 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from elastocal.counting import counted, first_names
-from elastocal.diagnosis.words import in_words
 from elastocal.figures.arms import draw_links
 from elastocal.figures.style import MICRO, MILLI, STAGES, label_decades, legend_below, note, panels, styled
+from elastocal.report.words import in_words
 
 # About the vertical of the base, since what turns with the first joint then stays one component; and along the force, since
 # what gives way does so in its direction.

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, StrMethodFormatter
 
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.words import physical_name
+from elastocal.effects.catalogue import physical_name
 from elastocal.figures.style import PALETTE, note, panels, styled
 
 if TYPE_CHECKING:
