@@ -38,8 +38,6 @@ METRIC_NAMES = {
 }
 # Designs in the order of the tables, and numbers of configurations that count as few.
 _DESIGNS, _FEW = ("random", "D", "A", "I", TEST_POSE), (2, 3, 4, 6, 8, 10)
-# The paper's Table 2 in that of the study.
-_DEVIATIONS = {"deviation_mean": "mean_mm", "deviation_std": "std_mm", "deviation_max": "max_mm"}
 # Beyond so many configurations nothing is known of a length.
 _LONGEST = 1000
 _CONTINUED = "†"
@@ -69,52 +67,71 @@ def study_facts(
     ``classical`` and ``best`` strategy, all ``strategies``, ``accuracy_um``, and ``stated``, numbers of the configuration.
     Returns rows and paragraphs of `study.txt` under its headings, strings ready to print.
     """
-    length, limit, titles = settings["length"], settings["configurations"], [names[robot] for robot in robots]
+    length, titles, accuracy = settings["length"], [names[robot] for robot in robots], settings["accuracy_um"]
     whole = {name: frame.assign(robot=frame.robot.map(names)) if "robot" in frame else frame for name, frame in tables.items()}
-    of = {name: frame[frame.robot.isin(titles)] if "robot" in frame else frame for name, frame in whole.items()}
-    judged = whole["comparison"][whole["comparison"].p_value.notna()]
-    expectations = whole["expectations"][whole["expectations"].paper.notna()]
-    plain = ("joint", "solvers", "stiffness", "geometry", "weighting")
-    rows = {name: of[name] for name in plain} | {"outside": judged[judged.p_value < LEVEL], "expectations": expectations}
-    rows |= {name: of[name][of[name].accuracy_um == settings["accuracy_um"]] for name in ("break_even", "needed")}
-    rows["tubes"] = tables["tubes"]
-    rows["claims"] = of["claims"].assign(found=_found(of["claims"], names))
-    facts = {name: _records(frame) for name, frame in rows.items()} | {
-        "measured": _measured(of["studies"], limit),
-        "over_studies": [_over_studies(of["studies"], title, settings) for title in titles],
-        "one_set": _one_set(tables, names),
-        "extended": merge_errors(tables["extended"].drop(columns="robot")).to_numpy().tolist(),
+    # These have rows of robots with links, too.
+    linked = ("ladder", "tubes", "extended", "comparison", "expectations", "solvers", "table2")
+    of = {
+        name: frame[frame.robot.isin(titles)] if "robot" in frame and name not in linked else frame
+        for name, frame in whole.items()
+    }
+    judged, pairs = of["comparison"][of["comparison"].p_value.notna()], of["score_pairs"]
+    of |= {
+        "claims": of["claims"].assign(found=_found(of["claims"], names)),
+        "outside": judged[judged.p_value < LEVEL],
+        "printed": of["comparison"][of["comparison"].table == "2"],
+        "expectations": of["expectations"][of["expectations"].paper.notna()],
+        "kinds": of["kinds"].assign(apart=(of["kinds"].scalars - 6 * length).abs()),
+        "turned": pairs[pairs.reversed & (pairs.metric != REFERENCE)].assign(
+            size=lambda frame: (frame.ratio / frame.rms_ratio).abs()
+        ),
+    }
+    of |= {name: of[name][of[name].accuracy_um == accuracy] for name in ("break_even", "needed")}
+
+    def each(table: str, *columns: str) -> list[tuple[Any, ...]]:
+        """Distinct values of columns of a table, in its order."""
+        return list(dict.fromkeys(of[table][[*columns]].itertuples(index=False, name=None)))
+
+    def at(table: str, **keys: Any) -> dict[str, Any] | None:
+        """The first row of a table with these values."""
+        found = of[table][np.logical_and.reduce([of[table][name] == value for name, value in keys.items()])]
+        return next(iter(found.to_dict("records")), None)
+
+    extended = merge_errors(of["extended"].drop(columns="robot")).to_numpy().tolist()
+    facts = {
+        "titles": titles,
+        "classical": settings["classical"],
+        "metric_count": len(METRIC_NAMES),
+        "repeatability_um": f"{REPEATABILITY_UM:g}",
+        **{name: f"{settings[name]:g}" for name in ("noise_um", "length", "accuracy_um")},
+        "stated": {
+            name: ", ".join(f"{value:g}" for value in np.atleast_1d(values)) for name, values in settings["stated"].items()
+        },
+        "cells": str(len(judged)),
+        "differ": str(int((judged.p_holm < LEVEL).sum())),
+        "studies": str(int(of["expectations"].studies.max())) if len(of["expectations"]) else "0",
+        "extended": extended,
         "strategies": [_stages(strategy) for strategy in settings["strategies"]],
-        "ladder": _ladder(tables["ladder"]),
-        "costs": {title: cheapest(of["costs"][of["costs"].robot == title]) for title in titles},
-        "budget": _budget(of["budget"], of["pairs"], length),
-        "simulated": _simulated(of["simulated"], length),
-        "smallest": _smallest(of["simulated"], titles, settings["accuracy_um"]),
         "few": _few(of["few"]),
         "few_heads": [str(size) for size in _FEW if size in set(of["few"].configurations)],
-        "kinds": _kinds(of["kinds"], titles, length),
-        "places": [_records(of["places"][of["places"].robot == title]) for title in titles],
-        "observability": _observability(of["observability"], titles),
-        "scores": _scores(of["scores"]),
-        "staged": _staged(of["scores"], titles),
-        "metrics": _metrics(of["score_pairs"]),
-        "summaries": _summaries(tables["ladder"], tables["pairs"]),
-        "cells": len(judged),
-        "differ": int((judged.p_holm < LEVEL).sum()),
-        "studies": int(expectations.studies.max()) if len(expectations) else 0,
     }
-    helpers = {"word_value": word_value, "column_head": column_head, "ratio": ratio_words}
-    shown = {"noise_um": f"{settings['noise_um']:g}", "length": f"{length}", "repeatability_um": f"{REPEATABILITY_UM:g}"}
-    more = {
+    helpers = {"word_value": word_value, "column_head": column_head, "ratio": ratio_words, "each": each, "at": at}
+    constants = {"infinity": np.inf, "metrics": METRIC_NAMES, "chosen": CHOSEN, "designs": _DESIGNS, "reference": REFERENCE}
+    chosen = {
+        "titles": titles,
+        "size": length,
+        "accuracy": accuracy,
         "classical": settings["classical"],
-        "accuracy_um": f"{settings['accuracy_um']:g}",
-        "metric_count": len(METRIC_NAMES),
+        "favoured": settings["best"],
     }
-    stated = {name: ", ".join(f"{value:g}" for value in np.atleast_1d(values)) for name, values in settings["stated"].items()}
-    said = sentences("study.txt", titles=titles, infinity=np.inf, **facts, **helpers)
-    kept = {name: facts[name] for name in ("extended", "strategies", "few", "few_heads")} | {"titles": titles, "stated": stated}
-    numbers = {name: str(facts[name]) for name in ("cells", "differ", "studies")}
-    return said | kept | numbers | shown | more
+    more = {
+        "measured": _measured(of["studies"], settings["configurations"]),
+        "figures": _figures(of["studies"]),
+        "costs": {title: cheapest(of["costs"][of["costs"].robot == title]) for title in titles},
+        "summaries": _summaries(tables["ladder"], tables["pairs"]),
+        "t": {name: frame.to_dict("records") for name, frame in of.items()},
+    }
+    return sentences("study.txt", **helpers, **constants, **chosen, **more) | facts
 
 
 def paper_rows(beside: pd.DataFrame, names: Mapping[str, str], configurations: int) -> list[dict[str, str]]:
@@ -159,10 +176,6 @@ def ratio_words(row: Mapping[str, Any], name: str = "ratio", digits: int = 3) ->
     return f"{value} ({low} to {high})"
 
 
-def _records(frame: pd.DataFrame) -> list[dict[Any, Any]]:
-    return frame.to_dict("records")
-
-
 def _continued(quantity: str, value: float, error: float, configurations: int, longest: float = np.inf) -> str:
     """A score with its error; a length beyond a data set, where the curve is continued as 1/n, is marked."""
     if not quantity.startswith("n_"):
@@ -188,8 +201,8 @@ def _measured(table: pd.DataFrame, configurations: int) -> list[dict[str, Any]]:
     """
     rows, seen = [], set()
     for (robot, strategy), cells in table.groupby(["robot", "strategy"], sort=False):
-        by = {(row["measured"], row["average"]): row for row in _records(cells)}
-        figures = _figures(table)
+        by = {(row["measured"], row["average"]): row for row in cells.to_dict("records")}
+        figures = _figures(table)[:4]
         fixed = [name.replace("k_sigma_", "k_sigma_fixed_joints_") for name in figures[:2]]
         usual = by["pose", "stiffness"]
         # One estimator under another name; the fixed joints of its last stage are fewer, perhaps.
@@ -207,38 +220,10 @@ def _measured(table: pd.DataFrame, configurations: int) -> list[dict[str, Any]]:
 
 
 def _figures(table: pd.DataFrame) -> list[str]:
-    """The four figures of Table 4 by their columns, whatever length and limits they have."""
+    """The four figures of Table 4 and the RMS error by their columns, whatever length and limits they have."""
     names = [name for name in table.columns if not name.endswith("_std") and "fixed_joints" not in name]
-    return [next(name for name in names if name.startswith(start)) for start in ("k_sigma_", "n_k_sigma_", "dev_", "n_dev_")]
-
-
-def _over_studies(table: pd.DataFrame, robot: str, settings: Mapping[str, Any]) -> list[str]:
-    """What studies say of the classical strategy and the best one.
-
-    Returns the robot; dev, RMS and their ratio of the classical strategy; its dev over that of the best; dev of averaged
-    compliances.
-    """
-    poses = table[(table.robot == robot) & (table.measured == "pose")].set_index(["strategy", "average"])
-    usual, averaged = (poses.loc[(settings["classical"], average)] for average in ("stiffness", "compliance"))
-    dev = _figures(table)[2]
-    rms = next(name for name in table.columns if name.startswith("rms_") and not name.endswith("_std"))
-    words = [word_value(row[name], row[f"{name}_std"]) for row, name in ((usual, dev), (usual, rms), (averaged, dev))]
-    ratio = usual[dev] / poses.loc[(settings["best"], "stiffness")][dev]
-    return [robot, words[0], words[1], f"{usual[rms] / usual[dev]:.1f}", f"{ratio:.2f}", words[2]]
-
-
-def _one_set(tables: Mapping[str, pd.DataFrame], names: Mapping[str, str]) -> list[dict[str, Any]]:
-    """The paper's Table 2 against the statistics of single data sets."""
-    studied, figures = tables["table2"].set_index("robot"), tables["comparison"]
-    figures = figures[(figures.table == "2") & figures.robot.isin(studied.index)]
-    rows = []
-    for row in _records(figures):
-        column = _DEVIATIONS[row["quantity"]]
-        mine = {end: studied.loc[row["robot"], f"{column}{end}"] for end in ("", "_one_set", "_one_set_std")}
-        rows.append(
-            {**row, "robot": names[row["robot"]], "all": mine[""], "one": mine["_one_set"], "std": mine["_one_set_std"]}
-        )
-    return rows
+    starts = ("k_sigma_", "n_k_sigma_", "dev_", "n_dev_", "rms_")
+    return [next(name for name in names if name.startswith(start)) for start in starts]
 
 
 def _stages(strategy: Strategy) -> list[str]:
@@ -255,16 +240,6 @@ def _stages(strategy: Strategy) -> list[str]:
         for stage in strategy.stages
     ]
     return [strategy.name, "; then ".join(stages)]
-
-
-def _ladder(ladder: pd.DataFrame) -> list[dict[str, Any]]:
-    """What joints alone leave, what the best number of link springs would, and what cross-validation chooses."""
-    rows = []
-    for (noise, length), cell in ladder.groupby(["noise_um", "length"]):
-        by = cell.set_index("link_springs")[["rms_um", "rms_um_std_error"]]
-        best = str(by.drop(index=CHOSEN).rms_um.idxmin())
-        rows.append({"noise": noise, "length": length, "springs": best, "of": [by.loc[name] for name in ("0", best, CHOSEN)]})
-    return rows
 
 
 def cheapest(costs: pd.DataFrame) -> list[tuple[str, float]]:
@@ -285,46 +260,6 @@ def cheapest(costs: pd.DataFrame) -> list[tuple[str, float]]:
     return list(zip(order, [0.0, *meet], strict=True))
 
 
-def _budget(budget: pd.DataFrame, pairs: pd.DataFrame, length: int) -> list[dict[str, Any]]:
-    """Sets of points with as many configurations and with as many measurements, the latter against the end-effector alone."""
-    rows = []
-    for (robot, points), cell in budget.groupby(["robot", "points"], sort=False):
-        many = 2 * length // int(cell.measurements_per_configuration.iloc[0])
-        at = {size: _records(cell[cell.configurations == size])[:1] for size in (length, many)}
-        against = pairs[(pairs.robot == robot) & (pairs.points == points)]
-        rows.append(
-            {
-                "robot": robot,
-                "points": points,
-                "same": at[length],
-                "many": many,
-                "equal": at[many],
-                "pair": _records(against)[:1],
-            }
-        )
-    return rows
-
-
-def _simulated(table: pd.DataFrame, length: int) -> list[dict[str, Any]]:
-    """Simulated errors at one size by load and design."""
-    rows = []
-    for (robot, load), cell in table[table.configurations == length].groupby(["robot", "load"], sort=False):
-        hidden = str(cell.unobservable.iloc[0])
-        by = cell.set_index("design")
-        there = "; ".join(f"{by.at_test_pose_um[name]:.0f}" for name in ("I", TEST_POSE))
-        row = {"robot": robot, "load": load, "hidden": "none" if hidden in ("", "nan") else f"joint {hidden}", "there": there}
-        rows.append(row | {"gain": by.gain["I"], "of": [by.loc[name] for name in _DESIGNS]})
-    return rows
-
-
-def _smallest(table: pd.DataFrame, titles: Sequence[str], accuracy_um: float) -> list[dict[str, Any]]:
-    """The smallest simulated design within an accuracy on each robot, random loads, I-optimal."""
-    within = table[(table.load == "random") & (table.design == "I") & (table.rms_um <= accuracy_um)].sort_values(
-        "configurations"
-    )
-    return [{"robot": title, "first": _records(within[within.robot == title])[:1]} for title in titles]
-
-
 def _few(table: pd.DataFrame) -> list[list[str]]:
     """RMS error from few configurations: robot, strategy, error of the nominal values in percent, and the errors.
 
@@ -343,49 +278,6 @@ def _few(table: pd.DataFrame) -> list[list[str]]:
         alike.setdefault((*row[:2], *row[3:]), row)
     often = [(row[0], row[1]) for row in alike.values()]
     return [[*row[:2], "any" if often.count((row[0], row[1])) == 1 else row[2], *row[3:]] for row in alike.values()]
-
-
-def _kinds(table: pd.DataFrame, titles: Sequence[str], length: int) -> list[dict[str, Any]]:
-    """Error by what is measured: in as many configurations and with as many scalars."""
-    rows = []
-    for kind, part in table.groupby("kind", sort=False):
-        cells = [part[part.robot == title] for title in titles]
-        same = [_records(cell[cell.configurations == length])[0] for cell in cells]
-        equal = [cell.iloc[[int(np.argmin(np.abs(cell.scalars - 6 * length)))]] for cell in cells]
-        rows.append({"kind": kind, "same": same, "equal": [_records(cell)[0] for cell in equal]})
-    return rows
-
-
-def _observability(table: pd.DataFrame, titles: Sequence[str]) -> dict[str, list[Any]]:
-    """Rank correlations of each index on each robot."""
-    by = table.set_index(["index", "robot"])
-    return {str(index): [by.loc[(index, title)] for title in titles] for index in dict.fromkeys(table["index"])}
-
-
-def _scores(scores: pd.DataFrame) -> list[dict[str, Any]]:
-    """Scores of each strategy on each robot by their names; those of which the robot reaches nothing are missing."""
-    groups = scores.groupby(["robot", "strategy"], sort=False)
-    return [
-        {"robot": robot, "strategy": name, "of": cell.set_index("metric").to_dict("index")} for (robot, name), cell in groups
-    ]
-
-
-def _staged(scores: pd.DataFrame, titles: Sequence[str]) -> list[dict[str, Any]]:
-    """RMS error of each strategy over that of the classical one, paired by data set, robot by robot."""
-    by = scores[scores.metric == REFERENCE].set_index(["strategy", "robot"])
-    return [
-        {"strategy": name, "of": [by.loc[(name, title)] for title in titles]}
-        for name in dict.fromkeys(by.index.get_level_values(0))
-    ]
-
-
-def _metrics(pairs: pd.DataFrame) -> dict[str, Any]:
-    """How often metrics put two estimators in the other order than the RMS error of one data set does, and the worst pair."""
-    turned = pairs[pairs.reversed & (pairs.metric != REFERENCE)]
-    counts = {METRIC_NAMES[name]: int((turned.metric == name).sum()) for name in METRIC_NAMES if (turned.metric == name).any()}
-    worst = _records(turned.iloc[[int((turned.ratio / turned.rms_ratio).abs().argmax())]]) if len(turned) else []
-    example = [row | {"metric": METRIC_NAMES[row["metric"]]} for row in worst]
-    return {"pairs": int((pairs.metric == REFERENCE).sum()), "counts": counts, "example": example}
 
 
 def _summaries(ladder: pd.DataFrame, pairs: pd.DataFrame) -> dict[str, Any]:
