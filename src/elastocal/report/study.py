@@ -157,7 +157,7 @@ def paper_tables(frames: Mapping[str, pd.DataFrame], names: Mapping[str, str], c
     """The paper's tables of one study as rows of cells, heads first; lengths beyond a data set are marked."""
     found = {}
     for name, frame in frames.items():
-        lengths = [column for column in frame if column.startswith("n_") and not column.endswith("_std_error")]
+        lengths = [column for column in map(str, frame) if column.startswith("n_") and not column.endswith("_std_error")]
         beyond = {column_head(column): frame[column] > configurations for column in lengths}
         heads, *rows = list_rows(frame.assign(robot=frame.robot.map(names)) if "robot" in frame else frame)
         marks = [
