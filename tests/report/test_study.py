@@ -15,7 +15,7 @@ from elastocal.report.study import brief_names, cheapest, paper_rows, paper_tabl
 from elastocal.report.typesetting import compile_document, template
 
 EVERY = facts()
-FIGURES = ["fig2", "fig3", "fig4", "fig5a", "fig5c", "table2_samples", "bias_and_accuracy", "accuracy_of_one_data_set"]
+FIGURES = ["fig2", "fig3", "fig4", "fig5a", "fig5c", "bias_and_accuracy"]
 FIGURES += ["scores_against_paper", "ladder", "designs", "arm_map", "metrics", "studies", "costs"]
 BIBLIOGRAPHY = Path(__file__).resolve().parents[2] / "paper" / "paper.bib"
 HEAD = {
