@@ -116,9 +116,9 @@ def test_a_printed_figure_stands_beside_ours_and_lengths_beyond_a_data_set_are_m
     assert scored["ours"] == "9.0 ± 1.1" and scored["robot"] == "KUKA" and "differs" not in scored
     assert (without["ours"], without["strategy"]) == ("not studied", "")
     assert (inside["ours"], beyond["ours"]) == ("99 ± 20", "120 ± 20†")
-    frame = pd.DataFrame({"robot": ["kuka"] * 2, "n_dev_2_um": [99.0, 120.0], "n_dev_2_um_std_error": 20.0})
+    frame = pd.DataFrame({"robot": ["kuka"] * 3, "n_dev_2_um": [99.0, 120.0, np.inf], "n_dev_2_um_std_error": 20.0})
     (_, *lines) = paper_tables({"table4": frame}, {"kuka": "KUKA"}, 100)["table4"]
-    assert lines == [["KUKA", "99 ± 20"], ["KUKA", "120 ± 20†"]]
+    assert lines == [["KUKA", "99 ± 20"], ["KUKA", "120 ± 20†"], ["KUKA", "not reached"]]
 
 
 def test_names_are_as_short_as_they_may_be():

@@ -158,7 +158,7 @@ def paper_tables(frames: Mapping[str, pd.DataFrame], names: Mapping[str, str], c
     found = {}
     for name, frame in frames.items():
         lengths = [column for column in map(str, frame) if column.startswith("n_") and not column.endswith("_std_error")]
-        beyond = {column_head(column): frame[column] > configurations for column in lengths}
+        beyond = {column_head(column): frame[column].between(configurations, np.inf, "neither") for column in lengths}
         heads, *rows = list_rows(frame.assign(robot=frame.robot.map(names)) if "robot" in frame else frame)
         marks = [
             [_CONTINUED if head in beyond and beyond[head].iloc[row] else "" for head in heads] for row in range(len(rows))
