@@ -266,7 +266,6 @@ def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[
         "catalogue": "" if of_data else name,
         "family": effect["family"],
         "description": say.as_sentence(effect.get("detail") or description(name)),
-        "members": say.members_words(members),
         "locations": at if len(effect["locations"]) > 1 else [],
         "parameters": rows,
         "with_prior": any(entry.get("prior_std") for entry in shown),
@@ -307,7 +306,7 @@ def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str
     # What belongs to an effect as a whole, such as its largest sag, is no member's; faults of the data have none.
     owner = member or (effect_of(members[0]) if members else "")
     name = say.parameter_words(effect_of(owner), entry["name"].removeprefix(f"{owner} ")) if owner else say.words(entry["name"])
-    where = f"{say.members_words([member])}: " if member and len(members) > 1 else ""
+    where = f"{say.place_words([member])}: " if member and len(members) > 1 else ""
     row = [where + name, *say.scaled(entry["value"], entry["std_error"], entry["unit"])]
     if entry["unit"] == "–" and float(entry["value"]).is_integer():
         row[1] = grouped(int(entry["value"]))

@@ -235,7 +235,6 @@ def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
         alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different joint angles", reason)
         found.setdefault((effect_of(key), alike.replace("no approach", "no direction of approach")), []).append(key)
     rows = [
-        [say.capital(physical_name(effect)), say.members_words(keys, 4) or "–", reason]
-        for (effect, reason), keys in found.items()
+        [say.capital(physical_name(effect)), say.place_words(keys) or "–", reason] for (effect, reason), keys in found.items()
     ]
     return sorted(rows, key=lambda row: (row[2], row[0]))

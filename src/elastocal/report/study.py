@@ -95,7 +95,7 @@ def study_facts(
     def at(table: str, **keys: Any) -> dict[str, Any] | None:
         """The first row of a table with these values."""
         found = of[table][np.logical_and.reduce([of[table][name] == value for name, value in keys.items()])]
-        return next(iter(found.to_dict("records")), None)
+        return next(iter(_records(found)), None)
 
     extended = merge_errors(of["extended"].drop(columns="robot")).to_numpy().tolist()
     facts = {
@@ -129,7 +129,7 @@ def study_facts(
         "figures": _figures(of["studies"]),
         "costs": {title: cheapest(of["costs"][of["costs"].robot == title]) for title in titles},
         "summaries": _summaries(tables["ladder"], tables["pairs"]),
-        "t": {name: frame.to_dict("records") for name, frame in of.items()},
+        "t": {name: _records(frame) for name, frame in of.items()},
     }
     return sentences("study.txt", **helpers, **constants, **chosen, **more) | facts
 
@@ -142,14 +142,16 @@ def paper_rows(beside: pd.DataFrame, names: Mapping[str, str], configurations: i
     """
     return [
         {
-            "table": row.table,
-            "robot": names.get(row.robot, ""),
-            "strategy": row.strategy if isinstance(row.strategy, str) else "",
-            "quantity": column_head(row.quantity),
-            "paper": f"{row.paper:g}",
-            "ours": "not studied" if np.isnan(row.ours) else _continued(row.quantity, row.ours, row.mc_std, configurations),
+            "table": row["table"],
+            "robot": names.get(row["robot"], ""),
+            "strategy": row["strategy"] if isinstance(row["strategy"], str) else "",
+            "quantity": column_head(row["quantity"]),
+            "paper": f"{row['paper']:g}",
+            "ours": "not studied"
+            if np.isnan(row["ours"])
+            else _continued(row["quantity"], row["ours"], row["mc_std"], configurations),
         }
-        for row in beside.itertuples()
+        for row in _records(beside)
     ]
 
 
@@ -168,6 +170,11 @@ def paper_tables(frames: Mapping[str, pd.DataFrame], names: Mapping[str, str], c
             *([f"{cell}{mark}" for cell, mark in zip(*each, strict=True)] for each in zip(rows, marks, strict=True)),
         ]
     return found
+
+
+def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    rows: list[Any] = frame.to_dict("records")
+    return rows
 
 
 def ratio_words(row: Mapping[str, Any], name: str = "ratio", digits: int = 3) -> str:
@@ -201,7 +208,7 @@ def _measured(table: pd.DataFrame, configurations: int) -> list[dict[str, Any]]:
     """
     rows, seen = [], set()
     for (robot, strategy), cells in table.groupby(["robot", "strategy"], sort=False):
-        by = {(row["measured"], row["average"]): row for row in cells.to_dict("records")}
+        by = {(row["measured"], row["average"]): row for row in _records(cells)}
         figures = _figures(table)[:4]
         fixed = [name.replace("k_sigma_", "k_sigma_fixed_joints_") for name in figures[:2]]
         usual = by["pose", "stiffness"]

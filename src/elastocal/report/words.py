@@ -14,6 +14,7 @@ import numpy as np
 from elastocal.counting import plural
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects, physical_name
+from elastocal.effects.protocol import effect_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -84,23 +85,17 @@ def candidate_words(key: str) -> str:
 
 def location_words(effect: str, location: str) -> str:
     """A location without its effect: links 1, 2 and 3 (one section)."""
-    return effect_words(effect, [location]).removeprefix(physical_name(effect)).strip().removeprefix("of ") or "the whole robot"
+    return _without_name(effect, effect_words(effect, [location])) or "the whole robot"
 
 
-def members_words(keys: Iterable[str], most: int = 12) -> str:
-    """What candidates of one effect are, those of one joint and those of which the same is said together.
+def place_words(keys: Sequence[str]) -> str:
+    """Where candidates of one effect act, without its name: joints 2 and 3, or nothing."""
+    effect = effect_of(keys[0])
+    return _without_name(effect, found_words(effect, keys))
 
-    joint 2: orders 3-6, orders 13-18; joints 4 and 10: orders 1-2.
-    """
-    keys = sorted(keys, key=lambda key: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", key)])
-    effect = keys[0].partition("@")[0].partition("[")[0] if keys else ""
-    alike: dict[tuple[tuple[int, ...] | None, str], list[int]] = {}
-    for joints, details in _gathered(map(_ANY_KEY.match, keys)).items():
-        which = ", ".join(filter(None, (_detail(effect, detail) for detail in details)))
-        alike.setdefault((joints if len(joints) != 1 else None, which), []).extend(joints)
-    parts = [": ".join(filter(None, (at_joints(effect, at).removeprefix(" of "), which))) for (_, which), at in alike.items()]
-    shown = [part for part in parts if part]
-    return "; ".join(shown[:most]) + (f"; {len(shown) - most} more" if len(shown) > most else "")
+
+def _without_name(effect: str, text: str) -> str:
+    return text.removeprefix(physical_name(effect)).strip().removeprefix("of ")
 
 
 def at_joints(effect: str, joints: Collection[int]) -> str:
