@@ -111,11 +111,11 @@ def test_the_cheapest_set_changes_where_two_lines_meet_and_not_at_a_point_of_the
 def test_a_printed_figure_stands_beside_ours_and_lengths_beyond_a_data_set_are_marked():
     columns = ["table", "robot", "strategy", "quantity", "paper", "ours", "mc_std", "z"]
     rows = [("4", "kuka", "6DoF", "dev_20", 8.386, 9.03, 1.15, 0.56), ("1", "kuka", np.nan, "c1", 0.54, np.nan, 0.0, np.nan)]
-    rows += [("4", "kuka", "6DoF", "n_dev_2_um", 43.0, value, 20.0, 1.0) for value in (99.0, 120.0)]
-    scored, without, inside, beyond = paper_rows(pd.DataFrame(rows, columns=columns), {"kuka": "KUKA"}, 100)
+    rows += [("4", "kuka", "6DoF", "n_dev_2_um", 43.0, value, 20.0, 1.0) for value in (99.0, 120.0, np.inf)]
+    scored, without, inside, beyond, never = paper_rows(pd.DataFrame(rows, columns=columns), {"kuka": "KUKA"}, 100)
     assert scored["ours"] == "9.0 ± 1.1" and scored["robot"] == "KUKA" and "differs" not in scored
     assert (without["ours"], without["strategy"]) == ("not studied", "")
-    assert (inside["ours"], beyond["ours"]) == ("99 ± 20", "120 ± 20†")
+    assert (inside["ours"], beyond["ours"], never["ours"]) == ("99 ± 20", "120 ± 20†", "not reached")
     frame = pd.DataFrame({"robot": ["kuka"] * 3, "n_dev_2_um": [99.0, 120.0, np.inf], "n_dev_2_um_std_error": 20.0})
     (_, *lines) = paper_tables({"table4": frame}, {"kuka": "KUKA"}, 100)["table4"]
     assert lines == [["KUKA", "99 ± 20"], ["KUKA", "120 ± 20†"], ["KUKA", "not reached"]]

@@ -187,7 +187,7 @@ def _continued(quantity: str, value: float, error: float, configurations: int, l
     """A score with its error; a length beyond a data set, where the curve is continued as 1/n, is marked."""
     if not quantity.startswith("n_"):
         return word_value(value, error)
-    if value >= longest:
+    if np.isfinite(longest) and value >= longest:
         return f"over {longest:g}{_CONTINUED}"
     text = f"{value:.0f} ± {error:.0f}" if np.isfinite(longest) else word_value(value, error)
     return text + (_CONTINUED if np.isfinite(value) and value > configurations else "")
