@@ -16,13 +16,12 @@ from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, 
 from elastocal.diagnosis.contradictions import contradictions, pose_error_warnings, scatter_warnings
 from elastocal.diagnosis.findings import Evidence
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
-from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.kept_rows import first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, SEVERAL, UNEXPLAINED, concluded
-from elastocal.effects.catalogue import physical_name
+from elastocal.effects.catalogue import effects
 from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
@@ -225,7 +224,7 @@ def _explained(
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
         # No verdict yet, and no probability: a later search, or the poses left out, may say otherwise.
-        words = [physical_name(name) if name != OTHER else "an unknown mechanism" for name in conclusion.best.mechanisms]
+        words = [getattr(effects().get(name), "words", "an unknown mechanism") for name in conclusion.best.mechanisms]
         leading = " with ".join(words) or "nothing is missing"
         tell(f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}")
         noise = remaining_noise(problem.problem, model, taken, declared.noise)

@@ -27,11 +27,6 @@ def effects() -> dict[str, Effect]:
     return dict(sorted((each.name, each) for each in found.values()))
 
 
-def physical_name(effect: str) -> str:
-    """Physical name of an effect; its own name as words where the catalogue does not have it."""
-    return getattr(effects().get(effect), "words", effect.replace("_", " "))
-
-
 def candidates_on(sites: Sites) -> dict[str, Candidate]:
     """Every way in which an effect of the catalogue can act on a robot.
 

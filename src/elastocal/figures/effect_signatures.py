@@ -4,6 +4,7 @@ Effects are distinguishable by these dependences, so that all are shown by the s
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -71,7 +72,7 @@ def signature(name: str, robot: Robot) -> Signature:
     turned[:, joint - 1] = np.radians(angle)
     # Angles, pull, approach and time of each experiment; what one does not vary is as in the middle of the campaign.
     middle, pulled = np.full(_SAMPLES, _HOURS / 2), np.full(_SAMPLES, _PULL_N)
-    experiments = {
+    experiments: dict[str, Any] = {
         "by angle": (turned, 0 * pulled, 1.0, middle),
         "by angle, loaded": (turned, pulled, 1.0, middle),
         "by force": (still, _FORCE_N, 1.0, middle),

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.application.certificate.repeatability import ISO_CYCLES, ISO_POSES
 from elastocal.counting import counted
-from elastocal.effects.catalogue import physical_name
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
 from elastocal.report.loop_facts import TITLES
@@ -70,7 +69,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def share_name(name: str) -> str:
     """A line of the error budget in words."""
-    return _SHARES.get(name) or physical_name(name)
+    return _SHARES.get(name) or say.physical_name(name)
 
 
 def _share(line: Mapping[str, Any]) -> list[str]:

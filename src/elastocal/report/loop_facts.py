@@ -12,7 +12,7 @@ from elastocal import __version__
 from elastocal.counting import counted, grouped, plural
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.effects.catalogue import effects, physical_name
+from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import loop_tables as tables
 from elastocal.report import words as say
@@ -159,7 +159,7 @@ def _said_of(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str,
     where = [f"{say.location_words(name, each['location'])} ({say.probability_words(each['probability'])})" for each in at]
     return {
         "found": say.found_words(name, effect["members"]),
-        "bare": physical_name(name),
+        "bare": say.physical_name(name),
         "probability": say.probability_words(effect["probability"]),
         "cost": cost_words(effect, heldout),
         "cost_m": effect["cost_m"],
@@ -215,7 +215,7 @@ def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
     # Beside a mechanism that was found, what is unknown is a related one.
     unknown = say.RELATED if found else say.UNKNOWN
     others = [
-        row(unknown if name == OTHER else physical_name(name), p)
+        row(unknown if name == OTHER else say.physical_name(name), p)
         for name, p in stated["mechanisms"].items()
         if name not in found
     ]
@@ -261,7 +261,7 @@ def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[
     ]
     rivals, evidence = effect["alternatives"], effect.get("evidence") or ()
     return {
-        "name": say.capital(say.words(name) if of_data else physical_name(name))
+        "name": say.capital(say.words(name) if of_data else say.physical_name(name))
         + (f" of {plural('joint', len(joints))} {say.listed(map(str, joints))}" if joints else ""),
         "catalogue": "" if of_data else name,
         "family": effect["family"],

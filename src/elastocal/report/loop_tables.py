@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.counting import counted, grouped
-from elastocal.effects.catalogue import physical_name
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
 
@@ -235,6 +234,7 @@ def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
         alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different joint angles", reason)
         found.setdefault((effect_of(key), alike.replace("no approach", "no direction of approach")), []).append(key)
     rows = [
-        [say.capital(physical_name(effect)), say.place_words(keys) or "–", reason] for (effect, reason), keys in found.items()
+        [say.capital(say.physical_name(effect)), say.place_words(keys) or "–", reason]
+        for (effect, reason), keys in found.items()
     ]
     return sorted(rows, key=lambda row: (row[2], row[0]))

@@ -13,7 +13,7 @@ import numpy as np
 
 from elastocal.counting import plural
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.effects.catalogue import effects, physical_name
+from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
 
 if TYPE_CHECKING:
@@ -54,6 +54,11 @@ _IN_COMMON = {
 _PARTS = ("column", "base")
 # Bands of orders, variants and the like are given for as many locations; of more only their joints.
 _MOST_DETAILED = 2
+
+
+def physical_name(effect: str) -> str:
+    """Physical name of an effect; its own name as words where the catalogue does not have it."""
+    return getattr(effects().get(effect), "words", words(effect))
 
 
 def parameter_words(effect: str, name: str) -> str:
