@@ -4,7 +4,7 @@ from made_loop_facts import CAMPAIGNS, facts_of
 from made_loop_tables import campaign_descriptions, experiment_rows, parameter_table, split_rows, step_rows
 
 from elastocal import __version__
-from elastocal.report.loop_tables import held_rows
+from elastocal.report.loop_tables import held_rows, untestable_rows
 from elastocal.report.loop_tables import step_rows as table_rows
 
 
@@ -64,3 +64,17 @@ def test_parameters_that_are_not_determined_are_gathered_by_owner_and_stand_apar
     facts = facts_of(CAMPAIGNS["named"], parameters=parameter_table(["joint_offset@2 offset", left], by_prior=[left]))
     assert facts["held"] == [["Zero offset of joint 3", "offset"]]
     assert [row[0] for row in facts["others"]["rows"]] == ["Zero offset of joint 2"]
+
+
+def test_what_cannot_be_tested_is_gathered_by_effect_and_reason_and_long_lists_are_cut():
+    few = {f"lost_motion@{k}": f"{k} angles of joint {k} where 4 are needed" for k in (1, 2)}
+    many = {f"cross_compliance@{k}+{k + 1}": "no approach in the data" for k in range(1, 10)}
+    assert untestable_rows(few | many | {"payload": "no load"}) == [
+        [
+            "Elastic coupling",
+            "joints 1 and 2, of joints 2 and 3, of joints 3 and 4 and of joints 4 and 5 and 5 more",
+            "no direction of approach in the data",
+        ],
+        ["Weight of an undeclared payload", "–", "no load"],
+        ["Lost motion (backlash)", "joints 1 and 2", "too few different joint angles"],
+    ]

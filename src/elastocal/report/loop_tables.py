@@ -22,6 +22,8 @@ _SPLITS = {"held out": "validation poses", "joint space": "block of joint space"
 MOSTLY_PRIOR = 0.7
 # More than these would fill pages that nobody reads; the tables have them all.
 _MOST_OTHERS, _MOST_BLOCKS = 40, 12
+# Letters of a list of places beyond which only the first few are shown.
+_LONGEST, _SHOWN = 100, 4
 
 
 def _error_unit(lengths_m: Sequence[float]) -> tuple[float, str]:
@@ -233,8 +235,10 @@ def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
         # Reasons that differ from joint to joint are one reason.
         alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different joint angles", reason)
         found.setdefault((effect_of(key), alike.replace("no approach", "no direction of approach")), []).append(key)
-    rows = [
-        [say.capital(say.physical_name(effect)), say.place_words(keys) or "–", reason]
-        for (effect, reason), keys in found.items()
-    ]
+    rows = []
+    for (effect, reason), keys in found.items():
+        where = say.place_words(keys)
+        if len(where) > _LONGEST:
+            where = f"{say.place_words(keys[:_SHOWN])} and {len(keys) - _SHOWN} more"
+        rows.append([say.capital(say.physical_name(effect)), where or "–", reason])
     return sorted(rows, key=lambda row: (row[2], row[0]))
