@@ -63,6 +63,10 @@ def test_confounding_annotates_every_pair_and_marks_what_was_found():
     assert len(numbers) == 12 * 11
     bold = [label.get_text() for label in figure.axes[0].get_yticklabels() if label.get_fontweight() == "bold"]
     assert bold == ["Effect 0 of joint 1  1"]
+    # What was found is shown whatever its place.
+    late = candidate_table(count=20) | {"chosen": np.arange(25) == 18}
+    labels = row_labels(confounding(late, confounding_table(late)).axes[0])
+    assert len(labels) == 16 and labels[-1] == "Effect 18 of joint 1  16"
     assert figure.axes[1].get_ylabel() == "angle between the contributions (°)"
 
 

@@ -48,6 +48,11 @@ def test_no_two_candidates_are_printed_alike(chain):
         ("link_elasticity", ["column", "link 2"], "of the column and of link 2"),
         ("cross_compliance", ["joints 2 and 3", "joints 4 and 5"], "elastic coupling of joints 2 and 3 and of joints 4 and 5"),
         ("transmission_harmonic", ["joint 4 orders 1-2", "joint 4 orders 3-6"], "of joint 4 (orders 1-2, orders 3-6)"),
+        (
+            "transmission_harmonic",
+            ["joint 4 orders 1-2", "joint 2 orders 3-6"],
+            "(orders 1-2) and of joint 2 (orders 3-6)",
+        ),
         ("transmission_harmonic", [f"joint {k} orders 1-2" for k in (4, 2, 10)], "error of joints 2, 4 and 10"),
         ("link_weight", ["off the line", "joint 5"], "of the whole arm (centres of mass off the links' axes) and of joint 5"),
         ("payload", [""], "weight of an undeclared payload"),

@@ -33,7 +33,7 @@ TITLES = {
     "not_testable": "these measurements can test no mechanism",
 }
 AT_FAULT = "the data are at fault"
-# What is said in one paragraph.
+# What is stated in one paragraph.
 _IN_ONE = (
     *(
         "headline_caption",
@@ -71,11 +71,11 @@ def campaign_sentences(
     """What `campaign.txt` says of a campaign, by headings.
 
     `verdict`: contents of verdict.json. `steps`, `experiment`: rows of before_after.csv and next_experiment.csv.
-    `descriptions`: contents of campaign.json; without them nothing is said of the method.
+    `descriptions`: contents of campaign.json; without them nothing is stated of the method.
     """
     faulty = data_at_fault(verdict)
     facts = {
-        "effects": [] if faulty else [_said_of(effect, verdict["heldout"]) for effect in verdict["effects"]],
+        "effects": [] if faulty else [_worded(effect, verdict["heldout"]) for effect in verdict["effects"]],
         "faulty": faulty,
         "headline": _headline(verdict),
         "accuracy": verdict.get("accuracy"),
@@ -102,14 +102,14 @@ def loop_facts(
     `descriptions`: contents of campaign.json. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
     faulty, heldout = data_at_fault(verdict), verdict["heldout"]
-    said = campaign_sentences(verdict, steps, experiment, descriptions)
+    stated = campaign_sentences(verdict, steps, experiment, descriptions)
     # Probabilities are then those from before the measurements.
     searched = {entry["name"] for effect in verdict["effects"] for entry in effect["parameters"] if entry.get("shape")}
     held = [*(name for name in verdict["held"] if name not in searched), *tables.left_to_priors(parameters)]
     return {
-        **{name: " ".join(said[name]) for name in _IN_ONE},
-        **{name: said[name] for name in ("sentences", "now", "warnings", "noise", "settings")},
-        "method": dict(said["method"]),
+        **{name: " ".join(stated[name]) for name in _IN_ONE},
+        **{name: stated[name] for name in ("sentences", "now", "warnings", "noise", "settings")},
+        "method": dict(stated["method"]),
         "campaign": verdict["campaign"],
         "robot": descriptions["robot"]["name"],
         "verdict": AT_FAULT if faulty else TITLES[verdict["verdict"]],
@@ -151,7 +151,7 @@ def _headline(verdict: Mapping[str, Any]) -> dict[str, str] | None:
     return stages | {"noise": say.millimetres(floor) if floor else "", "poses": counted(errors["poses"], "validation pose")}
 
 
-def _said_of(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str, Any]:
+def _worded(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str, Any]:
     """What sentences say of an effect: its names, how sure it is, what it costs, what else it may be."""
     name, others = effect["name"], effect["alternatives"]
     at = [entry for entry in effect["locations"] if entry["probability"] >= _LEAST_SHOWN]
@@ -259,7 +259,7 @@ def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[
         for e in effect["locations"]
         if e["probability"] >= _LEAST_SHOWN
     ]
-    rivals, evidence = effect["alternatives"], effect.get("evidence") or ()
+    others, evidence = effect["alternatives"], effect.get("evidence") or ()
     return {
         "name": say.capital(say.words(name) if of_data else say.physical_name(name))
         + (f" of {plural('joint', len(joints))} {say.listed(map(str, joints))}" if joints else ""),
@@ -276,7 +276,7 @@ def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[
         "cost": "" if of_data or not effect["adopted"] else cost_words(effect, heldout),
         "gain": effect["heldout_gain"],
         "adopted": effect["adopted"],
-        "alternatives": say.listed(rivals if of_data else map(say.alternative_words, rivals), _MOST_NAMES) if rivals else "",
+        "alternatives": say.listed(others if of_data else map(say.alternative_words, others), _MOST_NAMES) if others else "",
         # RMS distance between measured and predicted positions as written and with the fault corrected.
         "evidence": [say.length(value) for value in evidence[:2]] if len(evidence) > 1 and None not in evidence else [],
     }

@@ -34,9 +34,9 @@ def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
         if match := _CAMPAIGN.fullmatch(path):
             verdict = json.loads(Path(workplace, path).with_name("verdict.json").read_text(encoding="utf-8"))
             of_use = verdict["verdict"] in _OF_USE and not data_at_fault(verdict)
-            said = campaign_sentences(verdict)
-            errors = [f"  {line}" for line in said["headline_line"]]
-            lines += [f"{'✓' if of_use else '!'} {match[1]}: {said['sentences'][0]}", *errors, f"  report: {path}"]
+            stated = campaign_sentences(verdict)
+            errors = [f"  {line}" for line in stated["headline_line"]]
+            lines += [f"{'✓' if of_use else '!'} {match[1]}: {stated['sentences'][0]}", *errors, f"  report: {path}"]
             then = "elastocal correct, elastocal certificate" if of_use else '"What to do now" on the first page of the report'
             following.append(f"next: {then}")
     # Of several campaigns each report says it.

@@ -54,8 +54,8 @@ def sentences(name: str, **facts: Any) -> dict[str, Any]:
         r"^(##?) (\w+)\n(.*?)(?=^##? \w+\n|\Z)", template(name).render(facts), re.DOTALL | re.MULTILINE
     ):
         parts = re.split(r"\n" if len(marks) > 1 else r"\n[ \n]*\n", text)
-        said = [re.sub(r"[ \n]+", " ", part.strip(" \n")) for part in parts if part.strip(" \n")]
-        found[head] = [[cell.strip(" ") for cell in line.split("¦")] for line in said] if len(marks) > 1 else said
+        stated = [re.sub(r"[ \n]+", " ", part.strip(" \n")) for part in parts if part.strip(" \n")]
+        found[head] = [[cell.strip(" ") for cell in line.split("¦")] for line in stated] if len(marks) > 1 else stated
     return found
 
 
