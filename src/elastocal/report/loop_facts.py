@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal import __version__
-from elastocal.counting import counted, grouped, plural
+from elastocal.counting import grouped, plural
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
@@ -33,21 +33,8 @@ TITLES = {
     "not_testable": "these measurements can test no mechanism",
 }
 AT_FAULT = "the data are at fault"
-# What is stated in one paragraph.
-_IN_ONE = (
-    *(
-        "headline_caption",
-        "cost",
-        "probabilities",
-        "accuracy_words",
-        "held_out",
-        "range",
-        "remainder",
-        "noise_source",
-        "misfit",
-    ),
-    *("none_found", "next", "made"),
-)
+# Sections of the template that are lists; the others are one paragraph.
+_LISTS = ("sentences", "now", "warnings", "headline", "accuracy", "noise", "settings", "method")
 # Causes and locations below this are not shown; from `_SURE` on a location is stated without its alternatives, a cause is real.
 _LEAST_SHOWN, _SURE = 0.01, 0.95
 # Causes of which page 1 has a bar, if they are not part of the verdict.
@@ -75,9 +62,8 @@ def campaign_sentences(
     """
     faulty = data_at_fault(verdict)
     facts = {
-        "effects": [] if faulty else [_worded(effect, verdict["heldout"]) for effect in verdict["effects"]],
+        "effects": [] if faulty else [effect_facts(effect, verdict["heldout"]) for effect in verdict["effects"]],
         "faulty": faulty,
-        "headline": _headline(verdict),
         "accuracy": verdict.get("accuracy"),
         "ends": [_with_interval(step) for step in steps if step["kind"] != "frames"],
         "new_poses": len({(row["effect"], row["pose"]) for row in experiment}),
@@ -107,16 +93,14 @@ def loop_facts(
     searched = {entry["name"] for effect in verdict["effects"] for entry in effect["parameters"] if entry.get("shape")}
     held = [*(name for name in verdict["held"] if name not in searched), *tables.left_to_priors(parameters)]
     return {
-        **{name: " ".join(stated[name]) for name in _IN_ONE},
-        **{name: stated[name] for name in ("sentences", "now", "warnings", "noise", "settings")},
+        **{name: lines if name in _LISTS else " ".join(lines) for name, lines in stated.items()},
         "method": dict(stated["method"]),
         "campaign": verdict["campaign"],
         "robot": descriptions["robot"]["name"],
         "verdict": AT_FAULT if faulty else TITLES[verdict["verdict"]],
         "faulty": faulty,
-        "headline": _headline(verdict),
+        "headline": dict(stated["headline"]) or None,
         "causes": [] if verdict["verdict"] == "not_testable" else cause_rows(verdict),
-        "accuracy": _accuracy_rows(verdict),
         "measured": tables.measured_rows(table, descriptions),
         "floor": say.length(heldout["noise_floor_rms_m"]),
         "steps": tables.step_rows(steps, heldout["noise_floor_rms_m"]),
@@ -140,35 +124,6 @@ def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence
     """
     names = [Path(figure).stem for figure in figures]
     compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures, origin)
-
-
-def _headline(verdict: Mapping[str, Any]) -> dict[str, str] | None:
-    """Errors on validation poses in mm, ``before`` any calibration and ``after``, and what ``noise`` alone leaves, if known."""
-    if data_at_fault(verdict):
-        return None
-    errors, floor = verdict["heldout"], verdict["heldout"]["noise_floor_rms_m"]
-    stages = {"before": say.millimetres(errors["uncalibrated"]["rms_m"]), "after": say.millimetres(errors["after"]["rms_m"])}
-    return stages | {"noise": say.millimetres(floor) if floor else "", "poses": counted(errors["poses"], "validation pose")}
-
-
-def _worded(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str, Any]:
-    """What sentences say of an effect: its names, how sure it is, what it costs, what else it may be."""
-    name, others = effect["name"], effect["alternatives"]
-    at = [entry for entry in effect["locations"] if entry["probability"] >= _LEAST_SHOWN]
-    sure = len(effect["members"]) > 1 or not at or at[0]["probability"] >= _SURE
-    where = [f"{say.location_words(name, each['location'])} ({say.probability_words(each['probability'])})" for each in at]
-    return {
-        "found": say.found_words(name, effect["members"]),
-        "bare": say.physical_name(name),
-        "probability": say.probability_words(effect["probability"]),
-        "cost": cost_words(effect, heldout),
-        "cost_m": effect["cost_m"],
-        "gain": effect["heldout_gain"],
-        "adopted": effect["adopted"],
-        "instead": say.listed(map(say.alternative_words, others), _MOST_NAMES, last="or") if others else "",
-        "common": say.in_common(name, others),
-        "unsure": [] if sure else where,
-    }
 
 
 def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
@@ -224,26 +179,6 @@ def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
     return sorted([*rows, *others], key=lambda each: -each["probability"])
 
 
-def _accuracy_rows(verdict: Mapping[str, Any]) -> list[list[str]]:
-    """Rows of the accuracy: whose error, RMS, at the worst pose; in mm."""
-    stated, errors = verdict.get("accuracy"), verdict["heldout"]
-    if not stated:
-        return []
-
-    def sure(name: str) -> str:
-        bound = stated[f"{name}_bound_m"]
-        below = "" if bound is None else f" ({100 * stated['confidence']:g} % sure: below {say.millimetres(bound)})"
-        return say.millimetres(stated[f"{name}_m"]) + below
-
-    own = f"the robot itself, {stated['kind']} over {stated['region']} ({stated['poses']})"
-    after = errors["after"]
-    measured = [
-        f"the tracker against the model, at {counted(errors['poses'], 'validation pose')}",
-        *map(say.millimetres, (after["rms_m"], after["max_m"])),
-    ]
-    return [measured, [own, sure("rms"), sure("worst")]]
-
-
 def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str, Any]:
     """Facts of one effect or fault of the data; `heldout`: of verdict.json."""
     known = [entry for entry in effect["parameters"] if not entry.get("held") or entry.get("shape")]
@@ -254,29 +189,34 @@ def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[
         ]
     name, members, of_data = effect["name"], effect["members"], effect["family"] == OF_DATA
     rows, joints = [_parameter_row(entry, members) for entry in shown], effect["joints"] if of_data else ()
-    at = [
-        [say.location_words(name, e["location"]), say.probability_words(e["probability"])]
-        for e in effect["locations"]
-        if e["probability"] >= _LEAST_SHOWN
-    ]
+    at = [entry for entry in effect["locations"] if entry["probability"] >= _LEAST_SHOWN]
+    where = [[say.location_words(name, entry["location"]), say.probability_words(entry["probability"])] for entry in at]
+    sure = len(members) > 1 or not at or at[0]["probability"] >= _SURE
     others, evidence = effect["alternatives"], effect.get("evidence") or ()
+    instead = others if of_data else [*map(say.alternative_words, others)]
     return {
         "name": say.capital(say.words(name) if of_data else say.physical_name(name))
         + (f" of {plural('joint', len(joints))} {say.listed(map(str, joints))}" if joints else ""),
+        "found": say.found_words(name, members),
+        "bare": say.physical_name(name),
         "catalogue": "" if of_data else name,
         "family": effect["family"],
         "description": say.as_sentence(effect.get("detail") or description(name)),
-        "locations": at if len(effect["locations"]) > 1 else [],
+        "locations": where if len(effect["locations"]) > 1 else [],
+        "unsure": [] if sure else [f"{place} ({probability})" for place, probability in where],
         "parameters": rows,
         "with_prior": any(entry.get("prior_std") for entry in shown),
         "left_out": grouped(len(known)) if len(known) > len(shown) else "",
         "with_angle": any("q)" in row[0] for row in rows),
         "held": len(effect["parameters"]) - len(known),
         "probability": "" if effect["probability"] is None else say.probability_words(effect["probability"]),
-        "cost": "" if of_data or not effect["adopted"] else cost_words(effect, heldout),
+        "cost": "" if of_data else cost_words(effect, heldout),
+        "cost_m": effect.get("cost_m"),
         "gain": effect["heldout_gain"],
         "adopted": effect["adopted"],
-        "alternatives": say.listed(others if of_data else map(say.alternative_words, others), _MOST_NAMES) if others else "",
+        "alternatives": say.listed(instead, _MOST_NAMES) if others else "",
+        "instead": say.listed(instead, _MOST_NAMES, last="or") if others else "",
+        "common": say.in_common(name, others),
         # RMS distance between measured and predicted positions as written and with the fault corrected.
         "evidence": [say.length(value) for value in evidence[:2]] if len(evidence) > 1 and None not in evidence else [],
     }
