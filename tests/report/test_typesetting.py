@@ -11,6 +11,7 @@ from jinja2 import UndefinedError
 
 from elastocal.figures.style import panels
 from elastocal.report.typesetting import compile_document, sentences
+from elastocal.report.words import FILTERS
 
 DOCUMENT = """#set document(date: none)
 #let facts = json("facts.json")
@@ -82,8 +83,8 @@ def test_a_template_has_paragraphs_and_rows_and_keeps_what_may_not_break(tmp_pat
     made += "## rows\na ¦ {{ b }} ¦\n{# no #}\n\nc ¦ d ¦ e\n"
     (tmp_path / "made.txt").write_text(made, encoding="utf-8")
     monkeypatch.setattr(resources, "files", {"elastocal.report": tmp_path}.__getitem__)
-    said = sentences("made.txt", b="x")
+    said = sentences("made.txt", FILTERS, b="x")
     assert said == {"one": ["A >\u00a099\u00a0% line."] * 2, "rows": [["a", "x", ""], ["c", "d", "e"]]}
     # What a template shows and nobody gave is an error and no hole.
     with pytest.raises(UndefinedError, match="b"):
-        sentences("made.txt")
+        sentences("made.txt", FILTERS)

@@ -50,7 +50,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     change = document["comparison"]
     spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": TITLES[document["verdict"]]}
     constants = {"iso_poses": ISO_POSES, "iso_cycles": ISO_CYCLES, "changed": bool(change) and change["p_value"] < _LEVEL}
-    stated = sentences("certificate.txt", document=document, **spoken, **constants)
+    stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken, **constants)
     compared = {} if change is None else {"campaign": change["campaign"], "sentence": " ".join(stated["comparison"])}
     if change is not None:
         compared["rows"] = [_change(each) for each in change["changes"][:_SHOWN_CHANGES]]

@@ -69,7 +69,9 @@ def campaign_sentences(
         "new_poses": len({(row["effect"], row["pose"]) for row in experiment}),
         "version": __version__,
     }
-    return sentences("campaign.txt", verdict={"next_experiment": None, **verdict}, descriptions=descriptions, **facts)
+    return sentences(
+        "campaign.txt", say.FILTERS, verdict={"next_experiment": None, **verdict}, descriptions=descriptions, **facts
+    )
 
 
 def loop_facts(

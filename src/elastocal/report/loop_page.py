@@ -86,7 +86,7 @@ def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str
     script = resources.files(__package__).joinpath("loop.js").read_text(encoding="utf-8")
     # Texts come from files of other people: they are escaped, and nothing in the data can end the script that holds it.
     numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
-    text = template("loop.html").render(page=page, origin=origin, data=Markup(numbers), script=Markup(script))
+    text = template("loop.html", say.FILTERS).render(page=page, origin=origin, data=Markup(numbers), script=Markup(script))
     write_text(path, text)
 
 

@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING
 
 import typst
 
-from elastocal import counting
 from elastocal.io.atomic_writes import atomic_write
-from elastocal.report import words
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -25,11 +23,8 @@ if TYPE_CHECKING:
     from elastocal.io.origin import Origin
 
 
-def template(name: str) -> Template:
-    """A template of this package; those of pages (.html) escape what they show.
-
-    What `words` and `counting` have are filters of it.
-    """
+def template(name: str, filters: Mapping[str, Any] | None = None) -> Template:
+    """A template of this package with filters of its own, such as `words.FILTERS`; pages (.html) escape what they show."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     def source(name: str) -> str:
@@ -38,12 +33,11 @@ def template(name: str) -> Template:
         return re.sub(r"^[ \t]*((?:\{%(?:(?!%\}).)*%\})+)[ \t]*\n", r"\1", text, flags=re.MULTILINE)
 
     environment = Environment(loader=FunctionLoader(source), autoescape=name.endswith(".html"), undefined=StrictUndefined)
-    filters = {**vars(words), **vars(counting)}
-    environment.filters |= {each: value for each, value in filters.items() if callable(value) and each[0] != "_"}
+    environment.filters |= filters or {}
     return environment.get_template(name)
 
 
-def sentences(name: str, **facts: Any) -> dict[str, Any]:
+def sentences(name: str, filters: Mapping[str, Any] | None = None, /, **facts: Any) -> dict[str, Any]:
     """What a template of sentences (.txt) says.
 
     Returns under each heading ``# name`` its paragraphs, list of str: empty lines stand between them, where other lines end
@@ -51,7 +45,7 @@ def sentences(name: str, **facts: Any) -> dict[str, Any]:
     """
     found: dict[str, Any] = {}
     for marks, head, text in re.findall(
-        r"^(##?) (\w+)\n(.*?)(?=^##? \w+\n|\Z)", template(name).render(facts), re.DOTALL | re.MULTILINE
+        r"^(##?) (\w+)\n(.*?)(?=^##? \w+\n|\Z)", template(name, filters).render(facts), re.DOTALL | re.MULTILINE
     ):
         parts = re.split(r"\n" if len(marks) > 1 else r"\n[ \n]*\n", text)
         stated = [re.sub(r"[ \n]+", " ", part.strip(" \n")) for part in parts if part.strip(" \n")]

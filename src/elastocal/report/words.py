@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal import counting
 from elastocal.counting import plural
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
@@ -313,3 +314,7 @@ def _unit(value: float, unit: str) -> tuple[float, str]:
     for power, sign in (("^2", "²"), ("^3", "³")):
         shown = shown.replace(power, sign)
     return factor, re.sub(r"(?<=\w|²|³) (?=\w)", "·", shown)
+
+
+# What sentences and pages may apply to what they show.
+FILTERS = {name: each for name, each in {**vars(counting), **globals()}.items() if callable(each) and name[0] != "_"}
