@@ -10,7 +10,7 @@ SEARCHED = (
     *("README.md", "Snakefile", "config.yaml", "data/README.md", "results/README.md", "reports/README.md"),
     *("config", "docs", "workflow", "src", "benchmarks"),
 )
-KINDS = {".py", ".smk", ".typ", ".yaml", ".md", ""}
+KINDS = {".py", ".smk", ".typ", ".txt", ".yaml", ".md", ""}
 # Each banned word with what is said instead.
 GLOSSARY = {
     r"rivals?|weigh(s|ed|ing)? (the )?alternatives": "alternative, compare alternatives",

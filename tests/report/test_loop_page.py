@@ -209,6 +209,7 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
             return page.evaluate(f"document.getElementById('{plot}').toDataURL()")
 
         for control, key, plot in (
+            ("shown", "ArrowDown", "robot"),
             ("which", "ArrowDown", "robot"),
             ("factor", "ArrowRight", "robot"),
             ("pose", "ArrowLeft", "robot"),

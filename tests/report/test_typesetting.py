@@ -1,12 +1,17 @@
 """A document compiles with the data and pictures that it reads, and its PDF appears whole or not at all."""
 
+import fnmatch
+import tomllib
 from importlib import resources
+from pathlib import Path
 
 import pytest
 import typst
+from jinja2 import UndefinedError
 
 from elastocal.figures.style import panels
-from elastocal.report.typesetting import compile_document
+from elastocal.report.typesetting import compile_document, sentences
+from elastocal.report.words import FILTERS
 
 DOCUMENT = """#set document(date: none)
 #let facts = json("facts.json")
@@ -61,3 +66,25 @@ def test_what_cannot_be_compiled_leaves_the_earlier_pdf_as_it_was(written, docum
         compile_document(written / "report.pdf", document, data, pictures)
     assert [file.name for file in written.iterdir()] == ["report.pdf"]
     assert (written / "report.pdf").read_text(encoding="utf-8") == "earlier"
+
+
+def test_templates_are_installed_with_the_package():
+    top = Path(__file__).resolve().parents[2]
+    patterns = tomllib.loads((top / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["elastocal"]
+    files = [
+        f"report/{file.name}" for file in (top / "src/elastocal/report").iterdir() if file.is_file() and file.suffix != ".py"
+    ]
+    assert len(files) > 8
+    assert [file for file in files if not any(fnmatch.fnmatch(file, pattern) for pattern in patterns)] == []
+
+
+def test_a_template_has_paragraphs_and_rows_and_keeps_what_may_not_break(tmp_path, monkeypatch):
+    made = "# one\n{% for n in (1, 2) %}\nA {{ n | probability_words }}\n  line.\n\n{% endfor %}\n"
+    made += "## rows\na ¦ {{ b }} ¦\n{# no #}\n\nc ¦ d ¦ e\n"
+    (tmp_path / "made.txt").write_text(made, encoding="utf-8")
+    monkeypatch.setattr(resources, "files", {"elastocal.report": tmp_path}.__getitem__)
+    said = sentences("made.txt", FILTERS, b="x")
+    assert said == {"one": ["A >\u00a099\u00a0% line."] * 2, "rows": [["a", "x", ""], ["c", "d", "e"]]}
+    # What a template shows and nobody gave is an error and no hole.
+    with pytest.raises(UndefinedError, match="b"):
+        sentences("made.txt", FILTERS)

@@ -17,11 +17,8 @@ FIGURES = [
     "studies",
     "costs",
     "bias_and_accuracy",
-    "accuracy_of_one_data_set",
     "scores_against_paper",
-    "table2_samples",
     "ladder",
-    "budget",
     "designs",
     "arm_map",
     "metrics",
@@ -43,39 +40,15 @@ DRAWN = {
             "accuracy_um": QUESTIONS["accuracies_um"][0],
         },
     ),
-    "draw_accuracy": (
-        (
-            "accuracy_of_one_data_set",
-            "accuracy_of_one_data_set",
-            "accuracy_of_one_data_set",
-            ABOUT,
-            "Error of one data set by strategy",
-        ),
-        {"per_dataset": rules.tabulate_accuracy.output.table},
-        {"titles": REDUCED_TITLES, "order": list(NAMES.values())} | LENGTH,
-    ),
     "draw_scores": (
         ("scores", "scores_against_paper", "scores_against_paper", PAPER, "Table 4 against further studies"),
         {"comparison": rules.compare_with_studies.output.table, "expectations": rules.tabulate_expectations.output.table},
         {"titles": REDUCED_TITLES},
     ),
-    "draw_table2_samples": (
-        ("table2_samples", "table2_samples", "table2_samples", PAPER, "Table 2 against single data sets"),
-        {
-            "initial": expand(rules.summarize_initial.output.initial, robot=config["robots"]),
-            "reference": f"{CONFIG}/paper/reference.csv",
-        },
-        {"titles": TITLES},
-    ),
     "draw_ladder": (
         ("ladder", "ladder", "ladder", ABOUT, "How many springs (RQ1)"),
         {"table": rules.tabulate_ladder.output.table},
         {},
-    ),
-    "draw_budget": (
-        ("budget", "budget", "budget", ABOUT, "Which points (RQ2)"),
-        {"table": rules.tabulate_budget.output.budget},
-        {"titles": REDUCED_TITLES} | LENGTH,
     ),
     "draw_designs": (
         ("designs", "designs", "designs", ABOUT, "Which configurations (RQ3)"),
@@ -88,7 +61,7 @@ DRAWN = {
     ),
     "draw_costs": (
         ("costs", "costs", "costs", ABOUT, "Cost of an accuracy (RQ2)"),
-        {"table": rules.tabulate_costs.output.costs},
+        {"table": rules.tabulate_costs.output.costs, "break_even": rules.tabulate_costs.output.break_even},
         {"titles": REDUCED_TITLES, "accuracy_um": QUESTIONS["accuracies_um"][0]},
     ),
     "draw_studies": (

@@ -6,11 +6,10 @@ import pandas as pd
 
 from elastocal.figures import study
 from elastocal.figures.style import save
-from elastocal.io.data_frames import read_frame, read_long, read_studies
+from elastocal.io.data_frames import read_long, read_studies
 from elastocal.study.evaluation import metrics
 from elastocal.study.jobs import read_reference
 from elastocal.study.repeated import repeated
-from elastocal.study.simulation import INITIAL
 
 # By the name of an input; others are tables for people.
 READ = {
@@ -26,10 +25,7 @@ def read_table(path: str) -> pd.DataFrame:
 
 
 def draw_study(job: Job) -> None:
-    tables = {name: READ.get(name, read_table)(job.input[name]) for name in job.params.tables if name != "initial"}
-    if "initial" in job.params.tables:
-        files = zip(job.params.settings["titles"], job.input.initial, strict=True)
-        tables["initial"] = {robot: read_frame(path, INITIAL) for robot, path in files}
+    tables = {name: READ.get(name, read_table)(job.input[name]) for name in job.params.tables}
     if "per_dataset" in tables:
         tables["per_dataset"] = tables["per_dataset"].query("noise_um == @job.params.noise_um")
     figure = getattr(study, job.params.figure)(**tables, **job.params.settings)

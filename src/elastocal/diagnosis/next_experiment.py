@@ -39,7 +39,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from elastocal.diagnosis.alternatives import Alternative
-    from elastocal.diagnosis.diagnose import Diagnosis, Evidence
+    from elastocal.diagnosis.diagnose import Diagnosis
+    from elastocal.diagnosis.findings import Evidence
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.new_states import Entries, Instrument
     from elastocal.diagnosis.search import Model
