@@ -32,7 +32,6 @@ include: "workflow/rules/league_files.smk"
 include: "workflow/rules/league.smk"
 include: "workflow/rules/signatures.smk"
 include: "workflow/rules/audit.smk"
-include: "workflow/rules/crate.smk"
 include: "workflow/rules/store.smk"
 
 

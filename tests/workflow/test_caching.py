@@ -45,7 +45,7 @@ def test_what_changes_no_result_reruns_nothing(finished_paper):
         study.append(name, "# a comment\n")
     study.append("src/elastocal/study/metrics.py", "# a comment\n")
     study.replace("src/elastocal/study/identification.py", '"""Equation 11', '"""Of equation 11')
-    for name in ("test", "cluster", "crate", "install"):
+    for name in ("test", "cluster", "install"):
         study.path(f"requirements/{name}.lock").write_text("# edited\n", encoding="utf-8")
     for name in study.files("Snakefile", "config.yaml", "config/**/*.*", "workflow/**/*.*", "src/**/*.*", "README.md"):
         os.utime(study.path(name))

@@ -72,9 +72,9 @@ except InputError as error:
     sys.exit(str(error))
 
 # All that decides what the results hold, but for code and measured data; which campaign of a user is asked for, what is put on
-# which store and what is described there decides nothing.
+# which store decides nothing.
 RESOLVED = {
-    "config": {key: value for key, value in config.items() if key not in ("campaign", "store", "crate_of", "origin")},
+    "config": {key: value for key, value in config.items() if key not in ("campaign", "store", "store_of", "origin")},
     "robots": STUDY.robots,
     "strategies": STUDY.strategies,
     "campaigns": SOURCES,
@@ -105,7 +105,7 @@ AUDITED = [
     *("interpretations", "switched", "identification", "evaluation", "tables", "questions", "loop", "league"),
 ]
 # Files that jobs make.
-MADE = re.compile("(data|results|reports)/|ro-crate-metadata.json$")
+MADE = re.compile("(data|results|reports)/")
 NAMES = {name: document["name"] for name, document in STUDY.strategies.items()}
 EXTENDED = [name for name in config["robots"] if "links" in STUDY.robots[name]]
 REDUCED = [name for name in config["robots"] if name not in EXTENDED]
@@ -186,9 +186,9 @@ def files_behind(targets):
     return [str(output) for output in outputs_behind(targets)]
 
 
-def described():
-    """Inputs of the targets that the crate is of."""
-    named = config.get("crate_of", ["study", "loop"])
+def stored_targets():
+    """Inputs of the targets that are put on an object store."""
+    named = config.get("store_of", ["study", "loop"])
     return [file for target in named for file in getattr(rules, target).input]
 
 

@@ -18,8 +18,8 @@ from elastocal.io.sources import source_digest
 from elastocal.io.texts import check_file
 
 RECORDS = Path("results/records")
-# What the pipeline makes, folders and a file; the rest is the user's.
-_MADE = ("data", "results", "reports", "ro-crate-metadata.json")
+# What the pipeline makes, the rest is the user's.
+_MADE = ("data", "results", "reports")
 _AS_WRITTEN = "the file as the pipeline wrote it (delete it and run the pipeline again)"
 # Of one output, and of all else that its record says.
 _FILES, _DIGEST = "files", "sha256"
