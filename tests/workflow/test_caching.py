@@ -18,6 +18,7 @@ SCRIPTS = sorted(
     for path in (REPOSITORY / "workflow" / "scripts").glob("*.py")
     if path.read_text(encoding="utf-8").splitlines()[-1].startswith("run(")
 )
+RUN_STEP = "run_step.py"
 DATA = {"draw_experiments", "simulate", "measure"}
 GRID = DATA | {"identify"}
 STAGED = "4-6DoF-after-3DoF"
@@ -129,14 +130,17 @@ def test_more_data_sets_rerun_their_draws_but_not_those_of_the_test(finished_pap
 
 
 def test_every_rule_watches_the_sources_of_its_own_script():
+    """That of a named step watches the function that it calls."""
     seen = []
     for file in sorted((REPOSITORY / "workflow" / "rules").glob("*.smk")):
-        for body in re.split(r"^rule ", file.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]:
+        for body in re.split(r"^ *rule\b", file.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]:
             scripts = re.findall(r'"\.\./scripts/(\w+\.py)"', body)
-            assert re.findall(r'sources\("(\w+\.py)"\)', body) == scripts
-            assert len(scripts) == ("script:" in body)
+            steps = re.findall(r'\bstep=("[\w.]+"|step)', body)
+            assert re.findall(r'sources\("(\w+\.py)"\)', body) == [name for name in scripts if name != RUN_STEP]
+            assert re.findall(r'sources\(("[\w.]+(?<!\.py)"|step)\)', body) == steps
+            assert len(scripts) == ("script:" in body) and len(steps) == scripts.count(RUN_STEP)
             seen += scripts
-    assert sorted(seen) == SCRIPTS
+    assert sorted(set(seen) | {RUN_STEP}) == SCRIPTS
 
 
 # Forks before it imports anything of the package, so that every script starts without it; other people's modules may be there.

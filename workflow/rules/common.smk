@@ -120,11 +120,15 @@ wildcard_constraints:
     test="(/test)?",
 
 
-def sources(script):
-    """A script and the package modules that it runs, whose dates count for nothing: `watch_sources` has their digests."""
+def sources(step):
+    """A script, or the one that calls a function of the packages, and the package modules that it runs.
+
+    Their dates count for nothing: `watch_sources` has their digests. The parameter `step` of a rule names the same function.
+    """
+    script, modules = (step, ()) if step.endswith(".py") else ("run_step.py", [step.rpartition(".")[0]])
     path = ROOT / "workflow" / "scripts" / script
     try:
-        files = [path, *closure(path, PACKAGES)]
+        files = [path, *closure(path, PACKAGES, *modules)]
     except InputError as error:
         sys.exit(str(error))
     return [ancient(placed(file)) for file in files]

@@ -13,13 +13,14 @@ from elastocal.errors import InputError
 PACKAGES = ("elastocal", "elastocal_proof")
 
 
-def closure(script: Path, source: Path) -> list[Path]:
+def closure(script: Path, source: Path, *named: str) -> list[Path]:
     """Source files that a script imports, directly or not.
 
-    `script`: imports modules of the packages and of its own folder. `source`: folder of the packages. Returns sorted, without
-    the script itself. Raises `InputError`: a source file that is no Python, such as an effect that is being written.
+    `script`: imports modules of the packages and of its own folder. `source`: folder of the packages. `named`: modules that it
+    imports because its rule names them. Returns sorted, without the script itself. Raises `InputError`: a source file that is
+    no Python, such as an effect that is being written.
     """
-    files, left, modules = set(), [script], set()
+    files, left, modules = set(), [script], set(named)
     while left:
         file = left.pop()
         files.add(file)

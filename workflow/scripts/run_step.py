@@ -1,0 +1,13 @@
+"""The script of every rule that names a `step`, a function of the packages: calls it with the job."""
+
+from importlib import import_module
+
+from job import Job, run
+
+
+def run_step(job: Job) -> None:
+    module, _, name = job.params.step.rpartition(".")
+    getattr(import_module(module), name)(job)
+
+
+run(run_step, snakemake)
