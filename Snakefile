@@ -35,6 +35,7 @@ include: "workflow/rules/audit.smk"
 include: "workflow/rules/store.smk"
 
 
+complete_rules()
 watch_sources()
 
 

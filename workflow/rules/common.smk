@@ -151,6 +151,21 @@ def reads_docstrings(file):
     return file.endswith(".py") and b".__doc__" in Path(file).read_bytes()
 
 
+def complete_rules():
+    """What rules have alike: a log and a time by their names and wildcards; of those with a script its sources among the inputs."""
+    for each in workflow.rules:
+        if each.norun:
+            continue
+        each.log_modifier = each.benchmark_modifier = each.input_modifier = each.output_modifier
+        place = Path(each.name, *(f"{{{name}}}" for name in re.findall(r"{(\w+)", each.output[0]))).as_posix()
+        if not each.log:
+            each.set_log(f"results/logs/{place}.log")
+        if not each.benchmark:
+            each.benchmark = f"results/timings/{place}.tsv"
+        if each.is_script and "sources" not in each.input.keys():
+            each.set_input(sources=sources(each.params.get("step") or Path(each.script).name))
+
+
 def watch_sources():
     """An edit of a source reruns the jobs that depend on it, and no others, whatever the date of the file.
 

@@ -28,15 +28,9 @@ LOOP_REPORTS = [
 
 
 rule simulate_campaign:
-    input:
-        sources=sources("simulate_campaign.py"),
     output:
         document="data/campaigns/{campaign}/campaign.yaml",
         measurements="data/campaigns/{campaign}/measurements.parquet",
-    log:
-        "results/logs/simulate_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/simulate_campaign/{campaign}.tsv"
     wildcard_constraints:
         campaign="|".join(SIMULATED) or "none",
     params:
@@ -49,14 +43,9 @@ rule simulate_campaign:
 rule import_campaign:
     input:
         robots=robots_of_import,
-        sources=sources("import_campaign.py"),
     output:
         document="data/campaigns/{campaign}/campaign.yaml",
         measurements="data/campaigns/{campaign}/measurements.parquet",
-    log:
-        "results/logs/import_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/import_campaign/{campaign}.tsv"
     wildcard_constraints:
         campaign="|".join(PUBLIC) or "none",
     params:
@@ -70,15 +59,10 @@ rule import_campaign:
 rule read_campaign:
     input:
         files=files_of,
-        sources=sources("read_campaign.py"),
     output:
         training="results/loop/{campaign}/training.parquet",
         held_out="results/loop/{campaign}/held_out.parquet",
         descriptions="results/loop/{campaign}/campaign.json",
-    log:
-        "results/logs/read_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/read_campaign/{campaign}.tsv"
     params:
         folder=lambda wildcards: folder_of(wildcards.campaign),
         robots=f"{CONFIG}/robots",
@@ -91,7 +75,6 @@ rule diagnose_campaign:
     input:
         descriptions=rules.read_campaign.output.descriptions,
         training=rules.read_campaign.output.training,
-        sources=sources("diagnose_campaign.py"),
     output:
         diagnosis="results/loop/{campaign}/diagnosis.json",
         steps="results/loop/{campaign}/steps.parquet",
@@ -100,10 +83,6 @@ rule diagnose_campaign:
         confounding="results/loop/{campaign}/confounding.parquet",
         candidates="reports/loop/{campaign}/candidates.parquet",
         experiment="reports/loop/{campaign}/next_experiment.csv",
-    log:
-        "results/logs/diagnose_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/diagnose_campaign/{campaign}.tsv"
     params:
         seed=config["seed"],
         states=config["loop"]["proposed_states"],
@@ -118,7 +97,6 @@ rule judge_campaign:
         held_out=rules.read_campaign.output.held_out,
         diagnosis=rules.diagnose_campaign.output.diagnosis,
         steps=rules.diagnose_campaign.output.steps,
-        sources=sources("judge_campaign.py"),
     output:
         verdict="reports/loop/{campaign}/verdict.json",
         before_after=shown(
@@ -131,10 +109,6 @@ rule judge_campaign:
         ),
         splits="reports/loop/{campaign}/splits.csv",
         residuals="reports/loop/{campaign}/residuals.parquet",
-    log:
-        "results/logs/judge_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/judge_campaign/{campaign}.tsv"
     params:
         seed=config["seed"],
     script:
@@ -145,7 +119,6 @@ rule summarize_campaigns:
     input:
         verdicts=lambda wildcards: expand("reports/loop/{name}/verdict.json", name=config["loop"][wildcards.kind]),
         residuals=lambda wildcards: expand("reports/loop/{name}/residuals.parquet", name=config["loop"][wildcards.kind]),
-        sources=sources("summarize_campaigns.py"),
     output:
         table=shown(
             "reports/loop/{kind}.csv",
@@ -155,10 +128,6 @@ rule summarize_campaigns:
             shows="All campaigns",
             kind="table",
         ),
-    log:
-        "results/logs/summarize_campaigns/{kind}.log",
-    benchmark:
-        "results/timings/summarize_campaigns/{kind}.tsv"
     wildcard_constraints:
         kind="campaigns|measured",
     params:
@@ -172,7 +141,6 @@ rule summarize_campaigns:
 rule draw_campaign_errors:
     input:
         table=rules.summarize_campaigns.output.table,
-        sources=sources("draw_campaign_errors.py"),
     output:
         pdf="reports/loop/{kind}.pdf",
         png=shown(
@@ -183,10 +151,6 @@ rule draw_campaign_errors:
             shows="Held-out errors before and after",
             kind="figure",
         ),
-    log:
-        "results/logs/draw_campaign_errors/{kind}.log",
-    benchmark:
-        "results/timings/draw_campaign_errors/{kind}.tsv"
     wildcard_constraints:
         kind="campaigns|measured",
     script:
@@ -199,10 +163,6 @@ rule measured_pictures:
         picture="reports/loop/measured.png",
     output:
         picture="docs/measured_data.png",
-    log:
-        "results/logs/measured_pictures.log",
-    benchmark:
-        "results/timings/measured_pictures.tsv"
     shell:
         "cp {input.picture} {output.picture} 2> {log}"
 

@@ -10,13 +10,8 @@ rule pack_sources:
     input:
         files=lambda wildcards: files_behind(stored_targets()),
         workflow=[placed(path) for path in (ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk")))],
-        sources=sources("pack_sources.py"),
     output:
         archive="reports/sources.zip",
-    log:
-        "results/logs/pack_sources.log",
-    benchmark:
-        "results/timings/pack_sources.tsv"
     params:
         configuration=RESOLVED,
     script:
@@ -35,10 +30,6 @@ if "store" in config:
             file="{stored}",
         output:
             file=in_store("{stored}"),
-        log:
-            "results/logs/upload/{stored}.log",
-        benchmark:
-            "results/timings/upload/{stored}.tsv"
         wildcard_constraints:
             stored="(data|results|reports)/.+",
         shell:

@@ -1,4 +1,4 @@
-"""What jobs read and no job made as a file by itself: sources, configuration, files in folders; and the digests of all files."""
+"""What jobs read and no job made as a file by itself: sources, configuration, files in folders; and digests of all files."""
 
 import zipfile
 from pathlib import Path
