@@ -6,6 +6,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from elastocal.application.accuracy import before_m
+from elastocal.application.calibrated import forward, nominal_forward
 from elastocal.application.certificate.error_budget import effect_costs
 from elastocal.application.scope import calibrate_on_case, campaign_accuracy, campaign_poses, judge_by_held_out, set_form
 from elastocal.campaigns.columns import columns_of
@@ -15,12 +19,13 @@ from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
 from elastocal.loop.loading import load_campaign
+from elastocal.mechanics.pose_differences import pose_differences
 
 if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
-    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.diagnosis.judge import Verdict
 
@@ -57,15 +62,24 @@ def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected robot and the cost of each effect.
 
-    ``accuracy`` is predicted, ``cost_m`` of an effect is the RMS error over the campaign's poses and loads if it alone were
-    left out of the correction. Both are None where the data are at fault, the cost also of an effect that is not in the final
-    model or moves no robot.
+    ``accuracy`` and ``uncorrected_m``, the RMS error without a correction at the same poses, are predicted; ``cost_m`` of an
+    effect is the RMS error over the campaign's poses and loads if it alone were left out of the correction. All are None where
+    the data are at fault, the cost also of an effect that is not in the final model or moves no robot.
     """
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
-    accuracy, costs = None, dict[str, float]()
+    accuracy, uncorrected, costs = None, None, dict[str, float]()
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out)
         accuracy = campaign_accuracy(found, case.observations.states).document()
+        uncorrected = _uncorrected_m(found, *campaign_poses(found, case.observations.states))
         costs = effect_costs(found, *campaign_poses(found, case.observations.states))
     effects = [effect | {"cost_m": costs.get(effect["name"])} for effect in verdict.document["effects"]]
-    return replace(verdict, document=verdict.document | {"accuracy": accuracy, "effects": effects})
+    stated = {"accuracy": accuracy, "uncorrected_m": uncorrected, "effects": effects}
+    return replace(verdict, document=verdict.document | stated)
+
+
+def _uncorrected_m(found: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> float:
+    """RMS error of the uncorrected robot at some commands, in the frame of its accuracy."""
+    position, rotation = forward(found, reported_angles, operating)
+    off = pose_differences(*nominal_forward(found.robot, reported_angles), position, rotation)
+    return float(np.sqrt((before_m(found, position, rotation, off) ** 2).mean()))

@@ -77,7 +77,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "decision": conformity["decision"],
         "decision_sentences": decision_sentences(document),
         "verdict": verdict_sentence(document),
-        "accuracy": before_and_after(document),
+        "errors": document["errors"],
         "now": what_to_do(document),
         "steps": [
             [
@@ -166,16 +166,6 @@ def verdict_sentence(document: Mapping[str, Any]) -> str:
     title = capital(TITLES[document["verdict"]])
     names = [physical_name(name) for name in document["effects"]]
     return f"{title}: {listed(names)}." if names else f"{title}."
-
-
-def before_and_after(document: Mapping[str, Any]) -> str:
-    """What correction is worth at the fitted poses: both as they are predicted, in one frame."""
-    after = accuracy_from(document["predicted"])
-    before = next(line["rms_m"] for line in document["budget"] if line["name"] == "uncorrected")
-    return (
-        f"At {after.region} the uncorrected robot is off by {millimetres(before)} RMS and the corrected one by "
-        f"{millimetres(after.rms_m)}, both as predicted by the model that was found and in the same frame."
-    )
 
 
 def what_to_do(document: Mapping[str, Any]) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.words import in_words
+from elastocal.loop.error_table import error_rows
 from elastocal.report.first_page import (
     AT_FAULT,
     TITLES,
@@ -72,6 +73,7 @@ def loop_facts(
         "warnings": [] if faulty else [_with_minus(as_sentence(in_words(warning))) for warning in verdict["warnings"]],
         "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),
         "accuracy": _accuracy(verdict),
+        "errors": error_rows(verdict),
         "measured": measured(table, descriptions),
         "noise": noise_rows(verdict["noise"], descriptions["campaign"]["measured"] == "pose"),
         "noise_source": NOISE_SOURCES[verdict["noise"]["source"]],

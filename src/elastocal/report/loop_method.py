@@ -52,9 +52,7 @@ def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
     """
     found: dict[tuple[str, str], list[str]] = {}
     for key, reason in untestable.items():
-        # Reasons that differ from joint to joint are one reason.
-        alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different joint angles", reason)
-        alike = alike.replace("no approach", "no direction of approach")
+        alike = reason.replace("no approach", "no direction of approach")
         found.setdefault((re.split(r"[@\[]", key)[0], alike), []).append(key)
     rows = [[capital(physical_name(effect)), members_words(keys, 4) or "–", reason] for (effect, reason), keys in found.items()]
     return sorted(rows, key=lambda row: (row[2], row[0]))
