@@ -64,11 +64,12 @@ rule read_campaign:
         held_out="results/loop/{campaign}/held_out.parquet",
         descriptions="results/loop/{campaign}/campaign.json",
     params:
+        step="elastocal.loop.loading.read_campaign",
         folder=lambda wildcards: folder_of(wildcards.campaign),
         robots=f"{CONFIG}/robots",
         files_sha256=lambda wildcards: digest_of(files_of(wildcards)) if wildcards.campaign in OWN else None,
     script:
-        "../scripts/read_campaign.py"
+        "../scripts/run_step.py"
 
 
 rule diagnose_campaign:
@@ -84,10 +85,11 @@ rule diagnose_campaign:
         candidates="reports/loop/{campaign}/candidates.parquet",
         experiment="reports/loop/{campaign}/next_experiment.csv",
     params:
+        step="elastocal.loop.steps.diagnose_campaign",
         seed=config["seed"],
         states=config["loop"]["proposed_states"],
     script:
-        "../scripts/diagnose_campaign.py"
+        "../scripts/run_step.py"
 
 
 rule judge_campaign:
@@ -110,9 +112,10 @@ rule judge_campaign:
         splits="reports/loop/{campaign}/splits.csv",
         residuals="reports/loop/{campaign}/residuals.parquet",
     params:
+        step="elastocal.loop.steps.judge_campaign",
         seed=config["seed"],
     script:
-        "../scripts/judge_campaign.py"
+        "../scripts/run_step.py"
 
 
 rule summarize_campaigns:
@@ -131,11 +134,12 @@ rule summarize_campaigns:
     wildcard_constraints:
         kind="campaigns|measured",
     params:
+        step="elastocal.loop.summary.summarize_campaigns",
         campaigns=lambda wildcards: config["loop"][wildcards.kind],
         folds=lambda wildcards: folds_of_one(config["loop"][wildcards.kind]),
         seed=config["seed"],
     script:
-        "../scripts/summarize_campaigns.py"
+        "../scripts/run_step.py"
 
 
 rule draw_campaign_errors:
