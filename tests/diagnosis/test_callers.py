@@ -31,7 +31,7 @@ CALLERS = {
     "src/elastocal_proof/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
     "src/elastocal_proof/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",
     "src/elastocal_proof/blind/stated_accuracy.py": "the same, and compares what is stated of the correction",
-    "src/elastocal/loop/steps.py": "rules",
+    "src/elastocal/loop/diagnosis_tables.py": "rules",
     "workflow/scripts/diagnose_cases.py": "blind proof",
     "workflow/scripts/diagnose_follow_ups.py": "follow-ups",
     "workflow/scripts/diagnose_league_folds.py": "makes the call on the training poses of each fold of the league",

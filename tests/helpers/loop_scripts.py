@@ -6,7 +6,7 @@ from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "workflow" / "scripts"
 CONFIG = {"origin": {"commit": "c0ffee", "configuration_sha256": "d16e57", "seed": 1}}
-ANALYSIS = ("loop.loading.read_campaign", "loop.steps.diagnose_campaign", "loop.steps.judge_campaign")
+ANALYSIS = ("loop.loading.read_campaign", "loop.diagnosis_tables.diagnose_campaign", "loop.whole.judge_campaign")
 FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
 PARAMS = {"seed": 1, "states": 4, "figures": FIGURES}
 STEPS = (*ANALYSIS, "draw_campaign", "compile_loop_report")

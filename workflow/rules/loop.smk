@@ -85,7 +85,7 @@ rule diagnose_campaign:
         candidates="reports/loop/{campaign}/candidates.parquet",
         experiment="reports/loop/{campaign}/next_experiment.csv",
     params:
-        step="elastocal.loop.steps.diagnose_campaign",
+        step="elastocal.loop.diagnosis_tables.diagnose_campaign",
         seed=config["seed"],
         states=config["loop"]["proposed_states"],
     script:
@@ -112,7 +112,7 @@ rule judge_campaign:
         splits="reports/loop/{campaign}/splits.csv",
         residuals="reports/loop/{campaign}/residuals.parquet",
     params:
-        step="elastocal.loop.steps.judge_campaign",
+        step="elastocal.loop.whole.judge_campaign",
         seed=config["seed"],
     script:
         "../scripts/run_step.py"

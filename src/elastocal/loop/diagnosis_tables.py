@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -9,17 +10,23 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.confounding import angles_between, nearest_angles
-from elastocal.diagnosis.diagnose import Diagnosis, Step
+from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
+from elastocal.diagnosis.next_experiment import propose
+from elastocal.diagnosis.proposal import facts_of, table_of
 from elastocal.diagnosis.search import initial_screening
+from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import mechanisms_of_models
 from elastocal.fitting.case import case_from, noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import Estimate
 from elastocal.fitting.parameters import parameters
-from elastocal.io.json_files import read_json
-from elastocal.io.storage import read_table
-from elastocal.loop.schemas import CANDIDATES, MODELS, measurements
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import read_json, write_json
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_table, write_table
+from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, CORRELATIONS, MODELS, STEPS, measurements
 from elastocal.mechanics.robot_file import joint_count
+from elastocal.random_streams import stream
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -29,6 +36,27 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
+
+
+def diagnose_campaign(job: Any) -> None:
+    """The step of a rule: what the training poses say, and the next experiment."""
+    case = load_case(job.input.descriptions, job.input.training)
+    name, seed = job.wildcards.campaign, job.params.seed
+    found = diagnose(case, Settings(), seed, lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True))
+    robot, draws = case.campaign.robot, stream(seed, case.campaign.name, "next experiment", 0)
+    proposal = propose(found, robot.joint_limits, Settings(), draws, job.params.states)
+    write_csv(job.output.experiment, table_of(proposal, robot))
+    found = replace(found, document=found.document | {"next_experiment": facts_of(proposal)})
+    write_json(job.output.diagnosis, diagnosis_facts(found))
+    origin = provenance(job.params, **job.wildcards)
+    write_table(job.output.steps, STEPS, step_blocks(found), origin)
+    for path, schema, columns in (
+        (job.output.correlations, CORRELATIONS, correlation_columns(found.final)),
+        (job.output.models, MODELS, model_columns(found)),
+        (job.output.candidates, CANDIDATES, candidate_columns(found)),
+        (job.output.confounding, CONFOUNDING, confounding_columns(found)),
+    ):
+        write_table(path, schema, [columns], origin)
 
 
 def load_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:

@@ -4,9 +4,10 @@ same two calls, with tables between them."""
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from elastocal.application.accuracy import before_m
 from elastocal.application.calibrated import forward, nominal_forward
@@ -15,19 +16,37 @@ from elastocal.application.scope import calibrate_on_case, campaign_accuracy, ca
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge
+from elastocal.diagnosis.judge import judge, residual_blocks, split_table
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import read_json, write_json
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_table, write_table
+from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
+from elastocal.loop.schemas import STEPS, residuals
 from elastocal.mechanics.pose_differences import pose_differences
 
 if TYPE_CHECKING:
     from pathlib import Path
-    from typing import Any
 
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.diagnosis.judge import Verdict
+
+
+def judge_campaign(job: Any) -> None:
+    """The step of a rule: the verdict, every model on poses that no step has seen."""
+    case = tables.load_case(job.input.descriptions, job.input.training)
+    held_out = tables.load_case(job.input.descriptions, job.input.held_out, "held_out")
+    found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
+    verdict = judged(found, held_out, job.params.seed)
+    write_json(job.output.verdict, verdict.document, allow_nan=False)
+    write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
+    write_csv(job.output.splits, pd.DataFrame(split_table(found, verdict.held_out, job.params.seed)))
+    schema = residuals(case.campaign.robot.joints)
+    write_table(job.output.residuals, schema, residual_blocks(found, verdict), provenance(job.params, **job.wildcards))
 
 
 def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
