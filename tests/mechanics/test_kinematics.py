@@ -18,8 +18,6 @@ from support import (
 from elastocal.mechanics import kinematics
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import (
-    BLOCK,
-    blocks,
     corners,
     jacobians,
     joint_axes,
@@ -188,11 +186,3 @@ def test_joints_stand_at_their_places_along_their_axes():
     place, axis = joint_axes(chain, np.array([[np.pi / 2, 0.3]])).swapaxes(0, 1)
     np.testing.assert_allclose(place[:, 0], [[0, 0, 0.5], [0, 1, 0.5]], atol=1e-12)
     np.testing.assert_allclose(axis[:, 0], [[0, 0, 1], [-1, 0, 0]], atol=1e-12)
-
-
-@pytest.mark.parametrize("size, lengths", [(0, []), (1, [1]), (BLOCK, [BLOCK]), (2 * BLOCK + 5, [BLOCK, BLOCK, 5])])
-def test_blocks_hold_each_configuration_once_and_in_order(size, lengths):
-    numbers = np.arange(size)
-    parts = [numbers[block] for block in blocks(size)]
-    assert [len(part) for part in parts] == lengths
-    np.testing.assert_array_equal(np.concatenate([numbers[:0], *parts]), numbers)
