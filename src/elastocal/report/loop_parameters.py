@@ -22,13 +22,13 @@ _MOST_OTHERS = 40
 
 
 def compliance_rows(compliance: Mapping[str, Sequence[float]]) -> list[list[str]]:
-    """Rows of the compliances: joint, before, after with its standard error."""
-    rows = []
+    """Rows of the compliances: joint, before, after with its standard error; no number of one that is not identifiable."""
+    rows, identified = [], any(compliance["std_error"])
     for joint, (before, after, error) in enumerate(
         zip(*(compliance[name] for name in ("before", "after", "std_error")), strict=True), 1
     ):
         if not error:
-            rows.append([str(joint), f"{before:.4g}", f"{after:.4g}"])
+            rows.append([str(joint), *(["not identifiable"] * 2 if identified else [f"{before:.4g}", f"{after:.4g}"])])
             continue
         stated = pm(after, error)
         decimals = len(stated.rpartition(".")[2]) if "." in stated else 0
