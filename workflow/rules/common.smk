@@ -19,7 +19,6 @@ from elastocal.errors import InputError
 from elastocal.io.origin import Origin, configuration_sha256, environment
 from elastocal.io.provenance import SOURCES_DIGEST
 from elastocal.io.records import checksum
-from elastocal.io.sources import keep_source_digests, source_digest
 from elastocal.report.outcome import outcome
 from elastocal.study.configuration import check_study, rows_read, override
 
@@ -135,20 +134,11 @@ def sources(step):
 
 
 def digest_of(files):
-    """One digest of all that some files hold, of modules but for comments and, where none of them reads these, docstrings."""
-    files = list(files)
-    documented = any(map(reads_docstrings, files))
-    return hashlib.sha256(" ".join(digest_of_file(file, documented) for file in files).encode()).hexdigest()[:16]
+    """One digest of all that some files hold."""
+    return hashlib.sha256(" ".join(map(checksum_once, files)).encode()).hexdigest()[:16]
 
 
-@cache
-def digest_of_file(file, documented):
-    return checksum(file) if documented else source_digest(file)
-
-
-@cache
-def reads_docstrings(file):
-    return file.endswith(".py") and b".__doc__" in Path(file).read_bytes()
+checksum_once = cache(checksum)
 
 
 def complete_rules():
@@ -177,8 +167,6 @@ def watch_sources():
         for each in workflow.rules
         if "sources" in each.input.keys()
     }
-    if workflow.is_main_process and not workflow.dryrun:
-        keep_source_digests({file for files in watched.values() for file in files if file.endswith(".py")})
     for each, files in watched.items():
         each.set_params(**{SOURCES_DIGEST: f"{digest_of(files)} {environment_sha256}"})
 
