@@ -143,16 +143,6 @@ def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size)
     np.testing.assert_allclose(jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole[2], rtol=0, atol=ROUNDING)
 
 
-def test_results_of_an_earlier_call_are_overwritten_in_place(kuka):
-    rng, point = np.random.default_rng(5), kuka.chain.end_effector
-    first, second = random_angles(rng, kuka.chain, 12).reshape(3, 4, 6), random_angles(rng, kuka.chain, 12).reshape(3, 4, 6)
-    held = poses_and_jacobians(kuka.chain, first, point)
-    again = poses_and_jacobians(kuka.chain, second, point, out=held)
-    for new, old, expected in zip(again, held, poses_and_jacobians(kuka.chain, second, point), strict=True):
-        assert np.shares_memory(new, old)
-        np.testing.assert_array_equal(new, expected)
-
-
 @pytest.mark.parametrize("batch", [(), (5,), (2, 3)])
 def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka, batch):
     points = [*kuka.chain.points[::-1], with_target_offset(kuka, (0.1, -0.2, 0.3)).chain.end_effector, kuka.chain.points[0]]
