@@ -1,10 +1,14 @@
 """Hypotheses, candidates one by one, and which of them contribute alike: what is drawn is what the tables hold."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
-from drawn_figures import texts
+from drawn_figures import row_labels, texts
+from made_loop_facts import plainly
 from made_loop_tables import candidate_table, confounding_table
 from made_loop_tables import probabilities as stated
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from elastocal.figures.candidates import (
     angle_matrix,
@@ -26,9 +30,9 @@ def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
         "Everything else",
     ]
     assert [bar.get_width() for bar in axis.patches] == pytest.approx([94, 5, 0.4, 0.6])
-    assert [text.get_text() for text in axis.texts] == ["94 %", "5 %", "<1 %", "1 %"]
+    assert [plainly(text.get_text()) for text in axis.texts] == ["94 %", "5 %", "< 1 %", "1 %"]
     certain = probabilities(stated([({"lost_motion": ["joint 3"]}, 0.9961), ({}, 0.0039)]), candidate_table(count=3)).axes[0]
-    assert [text.get_text() for text in certain.texts] == [">99 %", "<1 %"]
+    assert [plainly(text.get_text()) for text in certain.texts] == ["> 99 %", "< 1 %"]
 
 
 def test_of_many_hypotheses_the_leading_have_bars_and_the_rest_has_one():
@@ -60,6 +64,19 @@ def test_confounding_annotates_every_pair_and_marks_what_was_found():
     bold = [label.get_text() for label in figure.axes[0].get_yticklabels() if label.get_fontweight() == "bold"]
     assert bold == ["Effect 0 of joint 1  1"]
     assert figure.axes[1].get_ylabel() == "angle between the contributions (°)"
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_labels_of_two_lines_have_room_of_their_own(which):
+    table = candidate_table(count=6)
+    table["candidate"][1:4] = [f"transmission_harmonic@{k}[non-integer order between {k} and {k + 1}]" for k in range(1, 4)]
+    sets = [({"link_elasticity": [f"links 1 and 2 and {k} one section"], "payload": []}, 0.3) for k in (3, 4, 5)]
+    figure = probabilities(stated(sets), table)
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure.draw(renderer)
+    boxes = [label.get_window_extent(renderer) for label in figure.axes[which].get_yticklabels()]
+    assert any("\n" in label for label in row_labels(figure.axes[which]))
+    assert all(above.y0 >= below.y1 - 1 for above, below in pairwise(boxes))
 
 
 def test_where_nothing_can_be_tested_the_figures_say_so():

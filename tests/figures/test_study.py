@@ -6,12 +6,10 @@ import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
 from made_study_tables import TITLES, comparison, expectations, strategy_scores
-from matplotlib.colors import same_color, to_hex
+from matplotlib.colors import to_hex
 
 from elastocal.figures.study import (
-    accuracy_of_one_data_set,
     bias_and_accuracy,
-    budget,
     costs,
     designs,
     ladder,
@@ -20,7 +18,6 @@ from elastocal.figures.study import (
     over_studies,
     scores,
     stiffness_errors,
-    table2_samples,
 )
 from elastocal.figures.style import PALETTE
 
@@ -118,23 +115,6 @@ def test_bias_and_accuracy_puts_the_averaged_model_below_the_error_of_one_data_s
     assert legend_entries(figure) == [f"{name}: {end}" for name in ORDER for end in ends]
 
 
-def test_bars_of_one_data_set_stand_in_the_given_order_with_bound_error_and_efficiency():
-    figure = accuracy_of_one_data_set(PER_DATASET, TITLES, ORDER[::-1], 20)
-    for axis in figure.axes:
-        # The first of the order is on top.
-        assert [(bar.get_y() + bar.get_height() / 2, bar.get_width()) for bar in axis.patches] == [(1.0, 10.0), (0.0, 5.0)]
-        assert all(same_color(bar.get_facecolor(), PALETTE[5]) for bar in axis.patches)
-        (marks,) = [line for line in axis.lines if line.get_marker() == "|"]
-        assert marks.get_xydata().tolist() == [[4, 1], [4, 0]]
-        spans = [path.vertices[:, 0].tolist() for path in axis.collections[0].get_paths()]
-        assert spans == [[4.0, 16.0], [2.0, 8.0]]
-        assert [text.get_text() for text in axis.texts] == ["16 %", "64 %"]
-        assert axis.get_xlabel() == "RMS end-effector error (µm)"
-    assert row_labels(figure.axes[0]) == ORDER[::-1]
-    assert legend_entries(figure) == ["Cramér-Rao bound", "RMS error"] and "20 configurations" in figure.get_suptitle()
-    assert_nothing_cut_off(figure)
-
-
 def test_studies_are_drawn_as_their_mean_and_one_estimator_once():
     parts = [
         metrics_of(robot, name, size * (1 + 0.1 * study)).assign(study=study)
@@ -148,14 +128,6 @@ def test_studies_are_drawn_as_their_mean_and_one_estimator_once():
     assert len(lines) == 2 and "6DoF again" not in legend_entries(figure)
     np.testing.assert_allclose(lines[0].get_ydata(), 22.0 / LENGTHS, rtol=1e-9)
     assert_nothing_cut_off(figure)
-
-
-INITIAL = pd.DataFrame({"mean": np.linspace(1e-3, 2e-3, 101), "maximum": np.linspace(5e-3, 7e-3, 101)})
-INITIAL["mean_square"] = INITIAL["mean"] ** 2 + np.linspace(1e-4, 3e-4, 101) ** 2
-TABLE_2 = pd.DataFrame(
-    [("2", "kuka", "deviation_mean", 1.7), ("2", "kuka", "deviation_max", 6.5), ("3", "kuka", "deviation_std", 0.9)],
-    columns=["table", "robot", "quantity", "value"],
-)
 
 
 def find_points(axis, marker):
@@ -180,23 +152,6 @@ def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
     assert find_points(figure.axes[5], "D") == [(30.0, 0.0, False)]
 
 
-def test_samples_show_quartiles_and_nearly_the_whole_range_of_single_data_sets_in_millimetres():
-    figure = table2_samples({"fanuc": INITIAL, "kuka": INITIAL}, TABLE_2, {"fanuc": "Fanuc", "kuka": "Kuka"})
-    expected = {"mean": (1.0, 2.0), "std": (0.1, 0.3), "max": (5.0, 7.0)}
-    assert [axis.get_title() for axis in figure.axes] == [*expected]
-    for axis, (low, high) in zip(figure.axes, expected.values(), strict=True):
-        assert axis.get_xlabel() == "mm"
-        whole, half, middle = axis.lines[:3]
-        for line, shares in ((whole, (0.01, 0.99)), (half, (0.25, 0.75)), (middle, (0.5,))):
-            assert list(line.get_xdata()) == pytest.approx([low + share * (high - low) for share in shares])
-            assert set(line.get_ydata()) == {0}
-    # The paper's figure stands in the row of its robot, and nowhere where none is printed.
-    assert [[point[:2] for point in find_points(axis, "D")] for axis in figure.axes] == [[(1.7, 1.0)], [], [(6.5, 1.0)]]
-    assert [row_labels(axis) for axis in figure.axes] == [["Fanuc", "Kuka"], ["", ""], ["", ""]]
-    assert legend_entries(figure) == ["paper, Table 2"]
-    assert_nothing_cut_off(figure)
-
-
 def test_the_ladder_has_a_line_for_each_length_in_the_panel_of_its_noise():
     table = pd.concat([made.ladder(), made.ladder().assign(length=40), made.ladder().assign(noise_um=50.0)])
     figure = ladder(table)
@@ -205,17 +160,6 @@ def test_the_ladder_has_a_line_for_each_length_in_the_panel_of_its_noise():
     assert len(first.lines) == 2 and len(second.lines) == 1
     np.testing.assert_array_equal(first.lines[0].get_xydata(), [[0, 40], [1, 20]])
     assert legend_entries(figure) == ["20", "40"]
-    assert_nothing_cut_off(figure)
-
-
-def test_points_stand_in_their_row_with_both_budgets():
-    figure = budget(made.budget(), TITLES, 20)
-    kuka = figure.axes[0]
-    assert row_labels(kuka) == ["6DoF", "3+6DoF"] and kuka.get_title() == "Kuka"
-    same, equal = [line for line in kuka.lines if line.get_marker() == "o"]
-    np.testing.assert_allclose(same.get_xydata(), [[79, -0.16], [57, 0.84]])
-    np.testing.assert_allclose(equal.get_xydata(), [[52, 0.16], [57, 1.16]])
-    assert set(legend_entries(figure)) == {"20 configurations each", "40 measurements each", "Cramér-Rao bound"}
     assert_nothing_cut_off(figure)
 
 
@@ -241,9 +185,11 @@ def test_metrics_have_a_row_each_and_strategies_stand_where_their_ratio_is():
 
 
 def test_costs_have_a_line_for_each_set_of_points_over_the_first():
-    figure = costs(made.costs(), TITLES, 60.0)
+    figure = costs(made.costs(), made.break_even(), TITLES, 60.0)
     kuka = figure.axes[0]
     assert kuka.get_title() == "Kuka" and "60 µm over that of 6DoF" in kuka.get_ylabel()
+    # Where a set costs what the first does, as the table of break-even has it.
+    assert [line.get_xydata().tolist() for line in kuka.lines if line.get_gid() == "even"] == [[[0.35, 1.0]]]
     np.testing.assert_allclose(kuka.lines[0].get_xydata(), [[0.1, 1.0], [1.0, 1.0]])
     assert legend_entries(figure) == ["6DoF", "3+6DoF"]
     assert_nothing_cut_off(figure)

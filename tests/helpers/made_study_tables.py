@@ -5,14 +5,10 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from elastocal.report.answers import answers
-from elastocal.report.metric_answers import METRIC_NAMES
-from elastocal.report.question_answers import stated
-from elastocal.report.study_questions import Asked, answer_questions
+from elastocal.report.study import METRIC_NAMES, study_facts
 from elastocal.study.strategies import Stage, Strategy
 
 TITLES = {"kuka": "Kuka", "fanuc": "Fanuc"}
-CELLS = {"noise_um": 200.0, "length": 20, "classical_strategy": "6DoF"}
 STATED = {"force_N": 1000, "offset_m": 0.5, "tracker_m": [4.0, 0.0, 1.5], "edge_m": 1.0, "weight_N": 1000, "path_m": 0.5}
 STATED |= {"cutting_N": 500, "bar_m": 0.5, "acceptance_deg": 30}
 STRATEGIES = ("6DoF", "2DoF+6DoF")
@@ -25,23 +21,6 @@ def rows_of(**columns):
 
 def for_each_robot(frame):
     return pd.concat([frame.assign(robot=robot) for robot in TITLES], ignore_index=True)
-
-
-def metrics(noise_um=200.0, nonpositive=0.0, spread=0.1):
-    """At 10 and 20 configurations: dev of 6DoF 4 and 2 µm, of the other a quarter; 1 mm before calibration."""
-    frame = rows_of(robot=TITLES, noise_um=[noise_um], strategy=STRATEGIES, length=[10, 20])
-    part = frame.strategy.map(dict(zip(STRATEGIES, (1.0, 0.25), strict=True)))
-    frame = frame.assign(deviation=part * 40e-6 / frame.length, deviation_std_error=part * 0.1e-6)
-    return frame.assign(initial_deviation=1e-3, nonpositive_share=nonpositive, relative_spread=spread)
-
-
-def per_dataset():
-    """RMS errors of 6DoF 120 and 60 µm, of the other 80 and 40 µm; at another noise level other figures."""
-    frame = rows_of(noise_um=[200.0, 500.0], robot=TITLES, strategy=STRATEGIES, ds=[10, 20])
-    size = frame.strategy.map(dict(zip(STRATEGIES, (1200.0, 800.0), strict=True)))
-    frame["rms_um"] = size / frame.ds * frame.noise_um / 200.0
-    frame = frame.assign(mean_um=0.9 * frame.rms_um, mean_um_std_error=0.5, p95_um=1.5 * frame.rms_um, p95_um_std_error=1.2)
-    return frame.assign(efficiency=640.0 / size - 0.3, efficiency_std_error=0.012)
 
 
 def comparison():
@@ -194,7 +173,7 @@ def break_even():
 def costs():
     rows = [("6DoF", 0.1, True), ("3+6DoF", 0.1, False), ("6DoF", 1.0, False), ("3+6DoF", 1.0, True)]
     frame = pd.DataFrame(rows, columns=["points", "configuration_cost", "cheapest"])
-    return for_each_robot(frame.assign(cost=50.0, ratio=1.0, ratio_low=0.9, ratio_high=1.1))
+    return for_each_robot(frame.assign(cost=[50.0, 60.0, 80.0, 70.0], ratio=1.0, ratio_low=0.9, ratio_high=1.1))
 
 
 def simulated():
@@ -227,45 +206,33 @@ def stiffness():
     return for_each_robot(pd.DataFrame([row]))
 
 
-def question_facts():
-    """Facts of the research questions from these tables."""
-    tables = {
+def tables():
+    """All tables of the report."""
+    everything = {f"{name}_mm{end}": 1.0 for name in ("mean", "std", "max") for end in ("", "_one_set")}
+    extended = {"strategy": "6DoF", "robot": "bending", "initial_mean_mm": 1.234, "initial_mean_mm_std_error": 0.011}
+    extended |= {"residual_mean_um": 366.0, "residual_mean_um_std_error": np.nan}
+    extended |= {"share_compensated_percent": 70.0, "share_compensated_percent_std_error": 0.5}
+    solvers = {"robot": "kuka", "strategy": "6DoF", "closest_strategy": "2DoF+6DoF"}
+    solvers |= {"equation_11_difference": 2.4e-3, "gauss_newton_difference": 0.0, "between_solvers": 1.6e-4}
+    table2 = {"robot": "kuka", "mean_mm_one_set_std": 0.05} | everything | {"mean_mm_one_set": 1.05}
+    return {
         **{"claims": claims(), "joint": joint(), "studies": measured(), "break_even": break_even(), "costs": costs()},
         **{"simulated": simulated(), "few": few(), "kinds": kinds(), "stiffness": stiffness(), "ladder": ladder()},
-        **{"budget": budget(), "pairs": pairs(), "needed": needed(), "designs": designs(), "places": places()},
-        **{"scores": strategy_scores(), "score_pairs": score_pairs(), "tubes": tubes(), "observability": observability()},
-        **{"geometry": geometry(), "weighting": weighting()},
-    }
-    strategies = [Strategy("6DoF", (Stage(("6DoF",), tuple(range(6))),))]
-    return answer_questions(tables, Asked(TITLES, strategies, *STRATEGIES, 20, 60.0, "full_turn")) | {
-        "citation": {"authors": "the developers", "date": "2026-11-25", "version": "0.1.0", "license": "MIT"},
-        "titles": TITLES,
-        "names": TITLES,
-        "full_names": [*TITLES.values()],
-        "stated": stated(STATED),
-        "size": {"data_sets": "1000", "configurations": "100", "test_configurations": "500", "seed": "1"},
+        **{"budget": budget(), "pairs": pairs(), "needed": needed(), "places": places(), "scores": strategy_scores()},
+        **{"score_pairs": score_pairs(), "tubes": tubes(), "observability": observability(), "geometry": geometry()},
+        **{"weighting": weighting(), "comparison": comparison(), "expectations": expectations()},
+        **{name: pd.DataFrame([row]) for name, row in (("table2", table2), ("extended", extended), ("solvers", solvers))},
     }
 
 
 def facts(**changed):
     """Facts of the report of these tables, some of which may be changed."""
-    everything = {f"{name}_mm{end}": 1.0 for name in ("mean", "std", "max") for end in ("", "_one_set")}
-    replicates = pd.concat([metrics().assign(replicate=n) for n in (1, 2)])
-    grows = (replicates.replicate == 2) & (replicates.strategy == "6DoF")
-    extended = {"strategy": "6DoF", "robot": "kuka_extended", "initial_mean_mm": 1.234, "initial_mean_mm_std_error": 0.011}
-    extended |= {"residual_mean_um": 366.0, "residual_mean_um_std_error": np.nan}
-    extended |= {"share_compensated_percent": 70.0, "share_compensated_percent_std_error": 0.5}
-    solvers = {"robot": "kuka", "strategy": "6DoF", "closest_strategy": "2DoF+6DoF"}
-    solvers |= {"equation_11_difference": 2.4e-3, "gauss_newton_difference": 0.0, "between_solvers": 1.6e-4}
-    given = {
-        "comparison": comparison(),
-        "expectations": expectations(),
-        "table2": pd.DataFrame([{"robot": "kuka", "mean_mm_one_set_std": 0.05} | everything | {"mean_mm_one_set": 1.05}]),
-        "per_dataset": per_dataset(),
-        "extended": pd.DataFrame([extended]),
-        "solvers": pd.DataFrame([solvers]),
-        "metrics": metrics(),
-        "replicates": replicates.assign(deviation=replicates.deviation * np.where(grows, 1.1, 1.0)),
-        "noisiest": metrics(500.0, 0.012, 0.4),
+    names = TITLES | {"bending": "Kuka with elastic links"}
+    settings = {"noise_um": 200.0, "length": 20, "configurations": 100, "classical": STRATEGIES[0], "best": STRATEGIES[1]}
+    settings |= {"accuracy_um": 60.0, "stated": STATED, "strategies": [Strategy("6DoF", (Stage(("6DoF",), tuple(range(6))),))]}
+    return study_facts(tables() | changed, names, [*TITLES], settings) | {
+        "citation": {"authors": "the developers", "date": "2026-11-25", "version": "0.1.0", "license": "MIT"},
+        "names": names,
+        "full_names": [*TITLES.values()],
+        "size": {"data_sets": "1000", "configurations": "100", "test_configurations": "500", "seed": "1"},
     }
-    return answers(given | changed, TITLES, CELLS)

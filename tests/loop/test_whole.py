@@ -17,7 +17,7 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in, diagnosed
-from elastocal.report.first_page import sentences
+from elastocal.report.loop_facts import campaign_sentences
 
 # Loads in both senses, for what comes with the load and is in no catalogue.
 BOTH_SENSES = replace(PLAN, poses=40, ladder=(0, 1, -1))
@@ -140,7 +140,7 @@ import sys
 opened = []
 sys.addaudithook(lambda event, details: opened.append(str(details[0])) if event == "open" else None)
 from elastocal.loop.whole import diagnosed
-from elastocal.report.first_page import sentences
+from elastocal.report.loop_facts import campaign_sentences
 diagnosed(*sys.argv[1:3], 1)
 print("\\n".join(opened))
 """
@@ -190,6 +190,6 @@ def test_what_contradicts_an_adequate_model_is_stated_of_no_other(kind, stated, 
     monkeypatch.setattr("elastocal.diagnosis.diagnose.contradictions", lambda *_: ["a contradiction"])
     verdict = verdict_of(tmp_path, kuka, kind)
     assert (verdict["verdict"], verdict["contradictions"]) == ("unexplained", stated)
-    text = " ".join(sentences(verdict))
+    text = " ".join(campaign_sentences(verdict)["sentences"])
     assert ("the declared model cannot be right: a contradiction" in text) == bool(stated)
     assert ("residual of the declared model is more than noise" in text) != bool(stated)

@@ -23,7 +23,7 @@ from elastocal.application.calibrated import nominal_forward
 from elastocal.command.main import app
 from elastocal.errors import InputError
 from elastocal.figures import style
-from elastocal.report import certificate_pages
+from elastocal.report import certificate
 
 pytestmark = pytest.mark.slow
 
@@ -234,7 +234,7 @@ def test_a_command_that_is_killed_leaves_the_old_files_or_none(checkout, names_w
     child = os.fork()
     if not child:
         monkeypatch.setattr(style, "save", lambda *_: os._exit(9))
-        monkeypatch.setattr(certificate_pages, "write_certificate", lambda *_: os._exit(9))
+        monkeypatch.setattr(certificate, "write_certificate", lambda *_: os._exit(9))
         run(*words)
         os._exit(0)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9

@@ -17,11 +17,8 @@ FIGURES = [
     "studies",
     "costs",
     "bias_and_accuracy",
-    "accuracy_of_one_data_set",
     "scores_against_paper",
-    "table2_samples",
     "ladder",
-    "budget",
     "designs",
     "arm_map",
     "metrics",
@@ -162,32 +159,6 @@ rule draw_bias_and_accuracy:
         "../scripts/draw_bias_and_accuracy.py"
 
 
-rule draw_accuracy:
-    input:
-        per_dataset=rules.tabulate_accuracy.output.table,
-        sources=sources("draw_accuracy.py"),
-    output:
-        pdf="reports/figures/accuracy_of_one_data_set.pdf",
-        png=shown(
-            "reports/figures/accuracy_of_one_data_set.png",
-            "accuracy_of_one_data_set",
-            "Questions beyond the paper",
-            shows="Error of one data set by strategy",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_accuracy.log",
-    benchmark:
-        "results/timings/draw_accuracy.tsv"
-    params:
-        titles=REDUCED_TITLES,
-        order=list(NAMES.values()),
-        noise_um=config["tables"]["noise_um"],
-        length=config["tables"]["length"],
-    script:
-        "../scripts/draw_accuracy.py"
-
-
 rule draw_scores:
     input:
         comparison=rules.compare_with_studies.output.table,
@@ -212,30 +183,6 @@ rule draw_scores:
         "../scripts/draw_scores.py"
 
 
-rule draw_table2_samples:
-    input:
-        initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
-        reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("draw_table2_samples.py"),
-    output:
-        pdf="reports/figures/table2_samples.pdf",
-        png=shown(
-            "reports/figures/table2_samples.png",
-            "table2_samples",
-            "Tables and figures of the paper",
-            shows="Table 2 against single data sets",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_table2_samples.log",
-    benchmark:
-        "results/timings/draw_table2_samples.tsv"
-    params:
-        titles=TITLES,
-    script:
-        "../scripts/draw_table2_samples.py"
-
-
 rule draw_ladder:
     input:
         table=rules.tabulate_ladder.output.table,
@@ -251,26 +198,6 @@ rule draw_ladder:
         "results/timings/draw_ladder.tsv"
     script:
         "../scripts/draw_ladder.py"
-
-
-rule draw_budget:
-    input:
-        table=rules.tabulate_budget.output.budget,
-        sources=sources("draw_budget.py"),
-    output:
-        pdf="reports/figures/budget.pdf",
-        png=shown(
-            "reports/figures/budget.png", "budget", "Questions beyond the paper", shows="Which points (RQ2)", kind="figure"
-        ),
-    log:
-        "results/logs/draw_budget.log",
-    benchmark:
-        "results/timings/draw_budget.tsv"
-    params:
-        titles=REDUCED_TITLES,
-        length=config["tables"]["length"],
-    script:
-        "../scripts/draw_budget.py"
 
 
 rule draw_designs:
@@ -348,6 +275,7 @@ rule draw_metrics:
 rule draw_costs:
     input:
         table=rules.tabulate_costs.output.costs,
+        break_even=rules.tabulate_costs.output.break_even,
         sources=sources("draw_costs.py"),
     output:
         pdf="reports/figures/costs.pdf",

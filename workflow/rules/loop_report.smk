@@ -4,6 +4,8 @@ Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Write
 reports/loop/{campaign}/report.pdf and report.html, and, of the study too, the pictures of the README.
 """
 
+LOOP_PAGES = ("loop.typ", "sheet.typ", "loop.html", "loop.js", "campaign.txt", "shared.txt")
+
 
 rule draw_campaign:
     input:
@@ -45,7 +47,7 @@ rule compile_loop_report:
         steps=rules.diagnose_campaign.output.steps,
         descriptions=rules.read_campaign.output.descriptions,
         figures=rules.draw_campaign.output.pdf,
-        pages=[placed(PACKAGES / "elastocal/report" / name) for name in ("loop.typ", "sheet.typ", "loop.html", "loop.js")],
+        pages=[placed(PACKAGES / "elastocal/report" / name) for name in LOOP_PAGES],
     output:
         report="reports/loop/{campaign}/report.pdf",
         page=shown(

@@ -76,7 +76,6 @@ rule state_answers:
         budget=rules.tabulate_budget.output.budget,
         pairs=rules.tabulate_budget.output.pairs,
         needed=rules.tabulate_budget.output.lengths,
-        designs=rules.tabulate_designs.output.table,
         observability=rules.tabulate_observability.output.table,
         places=rules.tabulate_places.output.table,
         scores=rules.tabulate_uses.output.scores,
@@ -85,7 +84,6 @@ rule state_answers:
         geometry=rules.tabulate_assumptions.output.geometry,
         weighting=rules.tabulate_assumptions.output.weighting,
         table2=rules.tabulate_initial.output.table,
-        per_dataset=rules.tabulate_accuracy.output.table,
         extended=rules.tabulate_extended.output.table,
         solvers=rules.tabulate_solvers.output.table,
         claims=rules.judge_claims.output.table,
@@ -98,9 +96,7 @@ rule state_answers:
         kinds=rules.tabulate_decisions.output.kinds,
         stiffness=rules.tabulate_decisions.output.stiffness,
         citation=placed(ROOT / "CITATION.cff"),
-        metrics=cells("metrics", REDUCED, TABLE_NOISE),
-        replicates=cells("replicates", REDUCED, TABLE_NOISE),
-        noisiest=cells("metrics", REDUCED, f"{max(config['noise_um']):g}"),
+        template=placed(PACKAGES / "elastocal" / "report" / "study.txt"),
         sources=sources("state_answers.py"),
     output:
         answers="reports/answers.json",
@@ -111,11 +107,11 @@ rule state_answers:
     params:
         robots=REDUCED,
         names=TITLES,
-        cells={key: config["tables"][key] for key in ("noise_um", "length")} | {"classical_strategy": NAMES[CLASSICAL]},
+        cells={key: config["tables"][key] for key in ("noise_um", "length")} | {"configurations": config["configurations"]},
+        classical=NAMES[CLASSICAL],
         strategies=list(STUDY.strategies.values()),
         best=NAMES.get("3+6DoF-comb", NAMES[CLASSICAL]),
         accuracy_um=QUESTIONS["accuracies_um"][0],
-        joint_range=INTERPRETATIONS["joint_range"],
         size={key: config[key] for key in ("data_sets", "configurations", "test_configurations", "seed")},
         stated=STATED,
     script:
@@ -125,6 +121,7 @@ rule state_answers:
 rule write_study_page:
     input:
         answers=rules.state_answers.output.answers,
+        template=placed(PACKAGES / "elastocal" / "report" / "study_tables.md"),
         sources=sources("write_study_page.py"),
     output:
         page="docs/study_tables.md",

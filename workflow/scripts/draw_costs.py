@@ -9,7 +9,8 @@ from elastocal.figures.style import save
 
 
 def draw_costs(job: Job) -> None:
-    figure = costs(pd.read_csv(job.input.table), job.params.titles, job.params.accuracy_um)
+    table, break_even = pd.read_csv(job.input.table), pd.read_csv(job.input.break_even)
+    figure = costs(table, break_even, job.params.titles, job.params.accuracy_um)
     save(figure, job.output.pdf, job.output.png, origin_of(job))
 
 

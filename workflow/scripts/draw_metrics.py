@@ -6,7 +6,7 @@ import pandas as pd
 
 from elastocal.figures.study import metrics
 from elastocal.figures.style import save
-from elastocal.report.metric_answers import METRIC_NAMES
+from elastocal.report.study import METRIC_NAMES
 
 
 def draw_metrics(job: Job) -> None:

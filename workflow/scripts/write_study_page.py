@@ -1,16 +1,14 @@
 """Tables of the study as a page of the documentation."""
 
-import json
-from pathlib import Path
-
 from job import Job, run
 
 from elastocal.io.atomic_writes import write_text
-from elastocal.report.study_page import study_page
+from elastocal.io.json_files import read_json
+from elastocal.report.typesetting import template
 
 
 def write_study_page(job: Job) -> None:
-    write_text(job.output.page, study_page(json.loads(Path(job.input.answers).read_text(encoding="utf-8"))))
+    write_text(job.output.page, template("study_tables.md").render(read_json(job.input.answers)))
 
 
 run(write_study_page, snakemake)

@@ -61,8 +61,7 @@ def certificate(
     from elastocal.loop.certificate import Wanted, use_at
     from elastocal.loop.certificate import certificate as certified
     from elastocal.loop.measured import measured_errors
-    from elastocal.report.certificate_pages import write_certificate
-    from elastocal.report.certificate_words import certificate_facts
+    from elastocal.report.certificate import certificate_facts, write_certificate
 
     console = Console(stderr=True)
     campaign = read_descriptions(folder, pipeline() / "config" / "robots")[0]

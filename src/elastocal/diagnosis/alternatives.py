@@ -31,7 +31,7 @@ from elastocal.diagnosis.statistics import normal_equations
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from elastocal.diagnosis.diagnose import Evidence
+    from elastocal.diagnosis.findings import Evidence
     from elastocal.diagnosis.new_states import Instrument
     from elastocal.diagnosis.search import Model
 

@@ -11,16 +11,17 @@ from elastocal.counting import counted
 from elastocal.data_checks.catalogue import faults
 from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
-from elastocal.diagnosis.alarm import Alarm, alarm_of
+from elastocal.diagnosis.alarm import alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained
 from elastocal.diagnosis.contradictions import contradictions, pose_error_warnings, scatter_warnings
+from elastocal.diagnosis.findings import Evidence
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, SEVERAL, UNEXPLAINED, concluded
-from elastocal.diagnosis.words import hypothesis_words
+from elastocal.effects.catalogue import effects
 from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
@@ -35,10 +36,8 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
     from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.kept_rows import Kept
-    from elastocal.diagnosis.linearize import Linearized
-    from elastocal.diagnosis.search import Posterior
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.verdict import Conclusion, Hypothesis
+    from elastocal.diagnosis.verdict import Hypothesis
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
@@ -59,20 +58,6 @@ class Step:
     name: str
     kind: str
     fitted: Fit
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """What the last linearisation of a diagnosis says; None of it where the data are at fault.
-
-    `adopted`: whether the effects found enter the model.
-    """
-
-    linearized: Linearized
-    posterior: Posterior
-    alarm: Alarm
-    conclusion: Conclusion
-    adopted: bool
 
 
 @dataclass(frozen=True)
@@ -239,7 +224,8 @@ def _explained(
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
         # No verdict yet, and no probability: a later search, or the poses left out, may say otherwise.
-        leading = hypothesis_words(conclusion.best.mechanisms)
+        words = [getattr(effects().get(name), "words", "an unknown mechanism") for name in conclusion.best.mechanisms]
+        leading = " with ".join(words) or "nothing is missing"
         tell(f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}")
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m

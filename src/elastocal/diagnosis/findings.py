@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from elastocal.data_checks.protocol import OF_DATA
 from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities, locations_of
-from elastocal.diagnosis.words import part_of
+from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import Shape
 from elastocal.effects.sizes import lever_m
 from elastocal.fitting.linearization import effect_columns
@@ -20,9 +21,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from elastocal.data_checks.protocol import Fault
+    from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.averaging import Averaged
-    from elastocal.diagnosis.diagnose import Evidence
-    from elastocal.diagnosis.search import Problem
+    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.search import Posterior, Problem
+    from elastocal.diagnosis.verdict import Conclusion
     from elastocal.effects.protocol import Candidate, Parameter
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
@@ -37,6 +40,20 @@ _OF_MASS = {"kg": "rad kg/(N m)", "kg m": "rad kg m/(N m)"}
 _SCALED = ("value", "std_error", "prior_std")
 
 
+@dataclass(frozen=True)
+class Evidence:
+    """What the last linearisation of a diagnosis says; None of it where the data are at fault.
+
+    `adopted`: whether the effects found enter the model.
+    """
+
+    linearized: Linearized
+    posterior: Posterior
+    alarm: Alarm
+    conclusion: Conclusion
+    adopted: bool
+
+
 def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     """A location in words: joint 2, links 2 and 3, joint 4 orders 1-2.
 
@@ -44,7 +61,9 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     """
     joints = [str(entry) for entry in location if not isinstance(entry, str)]
     names = [entry for entry in location if isinstance(entry, str)]
-    where = f"{plural(part_of(mechanism), len(joints))} {' and '.join(joints)}" if joints else ""
+    # Numbers count joints, or links, which begin at the joint of the same number.
+    part = getattr(effects().get(mechanism), "part", "joint")
+    where = f"{plural(part, len(joints))} {' and '.join(joints)}" if joints else ""
     return " ".join(filter(None, [where, *names])) or ("base" if mechanism == OTHER else "")
 
 
@@ -199,10 +218,10 @@ def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: floa
     `entries`: of `effect_entries`. `rated_kg`: payload for which the robot is rated; looked at where the compliances are
     identified, without which no mass is.
     """
-    effects = {effect.key: effect for effect in final.model.effects}
+    fitted = {effect.key: effect for effect in final.model.effects}
     found = []
     for key in [key for entry in entries for key in entry["members"]]:
-        known = zip(effects[key].parameters, final.values_of(key)[0], final.places_of(key), strict=False)
+        known = zip(fitted[key].parameters, final.values_of(key)[0], final.places_of(key), strict=False)
         for parameter, value, index in known:
             error = float(np.sqrt(final.covariance[index, index]))
             size = f"{value:.3g} ± {error:.2g} {parameter.unit}"

@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.diagnosis.alternatives import Members
-    from elastocal.diagnosis.diagnose import Diagnosis, Evidence
+    from elastocal.diagnosis.diagnose import Diagnosis
+    from elastocal.diagnosis.findings import Evidence
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.new_states import Entries, Instrument
     from elastocal.diagnosis.search import Model

@@ -10,16 +10,18 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from elastocal.diagnosis.words import candidate_words, hypotheses_words
 from elastocal.effects.protocol import at_shapes
 from elastocal.figures.style import PALETTE, ink_on, note, panels, styled
+from elastocal.report.words import candidate_words, capital, hypotheses_words, probability_words
 
 FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
-# Hypotheses and candidates with a bar of their own.
-_HYPOTHESES, _NAMED = 8, 15
-_LEADING = 16
-_LINE = 44
-_REST_COLOUR = "#d9d9d9"
+# Hypotheses and candidates with a bar of their own, and candidates whose angles are shown.
+_HYPOTHESES, _NAMED, _LEADING = 8, 15, 16
+_REST = "Everything else"
+# Letters in a line of a label, and in the longest label.
+_LINE, _LONGEST = 44, 80
+# Height of a row of one line, and of each further line.
+_ROW_MM, _LINE_MM = 4.6, 3.0
 # Why nothing is tested where the data are at fault, as tables.candidate_columns notes it.
 _AT_FAULT = "the measurements are at fault"
 
@@ -33,19 +35,24 @@ def probabilities(stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarr
     order = rank_candidates(table)
     if stated is None or not len(order):
         return _note_nothing_tested(table)
-    sets = stated["sets"][:_HYPOTHESES]
-    labels = [textwrap.fill(_capital(words), _LINE) for words in hypotheses_words(sets)]
+    sets, named = stated["sets"][:_HYPOTHESES], order[:_NAMED]
+    labels = [textwrap.fill(capital(words), _LINE) for words in hypotheses_words(sets)]
     values = [entry["probability"] for entry in sets]
-    rest = 1.0 - sum(values)
-    if rest > 0.001:
-        labels, values = [*labels, "Everything else"], [*values, rest]
-    named = order[:_NAMED]
-    # Rows as high as their names are long.
-    heights = np.array([0.75 + 0.65 * (label.count("\n") + 1) for label in labels])
-    height_mm = 34 + 3.6 * heights.sum(), 22 + _row_mm(table["candidate"][named]) * len(named)
-    figure, axes = panels(2, 1, sum(height_mm), height_ratios=height_mm)
-    _bars(axes[0, 0], np.cumsum(heights) - heights / 2, heights.sum(), labels, values)
-    _factors(axes[1, 0], table, named)
+    if (rest := 1.0 - sum(values)) > 0.001:
+        labels, values = [*labels, _REST], [*values, rest]
+    names = [short_name(table["candidate"][index]) for index in named]
+    upper, lower = _heights_mm(labels), _heights_mm(names)
+    sizes = [34 + upper.sum(), 22 + lower.sum()]
+    figure, axes = panels(2, 1, sum(sizes), height_ratios=sizes)
+    colours = [PALETTE[0] if label != _REST else "#d9d9d9" for label in labels]
+    rows = _label_rows(axes[0, 0], labels, upper)
+    axes[0, 0].barh(rows, 100 * np.array(values), height=0.62 * upper, color=colours, zorder=2)
+    for row, value in zip(rows, values, strict=True):
+        place = {"xytext": (3, 0), "textcoords": "offset points", "va": "center", "fontsize": 7.5}
+        axes[0, 0].annotate(probability_words(value), (100 * value, row), **place)
+    axes[0, 0].set(xlim=(0, 112), xticks=range(0, 101, 20), xlabel="posterior probability (%)")
+    axes[0, 0].set_title("What is missing in the declared model", loc="left")
+    _factors(axes[1, 0], table, named, _label_rows(axes[1, 0], names, lower))
     present = [family for family in FAMILIES if family in set(table["family"][named])]
     handles = [Patch(color=FAMILIES[family], label=family) for family in present]
     if table["chosen"].any():
@@ -56,38 +63,39 @@ def probabilities(stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarr
     return figure
 
 
-def _bars(axis: Axes, rows: np.ndarray, end: float, labels: Sequence[str], values: Sequence[float]) -> None:
-    """Probabilities of hypotheses in percent."""
-    colours = [_REST_COLOUR if label == "Everything else" else PALETTE[0] for label in labels]
-    axis.barh(rows, 100 * np.array(values), height=0.9, color=colours, zorder=2)
-    for row, value in zip(rows, values, strict=True):
-        text = "<1 %" if value < 0.005 else ">99 %" if value >= 0.995 else f"{100 * value:.0f} %"
-        axis.annotate(text, (100 * value, row), (3, 0), textcoords="offset points", va="center", fontsize=7.5)
-    axis.set(yticks=rows, ylim=(end, 0), xlim=(0, 112), xticks=range(0, 101, 20), xlabel="posterior probability (%)")
-    axis.set_yticklabels(labels, fontsize=7)
-    axis.set_title("What is missing in the declared model", loc="left")
-    axis.grid(visible=False, axis="y")
-
-
-def _factors(axis: Axes, table: Mapping[str, np.ndarray], named: np.ndarray) -> None:
+def _factors(axis: Axes, table: Mapping[str, np.ndarray], named: np.ndarray, rows: np.ndarray) -> None:
     """Bayes factors of single candidates, coloured by family."""
-    factors, rows = table["log_bayes_factor"][named], np.arange(len(named))
-    axis.barh(
-        rows, factors, color=[FAMILIES.get(family, PALETTE[-1]) for family in table["family"][named]], height=0.62, zorder=2
-    )
-    chosen = table["chosen"][named].astype(bool)
+    factors, chosen = table["log_bayes_factor"][named], table["chosen"][named].astype(bool)
+    colours = [FAMILIES.get(family, PALETTE[-1]) for family in table["family"][named]]
+    axis.barh(rows, factors, color=colours, height=2.6, zorder=2)
     if chosen.any():
         style: dict[str, Any] = {"facecolor": "none", "edgecolor": "black", "linewidth": 1.3, "zorder": 3, "gid": "chosen"}
-        axis.barh(rows[chosen], factors[chosen], height=0.62, **style)
-    axis.set_xscale("function", functions=(_root, _square))
+        axis.barh(rows[chosen], factors[chosen], height=2.6, **style)
+    # Roots keep the small ones in sight; symmetric, since a factor may be below zero.
+    axis.set_xscale("function", functions=(lambda x: np.sign(x) * np.sqrt(np.abs(x)), lambda x: np.sign(x) * np.square(x)))
     low, high = min(factors.min(), 0.0), max(factors.max(), 2.0)
-    axis.set(yticks=rows, ylim=(len(named) - 0.4, -0.6), xlim=(_square(1.04 * _root(low)), 1.06 * high))
-    axis.set_xticks(_ticks(low, high))
+    # Squares of evenly spaced roots.
+    ends = np.linspace(-np.sqrt(-low), np.sqrt(high), 7)
+    ticks = {float(f"{root * abs(root):.2g}") for root in ends} | {0.0}
+    axis.set(xlim=(1.08 * low, 1.06 * high), xticks=sorted(tick for tick in ticks if low <= tick <= high))
+    axis.xaxis.set_major_formatter("{x:g}")
     axis.set_xlabel("Bayes factor against the declared model\n(natural logarithm; above 0 it explains more)")
     axis.axvline(0, color="black", linewidth=0.8, zorder=4)
-    axis.set_yticklabels([short_name(table["candidate"][index]) for index in named], fontsize=7, linespacing=0.9)
     axis.set_title("Each candidate cause alone", loc="left")
+
+
+def _heights_mm(labels: Sequence[str]) -> np.ndarray:
+    """Heights of rows in which labels of one or more lines fit."""
+    return np.array([_ROW_MM + _LINE_MM * label.count("\n") for label in labels])
+
+
+def _label_rows(axis: Axes, labels: Sequence[str], heights_mm: np.ndarray) -> np.ndarray:
+    """Label rows from above, in an axis whose unit is a millimetre; returns their middles."""
+    rows = np.cumsum(heights_mm) - heights_mm / 2
+    axis.set(yticks=rows, ylim=(heights_mm.sum(), 0))
+    axis.set_yticklabels(labels, fontsize=7, linespacing=1.0)
     axis.grid(visible=False, axis="y")
+    return rows
 
 
 @styled
@@ -97,40 +105,38 @@ def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]
     `table`: columns of the candidates table. `pairs`: columns of the confounding table.
     """
     known = set(pairs["one"]) | set(pairs["other"])
-    order = [index for index in rank_candidates(table) if name_in_pairs(table, index) in known]
-    shown = shortlist(order, table["chosen"])
+    # Those chosen whatever their place, as far as there is room; each by its name in the pairs, which have a shape's values.
+    ranked = [index for index in rank_candidates(table) if _in_pairs(table, index) in known]
+    kept = sorted(ranked, key=lambda index: not table["chosen"][index])[:_LEADING]
+    shown = [index for index in ranked if index in kept]
     if not shown:
         return _note_nothing_tested(table)
-    names = [table["candidate"][index] for index in shown]
-    chosen = set(table["candidate"][table["chosen"].astype(bool)])
-    angles = angle_matrix([name_in_pairs(table, index) for index in shown], pairs)
-    count = len(names)
-    figure, axes = panels(1, 1, 18 + _row_mm(names) * max(count, 6))
+    chosen = [bool(table["chosen"][table["candidate"] == table["candidate"][index]].any()) for index in shown]
+    angles = angle_matrix([_in_pairs(table, index) for index in shown], pairs)
+    labels = [f"{short_name(table['candidate'][index])}  {number}" for number, index in enumerate(shown, 1)]
+    count, row_mm = len(shown), max(_heights_mm(labels).max(), _ROW_MM)
+    figure, axes = panels(1, 1, 18 + row_mm * max(count, 6))
     axis = axes[0, 0]
     # Never black, so that the numbers can be read everywhere.
     colours = LinearSegmentedColormap.from_list("angles", ["#08306b", "#4292c6", "#c6dbef", "#ffffff"])
     image = axis.imshow(np.ma.masked_invalid(angles), cmap=colours, vmin=0, vmax=90, interpolation="nearest", aspect="auto")
-    for row in range(count):
-        for column in range(count):
-            if row != column and np.isfinite(angles[row, column]):
-                ink = ink_on(colours(angles[row, column] / 90))
-                axis.text(column, row, f"{angles[row, column]:.0f}", ha="center", va="center", fontsize=7, color=ink)
-    numbered = [f"{short_name(name)}  {number}" for number, name in enumerate(names, 1)]
+    for row, column in np.argwhere(np.isfinite(angles) & ~np.eye(count, dtype=bool)):
+        ink = ink_on(colours(angles[row, column] / 90))
+        axis.text(column, row, f"{angles[row, column]:.0f}", ha="center", va="center", fontsize=7, color=ink)
     axis.set(xticks=range(count), yticks=range(count))
     axis.set_xticklabels(range(1, count + 1), fontsize=7)
-    axis.set_yticklabels(numbered, fontsize=7, linespacing=0.9)
+    axis.set_yticklabels(labels, fontsize=7, linespacing=1.0)
     axis.tick_params(length=0)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)
-    for number, name in enumerate(names):
-        if name in chosen:
-            axis.get_yticklabels()[number].set(fontweight="bold", color=PALETTE[1])
-            frame = Rectangle((-0.5, number - 0.5), count, 1, fill=False, edgecolor=PALETTE[1], linewidth=1.4, zorder=4)
-            axis.add_patch(frame)
+    frame: dict[str, Any] = {"edgecolor": PALETTE[1], "linewidth": 1.4}
+    for number in np.flatnonzero(chosen):
+        axis.get_yticklabels()[number].set(fontweight="bold", color=PALETTE[1])
+        axis.add_patch(Rectangle((-0.5, number - 0.5), count, 1, fill=False, zorder=4, **frame))
     bar = figure.colorbar(image, ax=axis, ticks=[0, 20, 45, 70, 90])
     bar.set_label("angle between the contributions (°)")
-    if chosen & set(names):
-        handle = Patch(facecolor="none", edgecolor=PALETTE[1], linewidth=1.4, label="in the most probable model")
+    if any(chosen):
+        handle = Patch(facecolor="none", label="in the most probable model", **frame)
         figure.legend(handles=[handle], loc="outside lower center")
     return figure
 
@@ -141,20 +147,6 @@ def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
     order = tested[np.argsort(-table["log_bayes_factor"][tested], kind="stable")]
     _, first = np.unique(table["candidate"][order].astype(str), return_index=True)
     return order[np.sort(first)]
-
-
-def shortlist(order: Sequence[int] | np.ndarray, chosen: np.ndarray, count: int = _LEADING) -> list[int]:
-    """The first of an order, and those chosen whatever their place, as far as there is room; in the order."""
-    wanted = [index for index in order if chosen[index]][:count]
-    others = [index for index in order if not chosen[index]][: count - len(wanted)]
-    kept = {*wanted, *others}
-    return [index for index in order if index in kept]
-
-
-def name_in_pairs(table: Mapping[str, np.ndarray], index: int) -> str:
-    """Name of a candidate in the confounding table, which has it once for each value of its shape."""
-    shape = table["shape"][index]
-    return at_shapes(table["candidate"][index], [shape] if np.isfinite(shape) else [])
 
 
 def angle_matrix(names: Sequence[str], pairs: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -168,20 +160,16 @@ def angle_matrix(names: Sequence[str], pairs: Mapping[str, np.ndarray]) -> np.nd
     return angles
 
 
-def short_name(key: str, longest: int = 80) -> str:
+def short_name(key: str) -> str:
     """A candidate's key as words, in two lines where it is long and cut in the middle where it is very long."""
-    words = _capital(candidate_words(key))
-    words = words if len(words) <= longest else f"{words[: longest // 2]} … {words[-(longest // 2 - 2) :]}"
+    words = capital(candidate_words(key))
+    words = words if len(words) <= _LONGEST else f"{words[: _LONGEST // 2]} … {words[-(_LONGEST // 2 - 2) :]}"
     return textwrap.fill(words, 48)
 
 
-def _row_mm(names: Sequence[str]) -> float:
-    """Height of a row in which every name fits."""
-    return 5.6 if any("\n" in short_name(name) for name in names) else 4.3
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+def _in_pairs(table: Mapping[str, np.ndarray], index: int) -> str:
+    shape = table["shape"][index]
+    return at_shapes(table["candidate"][index], [shape] if np.isfinite(shape) else [])
 
 
 def _note_nothing_tested(table: Mapping[str, np.ndarray]) -> Figure:
@@ -189,23 +177,3 @@ def _note_nothing_tested(table: Mapping[str, np.ndarray]) -> Figure:
     if count and set(table["note"]) == {_AT_FAULT}:
         return note("The data are at fault: no cause in the robot was looked for.")
     return note(f"None of {count} candidate causes can be tested with these measurements.")
-
-
-def _root(value: np.ndarray | float) -> np.ndarray:
-    """Root that keeps the sign."""
-    return np.sign(value) * np.sqrt(np.abs(value))
-
-
-def _square(value: np.ndarray | float) -> np.ndarray:
-    return np.sign(value) * np.square(value)
-
-
-def _ticks(low: float, high: float) -> list[int]:
-    """Round values, so far apart that their numbers do not touch on an axis of roots."""
-    steps = [0, *(digit * 10**power for power in range(6) for digit in (1, 2, 5))]
-    apart = 0.07 * (_root(high) - _root(low))
-    kept: list[int] = []
-    for step in sorted({*steps, *(-step for step in steps)}, key=abs):
-        if low <= step <= high and all(abs(_root(step) - _root(other)) > apart for other in kept):
-            kept.append(step)
-    return sorted(kept)

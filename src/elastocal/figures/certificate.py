@@ -36,7 +36,7 @@ def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], to
     `maps`: one row of panels each. `forces_N`: hanging load of each. `tolerance_m`: drawn as a contour.
     """
     figure, axes = panels(len(maps), 2, 62 * len(maps) + 16, sharex=True, sharey=True)
-    grids = [[_bin(errors, values) for values in (errors.uncorrected_m, errors.corrected_m)] for errors in maps]
+    grids = [[np.sqrt(_grid(errors, values**2)[0]) for values in (errors.uncorrected_m, errors.corrected_m)] for errors in maps]
     known = np.concatenate([found[np.isfinite(found)] for pair in grids for found in pair] + [[tolerance_m]])
     scale = LogNorm(MILLI * known[known > 0].min(), MILLI * known.max())
     for row, errors, pair, force in zip(axes, maps, grids, forces_N, strict=True):
@@ -58,23 +58,19 @@ def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], to
     return figure
 
 
-def _statistic(errors: WorkspaceErrors, values: np.ndarray, how: Any) -> tuple[np.ndarray, list[np.ndarray]]:
-    """A statistic of values (N,) in each cell, (bins, bins), and the edges of the cells in m."""
-    from scipy.stats import binned_statistic_2d
+def _grid(errors: WorkspaceErrors, values: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Mean of values (N,) over distance from the base axis and height, (bins, bins), and the edges of the cells in m.
 
-    radius, height = np.hypot(errors.position[:, 0], errors.position[:, 1]), errors.position[:, 2]
-    edges = [np.linspace(values.min(), values.max(), _BINS + 1) for values in (radius, height)]
-    return np.asarray(binned_statistic_2d(radius, height, values, how, bins=edges).statistic), edges
-
-
-def _bin(errors: WorkspaceErrors, values: np.ndarray) -> np.ndarray:
-    """RMS of values (N,) in each cell with enough poses, (bins, bins); elsewhere not a number."""
-    enough = _statistic(errors, values, "count")[0] >= _FEWEST
-    return np.where(enough, np.sqrt(_statistic(errors, values**2, "mean")[0]), np.nan)
+    Not a number in cells of few poses.
+    """
+    at = np.hypot(errors.position[:, 0], errors.position[:, 1]), errors.position[:, 2]
+    counts, *edges = np.histogram2d(*at, bins=_BINS)
+    sums = np.histogram2d(*at, bins=edges, weights=values)[0]
+    return np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts >= _FEWEST), edges
 
 
 def _panel(axis: Axes, errors: WorkspaceErrors, found: np.ndarray, scale: LogNorm, tolerance_m: float) -> Any:
-    outside, edges = _statistic(errors, errors.outside.astype(float), "mean")
+    outside, edges = _grid(errors, errors.outside.astype(float))
     image = axis.pcolormesh(edges[0], edges[1], MILLI * found.T, cmap=_COLOURS, norm=scale, rasterized=True)
     middles = [(ends[1:] + ends[:-1]) / 2 for ends in edges]
     if np.nanmin(found) < tolerance_m < np.nanmax(found):

@@ -4,6 +4,7 @@ Effects are distinguishable by these dependences, so that all are shown by the s
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -37,26 +38,22 @@ _SAMPLES = 73
 _HOUR_S = 3600.0
 
 
+_FORCE_N, _TIME_H = np.linspace(-_PULL_N, _PULL_N, _SAMPLES), np.linspace(0, _HOURS, _SAMPLES)
+
+
 @dataclass(frozen=True)
 class Signature:
     """An effect at one location of the arm, displaced through the three experiments.
 
     `candidate`: with all its parameters at their plausible sizes and its shapes where a search starts. `joint`: whose angle is
-    varied, counted from 1. `angle_deg`, `force_N`, `time_h` (S,). `by_angle`, `by_angle_loaded` (S, 3): displacement of the
-    reflector in mm, base axes, without and with the largest pull. `by_force`, `by_force_falling` (S, 3): while the force rises
-    and while it falls. `by_time` (S, 3).
+    varied, counted from 1. `angle_deg` (S,). `moved` (S, 3): displacement of the reflector in mm, base axes: "by angle", "by
+    angle, loaded" by the largest pull, "by force" while it rises, "by force, falling", and "by time".
     """
 
     candidate: Candidate
     joint: int
     angle_deg: np.ndarray
-    force_N: np.ndarray
-    time_h: np.ndarray
-    by_angle: np.ndarray
-    by_angle_loaded: np.ndarray
-    by_force: np.ndarray
-    by_force_falling: np.ndarray
-    by_time: np.ndarray
+    moved: dict[str, np.ndarray]
 
 
 def signature(name: str, robot: Robot) -> Signature:
@@ -70,21 +67,22 @@ def signature(name: str, robot: Robot) -> Signature:
     joint = (*candidate.joints, *candidate.turning, _SHOWN_AT)[0]
     limits = np.clip(np.degrees(robot.joint_limits[joint - 1]), -_WIDEST_SWEEP_DEG, _WIDEST_SWEEP_DEG)
     angle = np.linspace(limits[0], limits[1], _SAMPLES)
-    force, time = np.linspace(-_PULL_N, _PULL_N, _SAMPLES), np.linspace(0, _HOURS, _SAMPLES)
     still = np.tile(np.radians(_POSE_DEG[: robot.joints]), (_SAMPLES, 1))
     turned = still.copy()
     turned[:, joint - 1] = np.radians(angle)
     # Angles, pull, approach and time of each experiment; what one does not vary is as in the middle of the campaign.
     middle, pulled = np.full(_SAMPLES, _HOURS / 2), np.full(_SAMPLES, _PULL_N)
-    experiments = (
-        (turned, 0 * force, 1.0, middle),
-        (turned, pulled, 1.0, middle),
-        (still, force, 1.0, middle),
-        (still, force, -1.0, middle),
-        (still, 0 * force, 1.0, time),
+    experiments: dict[str, Any] = {
+        "by angle": (turned, 0 * pulled, 1.0, middle),
+        "by angle, loaded": (turned, pulled, 1.0, middle),
+        "by force": (still, _FORCE_N, 1.0, middle),
+        "by force, falling": (still, _FORCE_N, -1.0, middle),
+        "by time": (still, 0 * pulled, 1.0, _TIME_H),
+    }
+    around = _weightless(robot), robot.compliance
+    return Signature(
+        candidate, joint, angle, {name: _moved_mm(candidate, *around, *each) for name, each in experiments.items()}
     )
-    moved = [_displacement_mm(candidate, _weightless(robot), robot.compliance, *each) for each in experiments]
-    return Signature(candidate, joint, angle, force, time, *moved)
 
 
 def list_candidates(name: str, robot: Robot) -> list[Candidate]:
@@ -96,7 +94,7 @@ def _weightless(robot: Robot) -> Sites:
     return replace(sites_of(robot), masses=(), gear_ratio=(_GEAR_RATIO,) * robot.joints)
 
 
-def _displacement_mm(
+def _moved_mm(
     candidate: Candidate,
     sites: Sites,
     compliance: np.ndarray,
@@ -140,15 +138,16 @@ def signature_figure(shown: Signature) -> Figure:
     figure.set_layout_engine(None)
     figure.subplots_adjust(left=0.085, right=0.99, bottom=0.18, top=0.96, wspace=0.08)
     angle, force, time = axes[0]
-    for panel, along, moved, dashes, label in (
-        (angle, shown.angle_deg, shown.by_angle, "-", "unloaded"),
-        (angle, shown.angle_deg, shown.by_angle_loaded, "--", f"pulled by {_PULL_N:.0f} N"),
-        (force, shown.force_N, shown.by_force, "-", "approached upwards"),
-        (force, shown.force_N, shown.by_force_falling, ":", "approached downwards"),
-        (time, shown.time_h, shown.by_time, "-", ""),
-    ):
+    looks = {
+        "by angle": (angle, shown.angle_deg, "-", "unloaded"),
+        "by angle, loaded": (angle, shown.angle_deg, "--", f"pulled by {_PULL_N:.0f} N"),
+        "by force": (force, _FORCE_N, "-", "approached upwards"),
+        "by force, falling": (force, _FORCE_N, ":", "approached downwards"),
+        "by time": (time, _TIME_H, "-", ""),
+    }
+    for name, (panel, along, dashes, label) in looks.items():
         for axis, colour in enumerate(PALETTE[:3]):
-            panel.plot(along, moved[:, axis], dashes, color=colour, label=label)
+            panel.plot(along, shown.moved[name][:, axis], dashes, color=colour, label=label)
     angle.set(xlabel=f"angle of joint {shown.joint} (°)", ylabel="displacement (mm)")
     force.set(xlabel="force on the end-effector (N)", xticks=(-_PULL_N, 0, _PULL_N))
     time.set(xlabel=f"time (h), warming by {_RISE_K:.0f} K")

@@ -14,9 +14,9 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from elastocal.counting import counted, first_names
-from elastocal.diagnosis.words import in_words
 from elastocal.figures.arms import draw_links
 from elastocal.figures.style import MICRO, MILLI, STAGES, label_decades, legend_below, note, panels, styled
+from elastocal.report.words import in_words
 
 # About the vertical of the base, since what turns with the first joint then stays one component; and along the force, since
 # what gives way does so in its direction.
@@ -63,7 +63,8 @@ def residuals(table: Mapping[str, np.ndarray]) -> Figure:
     rows = -(-len(drawn_against) // columns)
     figure, axes = panels(rows, columns, 24 + 43 * rows, sharey=True)
     parts = {stage: components(table, stage) for stage in stages}
-    scale, unit = length_unit(np.abs(parts["before"]))
+    # By the residuals and not by a few outliers.
+    scale, unit = (MILLI, "mm") if np.nanquantile(np.abs(parts["before"]), 0.95) > 1e-3 else (MICRO, "µm")
     # A few measurements may lie outside, which would press all others together.
     low, high = scale * np.nanquantile(parts["before"], [0.001, 0.999])
     limits = (min(1.2 * low, -0.2 * high), max(1.2 * high, -0.2 * low))
@@ -166,11 +167,6 @@ def components(table: Mapping[str, np.ndarray], stage: str) -> np.ndarray:
     return np.column_stack([cos * off[:, 0] + sin * off[:, 1], cos * off[:, 1] - sin * off[:, 0], off[:, 2], along])
 
 
-def length_unit(lengths_m: np.ndarray) -> tuple[float, str]:
-    """Factor and name of the unit in which lengths (...) in m are best read."""
-    return (MILLI, "mm") if np.nanquantile(lengths_m, 0.95) > 1e-3 else (MICRO, "µm")
-
-
 def bins_of(values: np.ndarray) -> np.ndarray:
     """Bin of each measurement, (M,): its own for each value where there are few, else of about equal counts; -1 where none."""
     finite = np.isfinite(values)
@@ -219,21 +215,14 @@ def running_quartiles(values: np.ndarray, residual: np.ndarray, bins: np.ndarray
     `values`, `residual` (M,). `bins` (M,) of int: from `bins_of`. Returns `middle` (B,): median of the values in each bin;
     `quartiles` (B, 3).
     """
-    ordered = np.sort(values[np.isfinite(values)])
-    few = len(np.unique(np.round(ordered, 3))) <= _FEWEST_BINS
-    wide = np.flatnonzero(np.diff(ordered) > (np.inf if few else _GAP * np.ptp(ordered)))
-    gaps = ordered[wide]
-    rows: list[list[float]] = []
-    for number in range(bins.max() + 1):
-        member = (bins == number) & np.isfinite(residual)
-        if member.sum() < _FEWEST_IN_BIN:
-            continue
-        at = np.median(values[member])
-        if rows and ((gaps >= rows[-1][0]) & (gaps < at)).any():
-            rows.append([at, np.nan, np.nan, np.nan])
-        rows.append([at, *np.quantile(residual[member], [0.25, 0.5, 0.75])])
-    quartiles = np.array(rows).reshape(-1, 4)
-    return quartiles[:, 0], quartiles[:, 1:]
+    known = (bins >= 0) & np.isfinite(residual)
+    groups = pd.DataFrame({"at": values, "off": residual})[known].groupby(bins[known])
+    enough = groups.size() >= _FEWEST_IN_BIN
+    rows = np.column_stack([groups["at"].median()[enough], groups["off"].quantile([0.25, 0.5, 0.75]).unstack()[enough]])
+    if len(levels := np.unique(np.round(values[known], 3))) > _FEWEST_BINS:
+        gaps = levels[:-1][np.diff(levels) > _GAP * np.ptp(levels)]
+        rows = np.insert(rows, np.searchsorted(rows[:, 0], gaps, "right"), np.nan, axis=0)
+    return rows[:, 0], rows[:, 1:]
 
 
 def middle_of_cells(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray:
@@ -339,7 +328,8 @@ def campaign_errors(table: pd.DataFrame) -> Figure:
         span = [rms - low, np.where(np.isfinite(high), high - rms, 0.0)]
         axis.errorbar(rms, rows, xerr=span, fmt="o", color=color, ms=4, lw=1.2, capsize=2, label=words, zorder=2)
     # Robots and series in capitals, as people write them.
-    names = table["campaign"].str.replace("_", " ").str.replace(r"^\w+|\b\w\b", lambda word: word[0].upper(), regex=True)
+    names = table["campaign"].str.replace("_on_", ", judged on ").str.replace("_", " ")
+    names = names.str.replace(r"^\w+|\b\w\b", lambda word: word[0].upper(), regex=True)
     # A campaign with two sessions has two lines.
     names = names.where(~names.duplicated(keep=False), names + ", " + table["poses"].map(lambda count: counted(count, "pose")))
     axis.set_yticks(rows, names)

@@ -10,10 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from elastocal.figures.style import MICRO, MILLI, PALETTE, label_decades, legend_below, line_style, note, panels, styled
-from elastocal.study.budget_tables import QUANTILE
+from elastocal.figures.style import MICRO, PALETTE, label_decades, legend_below, line_style, note, panels, styled
 from elastocal.study.printed import LEVEL
-from elastocal.study.tables import find_statistics
 
 # Of the linear panels of the noise impact: what a reader compares with the wanted accuracy.
 _LINEAR_UM = 20.0
@@ -161,30 +159,6 @@ def bias_and_accuracy(
     return figure
 
 
-@styled
-def accuracy_of_one_data_set(per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str], length: int) -> Figure:
-    """Error that one data set of a given length leaves, strategy by strategy, beside the bound of its own measurements.
-
-    `per_dataset`: the table of the same name, of one noise level. `titles`: name of each robot to draw, by its key. `order`:
-    strategies.
-    """
-    figure, axes = panels(1, len(titles), 72, sharey=True)
-    rows = np.arange(len(order))[::-1]
-    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
-        cell = per_dataset[(per_dataset.robot == robot) & (per_dataset.ds == length)].set_index("strategy").loc[list(order)]
-        errors = cell.rms_um_std_error
-        axis.barh(rows, cell.rms_um, xerr=errors, height=0.6, color=PALETTE[5], ecolor="black", label="RMS error")
-        axis.plot(cell.crlb_rms_um, rows, "|", color=PALETTE[1], markersize=14, markeredgewidth=2, label="Cramér-Rao bound")
-        for row, efficiency in zip(rows, cell.efficiency, strict=True):
-            axis.text(1, row, f"{100 * efficiency:.0f} %", va="center", fontsize=7.5)
-        axis.set(title=title, xlabel="RMS end-effector error (µm)", yticks=rows)
-        axis.set_yticklabels(order)
-        axis.grid(visible=False, axis="y")
-    figure.suptitle(f"one data set of {length} configurations; in the bars: efficiency, (bound / RMS)²", fontsize=9)
-    legend_below(figure, 2)
-    return figure
-
-
 def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str, scale: float, order: Sequence[str]) -> None:
     # Where the mean of 1/c exists in practice.
     mine = metrics[(metrics.robot == robot) & metrics.trustworthy]
@@ -265,32 +239,6 @@ def _read_expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.
 
 
 @styled
-def table2_samples(initial: Mapping[str, pd.DataFrame], reference: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
-    """Statistics of single data sets, in which the paper's Table 2 lies, although it is far from all data sets together.
-
-    `initial`: the initial table of each robot. `reference`: the printed figures. `titles`: name of each robot to draw, by its
-    key.
-    """
-    figure, axes = panels(1, 3, 66)
-    printed = reference[reference.table == "2"].set_index(["robot", "quantity"]).value
-    single = {robot: find_statistics(frame) for robot, frame in initial.items()}
-    for axis, quantity in zip(axes[0], ("mean", "std", "max"), strict=True):
-        for index, (robot, statistics) in enumerate(single.items()):
-            low, q1, middle, q3, high = np.percentile(MILLI * statistics[quantity], [1, 25, 50, 75, 99])
-            axis.plot([low, high], [index, index], color=PALETTE[index], linewidth=1)
-            axis.plot([q1, q3], [index, index], color=PALETTE[index], linewidth=5, solid_capstyle="butt")
-            axis.plot(middle, index, "o", color="white", markersize=3)
-            if (robot, f"deviation_{quantity}") in printed.index:
-                there = printed[robot, f"deviation_{quantity}"]
-                axis.plot(there, index, "D", color="black", markersize=4, label="paper, Table 2")
-        axis.set(title=quantity, xlabel="mm", yticks=range(len(initial)), ylim=(len(initial) - 0.5, -0.5), xlim=(0, None))
-        axis.set_yticklabels([titles[robot] for robot in initial] if axis is axes[0, 0] else [])
-        axis.grid(visible=False, axis="y")
-    legend_below(figure, 1, "single data sets: 1 to 99 %, quartiles and median")
-    return figure
-
-
-@styled
 def ladder(table: pd.DataFrame) -> Figure:
     """Error of one data set by number of link springs, for each noise and length, of the first robot with links.
 
@@ -318,43 +266,15 @@ def ladder(table: pd.DataFrame) -> Figure:
 
 
 @styled
-def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figure:
-    """Error of one data set by set of measuring points, with as many configurations and with as many measurements.
-
-    `table`: from `budget_tables.budget_table`. `titles`: name of each robot to draw, by its key. `length`: configurations; the
-    budget is twice as many measurements.
-    """
-    labels = list(dict.fromkeys(table.points))
-    figure, axes = panels(1, len(titles), 16 + 7 * len(labels), sharex=True, sharey=True)
-    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
-        mine = table[table.robot == robot]
-        same = mine[mine.configurations == length]
-        equal = mine[mine.configurations == 2 * length // mine.measurements_per_configuration]
-        for cells, colour, shift, name in (
-            (same, PALETTE[0], -0.16, f"{length} configurations each"),
-            (equal, PALETTE[1], 0.16, f"{2 * length} measurements each"),
-        ):
-            rows = [labels.index(points) + shift for points in cells.points]
-            spans = QUANTILE * cells.std_error_um
-            axis.errorbar(cells.rms_um, rows, xerr=spans, fmt="o", color=colour, markersize=4, label=name)
-            axis.plot(cells.crlb_rms_um, rows, "|", color="black", markersize=7, label="Cramér-Rao bound")
-        axis.set(title=title, xlabel="RMS error of one data set (µm), 95 % intervals", yticks=range(len(labels)))
-        axis.set(ylim=(len(labels) - 0.5, -0.5), xlim=(0, None))
-        axis.grid(visible=False, axis="y")
-    axes[0, 0].set_yticklabels(labels)
-    legend_below(figure, 3)
-    return figure
-
-
-@styled
-def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) -> Figure:
+def costs(table: pd.DataFrame, break_even: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) -> Figure:
     """Cost of an accuracy by each set of points over the first one, by the cost of a configuration.
 
-    `table`: from `costs.cost_table`. `titles`: name of each robot to draw, by its key.
+    `table`, `break_even`: from `costs.cost_table` and `costs.break_even_table`; discs are at break-even. `titles`: name of each
+    robot to draw, by its key.
     """
     if not table.ratio.gt(0).any():
         return note(f"no set of points reaches {accuracy_um:g} µm with the configurations of this study")
-    labels = list(dict.fromkeys(table.points))
+    labels, break_even = list(dict.fromkeys(table.points)), break_even[break_even.accuracy_um == accuracy_um]
     figure, axes = panels(1, len(titles), 78, sharey=True)
     for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
         for index, points in enumerate(labels):
@@ -362,12 +282,14 @@ def costs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) ->
             cost, band = cell.configuration_cost, {"color": PALETTE[index], "alpha": 0.12, "linewidth": 0}
             axis.plot(cost, cell.ratio, **line_style(index), label=points)
             axis.fill_between(cost, cell.ratio_low, cell.ratio_high, **band)
+            for even in break_even[(break_even.robot == robot) & (break_even.points == points)].break_even:
+                axis.plot(even, 1.0, "o", color=PALETTE[index], markeredgecolor="black", markersize=4.5, zorder=4, gid="even")
         axis.set(title=title, xlabel="cost of a configuration (measurements)", xscale="log", yscale="log")
         axis.set_xticks([0.01, 0.1, 1, 10])
         axis.xaxis.set_major_formatter("{x:g}")
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel(f"cost of {accuracy_um:g} µm over that of {labels[0] if labels else ''}")
-    title = "points measured in each configuration; bands: 95 % intervals by bootstrap over data sets"
+    title = "points measured in each configuration; bands: 95 % intervals by bootstrap over data sets; discs: break-even"
     legend_below(figure, 4, title)
     return figure
 

@@ -119,6 +119,7 @@ function drawRobot() {
   });
   for (const each of chosen(find("which").value)) {
     data.position.forEach((at, number) => {
+      if (find("shown").value === "held" && !data.held_out[number]) return;
       const [from, to] = [shown(at), shown(tip(each, number))];
       things.push([to[2], () => {
         line(pen, from, to, each.color, 1.8, { dash: each.dash });
@@ -233,7 +234,9 @@ find("pose").value = data.worst;
 find("factor").value = 50;
 // Where nothing was added one of two equal pictures is enough.
 if (!data.changed) for (const id of ["which", "step"]) find(id).value = "before";
-for (const id of ["which", "factor", "pose"]) find(id).addEventListener("input", drawRobot);
+// All measurements at once hide each other; without validation poses there is nothing else to show.
+if (!data.held_out.some(Boolean)) find("shown").value = "all";
+for (const id of ["which", "shown", "factor", "pose"]) find(id).addEventListener("input", drawRobot);
 for (const id of ["component", "against", "step"]) find(id).addEventListener("input", drawScatter);
 function drawAll() {
   takeColours();

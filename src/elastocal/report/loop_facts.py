@@ -1,4 +1,4 @@
-"""Everything that the report of a campaign states, worded, from the files that the loop wrote, and its pages."""
+"""What the report of a campaign shows, as PDF and as a page: rows of tables, and the sentences of `campaign.txt`."""
 
 from __future__ import annotations
 
@@ -6,37 +6,85 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import accuracy_from, accuracy_sentence
-from elastocal.data_checks.protocol import data_at_fault
-from elastocal.diagnosis.words import in_words
+import numpy as np
+
+from elastocal import __version__
+from elastocal.counting import counted, grouped, plural
+from elastocal.data_checks.protocol import OF_DATA, data_at_fault
+from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.effects.catalogue import effects
+from elastocal.effects.protocol import effect_of
 from elastocal.loop.error_table import error_rows
-from elastocal.report.first_page import (
-    AT_FAULT,
-    TITLES,
-    cause_rows,
-    headline,
-    held_out_sentence,
-    probability_sentence,
-    sentences,
-    what_to_do,
-    whose_errors,
-)
-from elastocal.report.loop_effects import NONE_FOUND, effect_facts
-from elastocal.report.loop_errors import as_judged, range_sentence, remainder_sentence, split_rows, step_rows
-from elastocal.report.loop_experiment import experiment_facts
-from elastocal.report.loop_measurements import NOISE_SOURCES, made, measured, misfit_sentence, noise_rows
-from elastocal.report.loop_method import method, setting_rows, untestable_rows
-from elastocal.report.loop_parameters import compliance_rows, held_rows, left_to_priors, other_parameters
-from elastocal.report.typesetting import compile_document
-from elastocal.report.wording import as_sentence, length, minus
+from elastocal.report import loop_tables as tables
+from elastocal.report import words as say
+from elastocal.report.typesetting import compile_document, sentences
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
-    import numpy as np
-
     from elastocal.io.origin import Origin
+
+TITLES = {
+    "adequate": "the declared model is adequate",
+    "named": "one mechanism is missing in the declared model",
+    "class": "one mechanism is missing in the declared model; which one is ambiguous",
+    "several": "several mechanisms are missing in the declared model",
+    "unexplained": "something is missing in the declared model that the catalogue does not have",
+    "not_testable": "these measurements can test no mechanism",
+}
+AT_FAULT = "the data are at fault"
+# What is said in one paragraph.
+_IN_ONE = (
+    *(
+        "headline_caption",
+        "cost",
+        "probabilities",
+        "accuracy_words",
+        "held_out",
+        "range",
+        "remainder",
+        "noise_source",
+        "misfit",
+    ),
+    *("none_found", "next", "made"),
+)
+# Causes and locations below this are not shown; from `_SURE` on a location is stated without its alternatives, a cause is real.
+_LEAST_SHOWN, _SURE = 0.01, 0.95
+# Causes of which page 1 has a bar, if they are not part of the verdict.
+_MOST_CAUSES = 6
+# A cause is negligible below this share of the corrected robot's error: squares add up, so that leaving it uncorrected raises
+# the error by 5 % at most. Ellison, S. L. R. and Williams, A. (eds.), EURACHEM/CITAC Guide CG 4, 2012, section 7.2.2:
+# components below a third of the largest need no closer look.
+NEGLIGIBLE = 1 / 3
+# The last digit of a cost.
+_FINEST_M = 1e-6
+# More than these would fill pages that nobody reads; the tables have them all.
+_MOST_NAMES, _MOST_PARAMETERS, _SHOWN_PARAMETERS = 8, 16, 10
+
+
+def campaign_sentences(
+    verdict: Mapping[str, Any],
+    steps: Sequence[Mapping[str, Any]] = (),
+    experiment: Sequence[Mapping[str, Any]] = (),
+    descriptions: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """What `campaign.txt` says of a campaign, by headings.
+
+    `verdict`: contents of verdict.json. `steps`, `experiment`: rows of before_after.csv and next_experiment.csv.
+    `descriptions`: contents of campaign.json; without them nothing is said of the method.
+    """
+    faulty = data_at_fault(verdict)
+    facts = {
+        "effects": [] if faulty else [_said_of(effect, verdict["heldout"]) for effect in verdict["effects"]],
+        "faulty": faulty,
+        "headline": _headline(verdict),
+        "accuracy": verdict.get("accuracy"),
+        "ends": [_with_interval(step) for step in steps if step["kind"] != "frames"],
+        "new_poses": len({(row["effect"], row["pose"]) for row in experiment}),
+        "version": __version__,
+    }
+    return sentences("campaign.txt", verdict={"next_experiment": None, **verdict}, descriptions=descriptions, **facts)
 
 
 def loop_facts(
@@ -54,45 +102,34 @@ def loop_facts(
     next_experiment.csv. `table`, `parameters` (N,): columns of the residuals and of the parameters of the final model.
     `descriptions`: contents of campaign.json. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
-    faulty = data_at_fault(verdict)
+    faulty, heldout = data_at_fault(verdict), verdict["heldout"]
+    said = campaign_sentences(verdict, steps, experiment, descriptions)
     # Probabilities are then those from before the measurements.
     searched = {entry["name"] for effect in verdict["effects"] for entry in effect["parameters"] if entry.get("shape")}
-    untested = verdict["verdict"] == "not_testable"
-    floor = verdict["heldout"]["noise_floor_rms_m"]
+    held = [*(name for name in verdict["held"] if name not in searched), *tables.left_to_priors(parameters)]
     return {
+        **{name: " ".join(said[name]) for name in _IN_ONE},
+        **{name: said[name] for name in ("sentences", "now", "warnings", "noise", "settings")},
+        "method": dict(said["method"]),
         "campaign": verdict["campaign"],
         "robot": descriptions["robot"]["name"],
-        "made": made(descriptions["campaign"]),
         "verdict": AT_FAULT if faulty else TITLES[verdict["verdict"]],
         "faulty": faulty,
-        "headline": headline(verdict),
-        "sentences": sentences(verdict),
-        "causes": [] if untested else cause_rows(verdict),
-        "probabilities": "" if faulty or untested else probability_sentence(verdict["probabilities"]),
-        "now": what_to_do(verdict, experiment),
-        "warnings": [] if faulty else [_with_minus(as_sentence(in_words(warning))) for warning in verdict["warnings"]],
-        "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),
-        "accuracy": _accuracy(verdict),
+        "headline": _headline(verdict),
+        "causes": [] if verdict["verdict"] == "not_testable" else cause_rows(verdict),
+        "accuracy": _accuracy_rows(verdict),
         "errors": error_rows(verdict),
-        "measured": measured(table, descriptions),
-        "noise": noise_rows(verdict["noise"], descriptions["campaign"]["measured"] == "pose"),
-        "noise_source": NOISE_SOURCES[verdict["noise"]["source"]],
-        "misfit": misfit_sentence(verdict["misfit"]),
-        "floor": length(floor),
-        "steps": step_rows(steps, floor),
-        "splits": split_rows(as_judged(splits, steps, verdict["heldout"])),
-        "range": range_sentence(verdict["heldout"]),
-        "remainder": "" if faulty else remainder_sentence(verdict["remainder"], verdict["heldout"]),
-        "effects": [effect_facts(effect, verdict["heldout"]) for effect in verdict["effects"]],
-        "none_found": NONE_FOUND.get(verdict["verdict"], NONE_FOUND["adequate"]),
-        "experiment": experiment_facts(experiment, verdict.get("next_experiment")),
-        "compliances": compliance_rows(verdict["compliance_urad_per_Nm"]),
+        "measured": tables.measured_rows(table, descriptions),
+        "floor": say.length(heldout["noise_floor_rms_m"]),
+        "steps": tables.step_rows(steps, heldout["noise_floor_rms_m"]),
+        "splits": tables.split_rows(tables.as_judged(splits, steps, heldout)),
+        "effects": [effect_facts(effect, heldout) for effect in verdict["effects"]],
+        "experiment": tables.experiment_facts(experiment),
+        "compliances": tables.compliance_rows(verdict["compliance_urad_per_Nm"]),
         "compliances_identified": any(verdict["compliance_urad_per_Nm"]["std_error"]),
-        "held": held_rows([*(name for name in verdict["held"] if name not in searched), *left_to_priors(parameters)]),
-        "untestable": untestable_rows(verdict["untestable"]),
-        "others": other_parameters(verdict, parameters),
-        "method": method(verdict, descriptions),
-        "settings": setting_rows(verdict["settings"]),
+        "held": tables.held_rows(held),
+        "untestable": tables.untestable_rows(verdict["untestable"]),
+        "others": tables.other_parameters(verdict, parameters),
         "found": [effect["name"] for effect in verdict["effects"]],
     }
 
@@ -107,13 +144,175 @@ def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence
     compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures, origin)
 
 
-def _accuracy(verdict: Mapping[str, Any]) -> str:
-    if not verdict.get("accuracy"):
-        return ""
-    stated = accuracy_from(verdict["accuracy"])
-    return f"{accuracy_sentence(stated)} {whose_errors(verdict['heldout']['after']['rms_m'], stated)}"
+def _headline(verdict: Mapping[str, Any]) -> dict[str, str] | None:
+    """Errors on validation poses in mm, ``before`` any calibration and ``after``, and what ``noise`` alone leaves, if known."""
+    if data_at_fault(verdict):
+        return None
+    errors, floor = verdict["heldout"], verdict["heldout"]["noise_floor_rms_m"]
+    stages = {"before": say.millimetres(errors["uncalibrated"]["rms_m"]), "after": say.millimetres(errors["after"]["rms_m"])}
+    return stages | {"noise": say.millimetres(floor) if floor else "", "poses": counted(errors["poses"], "validation pose")}
 
 
-def _with_minus(text: str) -> str:
-    """A sentence whose numbers have a true minus sign."""
-    return re.sub(r"(?<= )-(?=\d)", minus("-"), text)
+def _said_of(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str, Any]:
+    """What sentences say of an effect: its names, how sure it is, what it costs, what else it may be."""
+    name, others = effect["name"], effect["alternatives"]
+    at = [entry for entry in effect["locations"] if entry["probability"] >= _LEAST_SHOWN]
+    sure = len(effect["members"]) > 1 or not at or at[0]["probability"] >= _SURE
+    where = [f"{say.location_words(name, each['location'])} ({say.probability_words(each['probability'])})" for each in at]
+    return {
+        "found": say.found_words(name, effect["members"]),
+        "bare": say.physical_name(name),
+        "probability": say.probability_words(effect["probability"]),
+        "cost": cost_words(effect, heldout),
+        "cost_m": effect["cost_m"],
+        "gain": effect["heldout_gain"],
+        "adopted": effect["adopted"],
+        "instead": say.listed(map(say.alternative_words, others), _MOST_NAMES, last="or") if others else "",
+        "common": say.in_common(name, others),
+        "unsure": [] if sure else where,
+    }
+
+
+def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
+    """What an effect costs at the campaign's poses and loads: the RMS error if it alone were left out of the correction."""
+    cost = effect["cost_m"]
+    if cost is None:
+        known = effects().get(effect["name"])
+        moves = known is None or known.moves_robot
+        return "not in the final model" if moves else "an error of the measurement, not of the robot"
+    if cost > NEGLIGIBLE * heldout["after"]["rms_m"]:
+        return f"{say.millimetres(cost)} mm"
+    # No finer than a micrometre, and what was found is not nothing.
+    stated = say.millimetres(cost) if cost >= _FINEST_M / 2 else f"below {say.millimetres(_FINEST_M)}"
+    return f"{stated} mm: {'real, ' if effect['probability'] >= _SURE else ''}negligible"
+
+
+def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What may be missing, the most probable first: in words, with its probability and, of what was found, cost and gain.
+
+    Mechanisms may act together, so that probabilities need not add up to one. The gain is that of the validation poses.
+    """
+    stated, found = verdict["probabilities"], {effect["name"]: effect for effect in verdict["effects"]}
+    if stated is None:
+        return []
+
+    def row(name: str, probability: float, cost: str = "", gain: float | None = None) -> dict[str, Any]:
+        share = {"probability": probability, "words": say.probability_words(probability)}
+        return {
+            "name": say.capital(name),
+            **share,
+            "cost": cost,
+            "gain": "" if gain is None else say.minus(f"{-100 * gain:+.0f} %"),
+        }
+
+    rows = [
+        row(
+            say.found_words(name, each["members"]),
+            each["probability"],
+            cost_words(each, verdict["heldout"]),
+            each["heldout_gain"],
+        )
+        for name, each in found.items()
+    ]
+    # Beside a mechanism that was found, what is unknown is a related one.
+    unknown = say.RELATED if found else say.UNKNOWN
+    others = [
+        row(unknown if name == OTHER else say.physical_name(name), p)
+        for name, p in stated["mechanisms"].items()
+        if name not in found
+    ]
+    others = [each for each in [*others, row(say.NOTHING, stated["nothing"])] if each["probability"] >= _LEAST_SHOWN]
+    others = sorted(others, key=lambda each: -each["probability"])[:_MOST_CAUSES]
+    return sorted([*rows, *others], key=lambda each: -each["probability"])
+
+
+def _accuracy_rows(verdict: Mapping[str, Any]) -> list[list[str]]:
+    """Rows of the accuracy: whose error, RMS, at the worst pose; in mm."""
+    stated, errors = verdict.get("accuracy"), verdict["heldout"]
+    if not stated:
+        return []
+
+    def sure(name: str) -> str:
+        bound = stated[f"{name}_bound_m"]
+        below = "" if bound is None else f" ({100 * stated['confidence']:g} % sure: below {say.millimetres(bound)})"
+        return say.millimetres(stated[f"{name}_m"]) + below
+
+    own = f"the robot itself, {stated['kind']} over {stated['region']} ({stated['poses']})"
+    after = errors["after"]
+    measured = [
+        f"the tracker against the model, at {counted(errors['poses'], 'validation pose')}",
+        *map(say.millimetres, (after["rms_m"], after["max_m"])),
+    ]
+    return [measured, [own, sure("rms"), sure("worst")]]
+
+
+def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str, Any]:
+    """Facts of one effect or fault of the data; `heldout`: of verdict.json."""
+    known = [entry for entry in effect["parameters"] if not entry.get("held") or entry.get("shape")]
+    shown = known
+    if len(known) > _MOST_PARAMETERS:
+        shown = sorted(known, key=lambda e: abs(e["value"]) / e["std_error"] if e["std_error"] else 0.0, reverse=True)[
+            :_SHOWN_PARAMETERS
+        ]
+    name, members, of_data = effect["name"], effect["members"], effect["family"] == OF_DATA
+    rows, joints = [_parameter_row(entry, members) for entry in shown], effect["joints"] if of_data else ()
+    at = [
+        [say.location_words(name, e["location"]), say.probability_words(e["probability"])]
+        for e in effect["locations"]
+        if e["probability"] >= _LEAST_SHOWN
+    ]
+    rivals, evidence = effect["alternatives"], effect.get("evidence") or ()
+    return {
+        "name": say.capital(say.words(name) if of_data else say.physical_name(name))
+        + (f" of {plural('joint', len(joints))} {say.listed(map(str, joints))}" if joints else ""),
+        "catalogue": "" if of_data else name,
+        "family": effect["family"],
+        "description": say.as_sentence(effect.get("detail") or description(name)),
+        "locations": at if len(effect["locations"]) > 1 else [],
+        "parameters": rows,
+        "with_prior": any(entry.get("prior_std") for entry in shown),
+        "left_out": grouped(len(known)) if len(known) > len(shown) else "",
+        "with_angle": any("q)" in row[0] for row in rows),
+        "held": len(effect["parameters"]) - len(known),
+        "probability": "" if effect["probability"] is None else say.probability_words(effect["probability"]),
+        "cost": "" if of_data or not effect["adopted"] else cost_words(effect, heldout),
+        "gain": effect["heldout_gain"],
+        "adopted": effect["adopted"],
+        "alternatives": say.listed(rivals if of_data else map(say.alternative_words, rivals), _MOST_NAMES) if rivals else "",
+        # RMS distance between measured and predicted positions as written and with the fault corrected.
+        "evidence": [say.length(value) for value in evidence[:2]] if len(evidence) > 1 and None not in evidence else [],
+    }
+
+
+def _with_interval(step: Mapping[str, Any]) -> str:
+    """RMS error of a step on validation poses with its 95 % interval, in one unit."""
+    number, unit = say.length(step["heldout_rms_m"]).split("\u00a0")
+    ends = [(say.MICRO if unit == "µm" else say.MILLI) * step[f"heldout_rms_m_{end}"] for end in ("low", "high")]
+    return (
+        f"{number} [{say.plain(ends[0])}, {say.plain(ends[1])}]\u00a0{unit}"
+        if np.isfinite(ends).all()
+        else f"{number}\u00a0{unit}"
+    )
+
+
+def description(effect: str) -> str:
+    """What an effect of the catalogue is, in the first line of its docstring, without the formula."""
+    known = effects().get(effect)
+    summary = known.doc.split("\n")[0] if known and known.doc else say.words(effect)
+    return re.sub(r", \w+\([^,]*=.*$", "", summary.split(":")[0]).rstrip(".")
+
+
+def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str]:
+    # The longest, since keys may have blanks and one may begin another.
+    member = max((key for key in members if entry["name"].startswith(f"{key} ")), key=len, default=None)
+    # What belongs to an effect as a whole, such as its largest sag, is no member's; faults of the data have none.
+    owner = member or (effect_of(members[0]) if members else "")
+    name = say.parameter_words(effect_of(owner), entry["name"].removeprefix(f"{owner} ")) if owner else say.words(entry["name"])
+    where = f"{say.place_words([member])}: " if member and len(members) > 1 else ""
+    row = [where + name, *say.scaled(entry["value"], entry["std_error"], entry["unit"])]
+    if entry["unit"] == "–" and float(entry["value"]).is_integer():
+        row[1] = grouped(int(entry["value"]))
+    prior = entry.get("prior_std")
+    if prior and entry["std_error"] > tables.MOSTLY_PRIOR * prior:
+        return [*row, "mostly the prior"]
+    return [*row, "measurements" if entry["std_error"] else "the best of those tried" if entry.get("shape") else ""]

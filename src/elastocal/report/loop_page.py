@@ -7,15 +7,13 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jinja2 import Environment
 from markupsafe import Markup
 
-from elastocal.counting import grouped
-from elastocal.diagnosis.words import candidate_words
 from elastocal.io.atomic_writes import write_text
 from elastocal.loop.residual_tables import angles_of, worst_measurement
 from elastocal.mechanics.kinematics import corners, joint_axes
-from elastocal.report.wording import MICRO, capital, minus, probability_words
+from elastocal.report import words as say
+from elastocal.report.typesetting import template
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,10 +30,6 @@ _POSES = 40
 _LEADING = 15
 # Arrows of the middle length are this share of the width of what they are drawn in.
 _ARROW = 0.03
-_FACTS = (
-    *("campaign", "robot", "made", "headline", "now", "verdict", "sentences", "causes", "accuracy", "warnings", "effects"),
-    *("held_out_sentence", "remainder"),
-)
 
 
 def loop_page(
@@ -55,7 +49,7 @@ def loop_page(
         shown = np.unique([*_spread(count, _MOST_SHOWN - 1), worst_measurement(table)])
     some = {name: values[shown] for name, values in table.items()}
     position = np.column_stack([some[name] for name in "xyz"])
-    off = {step: MICRO * np.column_stack([some[f"{step}_d{axis}"] for axis in "xyz"]) for step in ("before", "after")}
+    off = {step: say.MICRO * np.column_stack([some[f"{step}_d{axis}"] for axis in "xyz"]) for step in ("before", "after")}
     angles = angles_of(some, robot.joints)
     # Validation poses of another campaign have numbers of their own.
     pose = np.column_stack([some["held_out"], some["session"], some["pose"]])
@@ -65,7 +59,7 @@ def loop_page(
     places = np.unique([*_spread(len(first), _POSES), np.flatnonzero(in_order == worst_pose)[0]])
     places = in_order[places]
     drawn, worst = first[places], int(np.flatnonzero(places == worst_pose)[0])
-    middle = np.median(np.linalg.norm(off["before"], axis=1)) / MICRO
+    middle = np.median(np.linalg.norm(off["before"], axis=1)) / say.MICRO
     data = {
         "position": position.round(6).tolist(),
         **{step: values.round(2).tolist() for step, values in off.items()},
@@ -79,13 +73,8 @@ def loop_page(
         "usual_factor": float(_ARROW * np.ptp(position, axis=0).max() / max(middle, 1e-9)),
         "changed": not np.allclose(off["before"], off["after"], rtol=0, atol=0.01),
     }
-    page = {name: facts[name] for name in _FACTS}
-    page["candidates"] = _candidates(candidates)
-    page["compliances"] = facts["compliances"] if facts["compliances_identified"] else []
-    page["same_sentence"] = "" if data["changed"] else "Nothing was added to the declared model: after is the same as before."
-    page["shown_sentence"] = (
-        "" if len(shown) == count else f"{grouped(len(shown))} of {grouped(count)} measurements are shown, evenly spread."
-    )
+    page = {**facts, "candidates": _candidates(candidates), "changed": data["changed"]}
+    page["shown"] = [] if len(shown) == count else [len(shown), count]
     return page, data
 
 
@@ -94,12 +83,11 @@ def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str
 
     `path`: the HTML file. `page`, `data`: from `loop_page`. `origin`: named at the foot of the page.
     """
-    folder = resources.files("elastocal.report")
-    template, script = (folder.joinpath(name).read_text(encoding="utf-8") for name in ("loop.html", "loop.js"))
+    script = resources.files(__package__).joinpath("loop.js").read_text(encoding="utf-8")
     # Texts come from files of other people: they are escaped, and nothing in the data can end the script that holds it.
     numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
-    text = Environment(autoescape=True).from_string(template)
-    write_text(path, text.render(page=page, origin=origin, data=Markup(numbers), script=Markup(script)))
+    text = template("loop.html").render(page=page, origin=origin, data=Markup(numbers), script=Markup(script))
+    write_text(path, text)
 
 
 def _candidates(table: Mapping[str, np.ndarray]) -> list[dict[str, str]]:
@@ -112,9 +100,9 @@ def _candidates(table: Mapping[str, np.ndarray]) -> list[dict[str, str]]:
     np.logical_or.at(chosen, of_key, np.asarray(table["chosen"], bool))
     return [
         {
-            "name": capital(candidate_words(keys[key])),
-            "factor": minus(f"{best[key]:.1f}"),
-            "words": probability_words(probability[key]),
+            "name": say.capital(say.candidate_words(keys[key])),
+            "factor": say.minus(f"{best[key]:.1f}"),
+            "words": say.probability_words(probability[key]),
             "chosen": "yes" if chosen[key] else "",
         }
         for key in np.argsort(-best, kind="stable")[:_LEADING]

@@ -25,7 +25,7 @@ _REPORTS = {
 def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
     """Lines about the reports among the files that a run has made, which are named from the workplace."""
     # Only a run that has made a report needs what makes its sentences.
-    from elastocal.report.first_page import headline, headline_sentence, sentences
+    from elastocal.report.loop_facts import campaign_sentences
 
     lines, following = [], []
     for path in sorted(map(str, made)):
@@ -34,9 +34,9 @@ def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
         if match := _CAMPAIGN.fullmatch(path):
             verdict = json.loads(Path(workplace, path).with_name("verdict.json").read_text(encoding="utf-8"))
             of_use = verdict["verdict"] in _OF_USE and not data_at_fault(verdict)
-            stated = headline(verdict)
-            errors = [f"  {headline_sentence(stated)}"] if stated else []
-            lines += [f"{'✓' if of_use else '!'} {match[1]}: {sentences(verdict)[0]}", *errors, f"  report: {path}"]
+            said = campaign_sentences(verdict)
+            errors = [f"  {line}" for line in said["headline_line"]]
+            lines += [f"{'✓' if of_use else '!'} {match[1]}: {said['sentences'][0]}", *errors, f"  report: {path}"]
             then = "elastocal correct, elastocal certificate" if of_use else '"What to do now" on the first page of the report'
             following.append(f"next: {then}")
     # Of several campaigns each report says it.

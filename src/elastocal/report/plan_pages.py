@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from elastocal.application.planning.survey import Survey
 
 _UNITS = {"deg": "°", "mm": "mm"}
+_LOADS = {0.0: "0", 1.0: "+F", -1.0: "−F"}
 
 
 def write_plan_sheet(path: str | Path, facts: Mapping[str, Any], figures: Mapping[str, str]) -> None:
@@ -31,45 +32,25 @@ def write_plan_sheet(path: str | Path, facts: Mapping[str, Any], figures: Mappin
 
 
 def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]) -> dict[str, Any]:
-    """What the sheet states: sentences, the heads of the table, and for each pose its cells and how often each load is read."""
+    """What the sheet shows: names and counts, heads of the table, and for each pose its cells and how often a load is read."""
     angles = [name for name in map(str, rows) if name.startswith("q") and name.rpartition("_")[2] in SHOWN]
     heads = ["pose", *(f"{name.partition('_')[0]} ({_UNITS[name.partition('_')[2]]})" for name in angles)]
     forces = ["fx", "fy", "fz"] if survey.loaded else []
-    heads += [f"F{name[1]} (N)" for name in forces] + ["measured"]
     poses = []
     for pose, part in rows.groupby("pose"):
         pulled = part[part["load"] == 1] if survey.loaded else part
-        cells = [
-            str(pose),
-            *(f"{part[name].iloc[0]:.2f}" for name in angles),
-            *(f"{round(pulled[name].iloc[0]) + 0:d}" for name in forces),
-        ]
-        visits = [
-            {"load": _load_name(share), "count": int(part.loc[part["load"] == load, "repeat"].nunique())}
-            for load, share in enumerate(survey.shares)
-            if (part["load"] == load).any()
-        ]
-        poses.append({"cells": cells, "visits": visits})
-    targets = ", ".join(target.name for target in survey.targets)
-    many = f"In each of them measure the targets {targets}." if len(survey.targets) > 1 else f"The target is {targets}."
+        cells = [str(pose), *(f"{part[name].iloc[0]:.2f}" for name in angles)]
+        counts = [part.loc[part["load"] == load, "repeat"].nunique() for load in range(len(survey.shares))]
+        visits = [{"load": _LOADS[share], "count": int(n)} for share, n in zip(survey.shares, counts, strict=True) if n]
+        poses.append({"cells": [*cells, *(f"{round(pulled[name].iloc[0]) + 0:d}" for name in forces)], "visits": visits})
     fitted = len(plan.fitted.joint_angles)
     return {
         "robot": survey.robot.name,
-        "lines": [
-            f"{counted(fitted, 'pose')} to fit and {len(poses) - fitted} held out: {counted(len(rows), 'measurement')}.",
-            many,
-        ],
-        "how": (
-            "Tick a box for each measurement. Several boxes behind one load: move away and approach the pose afresh each time."
-            + (" F is the load marked +F; −F is the opposite pull, 0 none." if survey.loaded else "")
-        ),
-        "heads": heads,
+        "targets": [target.name for target in survey.targets],
+        "loaded": survey.loaded,
+        "counts": [counted(fitted, "pose"), f"{len(poses) - fitted}", counted(len(rows), "measurement")],
+        "heads": [*heads, *(f"F{name[1]} (N)" for name in forces), "measured"],
         "rows": poses,
         "fitted": fitted,
-        "arrow": "The arrow is the direction of the load +F." if survey.loaded else "",
         "worth": " ".join(worth),
     }
-
-
-def _load_name(share: float) -> str:
-    return {0.0: "0", 1.0: "+F", -1.0: "−F"}[share]

@@ -1,8 +1,9 @@
-"""A typst document to a PDF, with the data and pictures that it reads beside it."""
+"""Templates and the data that they show: sentences and pages by Jinja, documents by Typst."""
 
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import tempfile
 from importlib import resources
@@ -11,13 +12,51 @@ from typing import TYPE_CHECKING
 
 import typst
 
+from elastocal import counting
 from elastocal.io.atomic_writes import atomic_write
+from elastocal.report import words
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from typing import Any
 
+    from jinja2 import Template
+
     from elastocal.io.origin import Origin
+
+
+def template(name: str) -> Template:
+    """A template of this package; those of pages (.html) escape what they show.
+
+    What `words` and `counting` have are filters of it.
+    """
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    def source(name: str) -> str:
+        # A line of tags alone leaves no line; one that has text, too, ends where it ends.
+        text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+        return re.sub(r"^[ \t]*((?:\{%(?:(?!%\}).)*%\})+)[ \t]*\n", r"\1", text, flags=re.MULTILINE)
+
+    environment = Environment(loader=FunctionLoader(source), autoescape=name.endswith(".html"), undefined=StrictUndefined)
+    filters = {**vars(words), **vars(counting)}
+    environment.filters |= {each: value for each, value in filters.items() if callable(value) and each[0] != "_"}
+    return environment.get_template(name)
+
+
+def sentences(name: str, **facts: Any) -> dict[str, Any]:
+    """What a template of sentences (.txt) says.
+
+    Returns under each heading ``# name`` its paragraphs, list of str: empty lines stand between them, where other lines end
+    does not matter; under each heading ``## name`` the rows of a table, list of lists of cells: a line each, ¦ between cells.
+    """
+    found: dict[str, Any] = {}
+    for marks, head, text in re.findall(
+        r"^(##?) (\w+)\n(.*?)(?=^##? \w+\n|\Z)", template(name).render(facts), re.DOTALL | re.MULTILINE
+    ):
+        parts = re.split(r"\n" if len(marks) > 1 else r"\n[ \n]*\n", text)
+        said = [re.sub(r"[ \n]+", " ", part.strip(" \n")) for part in parts if part.strip(" \n")]
+        found[head] = [[cell.strip(" ") for cell in line.split("¦")] for line in said] if len(marks) > 1 else said
+    return found
 
 
 def compile_document(
@@ -28,7 +67,7 @@ def compile_document(
     origin: Origin | None = None,
     package: str = __package__,
 ) -> None:
-    """Compile a document; the PDF appears whole or not at all.
+    """Compile a Typst document; the PDF appears whole or not at all.
 
     `path`: the PDF. `document`: file name of the document. `data`: JSON-serialisable contents of the files
     ``<name>.json`` that the document reads. `figures`: PDF files; the document finds them by their names. `origin`: what the

@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from elastocal.diagnosis.words import at_joints, listed, physical_name
 from elastocal.errors import InputError
 from elastocal.mechanics.components import WRENCH
+from elastocal.report.words import at_joints, listed, physical_name
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
 from elastocal_proof.plant.drives import Repeatability

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, StrMethodFormatter
 
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.words import physical_name
 from elastocal.figures.style import PALETTE, note, panels, styled
+from elastocal.report.words import physical_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

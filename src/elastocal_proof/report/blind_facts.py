@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from elastocal.counting import counted, grouped
-from elastocal.diagnosis.words import at_joints, listed
-from elastocal.report.wording import plain, words
+from elastocal.report.words import at_joints, listed, plain, words
 from elastocal_proof.blind.case_rows import EXACT_ALIASES
 from elastocal_proof.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARED, USUAL_DESIGN
 from elastocal_proof.blind.confusion import CLASS_WITH, CLASS_WITHOUT

@@ -1,30 +1,35 @@
-"""Mechanisms, locations and hypotheses are named as a robot engineer names them."""
+"""Effects, locations, hypotheses, numbers and units stand as a robot engineer writes them."""
 
 import pytest
 from support import ODD_CHAINS, OTHER_CHAINS, chain_of
 from synthetic import equipped
 
 from elastocal.diagnosis.findings import location_words
-from elastocal.diagnosis.words import (
+from elastocal.effects.catalogue import candidates_on, effects
+from elastocal.figures.candidates import short_name
+from elastocal.report.words import (
     UNKNOWN,
     alternative_words,
     candidate_words,
     effect_words,
     found_words,
     hypotheses_words,
-    hypothesis_words,
     in_common,
     in_words,
+    length,
+    listed,
+    millimetres,
+    plain,
+    probability_words,
+    scaled,
 )
-from elastocal.effects.catalogue import candidates_on, effects
-from elastocal.figures.candidates import short_name
 
 
-def test_every_effect_of_the_catalogue_brings_its_own_physical_name():
+def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind():
     named = {name: effect.words for name, effect in effects().items()}
-    assert all(named.values()), [name for name, words in named.items() if not words]
-    assert len(set(named.values())) == len(named)
+    assert all(named.values()) and len(set(named.values())) == len(named)
     assert not [words for words in named.values() if "_" in words or words != words.strip() or words[0].isupper()]
+    assert all(in_common(name, []) for name in effects())
 
 
 @pytest.mark.parametrize("chain", [*OTHER_CHAINS.values(), *ODD_CHAINS.values()])
@@ -44,14 +49,8 @@ def test_no_two_candidates_are_printed_alike(chain):
         ("cross_compliance", ["joints 2 and 3", "joints 4 and 5"], "elastic coupling of joints 2 and 3 and of joints 4 and 5"),
         ("transmission_harmonic", ["joint 4 orders 1-2", "joint 4 orders 3-6"], "of joint 4 (orders 1-2, orders 3-6)"),
         ("transmission_harmonic", [f"joint {k} orders 1-2" for k in (4, 2, 10)], "error of joints 2, 4 and 10"),
-        (
-            "link_weight",
-            ["off the line", "joint 5"],
-            "gravity sag of the whole arm (centres of mass off the links' axes) and of joint 5",
-        ),
-        ("link_weight", ["joint 5", ""], "gravity sag of joint 5 and of the whole arm"),
+        ("link_weight", ["off the line", "joint 5"], "of the whole arm (centres of mass off the links' axes) and of joint 5"),
         ("payload", [""], "weight of an undeclared payload"),
-        ("payload", [], "weight of an undeclared payload"),
     ],
 )
 def test_locations_are_gathered(effect, locations, expected):
@@ -59,49 +58,23 @@ def test_locations_are_gathered(effect, locations, expected):
 
 
 def test_locations_are_read_as_findings_write_them():
-    assert (
-        effect_words("cross_compliance", [location_words("cross_compliance", (2, 3))]) == "elastic coupling of joints 2 and 3"
-    )
     written = location_words("link_elasticity", (1, 2, "one section"))
     assert effect_words("link_elasticity", [written]) == found_words("link_elasticity", ["link_elasticity@1+2[one section]"])
 
 
-@pytest.mark.parametrize(
-    ("key", "expected"),
-    [
-        ("lost_motion@3", "lost motion (backlash) of joint 3"),
-        ("transmission_harmonic@1[orders 1-2]", "gear transmission error of joint 1 (orders 1-2)"),
-        ("force_bias[base axes]", "zero error of the force sensor (base axes)"),
-        ("link_elasticity[column]", "elastic bending and torsion of the column"),
-    ],
-)
-def test_candidates_are_named_in_words(key, expected):
-    assert candidate_words(key) == expected
-
-
-def test_other_is_unknown_alone_and_related_beside_a_mechanism():
-    assert hypothesis_words(["other"], {"other": ["joint 2"]}) == UNKNOWN == "something that the catalogue does not have"
-    assert hypothesis_words(["link_weight", "other"], {"link_weight": ["joint 2"]}) == (
-        "gravity sag of joint 2 or a related mechanism"
-    )
-    assert hypothesis_words([]) == "nothing is missing"
-    assert (alternative_words("other"), alternative_words("payload")) == (
-        "a related mechanism",
-        "weight of an undeclared payload",
-    )
-
-
-def test_hypotheses_that_hold_the_first_are_told_by_what_they_add():
-    sets = [["link_weight"], ["link_weight", "other"], ["joint_offset", "link_weight"], ["joint_offset"], []]
+def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is_unknown_or_related():
+    sets = [["link_weight"], ["link_weight", "other"], ["joint_offset", "link_weight"], ["joint_offset"], [], ["other"]]
     assert hypotheses_words([{"mechanisms": names, "locations": {"link_weight": ["joint 2"]}} for names in sets]) == [
         "gravity sag of joint 2",
         "the same or a related mechanism",
         "the same with zero offset",
         "zero offset",
         "nothing is missing",
+        UNKNOWN,
     ]
-    # Beside "nothing" all are told in full.
+    # Beside "nothing" all are stated in full.
     assert hypotheses_words([{"mechanisms": names, "locations": {}} for names in ([], ["joint_offset"])])[1] == "zero offset"
+    assert (alternative_words("other"), alternative_words("payload"))[0] == "a related mechanism"
 
 
 def test_keys_in_a_sentence_become_words_and_common_words_stay():
@@ -113,5 +86,29 @@ def test_keys_in_a_sentence_become_words_and_common_words_stay():
     assert said.startswith("gear ratio or coupling error of joint 3: per movement of joint 3 is -0.0042 rad/rad, more than")
 
 
-def test_every_family_of_the_catalogue_has_a_kind():
-    assert all(in_common(name, []) for name in effects())
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "expected"),
+    [
+        (1.176e-4, 3.64e-6, "rad", ("117.6 ± 3.6", "µrad")),
+        (1.5365e-7, 2.678e-9, "1/(N m^2)", ("(1.537 ± 0.027) · 10⁻⁷", "1/(N·m²)")),
+        (-1.588e-4, 8.2e-6, "rad kg/(N m)", ("−158.8 ± 8.2", "µrad·kg/(N·m)")),
+        (2.0e-13, None, "rad/(N m)^3", ("2.000 · 10⁻⁷", "µrad/(N·m)³")),
+        (0.0012, 0.0001, "m", ("1.20 ± 0.10", "mm")),
+        (0.02, 0.001, "1", ("0.0200 ± 0.0010", "")),
+        (0.0, 0.0, "rad", ("0", "µrad")),
+        (2e-4, 1e-5, "rad/rad", ("(2.00 ± 0.10) · 10⁻⁴", "rad/rad")),
+        (-4e-8, 1e-4, "m", ("0 ± 100", "µm")),
+    ],
+)
+def test_values_come_in_units_that_suit_them(value, error, unit, expected):
+    assert scaled(value, error, unit) == expected
+
+
+def test_no_probability_is_zero_or_one_and_lengths_and_lists_are_those_of_sentences():
+    said = [probability_words(value).replace("\u00a0", " ") for value in (0.0, 0.004, 0.02, 0.944, 0.996, 1.0)]
+    assert said == ["< 1 %", "< 1 %", "2 %", "94 %", "> 99 %", "> 99 %"]
+    stated = [length(value).replace("\u00a0", " ") for value in (1.2345e-4, 0.9999e-3, 0.0213, None)]
+    assert stated == ["123 µm", "1.00 mm", "21.3 mm", "unknown"]
+    assert [millimetres(value) for value in (1.5e-5, 0.9999e-3, 1.184e-3, 0.0213)] == ["0.015", "1.00", "1.18", "21.3"]
+    assert plain(0.000123) == "0.000123" and plain(1234.5) == "1234"
+    assert [listed("abc"), listed("a"), listed(""), listed("abcde", 2)] == ["a, b and c", "a", "none", "a, b and 3 more"]

@@ -1,0 +1,92 @@
+"""What a certificate states, from its contents: sentences and tables of `certificate.txt`, and its pages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elastocal.application.accuracy import accuracy_from, accuracy_sentence
+from elastocal.application.certificate.repeatability import ISO_CYCLES, ISO_POSES
+from elastocal.counting import counted
+from elastocal.effects.protocol import effect_of
+from elastocal.report import words as say
+from elastocal.report.loop_facts import TITLES
+from elastocal.report.typesetting import compile_document, sentences
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+    from typing import Any
+
+_SHARES = {
+    "joint_compliance": "joint compliance under loads and weights",
+    "declared_weight": "errors of the declared weights",
+    "joint_offset": "joint offsets",
+    "link_geometry": "link geometry",
+    "uncorrected": "no correction at all",
+    "form of the model": "form of the model",
+    "not commanded": "effects that no command contains",
+}
+_SHOWN_CHANGES = 12
+# Below the digits of any tracker.
+_NOTHING_M = 1e-7
+# Below this probability of the observed change where nothing changed, a robot counts as changed.
+_LEVEL = 0.05
+_TABLES = ("identity", "steps", "iso", "workspace", "data")
+
+
+def write_certificate(path: str | Path, facts: Mapping[str, Any], figures: Iterable[str]) -> None:
+    """Compile a certificate; the file appears whole or not at all.
+
+    `path`: the PDF. `facts`: from `certificate_facts`. `figures`: PDF files, named workspace and budget.
+    """
+    compile_document(path, "certificate.typ", {"facts": facts}, figures)
+
+
+def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Facts for the pages of a certificate.
+
+    `document`: of `loop.certificate.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
+    """
+    change = document["comparison"]
+    spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": TITLES[document["verdict"]]}
+    constants = {"iso_poses": ISO_POSES, "iso_cycles": ISO_CYCLES, "changed": bool(change) and change["p_value"] < _LEVEL}
+    said = sentences("certificate.txt", document=document, **spoken, **constants)
+    compared = {} if change is None else {"campaign": change["campaign"], "sentence": " ".join(said["comparison"])}
+    if change is not None:
+        compared["rows"] = [_change(each) for each in change["changes"][:_SHOWN_CHANGES]]
+        compared["more"] = max(len(change["changes"]) - _SHOWN_CHANGES, 0)
+    return {
+        **{name: lines if name in _TABLES else " ".join(lines) for name, lines in said.items()},
+        "campaign": document["campaign"],
+        "robot": document["robot"],
+        "decision": document["conformity"]["decision"],
+        "errors": document["errors"],
+        "floor": say.length(document["noise_floor_rms_m"]),
+        "budget": [[share_name(line["name"]), *_share(line)] for line in document["budget"]],
+        "budget_states": counted(document["budget_states"], "state"),
+        "comparison": compared or None,
+    }
+
+
+def share_name(name: str) -> str:
+    """A line of the error budget in words."""
+    return _SHARES.get(name) or say.physical_name(name)
+
+
+def _share(line: Mapping[str, Any]) -> list[str]:
+    """A line of the error budget: RMS and its interval."""
+    rms, known = line["rms_m"], line["low_m"] is not None and line["rms_m"] >= _NOTHING_M
+    limits = f"{say.length(line['low_m'])} to {say.length(line['high_m'])}" if known else "–"
+    if 0.0 < rms < _NOTHING_M:
+        return [f"below {say.length(_NOTHING_M, 1)}", limits]
+    return ["hidden by the tracker's noise" if line["name"] == "repeatability" and not rms else say.length(rms), limits]
+
+
+def _change(change: Mapping[str, Any]) -> list[str]:
+    """A parameter: where and what it is, before, after, the difference with its standard error, p."""
+    unit, owner = change["unit"], change["owner"]
+    where = share_name(owner) if owner in _SHARES else say.candidate_words(owner)
+    known = (change["before"], None), (change["after"], None), (change["after"] - change["before"], change["std_error"])
+    numbers = [" ".join(say.scaled(value, error, unit)) for value, error in known]
+    what = say.parameter_words(effect_of(owner), change["name"])
+    return [f"{say.capital(where)}: {what}", *numbers, say.plain(change["p_value"], 2)]
