@@ -175,11 +175,8 @@ def _mount(target: Mapping[str, Any], oriented: bool) -> str:
 
 def compliance_rows(compliance: Mapping[str, Sequence[float]]) -> list[list[str]]:
     """Rows of the compliances: joint, before, after with its standard error; no number of one that is not identifiable."""
-    rows, identified, columns = (
-        [],
-        any(compliance["std_error"]),
-        zip(*(compliance[name] for name in ("before", "after", "std_error")), strict=True),
-    )
+    rows, columns = [], zip(*(compliance[name] for name in ("before", "after", "std_error")), strict=True)
+    identified = any(compliance["std_error"])
     for joint, (before, after, error) in enumerate(columns, 1):
         if identified and not error:
             rows.append([str(joint), *["not identifiable"] * 2])
