@@ -20,7 +20,6 @@ from elastocal.fitting.case import case_from, noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import Estimate
 from elastocal.fitting.parameters import parameters
-from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
@@ -40,6 +39,9 @@ if TYPE_CHECKING:
 
 def diagnose_campaign(job: Any) -> None:
     """The step of a rule: what the training poses say, and the next experiment."""
+    # Who reads the tables of a diagnosis starts without pandas.
+    from elastocal.io.data_frames import write_csv
+
     case = load_case(job.input.descriptions, job.input.training)
     name, seed = job.wildcards.campaign, job.params.seed
     found = diagnose(case, Settings(), seed, lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True))

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from elastocal.application.accuracy import before_m
 from elastocal.application.calibrated import forward, nominal_forward
@@ -19,7 +18,6 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
-from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
@@ -38,6 +36,11 @@ if TYPE_CHECKING:
 
 def judge_campaign(job: Any) -> None:
     """The step of a rule: the verdict, every model on poses that no step has seen."""
+    # Who asks for the verdict alone starts without pandas.
+    import pandas as pd
+
+    from elastocal.io.data_frames import write_csv
+
     case = tables.load_case(job.input.descriptions, job.input.training)
     held_out = tables.load_case(job.input.descriptions, job.input.held_out, "held_out")
     found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
