@@ -5,7 +5,7 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper study audit test test-slow test-slurm fuzz soak mutants lint bench pictures site crate supply dist installed lock clean
+.PHONY: paper study audit test test-slow test-slurm fuzz soak mutants lint bench pictures site supply dist installed lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
@@ -82,12 +82,6 @@ installed: dist
 	$(BIN)/uv pip install -q --no-deps --python .installed/env/bin/python dist/*.whl
 	work="$$(mktemp -d)" && cd "$$work" && OMP_NUM_THREADS=1 "$(CURDIR)/.installed/env/bin/elastocal" demo --no-open && rm -r "$$work"
 
-# A finished run as a Workflow Run RO-Crate, held against its files and its profile.
-crate: .venv/ready .venv-crate/ready
-	$(BIN)/snakemake -j$(CORES) crate
-	$(BIN)/python workflow/check_crate.py
-	.venv-crate/bin/python workflow/validate_crate.py
-
 # What the environment consists of, as CycloneDX, and what is known to be vulnerable in it: asks the vulnerability service of PyPI.
 supply: .venv/ready .venv-supply/ready
 	.venv-supply/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible -o sbom.cdx.json $(BIN)/python
@@ -103,11 +97,10 @@ lock:
 	    -c requirements/run.lock -o requirements/cluster.lock
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --generate-hashes --no-header \
 	    -c requirements/audit.lock -c requirements/cluster.lock -o requirements/test.lock
-	uv pip compile --group crate --universal --python-version 3.11 --generate-hashes --no-header -o requirements/crate.lock
 	uv pip compile --group supply --universal --python-version 3.11 --generate-hashes --no-header -o requirements/supply.lock
 
 clean:
-	rm -rf .venv .venv-crate .venv-supply .snakemake data/simulated results/[a-z]* reports/[a-z]* site ro-crate-metadata.json sbom.cdx.json
+	rm -rf .venv .venv-supply .snakemake data/simulated results/[a-z]* reports/[a-z]* site sbom.cdx.json
 
 # A file of its own: the interpreter in the environment is a link to an old one, which make would take for out of date for ever.
 .venv/made: requirements/install.lock
@@ -135,8 +128,8 @@ clean:
 	$(INSTALL) --no-deps --require-hashes -r requirements/test.lock
 	touch $@
 
-# Tools of their own: the validator of crates, and what looks at the environment from outside.
-.venv-%/ready: requirements/%.lock | .venv/made
-	$(PYTHON) -m venv .venv-$*
-	$(BIN)/uv pip install -q --system-certs --python .venv-$*/bin/python --no-deps --require-hashes -r requirements/$*.lock
+# An environment of its own for what looks at the environment from outside.
+.venv-supply/ready: requirements/supply.lock | .venv/made
+	$(PYTHON) -m venv .venv-supply
+	$(BIN)/uv pip install -q --system-certs --python .venv-supply/bin/python --no-deps --require-hashes -r requirements/supply.lock
 	touch $@

@@ -32,10 +32,10 @@ include: "workflow/rules/league_files.smk"
 include: "workflow/rules/league.smk"
 include: "workflow/rules/signatures.smk"
 include: "workflow/rules/audit.smk"
-include: "workflow/rules/crate.smk"
 include: "workflow/rules/store.smk"
 
 
+complete_rules()
 watch_sources()
 
 

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.application.calibrated import nominal_forward
 from elastocal.campaigns.reading import campaign_files
+from elastocal.loop.error_table import error_rows
 
 
 @pytest.fixture
@@ -105,6 +106,18 @@ def measured_again(corrected, folder, off_m):
 def test_one_campaign_has_one_accuracy_in_correct_and_certificate_to_the_digit(corrected, issued):
     words = accuracy_sentence(accuracy_from(json.loads((issued[1] / "certificate.json").read_text())["accuracy"]))
     assert words in corrected[1]
+
+
+def test_what_the_robot_is_off_before_and_after_is_one_table_in_report_correct_and_certificate(corrected, issued, checkout):
+    rows = error_rows(json.loads((checkout / "reports" / "loop" / "made" / "verdict.json").read_text()))
+    document = json.loads((issued[1] / "certificate.json").read_text())
+    assert document["errors"] == rows and len(rows) == 2
+    assert document["budget"][0]["name"] == "uncorrected" and rows[1][1] == f"{1e3 * document['budget'][0]['rms_m']:.3f} mm"
+    targets = pd.read_csv(corrected[0] / "targets.csv")
+    before = 1e3 * np.sqrt((targets["predicted_error_before_m"] ** 2).mean())
+    assert corrected[1].count(" uncorrected, ") == 3 and f"{before:.3f} mm uncorrected" in corrected[1]
+    for where, uncorrected, after in rows:
+        assert f"{where}: {uncorrected} uncorrected, {after} corrected" in corrected[1]
 
 
 @pytest.mark.parametrize(

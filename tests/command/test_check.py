@@ -19,6 +19,7 @@ def test_headings_say_what_was_read_identified_and_testable(elastocal, folder):
     for words in ("read", "validation poses", "noise", "compliance", "testable"):
         assert any(line.startswith(f"  {words}") or words in line for line in rest), words
     assert any(line.startswith("! ") for line in rest)
+    assert "not determined by these poses: joint 6" in result.output
     assert rest[-1] == f"next: elastocal diagnose {folder}"
 
 

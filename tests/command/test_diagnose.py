@@ -1,13 +1,8 @@
 """The subcommand hands a campaign to its Snakemake target and shows what that says."""
 
-import io
-
 import pytest
-from rich.console import Console
 
 from elastocal.command import diagnose
-
-LINES = ["3 jobs\n", "1 of 3: read_campaign cell7\n", "2 of 3: judge_campaign cell7\n", "cell7: [bold] is missing\n"]
 
 
 @pytest.fixture
@@ -40,18 +35,9 @@ def test_without_a_checkout_the_installed_pipeline_runs_in_the_working_directory
     assert shown.endswith(f" --snakefile {tmp_path}/installed/Snakefile")
 
 
-def show(terminal):
-    text = io.StringIO()
-    diagnose.follow(LINES, Console(file=text, force_terminal=terminal, width=120))
-    return text.getvalue()
-
-
-def test_on_a_terminal_jobs_move_a_bar_and_the_verdict_stays():
-    text = show(True)
-    assert "judge_campaign cell7" in text
-    assert "1 of 3" in text
-    assert "3 jobs" not in text
-    assert "[bold] is missing" in text
+def test_lines_of_a_run_are_printed_as_they_are_but_for_the_profile(run, tmp_path):
+    shown = run(tmp_path, prints="1 of 3: read_campaign [bold]\nUsing workflow specific profile x").stderr
+    assert "1 of 3: read_campaign [bold]\n" in shown and "profile" not in shown
 
 
 def test_where_everything_is_up_to_date_the_outcome_is_printed_again(monkeypatch, run, tmp_path):

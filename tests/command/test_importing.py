@@ -1,4 +1,4 @@
-"""Robot files from URDF and from DH tables, as they are typed."""
+"""Robot files from URDF and from DH tables, and another program's table as measurements.csv, as they are typed."""
 
 import pytest
 import yaml
@@ -51,3 +51,86 @@ def test_a_file_that_is_there_stays_unless_forced(elastocal, refusal, output, wo
 
 def test_nothing_is_written_of_what_is_refused(refusal, output):
     assert "tip" in refusal(*of_urdf(output, parts=(*ARM[:2], ARM[3]))) and not output.exists()
+
+
+TEXT = "J1;X;Y;Z\n90;1000,5;2;3\n-90;1000;2;3\n"
+OPTIONS = ("--angles", "deg", "--lengths", "mm", "--target", "smr")
+
+
+@pytest.fixture
+def words(tmp_path):
+    """Writes the table and gives the words of its import."""
+
+    def written(*more, text=TEXT):
+        (tmp_path / "t.csv").write_text(text)
+        return "import", "csv", tmp_path / "t.csv", "--folder", tmp_path / "cell", *more
+
+    return written
+
+
+def test_a_table_becomes_measurements_and_the_options_are_kept(elastocal, words, tmp_path):
+    result = elastocal(*words(*OPTIONS))
+    assert result.exit_code == 0, result.exception
+    assert "2 measurements of smr at 2 poses, 1 joint" in result.output and "counted" in result.output
+    lines = (tmp_path / "cell" / "measurements.csv").read_text().splitlines()
+    assert lines[0] == "pose,load,repeat,target,q1,x,y,z" and lines[1].startswith("1,0,0,smr,1.57079") and "1.0005" in lines[1]
+
+
+def test_measurements_that_are_there_stay_unless_forced_and_an_empty_sheet_is_filled(elastocal, refusal, words, tmp_path):
+    (tmp_path / "cell").mkdir()
+    sheet = tmp_path / "cell" / "measurements.csv"
+    sheet.write_text("pose,load\n")
+    assert elastocal(*words(*OPTIONS)).exit_code == 0
+    before = sheet.read_bytes()
+    assert "--force" in refusal(*words(*OPTIONS))
+    assert sheet.read_bytes() == before
+
+
+def test_a_sheet_without_a_reading_is_filled_and_one_with_a_reading_stays(elastocal, refusal, words, tmp_path):
+    (tmp_path / "cell").mkdir()
+    sheet = tmp_path / "cell" / "measurements.csv"
+    sheet.write_text("# planned\npose,load,repeat,target,done,q1,x,y,z\n1,0,0,smr,x,0.1,,,\n2,0,0,smr,,0.2,,,1.5\n")
+    assert "--force" in refusal(*words(*OPTIONS))
+    sheet.write_text(sheet.read_text().replace("1.5", ""))
+    result = elastocal(*words(*OPTIONS))
+    assert result.exit_code == 0, result.exception
+    assert len(sheet.read_text().splitlines()) == 3
+
+
+@pytest.mark.parametrize("option", [("--column", "q1"), ("--unit", "=mm"), ("--angles", "gon")])
+def test_bad_options_leave_nothing_behind(refusal, words, tmp_path, option):
+    assert refusal(*words(*OPTIONS, *option))
+    assert not (tmp_path / "cell").exists()
+
+
+@pytest.mark.parametrize("name", ["@SUM(A1)", "=1+1", "a\u202eb"])
+def test_a_target_whose_name_would_be_a_formula_or_turn_letters_is_refused(refusal, words, tmp_path, name):
+    for named, text in ((("--target", name), TEXT), ((), f"J1;X;Y;Z;target\n90;1000,5;2;3;{name}\n")):
+        assert refusal(*words("--angles", "deg", "--lengths", "mm", *named, text=text))
+        assert not (tmp_path / "cell").exists()
+
+
+def test_every_import_ends_with_what_was_read_how_and_what_was_left_out(elastocal, words, tmp_path):
+    text = "lab\n# J1;X;Y;Z;Config;Temp;;\n90;1000,5;2;3;FUT;21 C;;\n-90;1000;2;3;NUT;21 C;;\n;;;;;;;\n# 4 more\n"
+    result = elastocal(*words(*OPTIONS, "--ignore", "Config", text=text))
+    assert result.exit_code == 0, result.exception
+    lines = result.output.splitlines()
+    assert "file: names of columns in line 2, separator semicolon, decimal comma, encoding utf-8" in lines
+    assert "read: q1 from 'J1' in deg; x from 'X' in mm; y from 'Y' in mm; z from 'Z' in mm" in lines
+    assert "not used: Temp, Config" in lines
+    for note in (
+        "1 line above the header",
+        "1 row of empty cells",
+        "2 columns without",
+        "1 line of comments",
+        "'Temp' not read",
+    ):
+        assert any(line.startswith("note: ") and note in line for line in lines), note
+    again = elastocal(*words("--options", tmp_path / "cell" / "import.yaml", "--force", text=text))
+    assert again.exit_code == 0 and again.output.splitlines()[:-1] == lines[:-1]
+
+
+def test_a_table_without_a_header_is_read_by_the_names_of_its_columns(elastocal, words, tmp_path):
+    result = elastocal(*words(*OPTIONS, "--columns", "q1,,x,y,z", text="90,7,1000.5,2,3\n-90,7,1000,2,3\n"))
+    assert result.exit_code == 0 and "names of columns as stated" in result.output and "not used: column 2" in result.output
+    assert (tmp_path / "cell" / "measurements.csv").read_text().splitlines()[1].endswith(",1.0005,0.002,0.003")

@@ -1,4 +1,4 @@
-"""The scripts of the loop's rules, run one after the other in this process as Snakemake would run them."""
+"""The steps of the loop's rules, run one after the other in this process as Snakemake would run them."""
 
 import runpy
 import sys
@@ -6,7 +6,7 @@ from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "workflow" / "scripts"
 CONFIG = {"origin": {"commit": "c0ffee", "configuration_sha256": "d16e57", "seed": 1}}
-ANALYSIS = ("read_campaign", "diagnose_campaign", "judge_campaign")
+ANALYSIS = ("loop.loading.read_campaign", "loop.diagnosis_tables.diagnose_campaign", "loop.whole.judge_campaign")
 FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
 PARAMS = {"seed": 1, "states": 4, "figures": FIGURES}
 STEPS = (*ANALYSIS, "draw_campaign", "compile_loop_report")
@@ -70,11 +70,13 @@ def run_loop(folder, robots, out, steps=STEPS):
 
 
 def run_script(script, job):
-    """Run one script of the workflow with a job in the place of Snakemake's."""
+    """Run one script of the workflow, or a function of the package, with a job in the place of Snakemake's."""
     sys.path.insert(0, SCRIPTS.as_posix())
     for name, value in {"rule": script, "wildcards": {}, "config": CONFIG}.items():
         job.__dict__.setdefault(name, value)
     try:
+        if "." in script:
+            job.params["step"], script = f"elastocal.{script}", "run_step"
         runpy.run_path((SCRIPTS / f"{script}.py").as_posix(), {"snakemake": job}, "__main__")
     finally:
         sys.path.remove(SCRIPTS.as_posix())

@@ -35,6 +35,7 @@ def made_document(decision="pass", comparison=None, repeats=True, measured=False
         "files": {"campaign.yaml": "ab" * 32},
         "verdict": "named",
         "effects": ["lost_motion"],
+        "errors": [["predicted over the poses", "1.500 mm", "0.120 mm"]],
         "held_out": [step("uncorrected", 1.5e-3), step("declared", 3e-4), step("corrected", 1.2e-4, True)],
         "noise_floor_rms_m": 1e-4,
         "joint_ranges": [{"low": -85.0, "high": 60.4, "unit": "deg"}, {"low": 0.0, "high": 1.5, "unit": "m"}],

@@ -254,6 +254,7 @@ def verdict_document(
                 "outside": {"before": errors, "after": after} if outside else None,
             },
         },
+        "uncorrected_m": 7e-4,
         "compliance_urad_per_Nm": {"before": [0.5] * 6, "after": [0.48] * 6, "std_error": [0.01] * 5 + [0.0]},
         "held": list(held),
         "candidates_tested": 0 if faulty else 30,

@@ -180,21 +180,3 @@ def test_a_value_that_an_empty_table_cannot_have_is_refused(new):
     write_table(new, TEXTS, [], ORIGIN)
     with refused(new, "kind", "'k'"):
         read_table(new, TEXTS, kind="k")
-
-
-def test_what_a_file_is_of_stands_in_columns_that_any_reader_finds(new):
-    write_table(new, SCHEMA, [block("a", 0), block("b", 3, 2)], ORIGIN | {"robot": "kuka", "noise": "200", "strategy": "6DoF"})
-    read = pq.read_table(new)
-    assert read.column_names[:3] == ["robot", "noise_um", "strategy"]
-    assert pa.types.is_dictionary(read.schema.field("robot").type)
-    assert set(read["robot"].to_pylist()) == {"kuka"} and set(read["noise_um"].to_pylist()) == {200.0}
-    encodings = pq.ParquetFile(new).metadata.row_group(0).column(1).encodings
-    assert any("DICTIONARY" in encoding for encoding in encodings)
-    # Those who know the schema read what they know.
-    assert list(read_table(new, SCHEMA)) == [column.name for column in SCHEMA.columns]
-
-
-def test_a_column_of_the_schema_is_not_taken_from_the_provenance(new):
-    schema = TableSchema("named", (Column("robot", "string", "", "another robot"), Column("number", "int32", "", "a number")))
-    write_table(new, schema, [{"robot": "mine", "number": np.arange(2)}], {"robot": "kuka"})
-    assert pq.read_table(new)["robot"].to_pylist() == ["mine", "mine"]

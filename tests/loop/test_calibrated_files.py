@@ -15,7 +15,7 @@ from support import refused
 from elastocal.application.calibrated import calibrate_by_fit
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
-from elastocal.io.sources import source_digest
+from elastocal.io.records import checksum
 from elastocal.io.storage import read_table
 from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.loop.diagnosis_tables import diagnosis_from
@@ -55,7 +55,7 @@ def test_it_says_what_code_data_and_environment_made_it(checkout):
     files["kuka.yaml"] = hashlib.sha256((ROBOTS / "kuka.yaml").read_bytes()).hexdigest()
     assert origin == {
         "commit": "c0ffee",
-        "code_sha256": digest({ENGINE: source_digest(checkout / ENGINE)}),
+        "code_sha256": digest({ENGINE: checksum(checkout / ENGINE)}),
         "data_sha256": digest(sorted(files.items())),
         "environment": environment(checkout),
     }

@@ -1,6 +1,7 @@
 """What is said of a campaign before it is diagnosed."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,10 +33,30 @@ def test_what_was_read_is_counted(facts):
 def test_springs_have_their_errors_and_candidates_their_reasons(facts):
     assert facts["diagnosable"] and facts["faults"] == []
     assert all(0 < spring["relative_std_error"] < 1 for spring in facts["compliance"][:5])
+    # Of the last joint, on whose axis the target sits, nothing is determined.
+    assert facts["compliance"][5] == {"value_urad_per_Nm": None, "relative_std_error": None}
     assert facts["testable"] > 20
     assert sum(facts["untestable"].values()) > 0 and all(facts["untestable"])
     assert any("one load beside none" in sentence for sentence in facts["suspicious"])
     assert any("held-out poses say little" in sentence for sentence in facts["suspicious"])
+
+
+def test_of_a_compliance_that_comes_out_negative_no_number_is_stated(kuka, tmp_path):
+    """What the declared model lacks hides behind it, and behind all others."""
+    signs = [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]
+    table = made_table(replace(kuka, compliance=kuka.compliance * signs), "made")
+    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table))
+    assert facts["compliance"] == [] and facts["accuracy"] is None
+    assert any("the compliance of joint 3 comes out negative" in sentence for sentence in facts["suspicious"])
+
+
+def test_what_a_joint_that_stood_still_forbids_is_one_reason(kuka, tmp_path):
+    limits = kuka.joint_limits.copy()
+    limits[[0, 3]] = 0.3
+    table = made_table(replace(kuka, joint_limits=limits), "made")
+    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table))
+    assert facts["untestable"]["joint 4 stood still"] > 5 and facts["untestable"]["joint 1 stood still"] > 5
+    assert not any("where" in reason for reason in facts["untestable"])
 
 
 def test_a_decisive_fault_is_said_and_the_campaign_is_not_diagnosable(kuka, tmp_path):

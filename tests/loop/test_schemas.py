@@ -38,3 +38,11 @@ def test_a_made_table_of_residuals_fits_its_schema_and_a_position_that_is_missin
     assert np.isnan(back["time_s"]).all()
     with refused(tmp_path / "w.parquet", "column x, "):
         write_table(tmp_path / "w.parquet", schemas.residuals(6), [table | {"x": np.full(len(table["x"]), np.nan)}], {})
+
+
+def test_gross_errors_are_left_out(tmp_path):
+    schema = schemas.residuals(6)
+    columns = {column.name: np.ones(3, column.type) for column in schema.columns}
+    columns |= {"row": np.array([1, 2, 3], np.int32), "gross_error": np.array([False, True, False])}
+    write_table(tmp_path / "residuals.parquet", schema, [columns], {})
+    assert schemas.read_residuals(tmp_path / "residuals.parquet", 6)["row"].tolist() == [1, 3]

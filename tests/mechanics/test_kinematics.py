@@ -18,8 +18,6 @@ from support import (
 from elastocal.mechanics import kinematics
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import (
-    BLOCK,
-    blocks,
     corners,
     jacobians,
     joint_axes,
@@ -145,16 +143,6 @@ def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size)
     np.testing.assert_allclose(jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole[2], rtol=0, atol=ROUNDING)
 
 
-def test_results_of_an_earlier_call_are_overwritten_in_place(kuka):
-    rng, point = np.random.default_rng(5), kuka.chain.end_effector
-    first, second = random_angles(rng, kuka.chain, 12).reshape(3, 4, 6), random_angles(rng, kuka.chain, 12).reshape(3, 4, 6)
-    held = poses_and_jacobians(kuka.chain, first, point)
-    again = poses_and_jacobians(kuka.chain, second, point, out=held)
-    for new, old, expected in zip(again, held, poses_and_jacobians(kuka.chain, second, point), strict=True):
-        assert np.shares_memory(new, old)
-        np.testing.assert_array_equal(new, expected)
-
-
 @pytest.mark.parametrize("batch", [(), (5,), (2, 3)])
 def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka, batch):
     points = [*kuka.chain.points[::-1], with_target_offset(kuka, (0.1, -0.2, 0.3)).chain.end_effector, kuka.chain.points[0]]
@@ -188,11 +176,3 @@ def test_joints_stand_at_their_places_along_their_axes():
     place, axis = joint_axes(chain, np.array([[np.pi / 2, 0.3]])).swapaxes(0, 1)
     np.testing.assert_allclose(place[:, 0], [[0, 0, 0.5], [0, 1, 0.5]], atol=1e-12)
     np.testing.assert_allclose(axis[:, 0], [[0, 0, 1], [-1, 0, 0]], atol=1e-12)
-
-
-@pytest.mark.parametrize("size, lengths", [(0, []), (1, [1]), (BLOCK, [BLOCK]), (2 * BLOCK + 5, [BLOCK, BLOCK, 5])])
-def test_blocks_hold_each_configuration_once_and_in_order(size, lengths):
-    numbers = np.arange(size)
-    parts = [numbers[block] for block in blocks(size)]
-    assert [len(part) for part in parts] == lengths
-    np.testing.assert_array_equal(np.concatenate([numbers[:0], *parts]), numbers)

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from support import PinocchioPoint, homogeneous, random_loads
 
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
-from elastocal.mechanics.links import extended_chain, spring_compliance, tube_compliance, with_tube
+from elastocal.mechanics.links import extended_chain, spring_compliance, tube_compliance
 from elastocal.mechanics.robot import Tube
 from elastocal.study.simulation import true_deflections
 
@@ -107,10 +107,3 @@ def test_extended_deflection_is_that_of_joints_and_beams_added_up(kuka_extended)
     # One newton keeps what is of second order below 1e-11 m; differences of poses round at 1e-15 m.
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-11)
     assert np.abs(expected).max() > 1e-7
-
-
-def test_with_tube_changes_every_tube_and_nothing_else(kuka_extended):
-    changed = with_tube(kuka_extended, TUBE)
-    assert {link.tube for link in changed.links} == {TUBE}
-    assert [(k.after, k.vector_m) for k in changed.links] == [(k.after, k.vector_m) for k in kuka_extended.links]
-    assert changed.chain == kuka_extended.chain

@@ -141,6 +141,11 @@ def test_robot_becomes_a_document_that_gives_it_back(more):
         ({"gear_ratio": [0, 100]}, "gear_ratio[0]"),
         ({"compensator": {"joint": 2, "kind": "rope"}}, "compensator.kind"),
         ({"payload_kg": 0}, "payload_kg"),
+        ({"compliance_urad_per_Nm": [1e-300, 1]}, "compliance_urad_per_Nm[0]"),
+        ({"gravity_m_s2": [0, 0, -9806.65]}, "gravity_m_s2[2]"),
+        ({"masses": [WEIGHED["masses"][0] | {"relative_std": 1e9}]}, "masses[0].relative_std"),
+        ({"lengths_m": {"l1": 1500}}, "lengths_m.l1"),
+        ({"links": TUBES | {"youngs_modulus_GPa": 7e10}}, "links.youngs_modulus_GPa"),
         # Beyond all machines, and so large that sums and squares of it are infinite.
         ({"payload_kg": 1e300}, "payload_kg"),
         ({"masses": [WEIGHED["masses"][0] | {"mass_kg": 1e300}]}, "masses[0].mass_kg"),

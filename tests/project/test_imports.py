@@ -21,8 +21,8 @@ SCRIPTS = {
         " ".join(f"elastocal.study.{name}" for name in ("arm_points", "assumptions", "ladder", "measurement_kinds", "points")),
         _OF_STUDY,
     ),
-    "reading": ("read_campaign", _NEVER | {"jsonschema", "pandas", "rich", "typer", "scipy"}),
-    "loop": ("diagnose_campaign judge_campaign", _NEVER | _BY_DOCUMENTS),
+    "reading": ("elastocal.loop.loading", _NEVER | {"jsonschema", "pandas", "rich", "typer", "scipy"}),
+    "loop": ("elastocal.loop.diagnosis_tables elastocal.loop.whole", _NEVER | _BY_DOCUMENTS | {"pandas"}),
     "blind": ("diagnose_cases", _NEVER | _BY_DOCUMENTS | {"pandas"}),
 }
 _HELP = """

@@ -12,7 +12,7 @@ from made_loop_facts import CAMPAIGNS, facts_of, plainly
 from made_loop_tables import candidate_table, residual_table
 
 from elastocal.io.origin import Origin
-from elastocal.loop.residual_tables import angles_of, worst_measurement
+from elastocal.loop.schemas import angles_of, worst_measurement
 from elastocal.mechanics.kinematics import corners
 from elastocal.report.loop_page import loop_page, write_loop_page
 

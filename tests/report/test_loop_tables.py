@@ -4,7 +4,7 @@ from made_loop_facts import CAMPAIGNS, facts_of
 from made_loop_tables import campaign_descriptions, experiment_rows, parameter_table, split_rows, step_rows
 
 from elastocal import __version__
-from elastocal.report.loop_tables import held_rows, untestable_rows
+from elastocal.report.loop_tables import compliance_rows, held_rows, untestable_rows
 from elastocal.report.loop_tables import step_rows as table_rows
 
 
@@ -67,7 +67,7 @@ def test_parameters_that_are_not_determined_are_gathered_by_owner_and_stand_apar
 
 
 def test_what_cannot_be_tested_is_gathered_by_effect_and_reason_and_long_lists_are_cut():
-    few = {f"lost_motion@{k}": f"{k} angles of joint {k} where 4 are needed" for k in (1, 2)}
+    few = {f"lost_motion@{k}": "too few different angles of a joint" for k in (1, 2)}
     many = {f"cross_compliance@{k}+{k + 1}": "no approach in the data" for k in range(1, 10)}
     assert untestable_rows(few | many | {"payload": "no load"}) == [
         [
@@ -76,5 +76,11 @@ def test_what_cannot_be_tested_is_gathered_by_effect_and_reason_and_long_lists_a
             "no direction of approach in the data",
         ],
         ["Weight of an undeclared payload", "–", "no load"],
-        ["Lost motion (backlash)", "joints 1 and 2", "too few different joint angles"],
+        ["Lost motion (backlash)", "joints 1 and 2", "too few different angles of a joint"],
     ]
+
+
+def test_of_a_compliance_that_is_not_identifiable_no_number_is_stated_and_of_a_file_that_fits_none_all_are():
+    rows = compliance_rows({"before": [0.5, 0.4], "after": [0.48, 0.4], "std_error": [0.01, 0.0]})
+    assert rows == [["1", "0.500", "0.480 ± 0.010"], ["2", "not identifiable", "not identifiable"]]
+    assert compliance_rows({"before": [0.5], "after": [0.5], "std_error": [0.0]}) == [["1", "0.5", "0.5"]]

@@ -44,8 +44,3 @@ def test_sources_inside_of_another_repository_have_no_commit_nor_have_those_with
     assert commit_of(checkout / "copy", ["Snakefile"]) == UNKNOWN
     monkeypatch.setenv("PATH", "")
     assert commit_of(checkout, ["Snakefile"]) == UNKNOWN
-
-
-def test_a_repository_without_a_commit_has_none(tmp_path):
-    git(tmp_path, "init", "-q")
-    assert commit_of(tmp_path, ["Snakefile"]) == UNKNOWN

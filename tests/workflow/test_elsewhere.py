@@ -24,10 +24,10 @@ def test_every_target_finds_its_sources_and_its_jobs_can_be_grouped(unstarted, t
     place = tmp_path / "results of mine"
     place.mkdir()
     where = "--snakefile", str(unstarted.path("Snakefile")), "--profile", str(unstarted.path("profiles/slurm"))
-    done = started(**unstarted.command("-n", "-p", *where, "--", *TARGETS, "crate") | {"cwd": place})
+    done = started(**unstarted.command("-n", "-p", *where, "--", *TARGETS) | {"cwd": place})
     assert done.returncode == 0, done.stderr[-3000:]
     laid_out = set(re.findall(r"^(\w+) +\d+$", done.stdout, re.MULTILINE))
-    assert {"seal_cases", "compile_report", "tabulate_league", "summarize_closed_loop", "write_crate"} <= laid_out
+    assert {"seal_cases", "compile_report", "tabulate_league", "summarize_closed_loop"} <= laid_out
 
 
 def test_the_paper_is_its_tables_and_figures_alone(paper):

@@ -2,15 +2,11 @@
 
 import fcntl
 import os
-import subprocess
-import time
 from pathlib import Path
 
-import psutil
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from durations import HUNG_S
 from study_folder import PAPER
 from support import refused
 
@@ -86,30 +82,6 @@ def test_two_runs_of_the_same_files_are_refused_in_one_line(unstarted):
     assert ended.returncode != 0
     last = ended.stderr.splitlines()[-1]
     assert last == "snakemake: found another run at work on the same files; allowed: the same command once that one has ended"
-
-
-def test_a_killed_job_leaves_no_file_under_the_final_name(finished_paper):
-    """Killed after its first block, with no chance to tidy up."""
-    finished_paper.append(
-        "src/elastocal/study/simulation.py",
-        "\n_blocks = measured_blocks\n\n\ndef measured_blocks(*arguments):\n    import time\n\n"
-        "    for block in _blocks(*arguments):\n        yield block\n        time.sleep(600)\n",
-    )
-    finished_paper.path(MEASURED).unlink()
-    started = subprocess.Popen(
-        **finished_paper.command("-j1", MEASURED), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
-    latest = time.monotonic() + HUNG_S
-    while not any(finished_paper.path(name).stat().st_size > 4 for name in finished_paper.files(f"{MEASURED}.*.partial")):
-        assert started.poll() is None
-        assert time.monotonic() < latest
-        time.sleep(0.05)
-    for process in [*psutil.Process(started.pid).children(recursive=True), started]:
-        process.kill()
-    assert started.wait() != 0
-    assert not finished_paper.path(MEASURED).exists() and len(finished_paper.files(f"{MEASURED}.*.partial")) == 1
-    begin(finished_paper.path(".snakemake"), [str(finished_paper.path("data"))]).close()
-    assert finished_paper.files(f"{MEASURED}.*.partial") == []
 
 
 def test_what_stands_in_a_folder_of_the_pipeline_and_is_no_file_is_refused_before_any_job(unstarted, tmp_path):

@@ -98,16 +98,3 @@ def test_a_job_that_ended_well_leaves_a_record_of_what_it_read_and_wrote_when_an
     assert record["environment"]["numpy"] == np.__version__ and "requirements/run.lock" in record["environment"]
     assert (record["rule"], record["wildcards"], record["origin"]) == ("copy", {"robot": "kuka"}, job.config["origin"])
     assert record["started"] <= record["ended"] and record["ended"].endswith("+00:00")
-
-
-def test_a_job_that_failed_leaves_none(job):
-    with pytest.raises(SystemExit):
-        run(lambda _: (_ for _ in ()).throw(InputError("a", "", "x", "y")), job)
-    assert not Path("results/records").exists()
-
-
-def test_what_other_jobs_make_needs_their_record(job):
-    run(copied, job)
-    Path("results/records/results/b.csv.json").unlink()
-    with pytest.raises(SystemExit, match=f"^{OUTPUT}: found no record of the job that made it"):
-        run(copied, job_of(input=[OUTPUT], output=["results/c.csv"], log=["results/logs/c.log"]))

@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "faults"))
 
-from soak import contents, ended_by_itself, files_made, killed, killed_for_sure, part_of_the_study
+from soak import contents, ended_by_itself, files_made, killed_for_sure, part_of_the_study
 
 pytestmark = pytest.mark.slow
 MEASURED = ("data/simulated/kuka/200um/measured.parquet", "data/simulated/kuka/0um/measured.parquet")
@@ -36,11 +36,3 @@ def test_a_plain_run_finishes_what_a_killed_one_began(part, tmp_path):
     assert again.files(".snakemake/locks/*")
     ended_by_itself(again)
     assert contents(again) == expected
-
-
-@pytest.mark.parametrize("victim", ["job", "snakemake", "group"])
-def test_a_run_that_ended_before_the_kill_is_no_kill(part, victim):
-    """However fast the machine: nothing was left to be made."""
-    study, expected = part
-    assert not killed(study, victim, 10 * files_made(study), random.Random(1))
-    assert contents(study) == expected

@@ -1,10 +1,8 @@
 """A finished run on an object store, for which moto stands in: what is fetched is whole; only what changed goes up again."""
 
-import json
 import os
 import subprocess
 import sys
-from urllib.parse import unquote
 
 import boto3
 import pytest
@@ -60,21 +58,22 @@ def written(study, names):
 
 
 def fetched(bucket, folder, place):
-    """What the crate of a run describes that was fetched from the store and unpacked, each file as it says."""
+    """What the list of a run describes that was fetched from the store and unpacked, each file as it says."""
     for name in uploaded(bucket, folder):
         (place / name).parent.mkdir(parents=True, exist_ok=True)
         bucket.download_file(folder + name, str(place / name))
-    for arguments in (("-m", "zipfile", "-e", "reports/sources.zip", "."), ("workflow/check_crate.py",)):
-        done = subprocess.run([sys.executable, *arguments], cwd=place, capture_output=True, text=True, timeout=HUNG_S)
+    for command in ([sys.executable, "-m", "zipfile", "-e", "reports/sources.zip", "."], ["sha256sum", "-c", "SHA256SUMS"]):
+        done = subprocess.run(command, cwd=place, capture_output=True, text=True, timeout=HUNG_S)
         assert done.returncode == 0, done.stdout
-    crate = json.loads((place / "ro-crate-metadata.json").read_text(encoding="utf-8"))
-    return {unquote(entity["@id"]) for entity in crate["@graph"] if "sha256" in entity}
+    return {line.split("  ", 1)[1] for line in (place / "SHA256SUMS").read_text(encoding="utf-8").splitlines()}
 
 
-def test_what_is_fetched_from_the_store_is_the_run_that_its_crate_describes(study, bucket, tmp_path):
+def test_what_is_fetched_from_the_store_is_the_whole_run(study, bucket, tmp_path):
     described = fetched(bucket, FOLDER, tmp_path)
     made = study.files("data/**/*.parquet", "results/**/*.parquet", "reports/tables/*", "reports/figures/*", "reports/*.pdf")
     assert len(made) > 60 and set(made) <= described
+    assert {"src/elastocal/errors.py", "workflow/scripts/job.py", "workflow/rules/store.smk"} <= described
+    assert (tmp_path / "configuration.json").is_file()
     # The store keeps no second copy here.
     assert study.files(".snakemake/storage/s3/**/*.parquet") == []
 
@@ -82,7 +81,7 @@ def test_what_is_fetched_from_the_store_is_the_run_that_its_crate_describes(stud
 def test_the_targets_that_are_named_are_described_and_uploaded_and_no_others(small_proof, bucket, tmp_path):
     """The smallest blind proof, two of whose jobs write folders of cases."""
     proof = small_proof.copied_to(tmp_path / "proof")
-    proof.run("store", "--config", f"store=s3://{BUCKET}/{BLIND.rstrip('/')}", "crate_of=[blind]", "blind=smoke")
+    proof.run("store", "--config", f"store=s3://{BUCKET}/{BLIND.rstrip('/')}", "store_of=[blind]", "blind=smoke")
     described = fetched(bucket, BLIND, tmp_path / "fetched")
     cases = proof.files("data/blind/smoke_1/*/*", "data/sealed/smoke_1/*.json")
     assert len(cases) > 10 and set(cases) <= described
@@ -104,7 +103,7 @@ def test_only_what_is_made_again_here_or_missing_there_is_uploaded_again(study, 
     after = uploaded(bucket)
     assert set(after) == set(before)
     made_again = {name for name, when in written(study, after).items() if when != earlier[name]}
-    assert {"reports/tables/table1.tex", "reports/sources.zip", "ro-crate-metadata.json"} <= made_again
+    assert {"reports/tables/table1.tex", "reports/sources.zip"} <= made_again
     assert len(made_again) < 20
     assert {name for name in after if after[name] != before[name]} == {missing} | made_again
 

@@ -19,7 +19,6 @@ from elastocal.errors import InputError
 from elastocal.io.origin import Origin, configuration_sha256, environment
 from elastocal.io.provenance import SOURCES_DIGEST
 from elastocal.io.records import checksum
-from elastocal.io.sources import keep_source_digests, source_digest
 from elastocal.report.outcome import outcome
 from elastocal.study.configuration import check_study, rows_read, override
 
@@ -86,9 +85,9 @@ except InputError as error:
     sys.exit(str(error))
 
 # All that decides what the results hold, but for code and measured data; which campaign of a user is asked for, what is put on
-# which store and what is described there decides nothing.
+# which store decides nothing.
 RESOLVED = {
-    "config": {key: value for key, value in config.items() if key not in ("campaign", "store", "crate_of", "origin")},
+    "config": {key: value for key, value in config.items() if key not in ("campaign", "store", "store_of", "origin")},
     "robots": STUDY.robots,
     "strategies": STUDY.strategies,
     "campaigns": SOURCES,
@@ -119,7 +118,7 @@ AUDITED = [
     *("interpretations", "switched", "identification", "evaluation", "tables", "questions", "loop", "league"),
 ]
 # Files that jobs make.
-MADE = re.compile("(data|results|reports)/|ro-crate-metadata.json$")
+MADE = re.compile("(data|results|reports)/")
 NAMES = {name: document["name"] for name, document in STUDY.strategies.items()}
 EXTENDED = [name for name in config["robots"] if "links" in STUDY.robots[name]]
 REDUCED = [name for name in config["robots"] if name not in EXTENDED]
@@ -149,20 +148,26 @@ def sources(step):
 
 
 def digest_of(files):
-    """One digest of all that some files hold, of modules but for comments and, where none of them reads these, docstrings."""
-    files = list(files)
-    documented = any(map(reads_docstrings, files))
-    return hashlib.sha256(" ".join(digest_of_file(file, documented) for file in files).encode()).hexdigest()[:16]
+    """One digest of all that some files hold."""
+    return hashlib.sha256(" ".join(map(checksum_once, files)).encode()).hexdigest()[:16]
 
 
-@cache
-def digest_of_file(file, documented):
-    return checksum(file) if documented else source_digest(file)
+checksum_once = cache(checksum)
 
 
-@cache
-def reads_docstrings(file):
-    return file.endswith(".py") and b".__doc__" in Path(file).read_bytes()
+def complete_rules():
+    """What rules have alike: a log and a time by their names and wildcards; of those with a script its sources among the inputs."""
+    for each in workflow.rules:
+        if each.norun:
+            continue
+        each.log_modifier = each.benchmark_modifier = each.input_modifier = each.output_modifier
+        place = Path(each.name, *(f"{{{name}}}" for name in re.findall(r"{(\w+)", each.output[0]))).as_posix()
+        if not each.log:
+            each.set_log(f"results/logs/{place}.log")
+        if not each.benchmark:
+            each.benchmark = f"results/timings/{place}.tsv"
+        if each.is_script and "sources" not in each.input.keys():
+            each.set_input(sources=sources(each.params.get("step") or Path(each.script).name))
 
 
 def watch_sources():
@@ -176,8 +181,6 @@ def watch_sources():
         for each in workflow.rules
         if "sources" in each.input.keys()
     }
-    if workflow.is_main_process and not workflow.dryrun:
-        keep_source_digests({file for files in watched.values() for file in files if file.endswith(".py")})
     for each, files in watched.items():
         each.set_params(**{SOURCES_DIGEST: f"{digest_of(files)} {environment_sha256}"})
 
@@ -204,9 +207,9 @@ def files_behind(targets):
     return [str(output) for output in outputs_behind(targets)]
 
 
-def described():
-    """Inputs of the targets that the crate is of."""
-    named = config.get("crate_of", ["study", "loop"])
+def stored_targets():
+    """Inputs of the targets that are put on an object store."""
+    named = config.get("store_of", ["study", "loop"])
     return [file for target in named for file in getattr(rules, target).input]
 
 

@@ -28,15 +28,9 @@ LOOP_REPORTS = [
 
 
 rule simulate_campaign:
-    input:
-        sources=sources("simulate_campaign.py"),
     output:
         document="data/campaigns/{campaign}/campaign.yaml",
         measurements="data/campaigns/{campaign}/measurements.parquet",
-    log:
-        "results/logs/simulate_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/simulate_campaign/{campaign}.tsv"
     wildcard_constraints:
         campaign="|".join(SIMULATED) or "none",
     params:
@@ -49,14 +43,9 @@ rule simulate_campaign:
 rule import_campaign:
     input:
         robots=robots_of_import,
-        sources=sources("import_campaign.py"),
     output:
         document="data/campaigns/{campaign}/campaign.yaml",
         measurements="data/campaigns/{campaign}/measurements.parquet",
-    log:
-        "results/logs/import_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/import_campaign/{campaign}.tsv"
     wildcard_constraints:
         campaign="|".join(PUBLIC) or "none",
     params:
@@ -70,28 +59,23 @@ rule import_campaign:
 rule read_campaign:
     input:
         files=files_of,
-        sources=sources("read_campaign.py"),
     output:
         training="results/loop/{campaign}/training.parquet",
         held_out="results/loop/{campaign}/held_out.parquet",
         descriptions="results/loop/{campaign}/campaign.json",
-    log:
-        "results/logs/read_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/read_campaign/{campaign}.tsv"
     params:
+        step="elastocal.loop.loading.read_campaign",
         folder=lambda wildcards: folder_of(wildcards.campaign),
         robots=f"{CONFIG}/robots",
         files_sha256=lambda wildcards: digest_of(files_of(wildcards)) if wildcards.campaign in OWN else None,
     script:
-        "../scripts/read_campaign.py"
+        "../scripts/run_step.py"
 
 
 rule diagnose_campaign:
     input:
         descriptions=rules.read_campaign.output.descriptions,
         training=rules.read_campaign.output.training,
-        sources=sources("diagnose_campaign.py"),
     output:
         diagnosis="results/loop/{campaign}/diagnosis.json",
         steps="results/loop/{campaign}/steps.parquet",
@@ -100,15 +84,12 @@ rule diagnose_campaign:
         confounding="results/loop/{campaign}/confounding.parquet",
         candidates="reports/loop/{campaign}/candidates.parquet",
         experiment="reports/loop/{campaign}/next_experiment.csv",
-    log:
-        "results/logs/diagnose_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/diagnose_campaign/{campaign}.tsv"
     params:
+        step="elastocal.loop.diagnosis_tables.diagnose_campaign",
         seed=config["seed"],
         states=config["loop"]["proposed_states"],
     script:
-        "../scripts/diagnose_campaign.py"
+        "../scripts/run_step.py"
 
 
 rule judge_campaign:
@@ -118,7 +99,6 @@ rule judge_campaign:
         held_out=rules.read_campaign.output.held_out,
         diagnosis=rules.diagnose_campaign.output.diagnosis,
         steps=rules.diagnose_campaign.output.steps,
-        sources=sources("judge_campaign.py"),
     output:
         verdict="reports/loop/{campaign}/verdict.json",
         before_after=shown(
@@ -131,21 +111,17 @@ rule judge_campaign:
         ),
         splits="reports/loop/{campaign}/splits.csv",
         residuals="reports/loop/{campaign}/residuals.parquet",
-    log:
-        "results/logs/judge_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/judge_campaign/{campaign}.tsv"
     params:
+        step="elastocal.loop.whole.judge_campaign",
         seed=config["seed"],
     script:
-        "../scripts/judge_campaign.py"
+        "../scripts/run_step.py"
 
 
 rule summarize_campaigns:
     input:
         verdicts=lambda wildcards: expand("reports/loop/{name}/verdict.json", name=config["loop"][wildcards.kind]),
         residuals=lambda wildcards: expand("reports/loop/{name}/residuals.parquet", name=config["loop"][wildcards.kind]),
-        sources=sources("summarize_campaigns.py"),
     output:
         table=shown(
             "reports/loop/{kind}.csv",
@@ -155,24 +131,20 @@ rule summarize_campaigns:
             shows="All campaigns",
             kind="table",
         ),
-    log:
-        "results/logs/summarize_campaigns/{kind}.log",
-    benchmark:
-        "results/timings/summarize_campaigns/{kind}.tsv"
     wildcard_constraints:
         kind="campaigns|measured",
     params:
+        step="elastocal.loop.summary.summarize_campaigns",
         campaigns=lambda wildcards: config["loop"][wildcards.kind],
         folds=lambda wildcards: folds_of_one(config["loop"][wildcards.kind]),
         seed=config["seed"],
     script:
-        "../scripts/summarize_campaigns.py"
+        "../scripts/run_step.py"
 
 
 rule draw_campaign_errors:
     input:
         table=rules.summarize_campaigns.output.table,
-        sources=sources("draw_campaign_errors.py"),
     output:
         pdf="reports/loop/{kind}.pdf",
         png=shown(
@@ -183,10 +155,6 @@ rule draw_campaign_errors:
             shows="Held-out errors before and after",
             kind="figure",
         ),
-    log:
-        "results/logs/draw_campaign_errors/{kind}.log",
-    benchmark:
-        "results/timings/draw_campaign_errors/{kind}.tsv"
     wildcard_constraints:
         kind="campaigns|measured",
     script:
@@ -199,10 +167,6 @@ rule measured_pictures:
         picture="reports/loop/measured.png",
     output:
         picture="docs/measured_data.png",
-    log:
-        "results/logs/measured_pictures.log",
-    benchmark:
-        "results/timings/measured_pictures.tsv"
     shell:
         "cp {input.picture} {output.picture} 2> {log}"
 

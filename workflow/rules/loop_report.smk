@@ -16,7 +16,6 @@ rule draw_campaign:
         diagnosis=rules.diagnose_campaign.output.diagnosis,
         candidates=rules.diagnose_campaign.output.candidates,
         confounding=rules.diagnose_campaign.output.confounding,
-        sources=sources("draw_campaign.py"),
     output:
         pdf=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=[*LOOP_FIGURES]),
         png=[
@@ -30,10 +29,6 @@ rule draw_campaign:
             )
             for figure, shows in LOOP_FIGURES.items()
         ],
-    log:
-        "results/logs/draw_campaign/{campaign}.log",
-    benchmark:
-        "results/timings/draw_campaign/{campaign}.tsv"
     params:
         figures=list(LOOP_FIGURES),
     script:
@@ -53,7 +48,6 @@ rule compile_loop_report:
         descriptions=rules.read_campaign.output.descriptions,
         figures=rules.draw_campaign.output.pdf,
         pages=[placed(PACKAGES / "elastocal/report" / name) for name in LOOP_PAGES],
-        sources=sources("compile_loop_report.py"),
     output:
         report="reports/loop/{campaign}/report.pdf",
         page=shown(
@@ -64,10 +58,6 @@ rule compile_loop_report:
             shows="The report of the campaign",
             kind="report",
         ),
-    log:
-        "results/logs/compile_loop_report/{campaign}.log",
-    benchmark:
-        "results/timings/compile_loop_report/{campaign}.tsv"
     script:
         "../scripts/compile_loop_report.py"
 
@@ -77,7 +67,6 @@ rule draw_hero:
         descriptions=rules.read_campaign.output.descriptions,
         verdict=rules.judge_campaign.output.verdict,
         residuals=rules.judge_campaign.output.residuals,
-        sources=sources("draw_hero.py"),
     output:
         pdf="reports/loop/{campaign}/figures/hero.pdf",
         png=shown(
@@ -88,10 +77,6 @@ rule draw_hero:
             shows="Arm with its errors before and after",
             kind="figure",
         ),
-    log:
-        "results/logs/draw_hero/{campaign}.log",
-    benchmark:
-        "results/timings/draw_hero/{campaign}.tsv"
     script:
         "../scripts/draw_hero.py"
 
@@ -108,9 +93,5 @@ rule pictures:
         loop=expand("docs/loop_{figure}.png", figure=["arrows", "candidates"]),
         hero="docs/hero.png",
         measured="docs/measured_in_the_box.png",
-    log:
-        "results/logs/pictures.log",
-    benchmark:
-        "results/timings/pictures.tsv"
     shell:
         "(cp {input.figures} {input.hero} docs/; cp {input.measured} {output.measured}; for one in {input.loop}; do cp $one docs/loop_$(basename $one); done) 2> {log}"

@@ -8,13 +8,8 @@ rule draw_signatures:
     input:
         # It has a compensator and a rated load, without which some effects are not offered.
         robot=f"{CONFIG}/robots/gp180.yaml",
-        sources=sources("draw_signatures.py"),
     output:
         figures=directory("reports/figures/signatures"),
-    log:
-        "results/logs/draw_signatures.log",
-    benchmark:
-        "results/timings/draw_signatures.tsv"
     script:
         "../scripts/draw_signatures.py"
 

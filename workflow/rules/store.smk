@@ -1,22 +1,19 @@
 """A finished run on an object store: `snakemake -j2 store --config store=s3://BUCKET/FOLDER`.
 
-Makes what is not made yet, then uploads the crate, every file that it describes and a job made, and as one archive the other
-files that it describes: sources, configuration, and what lies in folders of cases. What is on the store and has not changed here
-since stays as it is. Of which targets, says `crate_of` (crate.smk).
+Makes what is not made yet, then uploads every file that a job behind it made, and as one archive what these read: sources,
+configuration, and what lies in folders of cases, with the SHA-256 of all. What is on the store and has not changed here since
+stays as it is. `--config store_of='[study, loop, blind]'` names the targets; study and loop are without.
 """
 
 
 rule pack_sources:
     input:
-        crate=rules.write_crate.output.crate,
-        check=placed(ROOT / "workflow" / "check_crate.py"),
-        sources=sources("pack_sources.py"),
+        files=lambda wildcards: files_behind(stored_targets()),
+        workflow=[placed(path) for path in (ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk")))],
     output:
         archive="reports/sources.zip",
-    log:
-        "results/logs/pack_sources.log",
-    benchmark:
-        "results/timings/pack_sources.tsv"
+    params:
+        configuration=RESOLVED,
     script:
         "../scripts/pack_sources.py"
 
@@ -33,12 +30,8 @@ if "store" in config:
             file="{stored}",
         output:
             file=in_store("{stored}"),
-        log:
-            "results/logs/upload/{stored}.log",
-        benchmark:
-            "results/timings/upload/{stored}.tsv"
         wildcard_constraints:
-            stored="((data|results|reports)/.+)|ro-crate-metadata.json",
+            stored="(data|results|reports)/.+",
         shell:
             "{sys.executable:q} -m elastocal.io.records {input.file:q} 2> {log:q} | sha256sum --check --quiet &>> {log:q} &&"
             " cp {input.file:q} {output.file:q} &>> {log:q}"
@@ -48,6 +41,6 @@ rule store:
     input:
         lambda wildcards: [
             in_store(output)
-            for output in outputs_behind([*described(), *rules.pack_sources.output])
+            for output in outputs_behind([*stored_targets(), *rules.pack_sources.output])
             if not output.is_directory
         ],

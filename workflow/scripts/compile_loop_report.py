@@ -7,8 +7,7 @@ import pandas as pd
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import final_parameters
-from elastocal.loop.residual_tables import read_residuals
-from elastocal.loop.schemas import CANDIDATES, STEPS
+from elastocal.loop.schemas import CANDIDATES, STEPS, read_residuals
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.report.loop_facts import loop_facts, write_loop_report
 from elastocal.report.loop_page import loop_page, write_loop_page

@@ -9,8 +9,7 @@ from elastocal.figures.residuals import arrows, before_after, residuals
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
-from elastocal.loop.residual_tables import angles_of, read_residuals, worst_measurement
-from elastocal.loop.schemas import CANDIDATES, CONFOUNDING
+from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, angles_of, read_residuals, worst_measurement
 from elastocal.mechanics.kinematics import corners
 from elastocal.mechanics.robot_file import robot_from_document
 

@@ -5,7 +5,7 @@ from job import Job, origin_of, run
 from elastocal.figures.arms import arm_with_errors
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
-from elastocal.loop.residual_tables import read_residuals
+from elastocal.loop.schemas import read_residuals
 from elastocal.mechanics.robot_file import robot_from_document
 
 

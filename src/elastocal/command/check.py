@@ -97,15 +97,19 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("declared model", f"residual of {1e3 * facts['residual_rms_m']:.3f} mm RMS on the fitted poses"),
         ("identified", f"{counted(facts['parameters'], 'parameter')}, effectively {facts['effective_parameters']:.0f}{left}"),
     ]
-    for mount in facts.get("mounts", []):
+    for mount in facts["mounts"]:
         rotation = ", ".join(f"{value:.4f}" for value in mount["rotation_rad"])
         found.append(("mount", f"{mount['target']}: rotation [{rotation}] rad in the frame of its point, fitted"))
-    for joint, spring in enumerate(facts.get("compliance", []), 1):
-        error = spring["relative_std_error"]
-        words = "not identifiable" if error is None else f"± {100 * error:.1f} %"
-        found.append(
-            ("compliance" if joint == 1 else "", f"joint {joint}: {spring['value_urad_per_Nm']:.3g} µrad/(N m) {words}")
-        )
+    springs = {f"joint {joint}": spring for joint, spring in enumerate(facts["compliance"], 1)}
+    known = [
+        f"{joint} {spring['value_urad_per_Nm']:.3g} ± {100 * spring['relative_std_error']:.1f} %"
+        for joint, spring in springs.items()
+        if spring["value_urad_per_Nm"] is not None
+    ]
+    if known:
+        found.append(("compliance", f"if the declared model is complete, in µrad/(N m): {', '.join(known)}"))
+    if unknown := [joint for joint, spring in springs.items() if spring["value_urad_per_Nm"] is None]:
+        found.append(("" if known else "compliance", f"not determined by these poses: {', '.join(unknown)}"))
     if facts["accuracy"]:
         sentence = accuracy_sentence(accuracy_from(facts["accuracy"]))
         found.append(("accuracy", f"if the declared model is complete: {sentence}"))

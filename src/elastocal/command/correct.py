@@ -67,7 +67,7 @@ def correct(
     from rich.console import Console
     from rich.progress import Progress
 
-    from elastocal.application.accuracy import accuracy_sentence, before_m, millimetres, predict_errors
+    from elastocal.application.accuracy import accuracy_sentence, before_m, predict_errors
     from elastocal.application.calibrated import OperatingConditions, assumptions
     from elastocal.application.compensation import find_joint_targets, large_steps
     from elastocal.application.scope import campaign_accuracy
@@ -75,6 +75,7 @@ def correct(
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.data_frames import write_csv
+    from elastocal.loop.error_table import error_lines
     from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
 
     console = Console(stderr=True)
@@ -145,12 +146,13 @@ def correct(
                 folder_of_all / program.name, controller.program(name, targets, _notes(campaign, wrench[good], date.today()))
             )
     lines, answer = [], f"{grouped(good.sum())} of {counted(len(good), 'target')} corrected"
-    if good.any():
-        rms = np.sqrt((before[good] ** 2).mean())
-        lines.append(f"Predicted position error without correction, in the same frame: {millimetres(rms)} RMS.")
+    stated = []
     if bounded.any():
         known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
-        lines.append(accuracy_sentence(known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")))
+        accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
+        stated.append((accuracy, float(np.sqrt((before[bounded] ** 2).mean()))))
+        lines.append(accuracy_sentence(accuracy))
+    lines = [*error_lines(campaign.verdict, *stated), *lines]
     if good.any():
         lines.append(accuracy_sentence(campaign_accuracy(calibrated, campaign.case.observations.states)))
     if controller:

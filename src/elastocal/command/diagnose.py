@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,9 +20,6 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-# What `snakemake_logger_plugin_elastocal` writes when a job starts.
-_JOB = re.compile(r"(\d+) of (\d+): (.+)")
-_JOBS = re.compile(r"[\d\u2009]+ jobs?")
 _NOTHING = "Nothing to be done"
 # Snakemake prints it before its logger begins.
 _NO_NEWS = "Using workflow specific profile"
@@ -57,23 +53,12 @@ def diagnose(
 
 
 def follow(lines: Iterable[str], console: Console) -> bool:
-    """Show the lines of a run as they come: a job as the state of a bar, where there is a terminal, any other as it is.
-
-    Returns whether there was nothing to do, where Snakemake prints no outcome.
-    """
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
+    """Show the lines of a run as they come; returns whether there was nothing to do, where Snakemake prints no outcome."""
     current = False
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f} of {task.total:.0f}")
-    with Progress(*columns, TimeElapsedColumn(), console=console, transient=True, disable=not console.is_terminal) as progress:
-        bar = progress.add_task("reading", total=1)
-        for line in map(str.rstrip, lines):
-            current = current or line.startswith(_NOTHING)
-            job = _JOB.fullmatch(line)
-            if job and console.is_terminal:
-                progress.update(bar, completed=int(job[1]) - 1, total=int(job[2]), description=job[3])
-            elif not line.startswith(_NO_NEWS) and not (_JOBS.fullmatch(line) and console.is_terminal):
-                print_lines([line], console)
+    for line in map(str.rstrip, lines):
+        current = current or line.startswith(_NOTHING)
+        if not line.startswith(_NO_NEWS):
+            print_lines([line], console)
     return current
 
 

@@ -1,19 +1,25 @@
-"""`elastocal import`: what people have, to the files that elastocal reads; robots here, measurements in `import_csv`."""
+"""`elastocal import`: what people have, robots and measurements, to the files that elastocal reads."""
 
+from __future__ import annotations
+
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer import Argument, Option
 
-from elastocal.command.import_csv import csv
+from elastocal.command.pipeline import pipeline
 from elastocal.command.printed import example
-from elastocal.command.quantities import LARGEST_RELATIVE_STD
-from elastocal.errors import printable
+from elastocal.command.quantities import LARGEST_RELATIVE_STD, MOST_ROWS
+from elastocal.counting import counted
+from elastocal.errors import InputError, printable
 from elastocal.exchange import DH_MASS_STD, URDF_MASS_STD
 
 if TYPE_CHECKING:
+    from elastocal.exchange.measurement_table import ImportedMeasurements
     from elastocal.exchange.robot_text import Imported
+    from elastocal.mechanics.robot import Robot
 
 importing = typer.Typer(name="import", no_args_is_help=True)
 _Output = Annotated[Path, Option("--output", "-o", help="The robot file to write.")]
@@ -87,12 +93,163 @@ def dh(
     _write(robot_from_dh(file, modified, options, name, mass_std), output)
 
 
-importing.command(epilog=example("elastocal import csv tracker.csv --folder campaigns/cell --target SMR1"))(csv)
+@importing.command(epilog=example("elastocal import csv tracker.csv --folder campaigns/cell --target SMR1"))
+def csv(
+    file: Annotated[Path, Argument(help="The table: CSV, tabs, semicolons, spaces.")],
+    folder: Annotated[Path, Option(help="Folder of the campaign; measurements.csv and import.yaml go there.")],
+    angles: Annotated[str | None, Option(help="Unit of angles whose header has none: deg, rad, mrad.")] = None,
+    lengths: Annotated[str | None, Option(help="Unit of lengths whose header has none: m, mm, um, in.")] = None,
+    rotation: Annotated[
+        str | None,
+        Option(help="Orientations: none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes), euler:xyz (fixed)."),
+    ] = None,
+    names: Annotated[
+        str | None,
+        Option(
+            "--columns", help="Of a table without a header: names of all columns in order, q1,q2,…; none for one to leave out."
+        ),
+    ] = None,
+    column: Annotated[list[str] | None, Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed.")] = None,
+    ignore: Annotated[list[str] | None, Option(help="Header of a column to leave out; as often as needed.")] = None,
+    unit: Annotated[list[str] | None, Option(help="NAME=UNIT of one column, such as fx=kN.")] = None,
+    target: Annotated[
+        list[str] | None,
+        Option(help="Name of the target where no column has it; of each of several markers in a row, or NAME=MARKER."),
+    ] = None,
+    wrench: Annotated[
+        Literal["on-robot", "by-robot"] | None, Option(help="Forces on the robot, or those that it exerts.")
+    ] = None,
+    skip_empty: Annotated[bool, Option("--skip-empty", help="Leave out rows without a position.")] = False,
+    separator: Annotated[
+        Literal["tab", "semicolon", "bar", "comma", "space"] | None, Option(help="Between columns. Default: found out.")
+    ] = None,
+    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of decimals. Default: found out.")] = None,
+    encoding: Annotated[str | None, Option(help="Such as utf-8 or cp1252. Default: found out.")] = None,
+    header: Annotated[
+        int | None, Option(min=1, max=MOST_ROWS, help="Line with the names of the columns. Default: found out.")
+    ] = None,
+    robot: Annotated[
+        Path | None, Option(help="Robot file whose joint_names the columns have. Default: that of FOLDER/campaign.yaml.")
+    ] = None,
+    options: Annotated[Path | None, Option(help="import.yaml of an earlier import, to repeat it.")] = None,
+    force: Annotated[bool, Option("--force", help="Replace a measurements.csv that is filled in.")] = False,
+) -> None:
+    """Make measurements.csv of another program's table.
+
+    Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11 .. r33, t11 .. t34, fx .. mz, pose,
+    load, repeat, target, time) or as the robot's file calls its joints, units by brackets or endings ("X [mm]", x_mm). What is
+    ambiguous is asked for. Poses, loads and repeats are counted where no column numbers them. The end of the output states
+    what was read, how, and what was left out; import.yaml has the options, and what was found out.
+    """
+    from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
+    from elastocal.exchange.measurement_table import (
+        IMPORT,
+        ImportOptions,
+        import_options_text,
+        read_import_options,
+        read_measurement_table,
+    )
+    from elastocal.io.atomic_writes import check_places, write_text, write_together
+
+    check_places(folder / CSV, folder / PARQUET, folder / IMPORT)
+    if (folder / PARQUET).exists() or ((folder / CSV).exists() and not force and _is_filled(folder / CSV)):
+        allowed = "another folder, or --force to replace measurements.csv"
+        raise InputError(folder, "", "measurements that are there already", allowed)
+    earlier = read_import_options(options) if options else ImportOptions()
+    units = _pairs("--unit", unit) | {
+        key: value for key, value in {"angles": angles, "lengths": lengths}.items() if value is not None
+    }
+    several = target if target and (len(target) > 1 or "=" in target[0]) else []
+    markers = {
+        name.strip(): (marker if equals else name).strip() for name, equals, marker in (t.partition("=") for t in several)
+    }
+    if len(markers) < len(several) or "" in markers:
+        raise InputError("--target", "", ", ".join(several), "a name for each marker, such as A, or A=MARKER")
+    stated: dict[str, Any] = {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty, "separator": separator}
+    stated |= {"decimal": decimal, "header": header, "encoding": encoding}
+    stated |= {"names": [name.strip() for name in names.split(",")] if names else None}
+    chosen = replace(
+        earlier,
+        ignore=[*(earlier.ignore or ()), *(ignore or ())] or None,
+        columns=dict(earlier.columns or {}) | _pairs("--column", column),
+        units=dict(earlier.units or {}) | units,
+        target=(target[0] if target else earlier.target) if not markers else None,
+        targets=markers or (earlier.targets if not target else None),
+        **{name: value for name, value in stated.items() if value},
+    )
+    found = read_measurement_table(file, chosen, _robot(robot, folder))
+    with write_together(folder, (CSV, IMPORT)) as partial:
+        write_measurements(partial / CSV, found.table, found.joints)
+        write_text(partial / IMPORT, import_options_text(found.options, file))
+    lines = [*_summary(found), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"]
+    typer.echo("\n".join(map(printable, lines)))
 
 
-def _write(result: "Imported", output: Path) -> None:
+def _write(result: Imported, output: Path) -> None:
     """Write the robot file, and print what was read."""
     from elastocal.exchange.robot_text import summary, write_robot
 
     write_robot(result, output)
     typer.echo("\n".join(map(printable, [*summary(result), f"written: {output.as_posix()}"])))
+
+
+def _robot(path: Path | None, folder: Path) -> Robot | None:
+    """The robot of the file, or of the campaign that the folder holds already."""
+    from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.reading import read_descriptions, read_robot
+
+    if path is None and (folder / DOCUMENT).is_file():
+        path = read_descriptions(folder, pipeline() / "config" / "robots")[1]
+    return None if path is None else read_robot(path)
+
+
+def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:
+    found = {}
+    for text in texts or ():
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise InputError(option, "", repr(text), "NAME=VALUE")
+        found[name.strip()] = value.strip()
+    return found
+
+
+def _is_filled(path: Path) -> bool:
+    """Whether a sheet holds a measurement: one of `init` or `plan`, without a position in any row, may be replaced."""
+    from csv import DictReader, Error
+
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        rows = DictReader((line for line in file if line.strip() and not line.startswith("#")), skipinitialspace=True)
+        try:
+            places = [name for name in rows.fieldnames or () if name.strip() in ("x", "y", "z", "rx", "ry", "rz")]
+            # Rows of a file without such columns may hold anything.
+            return any(not places or any((row[name] or "").strip() for name in places) for row in rows)
+        except Error:
+            return True
+
+
+def _summary(found: ImportedMeasurements) -> list[str]:
+    import numpy as np
+
+    from elastocal.mechanics.components import WRENCH_NAMES
+
+    table, options = found.table, found.options
+    columns, units = options.columns or {}, options.units or {}
+    poses = len(np.unique(np.column_stack([table.get("session", np.zeros_like(table["pose"])), table["pose"]]), axis=0))
+    targets = ", ".join(sorted(set(table["target"].tolist())))
+    first = [
+        f"{counted(len(table['pose']), 'measurement')} of {targets} at {counted(poses, 'pose')}, "
+        f"{counted(found.joints, 'joint')}",
+        f"file: names of columns {f'in line {options.header}' if options.header else 'as stated'}, "
+        f"separator {options.separator}, decimal {options.decimal}, encoding {options.encoding}",
+    ]
+    if found.skipped:
+        first.append(f"left out: {counted(found.skipped, 'row')} without a position")
+    read = [f"{name} from {header!r}{f' in {units[name]}' if name in units else ''}" for name, header in columns.items()]
+    lists = {
+        "counted, as no column has it": [name for name in ("pose", "load", "repeat") if name not in columns],
+        "taken for zero, as no column has it": [name for name in WRENCH_NAMES if name not in columns],
+        "not used": found.ignored,
+    }
+    lines = [*first, f"read: {'; '.join(read)}", f"orientations: {options.rotation}"]
+    lines += [f"{what}: {', '.join(names)}" for what, names in lists.items() if names]
+    return [*lines, *(f"note: {note}" for note in found.notes)]

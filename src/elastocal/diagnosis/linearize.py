@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.counting import counted
 from elastocal.diagnosis import other
 from elastocal.diagnosis.hypotheses import prior_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
@@ -262,5 +261,5 @@ def lacking(candidate: Candidate, there: frozenset[str], joint_angles: np.ndarra
     for joint in (candidate.joints or candidate.turning) if candidate.distinct_angles else ():
         angles = len(np.unique(np.round(np.mod(joint_angles[:, joint - 1], 2 * np.pi), 3)))
         if angles < candidate.distinct_angles:
-            return f"{counted(angles, 'angle')} of joint {joint} where {candidate.distinct_angles} are needed"
+            return f"joint {joint} stood still" if angles == 1 else "too few different angles of a joint"
     return ""

@@ -1,8 +1,8 @@
 """What each job read and wrote, when, and from which commit, configuration, seed and environment: a record beside every output.
 
-A record has the SHA-256 of its output and of all that the job read, of modules as `io.sources` has it: whoever reads a file
-next finds a byte that was altered, in it or in anything behind it. `python -m elastocal.io.records | sha256sum --check` judges
-all files, with the name of one behind `records` this one.
+A record has the SHA-256 of its output and of all that the job read: whoever reads a file next finds a byte that was altered, in
+it or in anything behind it. `python -m elastocal.io.records | sha256sum --check` judges all files, with the name of one behind
+`records` this one.
 """
 
 import hashlib
@@ -14,12 +14,11 @@ from pathlib import Path
 from elastocal.errors import InputError
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import Origin, configuration_sha256
-from elastocal.io.sources import source_digest
 from elastocal.io.texts import check_file
 
 RECORDS = Path("results/records")
-# What the pipeline makes, folders and a file; the rest is the user's.
-_MADE = ("data", "results", "reports", "ro-crate-metadata.json")
+# What the pipeline makes, the rest is the user's.
+_MADE = ("data", "results", "reports")
 _AS_WRITTEN = "the file as the pipeline wrote it (delete it and run the pipeline again)"
 # Of one output, and of all else that its record says.
 _FILES, _DIGEST = "files", "sha256"
@@ -115,7 +114,7 @@ def input_digests(paths: Iterable[str], checked: Collection[str] | None = None) 
         if judged and _made(path):
             digests[path] = _intact(path)[1]
         else:
-            digests[path] = _joint({file: source_digest(file) for file in files_of(path)})
+            digests[path] = _joint({file: checksum(file) for file in files_of(path)})
         if not judged and not record_of(path).is_file():
             own.append(path)
     return digests, tuple(own)
@@ -149,7 +148,7 @@ def check_sources(jobs: Iterable[JobRecord], within: str | Path, allowed: str) -
     for job in jobs:
         sources = {Path(within, file): digest for file, digest in job.sources.items()}
         for path, digest in sources.items():
-            if not path.is_file() or source_digest(path) != digest:
+            if not path.is_file() or checksum(path) != digest:
                 raise InputError(path, "", f"not what {job.name} was made with", allowed)
         for catalogue in (path for path in sources if path.name == _CATALOGUE):
             if new := set(catalogue.parent.glob("*.py")) - sources.keys():

@@ -7,7 +7,7 @@ That a file is as it was written says its record, see `io.records`.
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,32 +53,14 @@ class TableSchema:
         return next(column for column in self.columns if column.name == name)
 
 
-# What a file is of, where its provenance says so: a column of one value each, which any reader of Parquet finds by itself.
-_HEADS = {
-    "robot": Column("robot", "string", "", "name of the robot's file"),
-    "noise": Column("noise_um", "float64", "µm, µrad", "standard deviation of the measurement noise"),
-    "strategy": Column("strategy", "string", "", "name of the strategy's file"),
-}
-
-
-def head_columns(schema: TableSchema, provenance: Mapping[str, Any]) -> dict[str, Column]:
-    """Columns that a file has before those of its schema, by the entries of its provenance that they repeat."""
-    taken = {column.name for column in schema.columns}
-    return {key: column for key, column in _HEADS.items() if key in provenance and column.name not in taken}
-
-
 def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], provenance: Mapping[str, Any]) -> None:
     """Write a table block by block, each a row group; the file appears whole or not at all.
 
     `blocks`: one value or array for each column; all arrays of a block have the same length. `provenance`: JSON-serialisable;
-    says from what the table was made; a robot, noise and strategy in it become columns of their own, where the schema has none
-    of the name. Raises `InputError`: a column that is missing, too many, not finite or out of range.
+    says from what the table was made. Raises `InputError`: a column that is missing, too many, not finite or out of range.
     """
-    heads = head_columns(schema, provenance)
-    blocks = ({**block, **_headed(heads, provenance, block)} for block in blocks)
-    schema = replace(schema, columns=(*heads.values(), *schema.columns))
     fields = [pa.field(c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}) for c in schema.columns]
-    floats = [c.name for c in schema.columns if c.type.startswith("float") and c not in heads.values()]
+    floats = [c.name for c in schema.columns if c.type.startswith("float")]
     with (
         atomic_write(path) as partial,
         pq.ParquetWriter(
@@ -195,15 +177,6 @@ def _values(chunk: pa.Array) -> np.ndarray:
     if pa.types.is_string(chunk.type):
         return chunk.to_numpy(zero_copy_only=False)
     return np.array(chunk.to_pylist(), bool) if pa.types.is_boolean(chunk.type) else np.from_dlpack(chunk)
-
-
-def _headed(heads: Mapping[str, Column], provenance: Mapping[str, Any], block: Block) -> dict[str, str | np.ndarray]:
-    """One value a column of what a file is of, as long as a block."""
-    rows = max((len(values) for values in block.values() if not isinstance(values, str)), default=0)
-    return {
-        column.name: provenance[key] if column.type == "string" else np.full(rows, float(provenance[key]))
-        for key, column in heads.items()
-    }
 
 
 def _checked(path: str | Path, schema: TableSchema, block: Block) -> dict[str, np.ndarray]:

@@ -16,9 +16,7 @@ from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, checksum, jobs_behind
 from elastocal.io.storage import read_table
-from elastocal.loop.case_files import load_case
-from elastocal.loop.diagnosis_tables import final_parameters, rows_left_out, step_model
-from elastocal.loop.fit_columns import covariance_from
+from elastocal.loop.diagnosis_tables import covariance_from, final_parameters, load_case, rows_left_out, step_model
 from elastocal.loop.schemas import CORRELATIONS, STEPS
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import numpy as np
 from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import OperatingConditions
 from elastocal.application.certificate.comparison import compare_campaigns
-from elastocal.application.certificate.error_budget import error_budget
+from elastocal.application.certificate.error_budget import TOTAL, error_budget
 from elastocal.application.certificate.repeatability import of_sensor, repeatability
 from elastocal.application.certificate.workspace import draw_angles, workspace_errors
 from elastocal.application.compensation import find_joint_targets
@@ -21,6 +21,7 @@ from elastocal.application.scope import REGION, campaign_poses
 from elastocal.campaigns.reading import campaign_files
 from elastocal.exchange.target_path import OK
 from elastocal.io.records import checksum
+from elastocal.loop.error_table import error_rows
 from elastocal.random_streams import stream
 from elastocal.validation.conformity import PASS, UNDECIDED, conformity, predicted_conformity
 from elastocal.validation.fitted_range import beyond_campaign
@@ -121,6 +122,8 @@ def certificate(
         workspace_errors(calibrated, angles, np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0]), states.joint_angles)
         for force in forces
     ]
+    budget = error_budget(calibrated, *poses, _DRAWS, draws("budget"))
+    uncorrected = next(share.rms_m for share in budget if share.name == TOTAL)
     repeats = repeatability(campaign.measurements, campaign.targets, robot.chain.end_effector.name)
     document: dict[str, Any] = {
         "campaign": found.name,
@@ -134,6 +137,7 @@ def certificate(
         "measured_files": {} if measured is None else {name: checksum(file) for name, file in measured.files.items()},
         "verdict": found.verdict["verdict"],
         "effects": [effect["name"] for effect in found.verdict["effects"]],
+        "errors": error_rows(found.verdict, *([] if use is None else [(accuracy, uncorrected)])),
         "held_out": [_step(row) for _, row in found.errors.iterrows()],
         "noise_floor_rms_m": found.verdict["heldout"]["noise_floor_rms_m"],
         "accuracy": (accuracy if measured is None else measured.accuracy).document(),
@@ -146,7 +150,7 @@ def certificate(
             "repeatability": None if repeats is None else asdict(repeats),
             "repeatability_of_sensor_m": of_sensor(calibrated.noise.position_m),
         },
-        "budget": [asdict(share) for share in error_budget(calibrated, *poses, _DRAWS, draws("budget"))],
+        "budget": [asdict(share) for share in budget],
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
         "workspace": [_summary(force, each) for force, each in zip(forces, maps, strict=True)],

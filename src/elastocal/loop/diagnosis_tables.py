@@ -2,28 +2,70 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.confounding import angles_between, nearest_angles
-from elastocal.diagnosis.diagnose import Diagnosis, Step
+from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
+from elastocal.diagnosis.next_experiment import facts_of, propose, table_of
 from elastocal.diagnosis.search import initial_screening
+from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import mechanisms_of_models
-from elastocal.fitting.case import noise_facts, noise_from
+from elastocal.fitting.case import case_from, noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
-from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
-from elastocal.loop.schemas import CANDIDATES, MODELS
+from elastocal.fitting.model import Estimate
+from elastocal.fitting.parameters import parameters
+from elastocal.io.json_files import read_json, write_json
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_table, write_table
+from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, CORRELATIONS, MODELS, STEPS, measurements
+from elastocal.mechanics.robot_file import joint_count
+from elastocal.random_streams import stream
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from typing import Any
+    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.model import Model
+
+
+def diagnose_campaign(job: Any) -> None:
+    """The step of a rule: what the training poses say, and the next experiment."""
+    # Who reads the tables of a diagnosis starts without pandas.
+    from elastocal.io.data_frames import write_csv
+
+    case = load_case(job.input.descriptions, job.input.training)
+    name, seed = job.wildcards.campaign, job.params.seed
+    found = diagnose(case, Settings(), seed, lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True))
+    robot, draws = case.campaign.robot, stream(seed, case.campaign.name, "next experiment", 0)
+    proposal = propose(found, robot.joint_limits, Settings(), draws, job.params.states)
+    write_csv(job.output.experiment, table_of(proposal, robot))
+    found = replace(found, document=found.document | {"next_experiment": facts_of(proposal)})
+    write_json(job.output.diagnosis, diagnosis_facts(found))
+    origin = provenance(job.params, **job.wildcards)
+    write_table(job.output.steps, STEPS, step_blocks(found), origin)
+    for path, schema, columns in (
+        (job.output.correlations, CORRELATIONS, correlation_columns(found.final)),
+        (job.output.models, MODELS, model_columns(found)),
+        (job.output.candidates, CANDIDATES, candidate_columns(found)),
+        (job.output.confounding, CONFOUNDING, confounding_columns(found)),
+    ):
+        write_table(path, schema, [columns], origin)
+
+
+def load_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:
+    """A campaign from the files of step 1; `part` is the campaign that holds the test, where it is another one."""
+    descriptions = read_json(descriptions_path)
+    described = (part and descriptions[part]) or descriptions
+    joints = joint_count(described["robot"], described["source"])
+    return case_from(described, read_table(measurements_path, measurements(joints)))
 
 
 def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[str]]]:
@@ -31,11 +73,6 @@ def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[st
     for number, step in enumerate(diagnosis.steps):
         columns = parameter_columns(step.fitted)
         yield {"step": np.full(len(columns["value"]), number), **columns}
-
-
-def final_correlations(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
-    """Columns of the correlations table, of the final model."""
-    return correlation_columns(diagnosis.final)
 
 
 def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -179,3 +216,84 @@ def _with_priors(effect: Candidate, columns: Mapping[str, np.ndarray]) -> Candid
         for p, deviation in zip(effect.parameters, priors, strict=True)
     )
     return replace(effect, parameters=parameters)
+
+
+def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
+    """Columns of the parameters table of a fit."""
+    named = parameters(fitted.model, fitted.estimate)
+    return {
+        "owner": [owner for owner, _ in named],
+        "parameter": [parameter.name for _, parameter in named],
+        "unit": [parameter.unit for _, parameter in named],
+        "value": _absolute_values(fitted.model, fitted.estimate),
+        "std_error": np.sqrt(np.diag(fitted.covariance)),
+        "held": fitted.held,
+        "prior_std": np.array([np.nan if p.prior_std is None else p.prior_std for _, p in named]),
+    }
+
+
+def correlation_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
+    """Columns of the correlations table of a fit: every pair of parameters that are not held."""
+    named = [f"{owner} {parameter.name}" for owner, parameter in parameters(fitted.model, fitted.estimate)]
+    free = np.flatnonzero(~fitted.held)
+    deviation = np.sqrt(np.diag(fitted.covariance))[free]
+    correlation = fitted.covariance[np.ix_(free, free)] / np.outer(deviation, deviation)
+    rows, columns = np.tril_indices(len(free), -1)
+    return {
+        "one": [named[free[row]] for row in rows],
+        "other": [named[free[column]] for column in columns],
+        "correlation": correlation[rows, columns],
+    }
+
+
+def covariance_from(parameters: Mapping[str, np.ndarray], correlations: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The covariance of a fit from its tables, the inverse of `parameter_columns` and `correlation_columns`.
+
+    `parameters`, `correlations`: columns of one fit. Returns (P, P): zero where held.
+    """
+    names = [f"{owner} {parameter}" for owner, parameter in zip(parameters["owner"], parameters["parameter"], strict=True)]
+    place = {name: number for number, name in enumerate(names)}
+    deviation = np.where(parameters["held"], 0.0, parameters["std_error"])
+    correlation = np.eye(len(names))
+    for one, other, value in zip(correlations["one"], correlations["other"], correlations["correlation"], strict=True):
+        correlation[place[one], place[other]] = correlation[place[other], place[one]] = value
+    return correlation * np.outer(deviation, deviation)
+
+
+def estimate_from(columns: Mapping[str, np.ndarray], model: Model, sessions: Collection[int]) -> Estimate:
+    """The estimate of a model from the columns of its parameters.
+
+    `columns` (N,).
+    """
+    values = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
+
+    def placed(owner: str, *stated: Sequence[float] | None) -> tuple[list[float], np.ndarray]:
+        shift, turn = (
+            [values.get((owner, name), missing) for name, missing in zip(names, each or (0.0, 0.0, 0.0), strict=True)]
+            for names, each in zip((("dx", "dy", "dz"), ("rx", "ry", "rz")), stated, strict=True)
+        )
+        return shift, Rotation.from_rotvec(turn).as_matrix()
+
+    frames = [placed(f"frame {session}", None, None) for session in sessions]
+    targets = [placed(f"target {target.name}", target.offset_m, target.rotation) for target in model.targets]
+    return Estimate(
+        tuple(int(session) for session in sessions),
+        np.array([turn for _, turn in frames]),
+        np.array([shift for shift, _ in frames]),
+        np.array([shift for shift, _ in targets]),
+        np.array([turn for _, turn in targets]),
+        tuple(np.array([values[effect.key, p.name] for p in effect.parameters]) for effect in model.effects),
+        tuple(np.array([values[effect.key, s.name] for s in effect.shapes]) for effect in model.effects),
+    )
+
+
+def _absolute_values(model: Model, estimate: Estimate) -> np.ndarray:
+    parts = []
+    if model.fitted_frames:
+        for shift, turn in zip(estimate.frame_position, estimate.frame_rotation, strict=True):
+            parts += [shift, Rotation.from_matrix(turn).as_rotvec()]
+    for number, fitted in model.fitted_parts:
+        turn = Rotation.from_matrix(estimate.target_rotation[number]).as_rotvec()
+        parts.append(np.concatenate([estimate.target_offset[number], turn])[fitted])
+    effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
+    return np.concatenate([*parts, *effects]) if parts or effects else np.zeros(0)

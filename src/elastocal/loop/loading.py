@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from elastocal.campaigns import reading
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
+from elastocal.campaigns.columns import columns_of
 from elastocal.campaigns.holdout import split
-from elastocal.campaigns.reading import held_out_campaign, read_campaign, read_descriptions
 from elastocal.effects.catalogue import effects
 from elastocal.io.documents import read_document
+from elastocal.io.json_files import write_json
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import write_table
+from elastocal.loop.schemas import measurements
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -17,16 +22,25 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
 
 
+def read_campaign(job: Any) -> None:
+    """The step of a rule: a campaign's folder as tables."""
+    descriptions, training, held_out = load_campaign(job.params.folder, job.params.robots)
+    for path, part in ((job.output.training, training), (job.output.held_out, held_out)):
+        schema = measurements(part.joint_angles.shape[1])
+        write_table(path, schema, [columns_of(part)], provenance(descriptions, **job.wildcards))
+    write_json(job.output.descriptions, descriptions)
+
+
 def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements, Measurements]:
     """Read a campaign and part its measurements.
 
     `folder`, `robots_folder`: as in `reading.read_campaign`. Returns `descriptions`: ``campaign`` and ``robot``, the documents;
     ``held_out`` with the same of the campaign that holds the test, or None. Raises `InputError`.
     """
-    campaign = read_campaign(folder, robots_folder, effects())
+    campaign = reading.read_campaign(folder, robots_folder, effects())
     descriptions = _descriptions(folder, robots_folder, campaign)
     training, held_out = split(campaign)
-    other = held_out_campaign(campaign, folder, robots_folder, effects())
+    other = reading.held_out_campaign(campaign, folder, robots_folder, effects())
     if other is None:
         return descriptions | {"held_out": None}, training, held_out
     elsewhere = f"{folder}/{campaign.holdout['campaign']}"
@@ -39,12 +53,12 @@ def load_whole_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[
     `folder`, `robots_folder`: as in `reading.read_campaign`. Returns `descriptions`: as by `load_campaign`, but for the
     campaign that holds the test. Raises `InputError`.
     """
-    campaign = read_campaign(folder, robots_folder, effects())
+    campaign = reading.read_campaign(folder, robots_folder, effects())
     return _descriptions(folder, robots_folder, campaign), campaign.measurements
 
 
 def _descriptions(folder: str | Path, robots_folder: str | Path, campaign: Campaign) -> dict[str, Any]:
-    document, robot_path = read_descriptions(folder, robots_folder)
+    document, robot_path = reading.read_descriptions(folder, robots_folder)
     # What a campaign may leave out gets its default here, so that no later step has to know what its absence means.
     complete = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT} | document
     complete |= {"table": campaign.table, "header_line": campaign.header_line}

@@ -5,7 +5,6 @@ Held-out poses are counted, and their joint angles compared with those fitted; w
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -38,7 +37,8 @@ if TYPE_CHECKING:
 FEWEST_HELD_OUT = 6
 # Loads whose directions span less than this share of the largest in a second direction pull in one line.
 _ONE_DIRECTION = 0.05
-_FEW_ANGLES = re.compile(r"\d+ angles of joint \d+ where \d+ are needed")
+# A compliance is stated where it is more than so many standard errors, and is impossible where it is less than minus as many.
+_CLEAR = 2.0
 
 
 def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
@@ -47,11 +47,12 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     `folder`, `robots_folder`: as in `reading.read_campaign`. Returns ``campaign, robot, joints, targets, frame, measured``;
     ``training`` and ``held_out`` with their ``poses``; ``states, measurements, numbers, loads, repeats, sessions,
     largest_force_N``; ``noise`` (source, position_m, orientation_rad); ``faults`` (name, sentence, decisive);
-    ``residual_rms_m`` of the declared model; ``parameters``, ``effective_parameters`` (without what priors decide) and ``held``
-    (those that are not identifiable); ``mounts`` (target, rotation_rad) that are fitted; ``compliance`` (value, relative
-    standard error of each joint) where identified; ``testable`` and ``untestable`` (how many candidate effects, by reason);
-    ``suspicious``, sentences; ``diagnosable``; ``accuracy`` that a robot is predicted to have which is corrected by the
-    declared model, if nothing is missing in it (`Accuracy.document`), None where the data are at fault. Raises `InputError`.
+    ``residual_rms_m`` of the declared model; ``parameters``, ``effective_parameters`` (without what priors decide) and
+    ``held`` (those that are not identifiable); ``mounts`` (target, rotation_rad) that are fitted; ``compliance`` (value,
+    relative standard error of each joint, None where these poses do not determine it); ``testable`` and ``untestable`` (how
+    many candidate effects, by reason); ``suspicious``, sentences; ``diagnosable``; ``accuracy`` that a robot is predicted
+    to have which is corrected by the declared model, if nothing is missing in it (`Accuracy.document`), None where the data
+    are at fault or a compliance comes out negative: then something is missing, and none is stated. Raises `InputError`.
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
     whole, settings = case_from(descriptions, columns_of(training)), Settings()
@@ -62,7 +63,9 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     campaign, states = case.campaign, case.observations.states
     found = faults(campaign, campaign.measurements)
     decisive = any(fault.decisive for fault in found)
+    springs, negative = _compliances(declared)
     facts: dict[str, Any] = _identified(declared) | {
+        "compliance": springs,
         "campaign": campaign.name,
         "robot": campaign.robot.name,
         "joints": campaign.robot.joints,
@@ -84,9 +87,15 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         "diagnosable": not decisive,
         "accuracy": None,
     }
-    if not decisive:
+    if not decisive and not negative:
         fitted = calibrate_on_case(case, declared.model, declared.estimate, declared.covariance, noise)
         facts["accuracy"] = campaign_accuracy(fitted, states).document()
+    if negative:
+        warnings = [
+            *warnings,
+            f"the compliance of joint {' and '.join(negative)} comes out negative: the declared model lacks something, so that"
+            " no compliance and no accuracy are stated before the diagnosis",
+        ]
     suspicious = [*warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case, settings)]
     return facts | _testable(part) | {"suspicious": [*suspicious, *repeat_warnings(training, held_out)]}
 
@@ -98,32 +107,41 @@ def _poses(session: np.ndarray, pose: np.ndarray) -> int:
 def _identified(declared: Fit) -> dict[str, Any]:
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
     vectors = Rotation.from_matrix(declared.estimate.target_rotation).as_rotvec()
-    found: dict[str, Any] = {
+    kept = [name for name, held in zip(named, declared.held, strict=True) if held]
+    return {
         "parameters": int((~declared.held).sum()),
         "effective_parameters": effective_parameters(declared),
-        "held": [name for name, held in zip(named, declared.held, strict=True) if held],
+        "held": kept,
         "mounts": [
             {"target": declared.model.targets[number].name, "rotation_rad": vectors[number].tolist()}
             for number, parts in declared.model.fitted_parts
-            if parts.stop == 6
+            if parts.stop == 6 and not {f"target {declared.model.targets[number].name} r{axis}" for axis in "xyz"} & {*kept}
         ],
     }
-    if declared.model.identifies_compliance:
-        mine = declared.places_of("joint_compliance")
-        values = joint_compliances(declared.model, declared.estimate)
-        errors = np.sqrt(np.diag(declared.covariance))[mine]
-        found["compliance"] = [
-            {"value_urad_per_Nm": 1e6 * float(value), "relative_std_error": None if held else float(abs(error / value))}
-            for value, error, held in zip(values, errors, declared.held[mine], strict=True)
-        ]
-    return found
+
+
+def _compliances(declared: Fit) -> tuple[list[dict[str, float | None]], list[str]]:
+    """Of each joint its compliance where it is clear of zero, none where one is negative; and which joints these are."""
+    if not declared.model.identifies_compliance:
+        return [], []
+    mine = declared.places_of("joint_compliance")
+    values = joint_compliances(declared.model, declared.estimate)
+    errors = np.where(declared.held[mine], np.inf, np.sqrt(np.diag(declared.covariance))[mine])
+    negative = [str(joint + 1) for joint in np.flatnonzero(values < -_CLEAR * errors)]
+    return [
+        {"value_urad_per_Nm": 1e6 * float(value), "relative_std_error": float(error / value)}
+        if value > _CLEAR * error
+        else {"value_urad_per_Nm": None, "relative_std_error": None}
+        for value, error in zip(values, errors, strict=True)
+        if not negative
+    ], negative
 
 
 def _testable(part: Kept) -> dict[str, Any]:
     case = part.case
     found = linearized(part.declared, part.searched, list(case.candidates.values()), Settings())
-    reasons = Counter(_FEW_ANGLES.sub("too few different angles of a joint", reason) for reason in found.untestable.values())
-    return {"testable": len(case.candidates) - len(found.untestable), "untestable": dict(reasons.most_common())}
+    reasons = Counter(found.untestable.values()).most_common()
+    return {"testable": len(case.candidates) - len(found.untestable), "untestable": dict(reasons)}
 
 
 def _suspicious(campaign: Campaign, facts: dict[str, Any], case: Case, settings: Settings) -> list[str]:

@@ -1,7 +1,17 @@
-"""Every table that the loop keeps, column by column. Written down here and nowhere else."""
+"""Every table that the loop keeps, column by column, written down here and nowhere else; and its residuals as they are read."""
 
-from elastocal.io.storage import Column, TableSchema
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.io.storage import Column, TableSchema, read_table
 from elastocal.mechanics.components import COMPONENTS, WRENCH
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
 
 _IDENTITY = (
     Column("session", "int32", "", "sessions have each their own tracker frame"),
@@ -128,3 +138,19 @@ def residuals(joints: int) -> TableSchema:
             ),
         ),
     )
+
+
+def read_residuals(path: str | Path, joints: int) -> dict[str, np.ndarray]:
+    """Columns of a residuals table, of the rows that are no gross errors."""
+    columns = read_table(path, residuals(joints))
+    return {name: values[~columns["gross_error"]] for name, values in columns.items()}
+
+
+def worst_measurement(table: Mapping[str, np.ndarray]) -> int:
+    """Row of a residuals table with the largest position error of the declared model."""
+    return int(np.argmax(np.linalg.norm([table[f"before_d{axis}"] for axis in "xyz"], axis=0)))
+
+
+def angles_of(table: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
+    """Joint angles (N, n) of a residuals table, as the model of the robot counts them, rad."""
+    return np.column_stack([table[f"q{joint}"] for joint in range(1, joints + 1)])

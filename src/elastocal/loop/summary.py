@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from elastocal.io.data_frames import read_frame, write_csv
+from elastocal.io.json_files import read_json
+from elastocal.loop.schemas import residuals
 from elastocal.random_streams import stream
 from elastocal.validation.held_out import Errors, intervals, summary
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from typing import Any
 
 _REPLICATES = 1000
 _STAGES = ("before", "after")
+
+
+def summarize_campaigns(job: Any) -> None:
+    """The step of a rule: all campaigns of one kind as one table."""
+    settings = job.params
+    verdicts = {name: read_json(path) for name, path in zip(settings.campaigns, job.input.verdicts, strict=True)}
+    held_out = {
+        name: read_frame(path, residuals(len(verdicts[name]["noise"]["joint_rad"]))).query("held_out and not gross_error")
+        for name, path in zip(settings.campaigns, job.input.residuals, strict=True)
+    }
+    write_csv(job.output.table, campaign_rows(verdicts, held_out, settings.folds, settings.seed))
 
 
 def campaign_rows(

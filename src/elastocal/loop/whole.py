@@ -4,25 +4,52 @@ same two calls, with tables between them."""
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from elastocal.application.accuracy import before_m
+from elastocal.application.calibrated import forward, nominal_forward
 from elastocal.application.certificate.error_budget import effect_costs
 from elastocal.application.scope import calibrate_on_case, campaign_accuracy, campaign_poses, judge_by_held_out, set_form
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge
+from elastocal.diagnosis.judge import judge, residual_blocks, split_table
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
+from elastocal.io.json_files import read_json, write_json
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_table, write_table
+from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
+from elastocal.loop.schemas import STEPS, residuals
+from elastocal.mechanics.pose_differences import pose_differences
 
 if TYPE_CHECKING:
     from pathlib import Path
-    from typing import Any
 
-    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.diagnosis.judge import Verdict
+
+
+def judge_campaign(job: Any) -> None:
+    """The step of a rule: the verdict, every model on poses that no step has seen."""
+    # Who asks for the verdict alone starts without pandas.
+    import pandas as pd
+
+    from elastocal.io.data_frames import write_csv
+
+    case = tables.load_case(job.input.descriptions, job.input.training)
+    held_out = tables.load_case(job.input.descriptions, job.input.held_out, "held_out")
+    found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
+    verdict = judged(found, held_out, job.params.seed)
+    write_json(job.output.verdict, verdict.document, allow_nan=False)
+    write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
+    write_csv(job.output.splits, pd.DataFrame(split_table(found, verdict.held_out, job.params.seed)))
+    schema = residuals(case.campaign.robot.joints)
+    write_table(job.output.residuals, schema, residual_blocks(found, verdict), provenance(job.params, **job.wildcards))
 
 
 def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
@@ -57,15 +84,24 @@ def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected robot and the cost of each effect.
 
-    ``accuracy`` is predicted, ``cost_m`` of an effect is the RMS error over the campaign's poses and loads if it alone were
-    left out of the correction. Both are None where the data are at fault, the cost also of an effect that is not in the final
-    model or moves no robot.
+    ``accuracy`` and ``uncorrected_m``, the RMS error without a correction at the same poses, are predicted; ``cost_m`` of an
+    effect is the RMS error over the campaign's poses and loads if it alone were left out of the correction. All are None where
+    the data are at fault, the cost also of an effect that is not in the final model or moves no robot.
     """
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
-    accuracy, costs = None, dict[str, float]()
+    accuracy, uncorrected, costs = None, None, dict[str, float]()
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out)
         accuracy = campaign_accuracy(found, case.observations.states).document()
+        uncorrected = _uncorrected_m(found, *campaign_poses(found, case.observations.states))
         costs = effect_costs(found, *campaign_poses(found, case.observations.states))
     effects = [effect | {"cost_m": costs.get(effect["name"])} for effect in verdict.document["effects"]]
-    return replace(verdict, document=verdict.document | {"accuracy": accuracy, "effects": effects})
+    stated = {"accuracy": accuracy, "uncorrected_m": uncorrected, "effects": effects}
+    return replace(verdict, document=verdict.document | stated)
+
+
+def _uncorrected_m(found: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> float:
+    """RMS error of the uncorrected robot at some commands, in the frame of its accuracy."""
+    position, rotation = forward(found, reported_angles, operating)
+    off = pose_differences(*nominal_forward(found.robot, reported_angles), position, rotation)
+    return float(np.sqrt((before_m(found, position, rotation, off) ** 2).mean()))

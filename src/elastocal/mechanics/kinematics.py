@@ -132,14 +132,13 @@ def joint_axes(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
 
 
 def poses_and_jacobians(
-    chain: Chain, coordinates: np.ndarray, point: MeasuringPoint, out: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+    chain: Chain, coordinates: np.ndarray, point: MeasuringPoint
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pose of a measuring point and its geometric Jacobian with respect to every coordinate of the chain.
 
-    `coordinates` (..., n): joint angles in rad (and springs of an extended chain in m or rad). `out`: what an earlier call for
-    as many configurations returned; the results overwrite it and no memory is allocated. Returns `position` (..., 3): m, base
-    frame; `rotation` (..., 3, 3); `jacobian` (..., 6, n): rows: linear velocity of the point (m per unit of coordinate),
-    angular velocity (rad per unit), base axes. Columns of coordinates behind the point are zero.
+    `coordinates` (..., n): joint angles in rad (and springs of an extended chain in m or rad). Returns
+    `position` (..., 3): m, base frame; `rotation` (..., 3, 3); `jacobian` (..., 6, n): rows: linear velocity of the point (m
+    per unit of coordinate), angular velocity (rad per unit), base axes. Columns of coordinates behind the point are zero.
 
     The twist of a revolute coordinate with axis z through o is (z x (p - o), z), of a prismatic one (z, 0): the columns of the
     geometric Jacobian [1], which are those of the spatial one [2] at the point.
@@ -150,12 +149,7 @@ def poses_and_jacobians(
     """
     components, batch = _component_first(coordinates)
     size = components.shape[1]
-    shapes = ((3,), (3, 3), (6, chain.coordinates))
-    if out is None:
-        results = [np.empty((*shape, size)) for shape in shapes]
-    else:
-        results = [_component_first_view(array, len(shape)) for array, shape in zip(out, shapes, strict=True)]
-    position, rotation, jacobian = results
+    position, rotation, jacobian = (np.empty((*shape, size)) for shape in ((3,), (3, 3), (6, chain.coordinates)))
     for part in blocks(size):
         frames = walk(chain, components[:, part], point.after)
         placed = place_point(frames, point)
@@ -182,12 +176,6 @@ def _component_first(coordinates: np.ndarray) -> tuple[np.ndarray, tuple[int, ..
     coordinates = np.asarray(coordinates, float)
     batch = coordinates.shape[:-1]
     return np.moveaxis(coordinates, -1, 0).reshape(coordinates.shape[-1], -1), batch
-
-
-def _component_first_view(array: np.ndarray, axes: int) -> np.ndarray:
-    """Memory of a result of this module, component first."""
-    components = np.moveaxis(array, range(-axes, 0), range(axes))
-    return components.reshape(*components.shape[:axes], -1)
 
 
 def _batch_first(components: np.ndarray, batch: tuple[int, ...], before: int = 0) -> np.ndarray:

@@ -60,6 +60,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "campaign": document["campaign"],
         "robot": document["robot"],
         "decision": document["conformity"]["decision"],
+        "errors": document["errors"],
         "floor": say.length(document["noise_floor_rms_m"]),
         "budget": [[share_name(line["name"]), *_share(line)] for line in document["budget"]],
         "budget_states": counted(document["budget_states"], "state"),

@@ -14,6 +14,7 @@ from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
+from elastocal.loop.error_table import error_rows
 from elastocal.report import loop_tables as tables
 from elastocal.report import words as say
 from elastocal.report.typesetting import compile_document, sentences
@@ -103,6 +104,7 @@ def loop_facts(
         "faulty": faulty,
         "headline": dict(stated["headline"]) or None,
         "causes": [] if verdict["verdict"] == "not_testable" else cause_rows(verdict),
+        "errors": error_rows(verdict),
         "measured": tables.measured_rows(table, descriptions),
         "floor": say.length(heldout["noise_floor_rms_m"]),
         "steps": tables.step_rows(steps, heldout["noise_floor_rms_m"]),

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from elastocal.io.atomic_writes import write_text
-from elastocal.loop.residual_tables import angles_of, worst_measurement
+from elastocal.loop.schemas import angles_of, worst_measurement
 from elastocal.mechanics.kinematics import corners, joint_axes
 from elastocal.report import words as say
 from elastocal.report.typesetting import template

@@ -174,9 +174,13 @@ def _mount(target: Mapping[str, Any], oriented: bool) -> str:
 
 
 def compliance_rows(compliance: Mapping[str, Sequence[float]]) -> list[list[str]]:
-    """Rows of the compliances: joint, before, after with its standard error."""
+    """Rows of the compliances: joint, before, after with its standard error; no number of one that is not identifiable."""
     rows, columns = [], zip(*(compliance[name] for name in ("before", "after", "std_error")), strict=True)
+    identified = any(compliance["std_error"])
     for joint, (before, after, error) in enumerate(columns, 1):
+        if identified and not error:
+            rows.append([str(joint), *["not identifiable"] * 2])
+            continue
         stated = say.pm(after, error) if error else f"{after:.4g}"
         decimals = len(stated.rpartition(".")[2]) if "." in stated else 0
         rows.append([str(joint), f"{before:.{decimals}f}" if error else f"{before:.4g}", stated])
@@ -232,9 +236,7 @@ def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
     """Candidates that were not tested, by their reasons, one row for each effect and reason."""
     found: dict[tuple[str, str], list[str]] = {}
     for key, reason in untestable.items():
-        # Reasons that differ from joint to joint are one reason.
-        alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different joint angles", reason)
-        found.setdefault((effect_of(key), alike.replace("no approach", "no direction of approach")), []).append(key)
+        found.setdefault((effect_of(key), reason.replace("no approach", "no direction of approach")), []).append(key)
     rows = []
     for (effect, reason), keys in found.items():
         where = say.place_words(keys)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.diagnosis.averaging import squares_explained
-from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
-from elastocal.loop.fit_columns import parameter_columns
+from elastocal.loop.diagnosis_tables import diagnosis_facts, parameter_columns, step_fit
 from elastocal_proof.league.methods import DIAGNOSIS, fitted_physics
 
 if TYPE_CHECKING:
