@@ -4,8 +4,7 @@ import numpy as np
 from drawn_figures import empty_pictures
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.plan import choose_plan
-from elastocal.application.planning.sheet import sheet
+from elastocal.application.planning.plan import choose_plan, sheet
 from elastocal.report.plan_pages import plan_facts, write_plan_sheet
 
 

@@ -6,12 +6,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from elastocal.application.certificate.error_budget import effect_costs
-from elastocal.application.scope import calibrate_on_case, campaign_accuracy, campaign_poses, judge_by_held_out, set_form
+from elastocal.application.accuracy import calibrate_on_case, campaign_accuracy, campaign_poses, judge_by_held_out, set_form
+from elastocal.application.certificate import effect_costs
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
+from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
 from elastocal.loop.loading import load_campaign
@@ -59,13 +60,14 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
 
     ``accuracy`` is predicted, ``cost_m`` of an effect is the RMS error over the campaign's poses and loads if it alone were
     left out of the correction. Both are None where the data are at fault, the cost also of an effect that is not in the final
-    model or moves no robot.
+    model or moves no robot. ``misplaced``: what was declared wrongly, see there.
     """
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
-    accuracy, costs = None, dict[str, float]()
+    accuracy, costs, wrong = None, dict[str, float](), list[dict[str, Any]]()
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out)
-        accuracy = campaign_accuracy(found, case.observations.states).document()
-        costs = effect_costs(found, *campaign_poses(found, case.observations.states))
+        accuracy = campaign_accuracy(found).document()
+        costs = effect_costs(found, *campaign_poses(found))
+        wrong = misplaced(diagnosis.final, case.campaign)
     effects = [effect | {"cost_m": costs.get(effect["name"])} for effect in verdict.document["effects"]]
-    return replace(verdict, document=verdict.document | {"accuracy": accuracy, "effects": effects})
+    return replace(verdict, document=verdict.document | {"accuracy": accuracy, "effects": effects, "misplaced": wrong})

@@ -6,12 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from elastocal.application.accuracy import MEASURED, PREDICTED, accuracy_from, accuracy_sentence, millimetres
-from elastocal.application.certificate.repeatability import ISO_CYCLES, ISO_POSES
+from elastocal.application.certificate import ISO_CYCLES, ISO_POSES
 from elastocal.counting import counted
-from elastocal.diagnosis.words import candidate_words, listed, parameter_words, physical_name
-from elastocal.effects.protocol import effect_of
+from elastocal.diagnosis.words import listed, physical_name
 from elastocal.report.first_page import TITLES, whose_errors
-from elastocal.report.wording import MICRO, capital, length, minus, percent, plain, scaled, span_words
+from elastocal.report.wording import MICRO, capital, length, minus, percent, plain, span_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -95,7 +94,8 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "budget": [[share_name(line["name"]), _share(line), _limits(line)] for line in document["budget"]],
         "budget_states": counted(document["budget_states"], "state"),
         "workspace": workspace_rows(document["workspace"]),
-        "comparison": None if document["comparison"] is None else comparison_facts(document["comparison"]),
+        "point": document["point"],
+        "misplaced": [each["sentence"] for each in document["misplaced"]],
         "files": [
             ["code of the diagnosis", document["origin"]["code_sha256"]],
             ["data of the diagnosis", document["origin"]["data_sha256"]],
@@ -191,13 +191,7 @@ def what_to_do(document: Mapping[str, Any]) -> str:
     }[decision]
     if last["rms_m"] >= first["rms_m"]:
         advice = "Do not correct the robot by this campaign: on validation poses it would be no better."
-    change = document["comparison"]
-    if change is None:
-        return advice
-    moved = f"No change since {change['campaign']} can be shown: its corrections may stay in use."
-    if change["p_value"] < _LEVEL:
-        moved = f"The robot moves differently than in {change['campaign']}: use the corrections of this campaign from now on."
-    return f"{advice} {moved}"
+    return advice
 
 
 def iso_rows(found: Mapping[str, Any], measured: Mapping[str, Any] | None) -> list[list[str]]:
@@ -250,35 +244,6 @@ def workspace_rows(maps: list[Mapping[str, Any]]) -> list[list[str]]:
         ]
         for each in maps
     ]
-
-
-def comparison_facts(found: Mapping[str, Any]) -> dict[str, Any]:
-    """Sentence and rows of the comparison with another campaign."""
-    apart, largest, expected = (length(found[name]) for name in ("rms_m", "largest_m", "expected_m"))
-    sentence = (
-        f"Over the workspace the robots of both campaigns lie {apart} RMS apart ({largest} at most), rigid motions of the base "
-        f"aside; {expected} would be expected if nothing had changed (p = {plain(found['p_value'], 2)}). "
-    ) + ("The robot has changed." if found["p_value"] < _LEVEL else "No change can be shown.")
-    if found["changes"]:
-        sentence += " What differs, parameter by parameter, most certain first (p adjusted for all by Holm):"
-    else:
-        sentence += " The campaigns identify different parameters, which are therefore not compared one by one."
-    return {
-        "campaign": found["campaign"],
-        "sentence": sentence,
-        "rows": [_change(change) for change in found["changes"][:_SHOWN_CHANGES]],
-        "more": max(len(found["changes"]) - _SHOWN_CHANGES, 0),
-    }
-
-
-def _change(change: Mapping[str, Any]) -> list[str]:
-    """A parameter: where and what it is, before, after, the difference with its standard error, p."""
-    unit = change["unit"]
-    where = share_name(change["owner"]) if change["owner"] in _SHARES else candidate_words(change["owner"])
-    known = (change["before"], None), (change["after"], None), (change["after"] - change["before"], change["std_error"])
-    numbers = [" ".join(scaled(value, error, unit)) for value, error in known]
-    what = parameter_words(effect_of(change["owner"]), change["name"])
-    return [f"{capital(where)}: {what}", *numbers, plain(change["p_value"], 2)]
 
 
 def _with_interval(step: Mapping[str, Any], metric: str) -> str:

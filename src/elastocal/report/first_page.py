@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import BASE
+from elastocal.application.frames import BASE
 from elastocal.counting import counted
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
@@ -161,6 +161,10 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
             *(as_sentence(fault["detail"]) for fault in faults),
             "No mechanism was looked for, and the residuals below are those of the data as they are.",
         ]
+    return [*(f"{capital(each['sentence'])}." for each in verdict["misplaced"]), *_of_mechanisms(verdict, kind, found)]
+
+
+def _of_mechanisms(verdict: Mapping[str, Any], kind: str, found: Sequence[Mapping[str, Any]]) -> list[str]:
     tested = counted(verdict["candidates_tested"], "candidate cause")
     if kind == "not_testable":
         return [

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.planning.plan import Plan
     from elastocal.application.planning.survey import Survey
+    from elastocal.campaigns.campaign import Target
 
 _UNITS = {"deg": "°", "mm": "mm"}
 
@@ -50,7 +51,7 @@ def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[s
             if (part["load"] == load).any()
         ]
         poses.append({"cells": cells, "visits": visits})
-    targets = ", ".join(target.name for target in survey.targets)
+    targets = "; ".join(_where(target) for target in survey.targets)
     many = f"In each of them measure the targets {targets}." if len(survey.targets) > 1 else f"The target is {targets}."
     fitted = len(plan.fitted.joint_angles)
     return {
@@ -69,6 +70,12 @@ def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[s
         "arrow": "The arrow is the direction of the load +F." if survey.loaded else "",
         "worth": " ".join(worth),
     }
+
+
+def _where(target: Target) -> str:
+    """A target with its measuring point and offset: the reflector has to sit there, or the robot is corrected elsewhere."""
+    at = target.offset_m and ", ".join(f"{1e3 * value:.2f}" for value in target.offset_m)
+    return f"{target.name} on {target.point}, " + (f"at ({at}) mm of it" if at else "at an offset that is fitted")
 
 
 def _load_name(share: float) -> str:

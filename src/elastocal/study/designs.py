@@ -9,9 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.application.planning.bound import best_value
-from elastocal.application.planning.criteria import CRITERIA, Criterion, criterion, mean_squares
-from elastocal.application.planning.exchange import choose_greedily, exchange_candidates, matrix_of
+from elastocal.application.planning.designs import (
+    CRITERIA,
+    Criterion,
+    best_value,
+    choose_greedily,
+    criterion,
+    exchange_candidates,
+    matrix_of,
+    mean_squares,
+)
 
 RANDOM, CONTINUOUS = "random", "bound"
 # Random designs of each size.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.planning.criteria import mean_squares
+from elastocal.application.planning.designs import mean_squares
 from elastocal.mechanics.kinematics import poses
 from elastocal.study.geometry import geometry_columns, qualities
 from elastocal.study.weighting import expected_errors, pose_deviation, range_noise

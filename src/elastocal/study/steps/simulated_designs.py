@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.planning.criteria import CRITERIA, Criterion, criterion
-from elastocal.application.planning.exchange import choose_greedily, exchange_candidates
+from elastocal.application.planning.designs import CRITERIA, Criterion, choose_greedily, criterion, exchange_candidates
 from elastocal.random_streams import stream
 from elastocal.study.designs import RANDOM
 from elastocal.study.metrics import make_judge, mean_form, mean_square_errors
