@@ -3,11 +3,10 @@
 import json
 
 import pytest
-from made_certificates import made_comparison, made_document
+from made_certificates import made_document
 
 from elastocal.report.certificate_words import (
     certificate_facts,
-    comparison_facts,
     decision_sentences,
     iso_rows,
     iso_warning,
@@ -64,17 +63,8 @@ def test_fewer_approaches_than_the_standard_asks_for_are_no_test_after_it(approa
     assert enough or f"{approaches} approaches to {poses} poses are fewer" in warning
 
 
-def test_changes_are_named_by_their_joint_and_counted():
-    found = comparison_facts(made_comparison())
-    assert "p = 0.0010" in found["sentence"] and found["sentence"].count("The robot has changed.") == 1
-    assert found["rows"][0][0] == "Joint compliance under loads and weights: offset" and "joint 2" in found["rows"][2][0]
-    assert found["rows"][0][3] == "200 ± 50 µrad"
-    assert (len(found["rows"]), found["more"]) == (12, 2)
-    assert "not compared one by one" in comparison_facts(made_comparison(0.5, 0))["sentence"]
-
-
 def test_facts_are_json_and_every_line_of_the_budget_has_a_name():
-    json.dumps(certificate_facts(made_document(comparison=made_comparison())), allow_nan=False)
+    json.dumps(certificate_facts(made_document(measured=True)), allow_nan=False)
     assert share_name("link_weight") == "gravity sag" and share_name("repeatability") == "repeatability"
     assert certificate_facts(made_document())["budget"][-1][1] == "hidden by the tracker's noise"
 

@@ -27,8 +27,10 @@ _MOST_SIZES = 3.0
 _LEAST_GAIN, _MOST_AXES = 5.5, 6
 # Places that say it as well as the best, in the same unit.
 _AS_WELL = 3.0
-# What is declared wrongly is wrong by so much, m: millimetres, a mistaken digit, another variant.
+# What is declared wrongly is wrong by so much at least, m: millimetres, a mistaken digit; another variant by what was fitted.
 _WRONG_M = 0.03
+# From this share of its length on a shift is along one axis.
+_ALONG = 0.95
 TOOL, BASE = "tool", "base"
 _BASE, _LINK, _OFFSET = "base_placement", "link_geometry", "joint_offset"
 
@@ -51,6 +53,7 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
     ]
     if not shifts or (np.abs(values) < usual)[shifts].all():
         return []
+    wrong_m = max(_WRONG_M, float(np.abs(values[shifts]).max()))
     # What the measurements say, without the prior of the fit.
     precision = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
     told = precision @ values
@@ -61,7 +64,7 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
         found = []
         for size in SIZES:
             prior = size * usual
-            prior[wrong] = _WRONG_M
+            prior[wrong] = wrong_m
             whole = precision + np.diag(np.where(geometry, prior**-2.0, 0.0))
             best = np.linalg.solve(whole, told)
             found.append((0.5 * (told @ best - np.linalg.slogdet(whole)[1]) - np.log(prior[geometry]).sum(), best))
@@ -75,16 +78,21 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
     taken: list[int] = []
     others: dict[str, set[str]] = {}
     last, at = explained(taken)
-    while len(taken) < min(_MOST_AXES, len(shifts)):
-        tried = {n: explained([*taken, n]) for n in shifts if n not in taken}
+    # Along one axis of a place, or along all of them.
+    ways = [(n,) for n in shifts] + [
+        tuple(n for n in shifts if place_of(n) == place) for place in {place_of(n) for n in shifts}
+    ]
+    while len(taken) < _MOST_AXES and (left := [way for way in ways if not set(way) & set(taken)]):
+        tried = {way: explained([*taken, *way]) for way in left}
         most = max(gain for gain, _ in tried.values())
         if most - last < _LEAST_GAIN:
             break
         # Of places that say it as well: targets and tools are misplaced before bases, and these before links.
-        alike = sorted((n for n in tried if tried[n][0] > most - _AS_WELL), key=lambda n: (_rank(place_of(n)), -tried[n][0]))
-        last, at = tried[alike[0]]
-        taken.append(alike[0])
-        others.setdefault(place_of(alike[0]), set()).update(place_of(n) for n in alike)
+        alike = [way for way in tried if tried[way][0] > most - _AS_WELL]
+        best = min(alike, key=lambda way: (_rank(place_of(way[0])), len(way), -tried[way][0]))
+        last, at = tried[best]
+        taken += best
+        others.setdefault(place_of(best[0]), set()).update(place_of(way[0]) for way in alike)
     found = []
     for place, alternatives in others.items():
         mine = [n for n in taken if place_of(n) == place]
@@ -126,8 +134,9 @@ def _millimetres(at: Sequence[float] | np.ndarray) -> str:
 
 def _sentence(facts: dict[str, Any], campaign: Campaign) -> str:
     shift, place, end = np.array(facts["shift_m"]), facts["place"], campaign.robot.chain.end_effector.name
-    along = f"along {'xyz'[np.argmax(np.abs(shift))]}" if (shift != 0.0).sum() == 1 else f"by {_millimetres(shift)}"
-    length = f"{1e3 * np.linalg.norm(shift):.1f} mm"
+    largest, whole = np.abs(shift).max(), np.linalg.norm(shift)
+    along = f"along {'xyz'[np.argmax(np.abs(shift))]}" if largest > _ALONG * whole else f"by {_millimetres(shift)}"
+    length = f"{1e3 * whole:.1f} mm"
     if place == TOOL:
         text = f"reflector or tool sits {length} from where it is declared, {along} of {end}: the flange is not certified, the "
         text += "reflector is"

@@ -63,7 +63,8 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     model or moves no robot. ``misplaced``: what was declared wrongly, see there.
     """
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
-    accuracy, costs, wrong = None, dict[str, float](), list[dict[str, Any]]()
+    accuracy, costs = None, dict[str, float]()
+    wrong: list[dict[str, Any]] = []
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out)
         accuracy = campaign_accuracy(found).document()
