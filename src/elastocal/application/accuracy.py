@@ -122,9 +122,8 @@ class Prediction:
 
     def accuracy(self, region: str) -> Accuracy:
         """The statement over these poses, named in words."""
-        scope = self.scope
+        names = ("frame", "offset_removed", "left_out", "left_out_m", "form_m", "contradicted")
         return Accuracy(
-            frame=scope.frame,
             kind=PREDICTED,
             rms_m=_rms(self.error_m),
             worst_m=_rms(self.worst_m),
@@ -133,13 +132,9 @@ class Prediction:
             noise="the tracker's noise is not in it",
             poses=len(self.error_m),
             region=region,
-            offset_removed=scope.offset_removed,
-            left_out=scope.left_out,
-            left_out_m=scope.left_out_m,
-            form_m=scope.form_m,
-            contradicted=scope.contradicted,
             repeated_m=_rms(self.repeated_m),
             fitted=bool(self.parameters_m.any()),
+            **{name: getattr(self.scope, name) for name in names},
         )
 
 

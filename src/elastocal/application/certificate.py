@@ -119,10 +119,9 @@ def _pool(distance: np.ndarray, pose: np.ndarray) -> tuple[float, tuple[float, f
 class WorkspaceErrors:
     """Errors at poses drawn over the workspace.
 
-    `joint_angles` (N, n): as the controller reports them, rad. `position` (N, 3): m, base axes. `uncorrected_m` (N,): distance
-    of the robot from where its file has it, less what the placement of its base takes up. `corrected_m` (N,): RMS error that is
-    predicted of the corrected robot. `bound_m` (N,): below which that one misses 95 % of the time, all told. `outside` (N,) of
-    bool: beyond the range of the fitted poses.
+    `joint_angles` (N, n): as the controller reports them, rad. `position` (N, 3): m, base axes. `uncorrected_m` (N,): as
+    `accuracy.before_m`. `corrected_m`, `bound_m` (N,): of the corrected robot, as `accuracy.Prediction`. `outside` (N,): beyond
+    the range of the fitted poses.
     """
 
     joint_angles: np.ndarray

@@ -105,7 +105,7 @@ def _find_other_postures(robot: Robot, stated: np.ndarray, found: np.ndarray) ->
     far = np.abs(found - stated) > np.where(robot.chain.prismatic, reach_m(robot), 1.0) * _NEAR_RAD
     if robot.joints != 6:
         return np.asarray(far.any(axis=1))
-    scale = np.array([1.0, 1.0, 1.0, *[reach_m(robot)] * 3])[:, None] / reach_m(robot)
+    scale = np.repeat([1.0 / reach_m(robot), 1.0], 3)[:, None]
     sides = [np.linalg.det(jacobians(robot.chain, each, robot.chain.end_effector) * scale) for each in (stated, found)]
     sides = [np.where(np.abs(side) < _SINGULAR_DETERMINANT, 0.0, np.sign(side)) for side in sides]
     return np.asarray(far.any(axis=1) | (sides[0] * sides[1] < 0))

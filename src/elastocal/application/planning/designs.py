@@ -14,8 +14,7 @@ equivalence theorem [3] as a bound that holds for any w. The weights come from t
 [1] Chaloner, K. and Verdinelli, I., Bayesian experimental design: a review, Statistical Science 10, 1995.
 [2] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
 [3] Kiefer, J. and Wolfowitz, J., The equivalence of two extremum problems, Canadian Journal of Mathematics 12, 1960.
-[4] Silvey, S. D., Titterington, D. M. and Torsney, B., An algorithm for optimal designs on a finite design space,
-    Communications in Statistics - Theory and Methods 7, 1978.
+[4] Silvey, S. D. et al., An algorithm for optimal designs on a finite design space, Comm. in Statistics 7, 1978.
 """
 
 from __future__ import annotations

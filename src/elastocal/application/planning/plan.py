@@ -52,10 +52,7 @@ REPEATED_POSES, REPEATS = 10, 4
 
 @dataclass(frozen=True)
 class Loads:
-    """With what the robot is loaded.
-
-    `force_N`: 0 for none. `pulled`: by a pull in any direction; otherwise by a weight that hangs down.
-    """
+    """With what the robot is loaded, 0 for nothing: `pulled` in any direction, or by a weight that hangs down."""
 
     force_N: float
     pulled: bool
@@ -77,10 +74,7 @@ class Loads:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Configurations among which a plan is made.
-
-    `joint_angles` (N, n): as the controller reports them, rad. `force` (N, 3): N, base axes.
-    """
+    """Configurations (N, n) as the controller reports them, rad, each with a force (N, 3), N, base axes."""
 
     joint_angles: np.ndarray
     force: np.ndarray
@@ -92,13 +86,11 @@ class Candidates:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to measure.
+    """What to measure: configurations that choose the parameters, in the order of a short tour; random ones that judge them.
 
-    `fitted`, `held_out`: configurations that choose the parameters, in the order of a short tour; those that judge them, which
-    are random. `efficiency`: share of the best possible design's worth that the fitted ones are sure to have, by the criterion.
-    `accuracy_m` (poses,): root mean square error of the end effector over the workspace that the parameters' uncertainty
-    leaves, as `accuracy` counts it, with the first 1, 2, .. of them, best first. `random_m` (designs, poses): the same with
-    random configurations.
+    `efficiency`: as in `designs.efficiency`. `accuracy_m` (poses,): RMS error of the end effector over the workspace that the
+    parameters' uncertainty leaves, as `accuracy` counts it, with the first 1, 2, .. of the fitted ones, best first. `random_m`
+    (designs, poses): the same with random configurations.
     """
 
     fitted: Candidates

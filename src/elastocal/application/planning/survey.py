@@ -4,8 +4,8 @@ The model is the one that a campaign declares: offsets of the joints, lengths an
 loads are measured, the errors of declared masses, and where tracker and reflectors are, if unknown. Sensitivities are those of
 the fit itself, at the robot file's values.
 
-Standard deviations of a sensor's readings are half of what its maker permits as the largest error, which a tracker's manual
-calls typical [1]; the angles of its probe are from [2], those of cameras from [3].
+Standard deviations of a sensor are half of what its maker permits as the largest error, which a tracker's manual calls typical
+[1]; the angles of its probe are from [2], those of cameras from [3].
 
 [1] Hexagon, Leica Absolute Tracker AT500 User Manual, section 2.8: transverse error at most 15 um + 6 um/m, typical results
     half of that.
@@ -47,7 +47,7 @@ _TRACKER_M, _CAMERA_M, _MARKERS_M = 30e-6, 0.12e-3, 0.2
 
 @dataclass(frozen=True)
 class Sensor:
-    """Standard deviations of one component of a reading; no orientation where it reads positions only.
+    """Standard deviations of one component of a measurement; no orientation where positions are measured only.
 
     `words`: which instrument it stands for. `measured`: what it reads, "position" or "pose", the usual first.
     """
