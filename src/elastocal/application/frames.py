@@ -30,9 +30,9 @@ class Scope:
     `frame`: "robot" or "base". `origin` (3,): about which the placement turns, m. `absorbed` (12, P): motion of the base (m,
     rad), constant offset and turn of the end effector that take up each parameter. `absorbed_before` (12,): the same of the
     nominal robot less the calibrated one. `left_out`: effects of the fit that no command contains, with what they contribute at
-    the campaign's poses, RMS and at the worst. `unstated`: the same of what goes with "time", "temperature", "approach", where a
-    command does not state it. `form_m`: what the form of the model leaves open there, RMS. `contradicted`: whether held-out poses
-    showed that to be more than other models say. `repeated_freedom`: degrees of freedom of the square of the joints'
+    the campaign's poses, RMS and at the worst. `unstated`: the same of what goes with "time", "temperature" or "approach" where
+    a command does not state it. `form_m`: what the form of the model leaves open there, RMS. `contradicted`: whether held-out
+    poses showed that to be more than other models say. `repeated_freedom`: degrees of freedom of the square of the joints'
     repeatability; 0 where it is taken as known.
     """
 

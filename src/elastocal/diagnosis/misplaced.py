@@ -56,7 +56,7 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
     wrong_m = max(_WRONG_M, float(np.abs(values[shifts]).max()))
     # What the measurements say, without the prior of the fit.
     precision = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
-    told = precision @ values
+    weighted = precision @ values
     precision[np.diag_indices(len(free))] -= np.where(geometry, fitted.prior_std[free] ** -2.0, 0.0)
 
     def explained(wrong: list[int]) -> tuple[float, np.ndarray]:
@@ -66,8 +66,8 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
             prior = size * usual
             prior[wrong] = wrong_m
             whole = precision + np.diag(np.where(geometry, prior**-2.0, 0.0))
-            best = np.linalg.solve(whole, told)
-            found.append((0.5 * (told @ best - np.linalg.slogdet(whole)[1]) - np.log(prior[geometry]).sum(), best))
+            best = np.linalg.solve(whole, weighted)
+            found.append((0.5 * (weighted @ best - np.linalg.slogdet(whole)[1]) - np.log(prior[geometry]).sum(), best))
         return max(found, key=lambda each: each[0])
 
     def place_of(number: int) -> str:
