@@ -41,7 +41,7 @@ def test_pages_and_document_are_written_beside_the_report(issued):
     # The answer in three lines: the decision, over which poses and of which point, what is missing.
     lines = result.output.splitlines()
     assert document["conformity"]["decision"] in lines[0] and "0.500 mm" in lines[0]
-    assert document["point"] in lines[1] and "nobody has measured" in lines[2] and lines[3].endswith(".pdf")
+    assert document["point"] in lines[1] and "Nobody has measured" in lines[2] and lines[3].endswith(".pdf")
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_a_robot_that_was_measured_at_corrected_targets_is_called_so_and_a_fail_
 
 def test_a_prediction_that_fails_exits_with_1(run, checkout, tmp_path):
     result = run(checkout / "made", "--tolerance", "1um", "--output", tmp_path / "out")
-    assert result.exit_code == 1 and result.output.startswith("! fail") and "nobody has measured" in result.output
+    assert result.exit_code == 1 and result.output.startswith("! fail") and "Nobody has measured" in result.output
 
 
 @pytest.mark.slow

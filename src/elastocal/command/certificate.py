@@ -104,14 +104,14 @@ def _lines(document: Mapping[str, Any], headline: Mapping[str, str]) -> list[str
     answer = (
         f"{found['decision']}, as {accuracy.kind}: the RMS position error of the corrected robot is {headline['rms']}, "
         f"{headline['sure']} sure to be below {headline['limit']}, the tolerance {headline['tolerance']}"
-        if accuracy.fitted
+        if accuracy.fitted or accuracy.form_m
         else f"{found['decision']}: no error is predicted of a robot of which nothing was fitted"
     )
-    poses = f"{FRAMES[accuracy.frame]}, over {accuracy.region} ({accuracy.poses})"
-    where = f"{poses}, {millimetres(accuracy.worst_m)} at the worst of them; {document['point']}"
-    rest = [f"too little for a pass: {'; '.join(found['shortfalls'])}"] if found["shortfalls"] else []
+    poses = f"In {FRAMES[accuracy.frame].removeprefix('in ')}, over {accuracy.region} ({accuracy.poses})"
+    where = f"{poses}, {millimetres(accuracy.worst_m)} at the worst of them. {document['point']}"
+    rest = [f"Too little for a pass: {'; '.join(found['shortfalls'])}."] if found["shortfalls"] else []
     if found["poses_needed"] is not None:
-        rest.append(f"about {counted(found['poses_needed'], 'measured pose')} would decide")
+        rest.append(f"About {counted(found['poses_needed'], 'measured pose')} would decide.")
     if accuracy.kind == "predicted":
-        rest.append("nobody has measured the corrected robot: command corrected targets, measure, and give --measured")
-    return [answer, where, *(["; ".join(rest)] if rest else []), *(f"! {each['sentence']}" for each in document["misplaced"])]
+        rest.append("Nobody has measured the corrected robot: command corrected targets, measure, and give --measured.")
+    return [answer, where, *([" ".join(rest)] if rest else []), *(f"! {each['sentence']}" for each in document["misplaced"])]

@@ -114,10 +114,10 @@ def point_sentence(campaign: Campaign) -> str:
             f"All errors are those of {end}, on which no target was measured ({names}): what lies between is the robot file's."
         )
     each = [
-        f"{target.name}, {'its offset fitted' if target.offset_m is None else f'at {_millimetres(target.offset_m)} of it'}"
+        target.name + (", whose offset was fitted" if target.offset_m is None else f" at {_millimetres(target.offset_m)} of it")
         for target in targets
     ]
-    return f"All errors are those of {end} as the target on it shows it: {'; '.join(each)}."
+    return f"All errors are those of {end}, measured by the target {'; '.join(each)}."
 
 
 def _at_end(campaign: Campaign) -> list[Target]:
