@@ -181,6 +181,10 @@ def test_what_goes_with_a_condition_counts_as_error_where_a_command_does_not_sta
     assert not stated.accuracy("").left_out and "not given" in unstated.accuracy("").left_out[0]
     assert unstated.accuracy("").left_out_m == pytest.approx(np.linalg.norm([rms for _, rms, _ in scope.unstated]))
     assert unstated.accuracy("").rms_m > stated.accuracy("").rms_m
+    missing = unstated.accuracy("").left_out_m ** 2
+    for name in ("rms_m", "bound_m", "error_m"):
+        added = np.mean(getattr(unstated, name) ** 2 - getattr(stated, name) ** 2)
+        assert added == pytest.approx(missing, rel=0.1)
 
 
 def test_an_unknown_offset_of_the_target_at_the_end_effector_is_no_error(fanuc):

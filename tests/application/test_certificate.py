@@ -116,6 +116,17 @@ def test_a_parameter_known_to_a_tenth_has_a_line_known_to_a_tenth():
     assert line.high_m / line.rms_m == pytest.approx(1 + 0.196, abs=0.01)
 
 
+def test_a_shape_that_is_known_widens_no_line(fanuc):
+    """It does not contribute in proportion: the interval is that of the linear parameter, known to a tenth."""
+    calibrated = made_calibrated(fanuc, "lost_motion@2", identified=False)
+    value = calibrated.estimate.coefficients[-1][0]
+    covariance = np.zeros_like(calibrated.covariance)
+    covariance[-2, -2] = (0.1 * value) ** 2
+    line = budget(replace(calibrated, covariance=covariance), 20_000)["lost_motion"]
+    assert line.low_m / line.rms_m == pytest.approx(1 - 0.196, abs=0.01)
+    assert line.high_m / line.rms_m == pytest.approx(1 + 0.196, abs=0.01)
+
+
 def test_bounds_over_the_workspace_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc):
     """100 robots at 100 poses; robots err at many poses alike, so that the share is known to some 2 %."""
     calibrated = made_calibrated(fanuc, *USUAL)
