@@ -30,7 +30,8 @@ INTERFACE = {
     },
     "Use a calibrated robot": {
         "elastocal.application.forward_model": ("ForwardModel", "read_calibrated"),
-        "elastocal.application.calibrated": ("calibrate_by_fit", "forward", "prediction_covariance"),
+        "elastocal.application.calibrated": ("calibrate_by_fit", "forward", "pose_sensitivities"),
+        "elastocal.application.accuracy": ("predict_errors",),
         "elastocal.application.compensation": ("find_joint_targets",),
     },
     "Judge predictions": {"elastocal.validation.held_out": ("position_errors", "intervals")},

@@ -15,7 +15,7 @@ from elastocal.application.calibrated import (
     calibrate_by_fit,
     calibrate_by_model,
     forward,
-    prediction_covariance,
+    pose_sensitivities,
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
@@ -93,7 +93,8 @@ def test_covariance_is_that_of_poses_over_drawn_parameters(fanuc):
         position, rotation = forward(moved, states.joint_angles, operating)
         turn = Rotation.from_matrix(rotation @ turned.transpose(0, 2, 1)).as_rotvec()
         drawn.append(np.concatenate([position - middle, turn], axis=1))
-    expected = prediction_covariance(found, states.joint_angles, operating)
+    sensitivities = pose_sensitivities(found, states.joint_angles, operating)
+    expected = sensitivities @ found.covariance @ sensitivities.transpose(0, 2, 1)
     for number in range(2):
         sample = np.cov(np.array(drawn)[:, number].T)
         deviation = np.sqrt(np.diag(expected[number]))

@@ -9,13 +9,7 @@ from made_calibrated import USUAL, made_calibrated
 from made_targets import numbers
 
 from elastocal.application.accuracy import predict_errors
-from elastocal.application.calibrated import (
-    NEUTRAL,
-    OperatingConditions,
-    coordinates_at_rest,
-    end_effector,
-    nominal_forward,
-)
+from elastocal.application.calibrated import NEUTRAL, OperatingConditions, come_to_rest, nominal_forward
 from elastocal.application.compensation import (
     OK,
     OTHER_POSTURE,
@@ -51,10 +45,10 @@ def draw_states(calibrated, count, force=100.0):
 
 def settle(robot, angles, operating):
     """As `forward`, with the loads found again until the arm has come to rest."""
-    coordinates = coordinates_at_rest(robot, angles, operating)
-    for _ in range(5):
-        coordinates = coordinates_at_rest(robot, angles, operating, coordinates)
-    return end_effector(robot, coordinates)
+    found = come_to_rest(robot, angles, operating)
+    for _ in range(6):
+        found = come_to_rest(robot, angles, operating, found[0])
+    return found[1:]
 
 
 @pytest.mark.parametrize("name", ["gp180", "ur10", "fanuc_static", "iiwa14"])

@@ -1,4 +1,4 @@
-"""The calibrated robot as a document and as a class: the same robot, to the bit."""
+"""The calibrated robot as files: the same robot to the bit, what a robot file can say, and what it leaves out."""
 
 import json
 from dataclasses import replace
@@ -6,49 +6,73 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from made_calibrated import made_calibrated
+from made_calibrated import made_calibrated, plain_estimate, plain_model
 from scipy.spatial.transform import Rotation
 from support import refused
 
-from elastocal.application.accuracy import Accuracy
-from elastocal.application.calibrated import OperatingConditions, forward, prediction_covariance
-from elastocal.application.forward_model import KEY, SIDECAR, ForwardModel, model_document, read_calibrated
-from elastocal.application.sidecar import sidecar
+from elastocal.application.accuracy import predict_errors
+from elastocal.application.calibrated import (
+    NEUTRAL,
+    OperatingConditions,
+    calibrate_by_model,
+    forward,
+    pose_sensitivities,
+    without,
+)
+from elastocal.application.forward_model import (
+    KEY,
+    SIDECAR,
+    ForwardModel,
+    find_left_out_m,
+    fold_effects,
+    model_document,
+    read_calibrated,
+    sidecar,
+)
+from elastocal.effects.catalogue import candidates_on
+from elastocal.mechanics.robot_file import document_of, robot_from_document
+from elastocal.mechanics.sites import sites_of
 
 KEYS = ("joint_offset@2", "link_geometry@3", "lost_motion@2", "transmission_harmonic@1[orders 1-2]", "thermal_growth[time]")
+GEOMETRY = ("joint_offset@2", "joint_offset@4", "link_geometry@1", "link_geometry@2", "link_geometry@3", "link_geometry@4")
 
 
-def states(robot, count=20):
-    rng = np.random.default_rng(1)
-    wrench = 100 * rng.standard_normal((count, 6))
-    return rng.uniform(-1, 1, (count, robot.joints)), OperatingConditions(wrench, None, np.full(count, 3600.0))
+def draw_states(robot, count=20):
+    draws = np.random.default_rng(5)
+    low, high = robot.joint_limits.T
+    angles = low + (high - low) * draws.random((count, robot.joints))
+    wrench = draws.standard_normal((count, 6)) * 50.0
+    return robot.reported_angles(angles), OperatingConditions(wrench, None, np.full(count, 3600.0))
 
 
-ACCURACY = Accuracy("base", "predicted", 1e-5, 2e-5, 3e-5, 4e-5, "none", 1, "one pose")
-
-
-def through_json(calibrated):
-    return read_calibrated(json.loads(json.dumps(model_document(calibrated), allow_nan=False)), "effects.json")
+def read_file_model(robot):
+    """The calibrated robot that a robot file alone describes: its springs, its weight, no effect."""
+    model = plain_model(robot)
+    values = [robot.compliance if e.effect == "joint_compliance" else np.zeros(len(e.parameters)) for e in model.effects]
+    count = sum(len(value) for value in values)
+    noise = made_calibrated(robot).noise
+    return calibrate_by_model(robot, model, plain_estimate(model, values), np.zeros((count, count)), noise)
 
 
 @pytest.mark.parametrize("name", ["gp180", "fanuc", "iiwa14"])
-def test_a_robot_with_weights_and_effects_comes_back_as_it_was(name):
+def test_a_robot_with_weights_and_effects_comes_back_from_json_as_it_was(name):
     calibrated = made_calibrated(analysed(name), *KEYS)
     calibrated = replace(calibrated, model=replace(calibrated.model, time_zero_s=120.0))
-    back = through_json(calibrated)
-    angles, operating = states(calibrated.robot)
+    back = read_calibrated(json.loads(json.dumps(model_document(calibrated), allow_nan=False)), "effects.json")
+    angles, operating = draw_states(calibrated.robot)
     for one, other in zip(forward(calibrated, angles, operating), forward(back, angles, operating), strict=True):
         np.testing.assert_array_equal(other, one)
-    found, expected = (prediction_covariance(each, angles, operating) for each in (back, calibrated))
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(*(pose_sensitivities(each, angles, operating) for each in (back, calibrated)))
+    np.testing.assert_array_equal(back.covariance, calibrated.covariance)
     np.testing.assert_array_equal(back.noise.joint_rad, calibrated.noise.joint_rad)
 
 
 def test_a_folder_gives_poses_and_targets_that_reach_them(tmp_path):
     calibrated = made_calibrated(analysed("kuka"), "joint_offset@2", "lost_motion@3")
-    (tmp_path / SIDECAR).write_text(json.dumps(sidecar(calibrated, "cell", "2026-11-23", ACCURACY)))
-    model = ForwardModel.read(tmp_path)
     angles = analysed("kuka").joint_limits.mean(axis=1) + np.array([0.1, 0.2, 0.1, 0.3, 0.7, 0.0])
+    accuracy = predict_errors(calibrated, angles[None], NEUTRAL).accuracy("one pose")
+    (tmp_path / SIDECAR).write_text(json.dumps(sidecar(calibrated, "cell", "2026-11-23", accuracy)))
+    model = ForwardModel.read(tmp_path)
     position, rotation = model.pose([angles])
     targets = model.joint_targets(position, rotation, start=angles[None])
     assert targets.status.tolist() == ["ok"]
@@ -68,3 +92,52 @@ def test_effects_that_this_version_does_not_have_are_refused(tmp_path):
     (tmp_path / SIDECAR).write_text("{}")
     with refused((tmp_path / SIDECAR).as_posix(), KEY, "elastocal export"):
         ForwardModel.read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [
+        *((name, ()) for name in ("gp180", "iiwa14", "fanuc_static", "fanuc_cpa", "ur10", "abb")),
+        *(("fanuc_cpa", (f"transmission_ratio@{joint}",)) for joint in (1, 3)),
+    ],
+)
+def test_poses_of_a_robot_file_under_load_are_those_of_the_calibrated_robot(name, more):
+    robot = analysed(name)
+    known = candidates_on(sites_of(robot))
+    calibrated = made_calibrated(robot, *(key for key in (*GEOMETRY, "link_geometry@6", *more) if key in known), size=1.0)
+    found = fold_effects(calibrated)
+    assert found.left_out == ()
+    angles, operating = draw_states(robot)
+    through_file = robot_from_document(document_of(found.robot))
+    for mine, theirs in zip(
+        forward(read_file_model(through_file), angles, operating), forward(calibrated, angles, operating), strict=True
+    ):
+        np.testing.assert_allclose(mine, theirs, atol=1e-9)
+
+
+def test_what_a_robot_file_cannot_say_is_left_out_and_changes_nothing_else():
+    keys = ["lost_motion@2", "transmission_harmonic@1[orders 1-2]"]
+    calibrated = made_calibrated(analysed("gp180"), *GEOMETRY, *keys)
+    found = fold_effects(calibrated)
+    assert [calibrated.model.effects[number].key for number in found.left_out] == keys
+    angles, operating = draw_states(calibrated.robot)
+    bare = without(calibrated, set(found.left_out))
+    ends = [forward(each, angles, operating)[0] for each in (read_file_model(found.robot), bare, calibrated)]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
+    off = find_left_out_m(calibrated, angles, operating)
+    np.testing.assert_allclose(off, np.linalg.norm(ends[2] - ends[1], axis=1))
+    assert off.max() > 1e-6
+
+
+def test_effects_and_springs_stand_in_the_sidecar_with_values_and_standard_errors():
+    calibrated = made_calibrated(analysed("gp180"), "joint_offset@2", "lost_motion@2")
+    accuracy = predict_errors(calibrated, np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
+    document = json.loads(json.dumps(sidecar(calibrated, "cell7", "2026-11-23", accuracy)))
+    assert document["accuracy"]["rms_m"] == accuracy.rms_m and "Predicted" in document["accuracy"]["words"]
+    (effect,) = document["effects"]
+    assert effect["key"] == "lost_motion@2" and effect["joints"] == [2]
+    values = np.concatenate([calibrated.estimate.coefficients[-1], calibrated.estimate.shapes[-1]])
+    assert [parameter["value"] for parameter in effect["parameters"]] == values.tolist()
+    errors = np.sqrt(np.diag(calibrated.covariance))[-len(values) :]
+    np.testing.assert_allclose([parameter["std_error"] for parameter in effect["parameters"]], errors)
+    assert [p["value"] for p in document["joint_compliance"]] == calibrated.estimate.coefficients[0].tolist()

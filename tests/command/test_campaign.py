@@ -25,7 +25,7 @@ WANTED = {
     "export": ["--output", "out"],
 }
 # What ends each once it has read the results; an export is made.
-NOWHERE = {"certificate": ["--compare", "nowhere"], "correct": [], "export": []}
+NOWHERE = {"certificate": ["--use", "nowhere"], "correct": [], "export": []}
 
 
 def edited_pins(checkout):

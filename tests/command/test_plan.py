@@ -4,7 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from analysed_robots import ROBOTS
+from analysed_robots import ROBOTS, analysed
+
+from elastocal.application.calibrated import nominal_forward
 
 PLAN = ("plan", ROBOTS / "ur10.yaml", "--candidates", 300, "--poses", 18, "--held-out", 4)
 
@@ -24,6 +26,23 @@ def test_a_plan_is_a_table_a_picture_and_a_folder_to_fill_in(run, tmp_path):
     assert yaml.safe_load((tmp_path / "cell" / "campaign.yaml").read_text())["holdout"] == {"poses": [19, 20, 21, 22]}
     table = pd.read_csv(tmp_path / "cell" / "plan.csv")
     assert (table["expected_accuracy_m"] > 0).all() and set(table["load"]) == {0, 1, 2}
+    assert heights(table).min() > 0.0
+
+
+def heights(table):
+    """Of the end effector over the base plane at each row of a plan, m."""
+    robot = analysed("ur10")
+    return nominal_forward(robot, table[[f"q{joint}" for joint in range(1, 7)]].to_numpy())[0][:, 2]
+
+
+def test_without_a_floor_poses_may_lie_below_the_base_and_with_one_where_it_is(run, tmp_path):
+    """A third of all configurations of this arm has its tip below."""
+    lowest = []
+    for number, words in enumerate((["--no-floor"], ["--floor", "0.3"])):
+        result = run("--output", tmp_path / f"{number}.csv", *words)
+        assert result.exit_code == 0, result.output
+        lowest.append(heights(pd.read_csv(tmp_path / f"{number}.csv")).min())
+    assert lowest[0] < -0.1 and lowest[1] > 0.3
 
 
 @pytest.mark.slow
@@ -59,6 +78,7 @@ def test_as_few_poses_as_reach_a_wanted_accuracy(run, tmp_path):
         (["--measured", "pose", "--orientation-noise", "0.01"], "with its unit"),
         (["--accuracy", "1um"], "--accuracy"),
         (["--box=-9,9,-9,9,-9,9"], "boxes"),
+        (["--floor", "9"], "--no-floor"),
     ],
 )
 def test_a_wrong_option_is_refused_by_its_name_and_nothing_is_written(refusal, tmp_path, words, message):

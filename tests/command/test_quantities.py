@@ -58,6 +58,6 @@ def test_every_option_that_is_a_number_has_a_range(value):
         assert result.exit_code == 2 and f"'{option}'" in result.output.splitlines()[-1], (words, result.output)
         found.add(option)
     assert found == {
-        *("--mass-std", "--force", "--risk", "--seed", "--poses", "--held-out", "--candidates", "--table", "--header"),
-        "--cores",
+        *("--mass-std", "--force", "--risk", "--seed", "--poses", "--held-out", "--candidates", "--header"),
+        *("--cores", "--floor", "--column"),
     }

@@ -9,7 +9,7 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm
 from matplotlib.contour import ContourSet
 
-from elastocal.application.certificate.workspace import WorkspaceErrors
+from elastocal.application.certificate import WorkspaceErrors
 from elastocal.figures.certificate import budget_bars, workspace_map
 
 

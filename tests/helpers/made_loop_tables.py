@@ -235,6 +235,7 @@ def verdict_document(
         },
         "misfit": None if faulty else {"before": 5.2, "after": 1.02},
         "remainder": remainder,
+        "misplaced": [],
         "contradictions": [],
         "kept": "effect" if adopted else "declared",
         "heldout": {

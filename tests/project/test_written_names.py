@@ -46,7 +46,7 @@ COMMANDS = {
     "plan": ((*PLAN, "--output", "out/plan.csv"), "out"),
     "plan of a campaign": ((*PLAN, "--folder", "out/cell"), "out"),
     "correct": (("correct", "made", "path.csv", "--output", "out/targets.csv"), "out"),
-    "export": (("export", "made", "--output", "out", "--table", "64"), "out"),
+    "export": (("export", "made", "--output", "out"), "out"),
     "certificate": ((*CERTIFICATE, "--output", "out"), "out"),
     "certificate of the campaign": (CERTIFICATE, "reports/loop/made"),
     "simulate_measurements.py": (("simulate_measurements.py", "simulated", "simulated/robot.yaml"), "simulated"),

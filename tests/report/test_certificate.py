@@ -1,10 +1,10 @@
-"""What a certificate states, and that it is typeset with and without a comparison."""
+"""What a certificate states, and that it is typeset."""
 
 import json
 
 import pytest
 from drawn_figures import empty_pictures
-from made_certificates import made_comparison, made_document
+from made_certificates import made_document
 
 from elastocal.report.certificate import certificate_facts, share_name, write_certificate
 
@@ -56,29 +56,16 @@ def test_fewer_approaches_than_the_standard_asks_for_are_no_test_after_it(approa
     assert warning == "" if enough else f"{approaches} approaches to {poses} poses are fewer" in warning
 
 
-def test_changes_are_named_by_their_joint_and_counted():
-    facts = certificate_facts(made_document(comparison=made_comparison()))
-    found = facts["comparison"]
-    assert "p = 0.0010" in found["sentence"] and found["sentence"].count("The robot has changed.") == 1
-    assert found["rows"][0][0] == "Joint compliance under loads and weights: offset" and "joint 2" in found["rows"][2][0]
-    assert found["rows"][0][3] == "200 ± 50 µrad" and (len(found["rows"]), found["more"]) == (12, 2)
-    assert "moves differently than in" in facts["now"]
-    same = certificate_facts(made_document(comparison=made_comparison(0.5, 0)))
-    assert "not compared one by one" in same["comparison"]["sentence"] and "No change since" in same["now"]
-
-
 def test_a_correction_that_makes_validation_poses_worse_is_advised_against():
     document = made_document()
     document["held_out"][-1]["rms_m"] = 2e-3
     assert certificate_facts(document)["now"].startswith("Do not correct the robot by this campaign")
 
 
-@pytest.mark.parametrize(
-    "comparison", [None, made_comparison(), made_comparison(0.5, 0)], ids=["none", "changes", "no changes"]
-)
+@pytest.mark.parametrize("measured", [False, True])
 @pytest.mark.parametrize("decision", ["pass", "fail", "undecided"])
-def test_every_kind_of_certificate_is_typeset(tmp_path, comparison, decision):
-    facts = certificate_facts(made_document(decision, comparison))
+def test_every_kind_of_certificate_is_typeset(tmp_path, measured, decision):
+    facts = certificate_facts(made_document(decision, measured=measured))
     json.dumps(facts, allow_nan=False)
     assert facts["budget"][-1][1] == "hidden by the tracker's noise" and share_name("link_weight") == "gravity sag"
     path = tmp_path / "certificate.pdf"

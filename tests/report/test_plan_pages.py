@@ -1,11 +1,13 @@
 """The sheet of a plan has a row for each pose, in degrees, with a box for each measurement."""
 
+from dataclasses import replace
+
 import numpy as np
 from drawn_figures import empty_pictures
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.plan import choose_plan
-from elastocal.application.planning.sheet import sheet
+from elastocal.application.planning.plan import choose_plan, sheet
+from elastocal.campaigns.campaign import Target
 from elastocal.report.plan_pages import plan_facts, write_plan_sheet
 
 
@@ -26,6 +28,10 @@ def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
         assert len(row["cells"]) + 1 == len(facts["heads"])
     boxes = sum(visit["count"] for row in facts["rows"] for visit in row["visits"])
     assert boxes * len(survey.targets) == len(rows)
+    # Where the reflector has to sit, which no error afterwards shows.
+    known = replace(survey, targets=(Target("T", "tool0", (0.1, 0.0, 0.05)),))
+    assert "T on tool0, at (100.00, 0.00, 50.00) mm of it" in plan_facts(known, plan, rows, ["worth"])["lines"][1]
+    assert "an offset that is fitted" in facts["lines"][1]
 
 
 def test_the_sheet_is_typeset(tmp_path):

@@ -14,7 +14,6 @@ TARGETS = (
     "blind",
     "closed_loop",
     "bad_rows",
-    "planning",
     "audit",
 )
 

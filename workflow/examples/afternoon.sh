@@ -19,7 +19,7 @@ python workflow/examples/rehearse.py measure "$cell"
 elastocal check "$cell"
 elastocal diagnose "$cell"
 python workflow/examples/rehearse.py path "$cell" "$work/path.csv"
-elastocal export "$cell" --urdf "$work/arm.urdf" --output "$work/calibrated" --table 1024
+elastocal export "$cell" --urdf "$work/arm.urdf" --output "$work/calibrated"
 elastocal certificate "$cell" --tolerance 0.2mm
 elastocal correct "$cell" "$work/path.csv" --output "$work/targets.csv" --format krl
 python workflow/examples/rehearse.py move "$cell" "$work/path.csv" "$work/targets.csv" --reveal

@@ -35,7 +35,7 @@ rule summarize_closed_loop:
         summary=shown(
             "reports/closed_loop/closed_loop.csv",
             "closed_loop",
-            "Closed loop and planning",
+            "Closed loop",
             shows="Errors by robot and model",
             kind="table",
         ),
@@ -44,7 +44,7 @@ rule summarize_closed_loop:
         picture=shown(
             "reports/closed_loop/closed_loop.png",
             "closed_loop",
-            "Closed loop and planning",
+            "Closed loop",
             shows="Errors after correction",
             kind="figure",
         ),

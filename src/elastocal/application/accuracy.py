@@ -1,17 +1,10 @@
 """What is meant by the accuracy of a robot that is commanded by its calibrated model: one definition for all commands.
 
-The error at a pose is the real robot less the commanded model. Predicted, it has four parts: what the uncertainty of the
-parameters leaves; the repeatability of the joints and the error that each new pose has of its own; what the form of the model
-leaves open, by what other models of the diagnosis predict, or held-out poses where these show more; and all of what the fit
-ascribes to effects that no command contains, such as a step of the set-up, for nothing shows that they leave the robot alone.
-Nothing of the tracker's noise is in it.
-
-It is stated in a frame. `BASE`, that of the declared base, where measurements were taken in it. `ROBOT`, the robot's own, is
-after the best rigid placement of the base over the campaign's poses [1]. In both, where the offset of the target on the end
-effector was fitted, a constant offset there is no error. Data and use have these freedoms in common: what the data cannot say
-of them costs the use nothing. They are taken up over the campaign's poses, so that a single new pose has an error too.
-
-[1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta Crystallographica A32, 1976.
+The error at a pose is the real robot less the commanded model, in a frame (`frames`). Predicted, it has four parts: what the
+uncertainty of the parameters leaves; the repeatability of the joints and the error that each new pose has of its own; what the
+form of the model leaves open, by what other models of the diagnosis predict, or held-out poses where these show more; and all
+of what the fit ascribes to effects that no command contains, such as a step of the set-up, for nothing shows that they leave
+the robot alone. Nothing of the tracker's noise is in it.
 """
 
 from __future__ import annotations
@@ -22,17 +15,41 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import gammaincinv
 
-from elastocal.application.calibrated import forward, pose_sensitivities, square_root
-from elastocal.mechanics.kinematics import jacobians
+from elastocal.application.calibrated import (
+    OperatingConditions,
+    calibrate_by_model,
+    forward,
+    move_to_end_effector,
+    moves_robot,
+    nominal_forward,
+    observations_of,
+    pose_sensitivities,
+    square_root,
+)
+from elastocal.application.frames import BASE, FRAMES, ROBOT, Scope, find_absorbed, free_parts, placement
+from elastocal.fitting.displacement import conditions, displaced_coordinates
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.noise import hidden_repeatability
+from elastocal.fitting.parameters import parameters
+from elastocal.mechanics.kinematics import jacobians, poses
+from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.validation.held_out import position_residuals
+from elastocal.validation.placing import placed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import States
 
-ROBOT, BASE = "robot", "base"
 PREDICTED, MEASURED = "predicted", "measured"
-# Of every bound, one-sided: the level that GUM and JCGM 106 take for granted.
+REGION = "the poses and loads that were fitted"
+# Of every bound, one-sided, as GUM and JCGM 106 have it; and how sure held-out poses must be that a prediction is too small
+# before they raise it: of honest campaigns one in twenty is.
 CONFIDENCE = 0.95
 # Robots drawn from what the fit leaves possible: so many tell a risk of 5 % to half a percent.
 _DRAWS, _SEED = 2000, 1
@@ -40,20 +57,20 @@ _DRAWS, _SEED = 2000, 1
 _WORST_OF_FORM = 9.0
 # Poses at a time, of so many draws.
 _AT_ONCE = 200
-FRAMES = {ROBOT: "in the robot's own frame (after the best placement of its base)", BASE: "in the frame of the declared base"}
+# States of a campaign over which its accuracy is stated: more change no digit.
+_MOST_STATES = 1000
 
 
 @dataclass(frozen=True)
 class Accuracy:
     """Whose error, how large, how sure; lengths in m.
 
-    `frame`: one of "robot", "base". `kind`: one of "predicted", "measured". `rms_m`, `worst_m`: root mean square over the
-    poses, and at the worst of them. `rms_bound_m`, `worst_bound_m`: below which they are with one-sided confidence; None where
-    nothing says so. `noise`: what became of the tracker's noise. `region`: which poses these are. `offset_removed`: whether a
-    constant offset at the end effector counts as no error. `left_out`: effects of the fit that no command contains: what they
-    were fitted to counts as error. `left_out_m`, `form_m`: of `rms_m`, by those, and by what the form of the model leaves open.
-    `contradicted`: whether held-out poses showed that the form leaves more open than the fitted poses say. `repeated_m`: of
-    `rms_m`, by the repeatability of the joints and the error that each pose has of its own.
+    `frame`: "robot" or "base". `kind`: "predicted" or "measured". `rms_m`, `worst_m`: root mean square over the poses, and at
+    the worst of them; with one-sided confidence below `rms_bound_m`, `worst_bound_m`, None where nothing says so. `noise`: what
+    became of the tracker's noise. `region`: which poses these are. `offset_removed`, `left_out`, `contradicted`: as in
+    `frames.Scope`. `left_out_m`, `form_m`, `repeated_m`: of `rms_m`, by what is left out, by what the form of the model leaves
+    open, by the repeatability of the joints and the error that each pose has of its own. `fitted`: whether anything of the
+    robot was; without, no error of 0 is one.
     """
 
     frame: str
@@ -72,6 +89,7 @@ class Accuracy:
     contradicted: bool = False
     repeated_m: float = 0.0
     confidence: float = CONFIDENCE
+    fitted: bool = True
 
     def document(self) -> dict[str, Any]:
         """As JSON."""
@@ -81,47 +99,6 @@ class Accuracy:
 def accuracy_from(document: Mapping[str, Any]) -> Accuracy:
     """The inverse of `Accuracy.document`."""
     return Accuracy(**{**document, "left_out": tuple(document["left_out"])})
-
-
-@dataclass(frozen=True)
-class Scope:
-    """In which frame errors are stated, and what of them is none there.
-
-    `frame`: one of "robot", "base". `origin` (3,): about which the placement turns, m. `absorbed` (12, P): motion of the base
-    (m, rad), constant offset and constant turn of the end effector that take up each parameter. `absorbed_before` (12,): the
-    same of the nominal robot less the calibrated one. `left_out_m`, `left_out_worst_m`: what effects that are not commanded
-    contribute at the campaign's poses: RMS, and at the worst. `unstated` (str, float, float): the same of effects that go with
-    something that a command may not state: "time", "temperature" or "approach". `form_m`: what the form of the model leaves
-    open there, RMS: other models predict otherwise, and so may the robot. `contradicted`: whether held-out poses showed that to
-    be more than other models say. `repeated_freedom`: degrees of freedom of the square of the joints' repeatability; 0 where it
-    is taken as known.
-    """
-
-    frame: str
-    origin: np.ndarray
-    absorbed: np.ndarray
-    absorbed_before: np.ndarray
-    offset_removed: bool = False
-    left_out: tuple[str, ...] = ()
-    left_out_m: float = 0.0
-    left_out_worst_m: float = 0.0
-    unstated: tuple[tuple[str, float, float], ...] = ()
-    form_m: float = 0.0
-    contradicted: bool = False
-    repeated_freedom: float = 0.0
-
-    def document(self) -> dict[str, Any]:
-        """As JSON."""
-        arrays = {name: getattr(self, name).tolist() for name in ("origin", "absorbed", "absorbed_before")}
-        return asdict(self) | arrays | {"left_out": list(self.left_out)}
-
-
-def scope_from(document: Mapping[str, Any]) -> Scope:
-    """The inverse of `Scope.document`."""
-    shapes = {"origin": (3,), "absorbed": (12, -1), "absorbed_before": (12,)}
-    arrays = {name: np.array(document[name], float).reshape(shape) for name, shape in shapes.items()}
-    unstated = tuple((name, rms, worst) for name, rms, worst in document["unstated"])
-    return Scope(**{**document, **arrays, "left_out": tuple(document["left_out"]), "unstated": unstated})
 
 
 @dataclass(frozen=True)
@@ -145,23 +122,19 @@ class Prediction:
 
     def accuracy(self, region: str) -> Accuracy:
         """The statement over these poses, named in words."""
-        scope = self.scope
+        names = ("frame", "offset_removed", "left_out", "left_out_m", "form_m", "contradicted")
         return Accuracy(
-            scope.frame,
-            PREDICTED,
-            float(np.sqrt((self.error_m**2).mean())),
-            float(np.sqrt((self.worst_m**2).mean())),
-            float(np.quantile(self.rms_m, CONFIDENCE)),
-            float(np.quantile(self.worst_m, CONFIDENCE)),
-            "the tracker's noise is not in it",
-            len(self.error_m),
-            region,
-            scope.offset_removed,
-            scope.left_out,
-            scope.left_out_m,
-            scope.form_m,
-            scope.contradicted,
-            float(np.sqrt((self.repeated_m**2).mean())),
+            kind=PREDICTED,
+            rms_m=_rms(self.error_m),
+            worst_m=_rms(self.worst_m),
+            rms_bound_m=float(np.quantile(self.rms_m, CONFIDENCE)),
+            worst_bound_m=float(np.quantile(self.worst_m, CONFIDENCE)),
+            noise="the tracker's noise is not in it",
+            poses=len(self.error_m),
+            region=region,
+            repeated_m=_rms(self.repeated_m),
+            fitted=bool(self.parameters_m.any()),
+            **{name: getattr(self.scope, name) for name in names},
         )
 
 
@@ -172,7 +145,7 @@ def predict_errors(
 
     Drawn robots, most of the work, are for errors over all poses; where those of each pose are enough, none (0) need be.
     """
-    scope, robot = _under(scope_in(calibrated), operating), calibrated.robot
+    scope, robot = _under(calibrated.scope, operating), calibrated.robot
     root, repeated = square_root(calibrated.covariance), np.hypot(calibrated.noise.joint_rad, calibrated.noise.pose_rad)
     stream = np.random.default_rng(_SEED)
     drawn = stream.standard_normal((root.shape[1], draws))
@@ -185,8 +158,7 @@ def predict_errors(
         angles, under = reported_angles[part], operating.part(part)
         columns = placement(scope, *forward(calibrated, angles, under))
         moved = (pose_sensitivities(calibrated, angles, under) - columns @ scope.absorbed) @ root
-        jacobian = jacobians(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
-        apart = jacobian * repeated
+        apart = jacobians(robot.chain, robot.model_angles(angles), robot.chain.end_effector) * repeated
         parts.append([each @ each.transpose(0, 2, 1) for each in (moved, apart)])
         off = moved[:, :3] @ drawn + apart[:, :3] @ (size * stream.standard_normal((len(angles), apart.shape[2], draws)))
         squares = (off**2).sum(axis=1)
@@ -198,14 +170,16 @@ def predict_errors(
     # An error of form is one law over all poses: what is open is how large it is.
     unknown = form * stream.standard_normal(draws) ** 2
     return Prediction(
-        np.sqrt(ours[:, :3].sum(axis=1)),
-        np.sqrt(own[:, :3].sum(axis=1)),
-        np.sqrt((ours + own)[:, 3:].sum(axis=1)),
-        np.sqrt((ours + own)[:, :3].sum(axis=1) + left_out + form),
-        np.sqrt(quantile_of_length((covariances[0] + covariances[1])[:, :3, :3] + form / 3.0 * np.eye(3)) ** 2 + left_out),
-        np.sqrt(total / len(reported_angles) + left_out + unknown),
-        np.sqrt(worst + scope.left_out_worst_m**2 + _WORST_OF_FORM * unknown),
-        scope,
+        parameters_m=np.sqrt(ours[:, :3].sum(axis=1)),
+        repeated_m=np.sqrt(own[:, :3].sum(axis=1)),
+        std_rad=np.sqrt((ours + own)[:, 3:].sum(axis=1)),
+        error_m=np.sqrt((ours + own)[:, :3].sum(axis=1) + left_out + form),
+        bound_m=np.sqrt(
+            quantile_of_length((covariances[0] + covariances[1])[:, :3, :3] + form / 3.0 * np.eye(3)) ** 2 + left_out
+        ),
+        rms_m=np.sqrt(total / len(reported_angles) + left_out + unknown),
+        worst_m=np.sqrt(worst + scope.left_out_worst_m**2 + _WORST_OF_FORM * unknown),
+        scope=scope,
     )
 
 
@@ -219,74 +193,6 @@ def _under(scope: Scope, operating: OperatingConditions) -> Scope:
         left_out_m=float(np.linalg.norm([scope.left_out_m, *(rms for _, rms, _ in missing)])),
         left_out_worst_m=float(np.linalg.norm([scope.left_out_worst_m, *(worst for _, _, worst in missing)])),
     )
-
-
-def before_m(calibrated: CalibratedRobot, position: np.ndarray, rotation: np.ndarray, off: np.ndarray) -> np.ndarray:
-    """How far an uncorrected robot misses poses, ndarray (N,), m.
-
-    `off` (N, 6) is the pose less that of the calibrated robot, base axes; what a placement takes up is no error.
-    """
-    scope = scope_in(calibrated)
-    return np.linalg.norm((off - placement(scope, position, rotation) @ scope.absorbed_before)[:, :3], axis=1)
-
-
-def scope_in(calibrated: CalibratedRobot) -> Scope:
-    """That of a calibrated robot; without one its errors are in base axes and nothing is left out."""
-    if calibrated.scope is not None:
-        return calibrated.scope
-    return Scope(BASE, np.zeros(3), np.zeros((12, len(calibrated.covariance))), np.zeros(12))
-
-
-def scope_about(position: np.ndarray) -> Scope:
-    """That of positions (N, 3) without a fit: placements turn about their middle."""
-    return Scope(ROBOT, position.mean(axis=0), np.zeros((12, 0)), np.zeros(12))
-
-
-def placement(scope: Scope, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Displacement and turn of poses by shift and turn of the base, offset and turn of the end effector, (N, 6, 12)."""
-    x, y, z = (position - scope.origin).T
-    found = np.zeros((len(position), 6, 12))
-    found[:, :3, :3] = found[:, 3:, 3:6] = np.eye(3)
-    found[:, 0, 4], found[:, 0, 5] = z, -y
-    found[:, 1, 3], found[:, 1, 5] = -z, x
-    found[:, 2, 3], found[:, 2, 4] = y, -x
-    found[:, :3, 6:9] = found[:, 3:, 9:] = rotation
-    return found
-
-
-def find_absorbed(columns: np.ndarray, field: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """How much of the free columns of `placement` takes up most of a field (N, 6, K) of displacements, ndarray (12, K).
-
-    Positions decide on all but the constant turn of the end effector, which takes up what is left of orientations.
-    """
-    found = np.zeros((12, field.shape[2]))
-    for rows, first, last in ((slice(0, 3), 0, 9), (slice(3, 6), 9, 12)):
-        mine = np.flatnonzero(free[first:last]) + first
-        if len(mine):
-            left = (field - columns @ found)[:, rows].reshape(3 * len(field), field.shape[2])
-            found[mine] = np.linalg.lstsq(columns[:, rows, mine].reshape(len(left), -1), left, rcond=None)[0]
-    return found
-
-
-def subtract_placement(scope: Scope, position: np.ndarray, rotation: np.ndarray, fields: np.ndarray) -> np.ndarray:
-    """Displacements (N, 6, K) of poses less what the placement that a scope leaves free takes up of each over these poses."""
-    columns = placement(scope, position, rotation)
-    free = np.repeat([scope.frame == ROBOT, scope.frame == ROBOT, scope.offset_removed, False], 3)
-    return np.asarray(fields - columns @ find_absorbed(columns, fields, free))
-
-
-def remove_rigid_motion(displacement: np.ndarray, position: np.ndarray, rotation: np.ndarray | None = None) -> np.ndarray:
-    """Displacements (..., N, 3) less the small rigid motion that explains most of their squares.
-
-    With rotations (N, 3, 3) of the end effector less a constant offset there too.
-    """
-    scope = scope_about(position)
-    columns = placement(scope, position, np.zeros((len(position), 3, 3)) if rotation is None else rotation)
-    field = np.moveaxis(displacement.reshape(-1, *displacement.shape[-2:]), 0, -1)
-    padded = np.concatenate([field, np.zeros_like(field)], axis=1)
-    free = np.repeat([True, True, rotation is not None, False], 3)
-    left = (padded - columns @ find_absorbed(columns, padded, free))[:, :3]
-    return np.moveaxis(left, -1, 0).reshape(displacement.shape)
 
 
 def quantile_of_length(covariance: np.ndarray) -> np.ndarray:
@@ -303,9 +209,137 @@ def quantile_of_length(covariance: np.ndarray) -> np.ndarray:
     return np.sqrt(gammaincinv(shape, CONFIDENCE) * mean / shape)
 
 
-def root_mean_square(displacement: np.ndarray) -> float:
-    """Root mean square of the lengths of displacements (N, 3)."""
-    return float(np.sqrt((displacement**2).sum(axis=1).mean()))
+def before_m(calibrated: CalibratedRobot, position: np.ndarray, rotation: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """How far an uncorrected robot misses poses, ndarray (N,), m.
+
+    `off` (N, 6) is the pose less that of the calibrated robot, base axes; what a placement takes up is no error.
+    """
+    scope = calibrated.scope
+    return np.linalg.norm((off - placement(scope, position, rotation) @ scope.absorbed_before)[:, :3], axis=1)
+
+
+def calibrate_on_case(case: Case, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
+    """A calibrated robot from a model that was fitted to a case, as `calibrate_by_model`, that knows what its errors mean.
+
+    Where the sensor hides how well each joint repeats, all are taken to repeat alike, by what the repeats leave possible.
+    """
+    robot, states, freedom = case.campaign.robot, case.observations.states, 0.0
+    if noise.source == "repeats" and not noise.joint_rad.any():
+        alike, freedom = hidden_repeatability(model, estimate, case.campaign.measurements)
+        noise = replace(noise, joint_rad=np.full(robot.joints, alike))
+    found = replace(calibrate_by_model(robot, model, estimate, covariance, noise), fitted=states)
+    scope = scope_of(found, model, estimate, covariance, states)
+    return replace(found, scope=replace(scope, repeated_freedom=freedom))
+
+
+def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> Scope:
+    """The scope of a fit with all of its effects to some states: in the base's frame where that was declared."""
+    robot, end, base = calibrated.robot, model.sites.chain.end_effector.name, model.fitted_frames
+    there = [target for target in model.targets if target.point == end]
+    offset = bool(there) and all(target.offset_m is None for target in there)
+    turn = bool(there) and all(target.rotation is None for target in there)
+    free = free_parts(base, offset, turn and model.rows == 6)
+    reported, operating = robot.reported_angles(states.joint_angles), conditions_in(calibrated, states)
+    position, rotation = forward(calibrated, reported, operating)
+    none = np.zeros((12, len(calibrated.covariance)))
+    scope = Scope(ROBOT if base else BASE, position.mean(axis=0), none, np.zeros(12), offset)
+    columns = placement(scope, position, rotation)
+    before = pose_differences(*nominal_forward(robot, reported), position, rotation)[..., None]
+
+    def size(fields: np.ndarray) -> tuple[float, float]:
+        squares = ((fields - columns @ find_absorbed(columns, fields, free))[:, :3] ** 2).sum(axis=(1, 2))
+        return float(np.sqrt(squares.mean())), float(np.sqrt(squares.max()))
+
+    unstated = []
+    for name, blank in (("time", "time_s"), ("temperature", "temperature_c"), ("approach", "approach")):
+        if any(name in effect.needs for effect in calibrated.model.effects):
+            other = forward(calibrated, reported, replace(operating, **{blank: None}))
+            unstated.append((name, *size(pose_differences(position, rotation, *other)[..., None])))
+    scope = replace(
+        scope,
+        unstated=tuple(unstated),
+        absorbed=find_absorbed(columns, pose_sensitivities(calibrated, reported, operating), free),
+        absorbed_before=find_absorbed(columns, before, free)[:, 0],
+    )
+    dropped = tuple(effect.key for effect in model.effects if not moves_robot(effect))
+    if not dropped:
+        return scope
+    if model.row_span is None and states.row is not None:
+        # Progress counts from the campaign's first row to its last, whichever of its states are asked.
+        model = replace(model, row_span=(int(states.row.min()), int(states.row.max())))
+    epochs = [states]
+    if not base:
+        # Nobody places the base anew: also as if all of the campaign had been at its end.
+        row, time = (None if each is None else np.full_like(each, each.max()) for each in (states.row, states.time_s))
+        epochs.append(replace(states, row=row, time_s=time))
+    sizes = [size(_find_left_out(model, estimate, covariance, each)) for each in epochs]
+    rms, worst = map(max, zip(*sizes, strict=True))
+    return replace(scope, left_out=dropped, left_out_m=rms, left_out_worst_m=worst)
+
+
+def conditions_in(calibrated: CalibratedRobot, states: States) -> OperatingConditions:
+    """Those of states; senses of approach as the controller counts them."""
+    back = np.linalg.inv(calibrated.robot.reported_matrix)
+    approach = None if states.approach is None else np.sign(states.approach @ back.T)
+    return OperatingConditions(states.wrench, approach, states.time_s, states.temperature_c)
+
+
+def campaign_poses(calibrated: CalibratedRobot) -> tuple[np.ndarray, OperatingConditions]:
+    """Commands (N, n) and conditions of a campaign over which its accuracy is stated: all, or evenly some of very many."""
+    states = calibrated.states
+    chosen = np.unique(np.linspace(0, len(states) - 1, min(len(states), _MOST_STATES)).astype(int))
+    return calibrated.robot.reported_angles(states.joint_angles[chosen]), conditions_in(calibrated, states).part(chosen)
+
+
+def campaign_accuracy(calibrated: CalibratedRobot) -> Accuracy:
+    """Predicted accuracy over the poses of a campaign: what it says of its robot as a whole."""
+    return predict_errors(calibrated, *campaign_poses(calibrated)).accuracy(REGION)
+
+
+def set_form(calibrated: CalibratedRobot, form_m: float, contradicted: bool = False) -> CalibratedRobot:
+    """A calibrated robot of which it is known how much the form of its model leaves open."""
+    return replace(calibrated, scope=replace(calibrated.scope, form_m=form_m, contradicted=contradicted))
+
+
+def judge_by_held_out(calibrated: CalibratedRobot, final: Fit, case: Case, held_out: Case) -> CalibratedRobot:
+    """A calibrated robot whose predicted errors are as large as its held-out poses say, where these contradict them.
+
+    By the mean square over targets at the end effector: it must be larger than those of robots and of noise that are drawn as
+    predicted. What it is more counts as error of the model's form. Nothing changes where the noise is not known.
+    """
+    end = case.campaign.robot.chain.end_effector.name
+    seen, states = held_out.observations, held_out.observations.states
+    mine = np.array([target.point == end for target in held_out.campaign.targets])[seen.target]
+    if final.noise.source == "residual" or not mine.any():
+        return calibrated
+    state = seen.state[mine]
+    found = predict_errors(calibrated, calibrated.robot.reported_angles(states.joint_angles), conditions_in(calibrated, states))
+    sensor = final.noise.position_m**2 / states.repeats[state]
+    noise = sensor @ np.random.default_rng(_SEED).chisquare(3, (len(state), len(found.rms_m))) / len(state)
+    square = float((position_residuals(*placed(final, case, held_out), seen)[mine] ** 2).sum(axis=1).mean())
+    if (found.rms_m**2 + noise < square).mean() <= CONFIDENCE:
+        return calibrated
+    known = (found.error_m[state] ** 2).mean() - calibrated.scope.form_m**2
+    return set_form(calibrated, float(np.sqrt(square - 3.0 * sensor.mean() - known)), contradicted=True)
+
+
+def _find_left_out(model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> np.ndarray:
+    """What effects that are not commanded do to the end effector, (S, 6, 1 + D): all of it, and a factor of its covariance."""
+    moved, values = move_to_end_effector(model, estimate)
+    states = replace(states, session=np.zeros_like(states.session))
+    kept = [moves_robot(effect) for effect in model.effects]
+    commanded = tuple(value if moves else 0.0 * value for moves, value in zip(kept, estimate.coefficients, strict=True))
+    chain, ends = model.sites.chain, []
+    for each in (values, replace(values, coefficients=commanded)):
+        coordinates = displaced_coordinates(moved, each, conditions(moved, each, states))
+        ends.append(poses(chain, coordinates, chain.end_effector))
+    keys = {effect.key for effect, moves in zip(model.effects, kept, strict=True) if not moves}
+    ours, theirs = (
+        np.array([owner in keys for owner, _ in parameters(*each)]) for each in ((moved, values), (model, estimate))
+    )
+    line = linearize(moved, values, observations_of(states), conditions(moved, values, states))
+    spread = line.sensitivities[..., ours] @ square_root(covariance[np.ix_(theirs, theirs)])
+    return np.concatenate([pose_differences(*ends[0], *ends[1])[..., None], spread], axis=2)
 
 
 def accuracy_sentence(accuracy: Accuracy) -> str:
@@ -318,6 +352,8 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
 
     frame = FRAMES[accuracy.frame]
     frame = frame[:-1] + offset + ")" if accuracy.frame == ROBOT else frame + (" (after" + offset[4:] + ")" if offset else "")
+    if not accuracy.fitted and not accuracy.form_m:
+        return f"No position error is predicted {frame}: nothing of the robot was fitted."
     rms, worst = value(accuracy.rms_m, accuracy.rms_bound_m), value(accuracy.worst_m, accuracy.worst_bound_m)
     text = (
         f"{accuracy.kind.capitalize()} position error of the corrected robot {frame}: {rms} RMS over {accuracy.region} "
@@ -335,3 +371,7 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
 def millimetres(length_m: float) -> str:
     """A length as it is printed, to the micrometre, so that one error has one form everywhere."""
     return f"{1e3 * length_m:.3f} mm"
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt((values**2).mean()))

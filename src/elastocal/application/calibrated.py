@@ -1,7 +1,9 @@
-"""The robot as it is: the final model of a diagnosis without what belongs to one campaign's set-up and its instruments.
+"""The robot as corrected: the final model of a diagnosis without what belongs to one campaign's set-up and its instruments.
 
-Poses are those of the end effector's measuring point in the robot's base frame: that of the chain, which the fit placed under
-the tracker. How far tool and work frame are known is another matter, and in no figure here.
+All that uses it (`accuracy`, `compensation`, `certificate`, `forward_model`) asks the same of it: where it comes to rest
+(`come_to_rest`, `forward`), how surely (`pose_sensitivities` with its covariance, noise and scope), and where it was fitted
+(`beyond_fitted`). Poses are those of the end effector's measuring point in the robot's base frame: that of the chain, which the
+fit placed under the tracker. How far tool and work frame are known is another matter, and in no figure here.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.frames import scope_in_base
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import effects
 from elastocal.fitting.displacement import conditions, displaced_coordinates
@@ -18,9 +21,10 @@ from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.kinematics import poses
+from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
 
 if TYPE_CHECKING:
-    from elastocal.application.accuracy import Scope
+    from elastocal.application.frames import Scope
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
@@ -28,7 +32,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
 # States at a time: what a walk along all sites makes of them stays in the processor's cache.
-AT_ONCE = 1024
+_AT_ONCE = 1024
 # °C, at which dimensions are stated (ISO 1).
 _REFERENCE_C = 20.0
 
@@ -41,8 +45,7 @@ class CalibratedRobot:
     with the effects that move the robot. Its one target is the end effector's measuring point. `estimate`: its values; the
     frame is the robot's base. `covariance` (P, P): of the parameters of the effects (linear, then shapes, effect by effect),
     marginal over frames, targets and all effects that are left out; zero where held. `noise`: of the campaign, with the
-    repeatability of the joints. `scope`: what its errors mean: see `accuracy`; the base's frame, with every effect commanded,
-    without.
+    repeatability of the joints. `scope`: what its errors mean. `fitted`: the campaign's states; None where they are not known.
     """
 
     robot: Robot
@@ -50,7 +53,14 @@ class CalibratedRobot:
     estimate: Estimate
     covariance: np.ndarray
     noise: Noise
-    scope: Scope | None = None
+    scope: Scope
+    fitted: States | None = None
+
+    @property
+    def states(self) -> States:
+        """The campaign's states, of a robot that has them."""
+        assert self.fitted is not None, "a robot that was read from its export has no campaign"
+        return self.fitted
 
 
 @dataclass(frozen=True)
@@ -70,11 +80,8 @@ class OperatingConditions:
 
     def part(self, chosen: slice | np.ndarray) -> OperatingConditions:
         """Those of some rows."""
-
-        def of(values: np.ndarray | None) -> np.ndarray | None:
-            return values if values is None or len(values) == 1 else values[chosen]
-
-        return OperatingConditions(of(self.wrench), of(self.approach), of(self.time_s), of(self.temperature_c))
+        found = [each if each is None or len(each) == 1 else each[chosen] for each in vars(self).values()]
+        return OperatingConditions(*found)
 
 
 NEUTRAL = OperatingConditions()
@@ -97,7 +104,7 @@ def calibrate_by_model(robot: Robot, model: Model, estimate: Estimate, covarianc
         coefficients=tuple(estimate.coefficients[number] for number in kept),
         shapes=tuple(estimate.shapes[number] for number in kept),
     )
-    return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise)
+    return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise, scope_in_base(len(rows)))
 
 
 def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
@@ -121,9 +128,14 @@ def moves_robot(effect: Candidate) -> bool:
     return not effect.of_setup and (module is None or module.moves_robot)
 
 
+def without(calibrated: CalibratedRobot, numbers: set[int]) -> CalibratedRobot:
+    """A robot without some effects of its model, by their numbers there: their linear parameters are zero."""
+    values = tuple(0.0 * v if number in numbers else v for number, v in enumerate(calibrated.estimate.coefficients))
+    return replace(calibrated, estimate=replace(calibrated.estimate, coefficients=values))
+
+
 def assumptions(calibrated: CalibratedRobot, conditions: OperatingConditions) -> list[str]:
     """What effects of the model need and the conditions do not have, one line for each with what is taken instead."""
-    needs = frozenset[str]().union(*(effect.needs for effect in calibrated.model.effects))
     taken = {
         "approach": (conditions.approach, "no joint's sense of approach is known, and hysteresis is left out"),
         "time": (conditions.time_s, "the time is that of the campaign's first measurement, when nothing had warmed up"),
@@ -133,7 +145,7 @@ def assumptions(calibrated: CalibratedRobot, conditions: OperatingConditions) ->
     return [
         f"{named[name]} needs the {name}, which is not given: {words}"
         for name, (values, words) in taken.items()
-        if name in needs and values is None
+        if named[name] and values is None
     ]
 
 
@@ -142,33 +154,26 @@ def forward(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where the robot really is: exact poses of the end effector's measuring point.
 
-    Loads act where the robot has yielded to them, by the fixed-point iteration of `displacement.conditions`.
-
     `reported_angles` (N, n): as the controller reports them, rad (m for prismatic joints). Returns position (N, 3), m, and
     rotation (N, 3, 3), base axes.
     """
     position, rotation = np.empty((len(reported_angles), 3)), np.empty((len(reported_angles), 3, 3))
     for part in parts(len(reported_angles)):
-        coordinates = coordinates_at_rest(calibrated, reported_angles[part], operating.part(part))
-        position[part], rotation[part] = end_effector(calibrated, coordinates)
+        _, position[part], rotation[part] = come_to_rest(calibrated, reported_angles[part], operating.part(part))
     return position, rotation
 
 
-def coordinates_at_rest(
+def come_to_rest(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions, near: np.ndarray | None = None
-) -> np.ndarray:
-    """Where the robot yields to, as coordinates (N, C) of its sites.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the robot yields to: coordinates (N, C) of its sites, and position and rotation as by `forward`.
 
-    `near` (N, C): coordinates at which the loads are taken, of states that differ little; by fixed-point iteration without.
+    `near` (N, C): coordinates at which the loads are taken, of states that differ little. Without, loads act where the robot
+    has yielded to them, by the fixed-point iteration of `displacement.conditions`.
     """
     fitted, states = (calibrated.model, calibrated.estimate), states_of(calibrated, reported_angles, operating)
-    return displaced_coordinates(*fitted, conditions(*fitted, states, near))
-
-
-def end_effector(calibrated: CalibratedRobot, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Position (N, 3), m, and rotation (N, 3, 3) of the end effector in base axes at coordinates (N, C) of the sites."""
-    chain = calibrated.model.sites.chain
-    return poses(chain, coordinates, chain.end_effector)
+    coordinates, chain = displaced_coordinates(*fitted, conditions(*fitted, states, near)), calibrated.model.sites.chain
+    return coordinates, *poses(chain, coordinates, chain.end_effector)
 
 
 def nominal_forward(robot: Robot, reported_angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -176,34 +181,24 @@ def nominal_forward(robot: Robot, reported_angles: np.ndarray) -> tuple[np.ndarr
     return poses(robot.chain, robot.model_angles(reported_angles), robot.chain.end_effector)
 
 
-def prediction_covariance(
-    calibrated: CalibratedRobot,
-    reported_angles: np.ndarray,
-    operating: OperatingConditions = NEUTRAL,
-    at_rest: np.ndarray | None = None,
-) -> np.ndarray:
-    """Covariance of the poses of `forward` by that of the parameters, to first order: G S G^T.
-
-    `at_rest` (N, C): as by `coordinates_at_rest`, where they are known. Returns (N, 6, 6): m and rad, base axes.
-    """
-    moved = pose_sensitivities(calibrated, reported_angles, operating, at_rest) @ square_root(calibrated.covariance)
-    return moved @ moved.transpose(0, 2, 1)
-
-
 def pose_sensitivities(
-    calibrated: CalibratedRobot,
-    reported_angles: np.ndarray,
-    operating: OperatingConditions = NEUTRAL,
-    at_rest: np.ndarray | None = None,
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions = NEUTRAL
 ) -> np.ndarray:
-    """Displacement and rotation of the poses of `forward` by the parameters, ndarray (N, 6, P); as `prediction_covariance`."""
+    """Displacement and rotation of the poses of `forward` by the parameters, ndarray (N, 6, P), m and rad, base axes."""
     model, estimate = calibrated.model, calibrated.estimate
     found = np.zeros((len(reported_angles), 6, len(calibrated.covariance)))
     for part in parts(len(reported_angles)):
         seen = observations_of(states_of(calibrated, reported_angles[part], operating.part(part)))
-        around = conditions(model, estimate, seen.states, None if at_rest is None else at_rest[part])
-        found[part] = linearize(model, estimate, seen, around).sensitivities
+        found[part] = linearize(model, estimate, seen, conditions(model, estimate, seen.states)).sensitivities
     return found
+
+
+def beyond_fitted(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray | None = None, times: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which commands (N, n) stand beyond the joint angles that were fitted, and which are loaded so many times more: (N,)."""
+    joints = beyond_campaign(calibrated.states, calibrated.robot.model_angles(reported_angles), None)
+    return joints, np.zeros_like(joints) if wrench is None else beyond_loads(calibrated.states, wrench, times)
 
 
 def states_of(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> States:
@@ -235,7 +230,7 @@ def observations_of(states: States) -> Observations:
 
 def parts(count: int) -> list[slice]:
     """So many states in parts that fit the cache."""
-    return [slice(start, min(start + AT_ONCE, count)) for start in range(0, count, AT_ONCE)]
+    return [slice(start, min(start + _AT_ONCE, count)) for start in range(0, count, _AT_ONCE)]
 
 
 def square_root(covariance: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import coordinates_at_rest, end_effector, parts
+from elastocal.application.calibrated import come_to_rest, parts
 from elastocal.application.inverse_kinematics import SOLVED_M, allowed_steps, along_path, find_beyond_limits, reach_m, refine
 from elastocal.exchange.target_path import OK
 from elastocal.mechanics.kinematics import jacobians
@@ -105,7 +105,7 @@ def _find_other_postures(robot: Robot, stated: np.ndarray, found: np.ndarray) ->
     far = np.abs(found - stated) > np.where(robot.chain.prismatic, reach_m(robot), 1.0) * _NEAR_RAD
     if robot.joints != 6:
         return np.asarray(far.any(axis=1))
-    scale = np.array([1.0, 1.0, 1.0, *[reach_m(robot)] * 3])[:, None] / reach_m(robot)
+    scale = np.repeat([1.0 / reach_m(robot), 1.0], 3)[:, None]
     sides = [np.linalg.det(jacobians(robot.chain, each, robot.chain.end_effector) * scale) for each in (stated, found)]
     sides = [np.where(np.abs(side) < _SINGULAR_DETERMINANT, 0.0, np.sign(side)) for side in sides]
     return np.asarray(far.any(axis=1) | (sides[0] * sides[1] < 0))
@@ -133,11 +133,10 @@ def _find_chunk_targets(
 ) -> Correction:
     robot, joints = calibrated.robot, calibrated.robot.joints
     reached = left <= SOLVED_M
-    length = reach_m(robot)
-    scale = np.array([1.0, 1.0, 1.0, length, length, length])
+    scale = np.repeat([1.0, reach_m(robot)], 3)
     uncorrected = robot.reported_angles(nominal)
-    coordinates = coordinates_at_rest(calibrated, uncorrected, operating)
-    before = pose_differences(position, rotation, *end_effector(calibrated, coordinates))
+    coordinates, *pose = come_to_rest(calibrated, uncorrected, operating)
+    before = pose_differences(position, rotation, *pose)
     inverse = np.linalg.pinv(jacobians(robot.chain, nominal, robot.chain.end_effector))
     angles, off = nominal.copy(), before.copy()
     singular = np.zeros(len(angles), bool)
@@ -151,9 +150,8 @@ def _find_chunk_targets(
         angles[moving] += step
         coordinates[moving, :joints] += step
         commands = robot.reported_angles(angles[moving])
-        coordinates[moving] = coordinates_at_rest(calibrated, commands, operating.part(moving), coordinates[moving])
-        reached_pose = end_effector(calibrated, coordinates[moving])
-        off[moving] = pose_differences(position[moving], rotation[moving], *reached_pose)
+        coordinates[moving], *pose = come_to_rest(calibrated, commands, operating.part(moving), coordinates[moving])
+        off[moving] = pose_differences(position[moving], rotation[moving], *pose)
         moving = moving[np.linalg.norm(off[moving] * scale, axis=1) > _CORRECTED_M]
         if not len(moving):
             break

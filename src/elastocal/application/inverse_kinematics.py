@@ -25,12 +25,10 @@ if TYPE_CHECKING:
 
 # Steps after which a start has converged or will not: Newton's method doubles the digits in the last few.
 _STEPS = 60
-# Of the pose error, m and as length at the reach; rounding of poses of some metres is a thousandth of it.
-_CONVERGED_M = 1e-10
-# Of joint limits, rad or m.
-_ROUNDING = 1e-9
-# Of a solution: beyond it the pose is out of reach.
-SOLVED_M = 1e-7
+# Of the pose error, m and as length at the reach: converged, a thousand times the rounding of poses of some metres; and beyond
+# which a pose is out of reach. Of joint limits, rad or m; and of solutions that are one.
+_CONVERGED_M, SOLVED_M = 1e-10, 1e-7
+_ROUNDING, _SAME = 1e-9, 1e-6
 # Damping in parts of the largest squared singular value, and by how much a step that fails or succeeds changes it.
 _DAMPING, _GROWS, _SHRINKS, _LEAST = 1e-2, 8.0, 0.15, 1e-14
 # Solutions of a row are sought from so many starts: an arm of six joints has eight postures as a rule.
@@ -41,8 +39,6 @@ _STARTS = 12
 STEP_PER_TURN, STEP_BESIDE = 5.0, np.radians(10.0)
 # Copies of a solution whole turns away, nearest the middle of the limits: all that fit into two turns either way.
 _MOST_TURNS = 4
-# Solutions nearer than this are one, rad or m.
-_SAME = 1e-6
 # What steps are too large by comes first, then the way, then how far from the middle of the limits it lies.
 _TOO_LARGE, _OFF_MIDDLE = 1e4, 1e-5
 # No joint turns farther in a step, rad or m: beyond it the linearization means nothing.
@@ -61,8 +57,7 @@ def refine(robot: Robot, position: np.ndarray, rotation: np.ndarray, start: np.n
     angles of the chain, rad. Returns `angles` (N, n): of the chain, rad; the best that was found; `error_m` (N,): what is left,
     rotations as lengths at the reach.
     """
-    angles, length = start.copy(), reach_m(robot)
-    scale = np.array([1.0, 1.0, 1.0, length, length, length])
+    angles, scale = start.copy(), np.repeat([1.0, reach_m(robot)], 3)
     error = np.full(len(angles), np.inf)
     damping = np.full(len(angles), _DAMPING)
     trial, open_rows = angles.copy(), np.arange(len(angles))

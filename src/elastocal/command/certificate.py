@@ -1,8 +1,9 @@
 """`elastocal certificate`: how good a robot is, against a tolerance, as PDF and JSON."""
 
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer import Argument, Option
@@ -11,6 +12,7 @@ from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import iso_date, print_answer, printed
 from elastocal.command.quantities import LARGEST_SEED, length_m
+from elastocal.counting import counted
 from elastocal.errors import InputError
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
@@ -34,7 +36,6 @@ def certificate(
             "must lie within what was fitted. Without, the poses of the campaign."
         ),
     ] = None,
-    compare: Annotated[Path | None, Option(help="Earlier diagnosed campaign of the same robot.")] = None,
     serial: Annotated[str | None, Option(help="Serial number of the robot. Default: the campaign's.")] = None,
     date: Annotated[str | None, Option(help="Date of the certificate, such as 2026-11-20. Default: today.")] = None,
     output: Annotated[Path | None, Option(help="Folder for both files. Default: the campaign's reports.")] = None,
@@ -43,9 +44,9 @@ def certificate(
 ) -> None:
     """Certify a robot against a tolerance: pass, fail or undecided.
 
-    The certificate has the risk of being wrong, repeatability, error budget and a map of the workspace. The exit code is 0 if
-    the robot passes, and 1 if it fails or is undecided. A robot that nobody measured after correction
-    is predicted to pass or fail; --measured states what was measured.
+    The certificate has the risk of being wrong, repeatability, error budget and a map of the workspace, and says of which point
+    it speaks. The exit code is 0 if the robot passes, and 1 if it fails or is undecided. A robot that nobody measured after
+    correction is predicted to pass or fail; --measured states what was measured.
     """
     from datetime import date as calendar
 
@@ -63,8 +64,8 @@ def certificate(
     from elastocal.loop.measured import measured_errors
     from elastocal.report.certificate import certificate_facts, write_certificate
 
-    console = Console(stderr=True)
-    campaign = read_descriptions(folder, pipeline() / "config" / "robots")[0]
+    console, robots = Console(stderr=True), pipeline() / "config" / "robots"
+    campaign = read_descriptions(folder, robots)[0]
     limit = length_m("--tolerance", tolerance)
     number = campaign.get("serial_number", "") if serial is None else printed("--serial", serial)
     stated = {"measured_on": campaign.get("measured_on", "")} | campaign.get("certificate", {})
@@ -72,28 +73,46 @@ def certificate(
     found = diagnosed_campaign(folder, accept_environment)
     place = output or workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=output or workplace() / "reports")
-    other = None if compare is None else diagnosed_campaign(compare, accept_environment)
-    robots = pipeline() / "config" / "robots"
     after = None if measured is None else measured_errors(measured, robots, found)
-    used = None
-    if use is not None:
-        used = use_at(found.calibrated, found.case.observations.states, read_target_path_of(use, found.calibrated.robot))
+    used = None if use is None else use_at(found.calibrated, read_target_path_of(use, found.calibrated.robot))
     if data_at_fault(found.verdict):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
     wanted = Wanted(limit, risk, number, day, seed, stated)
     with console.status("working"):
-        document, maps = certified(folder, robots, found, wanted, other, after, used)
+        document, maps = certified(folder, robots, found, wanted, after, used)
         facts = certificate_facts(document)
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
-            forces = [each["force_N"] for each in document["workspace"]]
+            forces, names = [each["force_N"] for each in document["workspace"]], [row[0] for row in facts["budget"]]
             drawn = {
                 "workspace": workspace_map(maps, forces, limit),
-                "budget": budget_bars(
-                    document["budget"], [row[0] for row in facts["budget"]], limit, document["tracker_rms_m"]
-                ),
+                "budget": budget_bars(document["budget"], names, limit, document["tracker_rms_m"]),
             }
             write_certificate(partial / PAGES, facts, [*save_all(drawn, scratch).values()])
             write_json(partial / DOCUMENT, document)
-    passed, answer = facts["decision"] == "pass", f"{facts['decision']}: {facts['decision_sentences']}"
-    print_answer(passed, answer, [str(place / PAGES), str(place / DOCUMENT)], facts["now"], console)
+    passed, (answer, *details) = facts["decision"] == "pass", _lines(document)
+    print_answer(passed, answer, [*details, str(place / PAGES), str(place / DOCUMENT)], facts["now"], console)
     raise typer.Exit(0 if passed else 1)
+
+
+def _lines(document: Mapping[str, Any]) -> list[str]:
+    """The answer in three lines: the decision by its criterion; over which poses and of which point; why, or what it lacks."""
+    from elastocal.application.accuracy import accuracy_from, millimetres
+    from elastocal.application.frames import FRAMES
+
+    found, accuracy = document["conformity"], accuracy_from(document["accuracy"])
+    answer = (
+        f"{found['decision']}, as {accuracy.kind}: the RMS position error of the corrected robot is"
+        f" {millimetres(accuracy.rms_m)}, {1 - found['accepted_risk']:.0%} sure to be below"
+        f" {millimetres(found['limit_m'])}, the tolerance"
+        f" {millimetres(found['tolerance_m'])}"
+        if accuracy.fitted or accuracy.form_m
+        else f"{found['decision']}: no error is predicted of a robot of which nothing was fitted"
+    )
+    poses = f"In {FRAMES[accuracy.frame].removeprefix('in ')}, over {accuracy.region} ({accuracy.poses})"
+    where = f"{poses}, {millimetres(accuracy.worst_m)} at the worst of them. {document['point']}"
+    rest = [f"Too little for a pass: {'; '.join(found['shortfalls'])}."] if found["shortfalls"] else []
+    if found["poses_needed"] is not None:
+        rest.append(f"About {counted(found['poses_needed'], 'measured pose')} would decide.")
+    if accuracy.kind == "predicted":
+        rest.append("Nobody has measured the corrected robot: command corrected targets, measure, and give --measured.")
+    return [answer, where, *([" ".join(rest)] if rest else []), *(f"! {each['sentence']}" for each in document["misplaced"])]

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from elastocal.exchange.controllers.protocol import Controller
     from elastocal.exchange.target_path import TargetPath
     from elastocal.loop.calibrated_files import Diagnosed
+    from elastocal.mechanics.robot import Robot
 
 # Lines that a message names.
 _NAMED = 5
@@ -67,16 +68,15 @@ def correct(
     from rich.console import Console
     from rich.progress import Progress
 
-    from elastocal.application.accuracy import accuracy_sentence, before_m, predict_errors
-    from elastocal.application.calibrated import OperatingConditions, assumptions
-    from elastocal.application.compensation import find_joint_targets, large_steps
-    from elastocal.application.scope import campaign_accuracy
+    from elastocal.application.accuracy import accuracy_sentence, before_m, campaign_accuracy, predict_errors
+    from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted
+    from elastocal.application.compensation import find_joint_targets
+    from elastocal.diagnosis.misplaced import point_sentence
     from elastocal.exchange.controllers.protocol import axes_of, check_name, targets_of
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.data_frames import write_csv
     from elastocal.loop.error_table import error_lines
-    from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
 
     console = Console(stderr=True)
     controller, table, program = _places_of(output, language)
@@ -103,34 +103,21 @@ def correct(
             wanted.start,
             lambda done: progress.update(bar, completed=done),
         )
-    bad = (found.status != OK).nonzero()[0]
-    if len(bad) and not partial:
-        rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in bad], _NAMED)
-        raise InputError(
-            path,
-            "",
-            rows,
-            "poses that the robot reaches within its limits, in the posture that q1..qn state if any, or --partial",
-        )
     good = found.status == OK
+    if not good.all() and not partial:
+        rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in (~good).nonzero()[0]], _NAMED)
+        reached = "poses that the robot reaches within its limits, in the posture that q1..qn state if any, or --partial"
+        raise InputError(path, "", rows, reached)
     if controller and not good.any():
         raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")
-    large = large_steps(calibrated.robot, wanted.position[good], wanted.rotation[good], found.joint_angles[good])
-    lines_of = [wanted.lines[row] for row in good.nonzero()[0]]
-    swings = [
-        f"line {lines_of[row]}: joint {joint + 1} "
-        + (f"shifts by {1e3 * step:.0f} mm" if prismatic[joint] else f"turns by {math.degrees(step):.1f} degrees")
-        + (f", {1e3 * most:.0f} allowed" if prismatic[joint] else f", {math.degrees(most):.1f} allowed")
-        for row, joint, step, most in large
-    ]
+    swings = _swings(wanted, found, good, calibrated.robot)
     if swings and not allow_large_steps:
         print_lines([f"! {line}" for line in swings[:_NAMED]], console)
         more = f" and {counted(len(swings) - 1, 'more large step')}" if len(swings) > 1 else ""
         raise InputError(path, "", swings[0] + more, "targets between, another posture, or --allow-large-steps")
-    fitted, angles = campaign.case.observations.states, calibrated.robot.model_angles(found.joint_angles)
     wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
-    beyond, outside = beyond_campaign(fitted, angles, wrench), beyond_campaign(fitted, angles, None)
-    heavy = beyond_loads(fitted, wrench, _LOADS_BOUNDED)
+    outside, loaded = beyond_fitted(calibrated, found.joint_angles, wrench)
+    beyond, heavy = outside | loaded, beyond_fitted(calibrated, found.joint_angles, wrench, _LOADS_BOUNDED)[1]
     bounded = good & ~outside & ~heavy
     status = found.status.astype(object)
     status[good & outside] = f"{NO_BOUND}joints outside the fitted range"
@@ -139,14 +126,12 @@ def correct(
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
     files = [table, program] if controller else [table]
     with write_together(output.parent, [file.name for file in files]) as folder_of_all:
-        write_csv(folder_of_all / table.name, _joint_targets(wanted, found, before, errors, beyond, status))
+        write_csv(folder_of_all / table.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
         if controller:
             targets = targets_of(found.joint_angles[good], prismatic, named)
-            write_text(
-                folder_of_all / program.name, controller.program(name, targets, _notes(campaign, wrench[good], date.today()))
-            )
-    lines, answer = [], f"{grouped(good.sum())} of {counted(len(good), 'target')} corrected"
-    stated = []
+            notes = _notes(campaign, wrench[good], date.today())
+            write_text(folder_of_all / program.name, controller.program(name, targets, notes))
+    lines, stated, share = [], [], f"{grouped(good.sum())} of {counted(len(good), 'target')}"
     if bounded.any():
         known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
         accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
@@ -154,25 +139,37 @@ def correct(
         lines.append(accuracy_sentence(accuracy))
     lines = [*error_lines(campaign.verdict, *stated), *lines]
     if good.any():
-        lines.append(accuracy_sentence(campaign_accuracy(calibrated, campaign.case.observations.states)))
+        lines += [accuracy_sentence(campaign_accuracy(calibrated)), point_sentence(campaign.case.campaign)]
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
-        lines.append(
-            f"{program.name} goes to {grouped(good.sum())} of {counted(len(good), 'target')}: {controller.WORDS}, {called}"
-        )
+        lines.append(f"{program.name} goes to {share}: {controller.WORDS}, {called}")
+    lines += [f"! {each['sentence']}" for each in campaign.verdict["misplaced"]]
     lines += [f"! {line}" for line in swings[:_NAMED]]
     if len(swings) > _NAMED:
         lines.append(f"! and {counted(len(swings) - _NAMED, 'more large step')}")
     if unbounded := int((good & ~bounded).sum()):
-        share = f"{grouped(unbounded)} of {counted(int(good.sum()), 'target')}"
         what = f"{_LOADS_BOUNDED:g} times the measured loads or outside the fitted range of joints"
-        lines.append(f"! no bound is stated for {share}: beyond {what}")
+        some = f"{grouped(unbounded)} of {counted(int(good.sum()), 'target')}"
+        lines.append(f"! no bound is stated for {some}: beyond {what}")
     if beyond.any():
-        share = f"{grouped(beyond.sum())} of {counted(len(beyond), 'target')}"
-        lines.append(f"! {share} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
+        some = f"{grouped(beyond.sum())} of {counted(len(beyond), 'target')}"
+        lines.append(f"! {some} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
     certify = f"elastocal certificate {folder} --tolerance 0.2mm"
     following = f"{certify}; or command 12 targets or more, measure them, and add --measured AFTER"
-    print_answer(not len(bad), answer, [*lines, *map(str, files)], following, console)
+    print_answer(bool(good.all()), f"{share} corrected", [*lines, *map(str, files)], following, console)
+
+
+def _swings(wanted: TargetPath, found: Correction, good: np.ndarray, robot: Robot) -> list[str]:
+    """A line for each joint that moves farther from one reached target to the next than `allowed_steps`."""
+    from elastocal.application.compensation import large_steps
+
+    lines = [wanted.lines[row] for row in good.nonzero()[0]]
+    return [
+        f"line {lines[row]}: joint {joint + 1} shifts by {1e3 * step:.0f} mm, {1e3 * most:.0f} allowed"
+        if robot.chain.prismatic[joint]
+        else f"line {lines[row]}: joint {joint + 1} turns by {math.degrees(step):.1f} degrees, {math.degrees(most):.1f} allowed"
+        for row, joint, step, most in large_steps(robot, wanted.position[good], wanted.rotation[good], found.joint_angles[good])
+    ]
 
 
 def _places_of(output: Path, language: str) -> tuple[Controller | None, Path, Path]:
@@ -208,7 +205,13 @@ def _notes(campaign: Diagnosed, wrench: np.ndarray, day: date) -> list[str]:
 
 
 def _joint_targets(
-    wanted: TargetPath, found: Correction, before: np.ndarray, errors: Prediction, beyond: np.ndarray, status: np.ndarray
+    wanted: TargetPath,
+    wrench: np.ndarray,
+    found: Correction,
+    before: np.ndarray,
+    errors: Prediction,
+    beyond: np.ndarray,
+    status: np.ndarray,
 ) -> pd.DataFrame:
     """The file of joint targets: wanted poses, loads, commands q1..qn (rad, as the controller reports them), errors, status.
 
@@ -235,6 +238,5 @@ def _joint_targets(
         "repeatability_m": errors.repeated_m,
         "outside_range": beyond,
     }
-    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
     loads = dict(zip(WRENCH_NAMES, wrench.T, strict=True))
     return pd.DataFrame(angles | stated | {"status": status} | columns | loads | nominal)

@@ -9,24 +9,19 @@ from typer import Argument, Option
 
 from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.printed import print_answer
-from elastocal.command.quantities import MOST_ROWS
 from elastocal.counting import counted
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.exchange.urdf_writing import CorrectedUrdf
     from elastocal.mechanics.robot import Robot
 
 ROBOT, URDF, SIDECAR = "robot.yaml", "robot.urdf", "effects.json"
-TABLE = "table.csv"
-# Of the angles of the table.
-_SEED = 1
 _ROUNDING_MM = 1e-5
 DH, DELTAS, FRAMES = "dh.csv", "dh_deltas.csv", ("dh_frames.pdf", "dh_frames.png")
-_NAMES = (ROBOT, URDF, SIDECAR, DH, DELTAS, *FRAMES, TABLE)
+_NAMES = (ROBOT, URDF, SIDECAR, DH, DELTAS, *FRAMES)
 
 
 def export(
@@ -35,13 +30,6 @@ def export(
     urdf: Annotated[
         Path | None, Option(help="The URDF that the robot was imported from. Its joint origins are changed, nothing else.")
     ] = None,
-    table: Annotated[
-        int,
-        Option(
-            min=0, max=MOST_ROWS, help="Rows of a table of errors over the joint space, for programs that cannot run the model."
-        ),
-    ] = 0,
-    force: Annotated[float, Option(min=0.0, max=1e6, help="Hanging load of the table in N.")] = 0.0,
     date: Annotated[str, Option(help="Date that the sidecar states. Default: today.")] = "",
     accept_environment: AcceptEnvironment = False,
 ) -> None:
@@ -55,11 +43,9 @@ def export(
     import yaml
     from rich.console import Console
 
-    from elastocal.application.accuracy import accuracy_sentence
+    from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
     from elastocal.application.calibrated import OperatingConditions
-    from elastocal.application.calibrated_geometry import fold_effects
-    from elastocal.application.scope import campaign_accuracy
-    from elastocal.application.sidecar import find_left_out_m, sidecar
+    from elastocal.application.forward_model import find_left_out_m, fold_effects, sidecar
     from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.json_files import write_json
@@ -75,7 +61,7 @@ def export(
     drop_in = None if urdf is None else write_calibrated_origins(urdf, calibrated.robot, robot)
     stated = f"Calibrated by elastocal from the campaign {found.name}."
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
-    accuracy = campaign_accuracy(calibrated, found.case.observations.states)
+    accuracy = campaign_accuracy(calibrated)
     document = sidecar(calibrated, found.name, date or calendar.today().isoformat(), accuracy)
     lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, URDF, SIDECAR))]
     with write_together(output, _NAMES) as partial:
@@ -91,7 +77,6 @@ def export(
             lines += _drop_in(drop_in, partial / URDF, calibrated.robot, robot, found.case.observations.states.joint_angles)
         write_json(partial / SIDECAR, document)
         lines += _denavit_hartenberg(calibrated.robot, robot, partial, output)
-        lines += _table(calibrated, table, force, partial, output) if table else []
     if document["effects"]:
         states = found.case.observations.states
         angles = calibrated.robot.reported_angles(states.joint_angles)
@@ -122,22 +107,6 @@ def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, a
         what = "ratios of joints, and errors behind a last joint that has no fixed one after it"
         lines.append(f"{URDF} cannot hold {what}: up to {off:.3f} mm at the measured poses")
     return lines
-
-
-def _table(calibrated: CalibratedRobot, rows: int, force: float, partial: Path, output: Path) -> list[str]:
-    """Write the table of errors to a folder that becomes `output`; how well one interpolates in it."""
-    import numpy as np
-
-    from elastocal.application.calibrated import OperatingConditions
-    from elastocal.application.forward_table import forward_table, interpolation_error_m
-    from elastocal.io.data_frames import write_csv
-
-    hanging = OperatingConditions(np.array([[0.0, 0.0, -force, 0.0, 0.0, 0.0]]))
-    found = forward_table(calibrated, rows, hanging, _SEED)
-    left, whole = interpolation_error_m(calibrated, found, hanging, _SEED + 1)
-    write_csv(partial / TABLE, found)
-    line = f"{output / TABLE}: {counted(len(found), 'row')}; interpolation leaves {1e3 * left:.3f} of {1e3 * whole:.3f} mm RMS"
-    return [line]
 
 
 def _denavit_hartenberg(nominal: Robot, robot: Robot, partial: Path, output: Path) -> list[str]:

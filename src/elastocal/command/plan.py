@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.planning.cell import Cell
     from elastocal.application.planning.plan import Candidates, Loads, Plan
-    from elastocal.application.planning.sensors import Sensor
-    from elastocal.application.planning.survey import Survey
+    from elastocal.application.planning.survey import Sensor, Survey
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.chain import Chain
 
@@ -60,6 +59,18 @@ class _Options:
     ] = None
     tracker: Annotated[str | None, Option(help="Position of the tracker, x,y,z in m, base axes.")] = None
     box: Annotated[list[str] | None, Option(help="Box to keep out of: xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")] = None
+    floor: Annotated[
+        float, Option(help="Height in m, base axes, that forearm and targets stay above: the plane that the base stands on.")
+    ] = 0.0
+    no_floor: Annotated[bool, Option("--no-floor", help="Nothing is below the robot.")] = False
+    column: Annotated[
+        float | None,
+        Option(
+            min=0.0,
+            help="Radius in m of the robot's own column, up to its shoulder, that forearm and hand keep out of; 0 for none. "
+            "Default: a tenth of the reach.",
+        ),
+    ] = None
     noise: Annotated[str | None, Option(help="Standard deviation of a coordinate, such as 0.03mm. Default: the sensor's.")] = (
         None
     )
@@ -88,7 +99,7 @@ def plan(**words: Any) -> None:
     """
     from rich.console import Console
 
-    from elastocal.application.planning.sheet import sheet
+    from elastocal.application.planning.plan import sheet
     from elastocal.campaigns.measurements import CSV
 
     options, console = _Options(**words), Console(stderr=True)
@@ -116,8 +127,8 @@ plan.__signature__ = inspect.signature(_Options, eval_str=True)  # type: ignore[
 def _read_task(options: _Options) -> _Task:
     """The task that the options state; the first that is wrong is refused by its name."""
     from elastocal.application.inverse_kinematics import reach_m
-    from elastocal.application.planning.cell import RADIUS_SHARE, Cell
-    from elastocal.application.planning.criteria import CRITERIA
+    from elastocal.application.planning.cell import COLUMN_SHARE, RADIUS_SHARE, Cell
+    from elastocal.application.planning.designs import CRITERIA
     from elastocal.application.planning.plan import Loads
     from elastocal.application.planning.survey import Survey
     from elastocal.campaigns.reading import read_robot
@@ -137,7 +148,10 @@ def _read_task(options: _Options) -> _Task:
             raise InputError("--box", "", str(corner.ravel().tolist()), allowed)
     tracker = None if options.tracker is None else numbers("--tracker", options.tracker, 3)
     accuracy = None if options.accuracy is None else length_m("--accuracy", options.accuracy)
-    return _Task(survey, Cell(boxes, tracker, RADIUS_SHARE * reach_m(arm)), loads, sensor, accuracy)
+    reach = reach_m(arm)
+    column = COLUMN_SHARE * reach if options.column is None else options.column
+    cell = Cell(boxes, tracker, RADIUS_SHARE * reach, None if options.no_floor else options.floor, column)
+    return _Task(survey, cell, loads, sensor, accuracy)
 
 
 def _check_places(options: _Options) -> list[str]:
@@ -160,7 +174,7 @@ def _check_places(options: _Options) -> list[str]:
 
 def _choose(task: _Task, options: _Options) -> tuple[Candidates, Plan]:
     """Configurations that the cell allows, and the plan among them: of the fewest poses where an accuracy is wanted."""
-    from elastocal.application.planning.plan import choose_plan, count_needed_poses, fewest_poses, find_allowed_candidates
+    from elastocal.application.planning.plan import choose_plan, fewest_poses, find_allowed_candidates
 
     def choose(poses: int) -> Plan:
         return choose_plan(task.survey, some, poses, options.held_out, options.criterion, options.seed)
@@ -169,8 +183,8 @@ def _choose(task: _Task, options: _Options) -> tuple[Candidates, Plan]:
     found = choose(options.poses)
     if task.accuracy_m is None:
         return some, found
-    enough = count_needed_poses(found.accuracy_m, task.accuracy_m)
-    if enough is None:
+    enough = int((found.accuracy_m > task.accuracy_m).sum()) + 1
+    if enough > len(found.accuracy_m):
         best = f"{1e3 * found.accuracy_m[-1]:.3f} mm with {counted(options.poses, 'pose')}"
         raise InputError("--accuracy", "", best, "more poses, or an accuracy that they reach")
     return some, choose(max(enough, fewest_poses(task.survey)))
@@ -180,7 +194,8 @@ def _describe(task: _Task, options: _Options, found: Plan) -> list[str]:
     """What a plan is worth, in sentences."""
     import numpy as np
 
-    from elastocal.application.accuracy import BASE, FRAMES, ROBOT, millimetres
+    from elastocal.application.accuracy import millimetres
+    from elastocal.application.frames import BASE, FRAMES, ROBOT
 
     survey, pose = task.survey, task.survey.measured == "pose"
     random = 1e3 * np.quantile(found.random_m[:, -1], [0.05, 0.5, 0.95])
@@ -252,7 +267,7 @@ def _read_targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
 
 def _find_sensor(name: str | None, measured: str | None) -> tuple[Sensor, str]:
     """What reads the targets, and whether it reads positions or poses."""
-    from elastocal.application.planning.sensors import SENSORS
+    from elastocal.application.planning.survey import SENSORS
 
     if measured not in (None, "position", "pose"):
         raise InputError("--measured", "", repr(measured), "position, pose")
@@ -281,7 +296,7 @@ def _write_campaign(place: Path, name: str, robot: Path, survey: Survey, found: 
     """A campaign to fill in: campaign.yaml, the robot file, and a sheet whose measurement columns are empty."""
     import yaml
 
-    from elastocal.application.planning.sheet import campaign_document
+    from elastocal.application.planning.plan import campaign_document
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
     from elastocal.io.atomic_writes import write_text

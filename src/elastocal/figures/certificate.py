@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
-from elastocal.application.certificate.workspace import WorkspaceErrors
+from elastocal.application.certificate import WorkspaceErrors
 from elastocal.figures.style import MILLI, PALETTE, panels, styled
 
 _BINS = 24

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from elastocal.application.scope import calibrate_on_case, set_form
+from elastocal.application.accuracy import calibrate_on_case, set_form
 from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.errors import InputError
 from elastocal.fitting.case import noise_from

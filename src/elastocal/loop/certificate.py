@@ -1,4 +1,4 @@
-"""A certificate of a diagnosed campaign: how good the robot is, against what, how sure that is, and what changed."""
+"""A certificate of a diagnosed campaign: how good the robot is, against what, and how sure that is."""
 
 from __future__ import annotations
 
@@ -10,21 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.accuracy import predict_errors
-from elastocal.application.calibrated import OperatingConditions
-from elastocal.application.certificate.comparison import compare_campaigns
-from elastocal.application.certificate.error_budget import TOTAL, error_budget
-from elastocal.application.certificate.repeatability import of_sensor, repeatability
-from elastocal.application.certificate.workspace import draw_angles, workspace_errors
+from elastocal.application.accuracy import REGION, campaign_poses, predict_errors
+from elastocal.application.calibrated import OperatingConditions, beyond_fitted
+from elastocal.application.certificate import draw_angles, error_budget, of_sensor, repeatability, workspace_errors
 from elastocal.application.compensation import find_joint_targets
-from elastocal.application.scope import REGION, campaign_poses
 from elastocal.campaigns.reading import campaign_files
+from elastocal.diagnosis.misplaced import point_sentence
 from elastocal.exchange.target_path import OK
 from elastocal.io.records import checksum
 from elastocal.loop.error_table import error_rows
 from elastocal.random_streams import stream
 from elastocal.validation.conformity import PASS, UNDECIDED, conformity, predicted_conformity
-from elastocal.validation.fitted_range import beyond_campaign
 from elastocal.validation.span import joint_ranges, shortfalls
 
 if TYPE_CHECKING:
@@ -33,18 +29,16 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.application.certificate.workspace import WorkspaceErrors
+    from elastocal.application.certificate import WorkspaceErrors
     from elastocal.exchange.target_path import TargetPath
-    from elastocal.fitting.observations import States
     from elastocal.loop.calibrated_files import Diagnosed
     from elastocal.loop.measured import MeasuredErrors
     from elastocal.mechanics.robot import Robot
 
 # Poses of the map: a bin of 25 by 25 has some ten.
 _POSES = 6000
-# Poses at which two campaigns are compared, and draws of what they would show if nothing had changed.
-_COMPARED, _DRAWS = 200, 2000
-_REPLICATES = 2000
+# Of intervals of the budget, and of the bootstrap over measured poses.
+_DRAWS, _REPLICATES = 2000, 2000
 _LIBRARIES = ("elastocal", "numpy", "scipy")
 USE = "the poses and loads of its use"
 _MODELS = {"frames": "uncorrected", "declared": "declared", "effect": "corrected"}
@@ -74,12 +68,12 @@ class Use:
     outside: np.ndarray
 
 
-def use_at(calibrated: CalibratedRobot, fitted: States, wanted: TargetPath) -> Use:
+def use_at(calibrated: CalibratedRobot, wanted: TargetPath) -> Use:
     """The use of a robot at wanted poses, each corrected; a pose that it cannot reach lies beyond."""
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
     found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
-    angles = calibrated.robot.model_angles(found.joint_angles)
-    return Use(found.joint_angles, operating, beyond_campaign(fitted, angles, wanted.wrench) | (found.status != OK))
+    joints, loads = beyond_fitted(calibrated, found.joint_angles, wanted.wrench)
+    return Use(found.joint_angles, operating, joints | loads | (found.status != OK))
 
 
 def certificate(
@@ -87,15 +81,14 @@ def certificate(
     robots_folder: str | Path,
     found: Diagnosed,
     wanted: Wanted,
-    other: Diagnosed | None = None,
     measured: MeasuredErrors | None = None,
     use: Use | None = None,
 ) -> tuple[dict[str, Any], list[WorkspaceErrors]]:
     """Contents of a certificate.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign. `other`: an earlier campaign of the same
-    robot. `measured`: of the corrected robot; without, what is stated of it is predicted. `use`: where the robot is used;
-    without, at the poses and loads of the campaign. Returns `document`: JSON-serialisable; `maps`: without load, and under the
+    `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign. `measured`: of the
+    corrected robot; without, what is stated of it is predicted. `use`: where the robot is used; without, at the poses and loads
+    of the campaign. Returns `document`: JSON-serialisable; `maps`: without load, and under the
     largest force of the campaign where it has any, hanging.
     """
     calibrated, case = found.calibrated, found.case
@@ -104,7 +97,7 @@ def certificate(
     def draws(purpose: str) -> np.random.Generator:
         return stream(wanted.seed, found.name, f"certificate: {purpose}", 0)
 
-    poses = campaign_poses(calibrated, states) if use is None else (use.reported_angles, use.operating)
+    poses = campaign_poses(calibrated) if use is None else (use.reported_angles, use.operating)
     prediction = predict_errors(calibrated, *poses)
     accuracy = prediction.accuracy(REGION if use is None else USE)
     decision = predicted_conformity(prediction.rms_m, accuracy.poses, wanted.tolerance_m, wanted.accepted_risk)
@@ -113,17 +106,16 @@ def certificate(
         decision = conformity(measured.errors, *terms, draws("conformity"), measured.noise_m)
     judged = found.verdict["heldout"]["configurations"] if measured is None else measured.configurations
     missing = shortfalls(judged, states, robot, None if use is None else use.outside)
+    if measured is None and not accuracy.fitted:
+        missing = ["nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted", *missing]
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
     angles = draw_angles(calibrated, _POSES, draws("workspace"))
     largest = float(np.linalg.norm(states.wrench[:, :3], axis=1).max())
     forces = [0.0, largest] if largest > 0.0 else [0.0]
-    maps = [
-        workspace_errors(calibrated, angles, np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0]), states.joint_angles)
-        for force in forces
-    ]
     budget = error_budget(calibrated, *poses, _DRAWS, draws("budget"))
-    uncorrected = next(share.rms_m for share in budget if share.name == TOTAL)
+    uncorrected = next(share.rms_m for share in budget if share.name == "uncorrected")
+    maps = [workspace_errors(calibrated, angles, np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0])) for force in forces]
     repeats = repeatability(campaign.measurements, campaign.targets, robot.chain.end_effector.name)
     document: dict[str, Any] = {
         "campaign": found.name,
@@ -142,6 +134,8 @@ def certificate(
         "noise_floor_rms_m": found.verdict["heldout"]["noise_floor_rms_m"],
         "accuracy": (accuracy if measured is None else measured.accuracy).document(),
         "predicted": accuracy.document(),
+        "point": point_sentence(campaign),
+        "misplaced": found.verdict["misplaced"],
         "worst_pose": _worst_pose(robot, poses[0], prediction.error_m),
         "conformity": asdict(decision) | {"configurations": judged, "shortfalls": missing},
         "joint_ranges": joint_ranges(states, robot),
@@ -154,12 +148,7 @@ def certificate(
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
         "workspace": [_summary(force, each) for force, each in zip(forces, maps, strict=True)],
-        "comparison": None,
     }
-    if other is not None:
-        document["comparison"] = {"campaign": other.name} | asdict(
-            compare_campaigns(other.calibrated, calibrated, angles[:_COMPARED], _DRAWS, draws("comparison"))
-        )
     return document, maps
 
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import FRAMES, accuracy_from, millimetres
+from elastocal.application.accuracy import accuracy_from, millimetres
+from elastocal.application.frames import FRAMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

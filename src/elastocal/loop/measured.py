@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.application.accuracy import BASE, CONFIDENCE, MEASURED, ROBOT, Accuracy, find_absorbed, placement, scope_about
+from elastocal.application.accuracy import CONFIDENCE, MEASURED, Accuracy
+from elastocal.application.frames import BASE, ROBOT, find_absorbed, placement, scope_about
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.measurements import CSV

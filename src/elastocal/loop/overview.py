@@ -12,15 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.application.scope import calibrate_on_case, campaign_accuracy
+from elastocal.application.accuracy import calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.catalogue import faults
 from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept
 from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import joint_compliances
+from elastocal.fitting.least_squares import fit
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.loop.loading import load_campaign
 from elastocal.validation.fitted_range import repeat_warnings
@@ -52,7 +54,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     relative standard error of each joint, None where these poses do not determine it); ``testable`` and ``untestable`` (how
     many candidate effects, by reason); ``suspicious``, sentences; ``diagnosable``; ``accuracy`` that a robot is predicted
     to have which is corrected by the declared model, if nothing is missing in it (`Accuracy.document`), None where the data
-    are at fault or a compliance comes out negative: then something is missing, and none is stated. Raises `InputError`.
+    are at fault or a compliance comes out negative: then something is missing, and none is stated; ``misplaced``, what was
+    declared wrongly. Raises `InputError`.
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
     whole, settings = case_from(descriptions, columns_of(training)), Settings()
@@ -86,18 +89,30 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         "residual_rms_m": float(np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())),
         "diagnosable": not decisive,
         "accuracy": None,
+        "misplaced": [],
     }
     if not decisive and not negative:
         fitted = calibrate_on_case(case, declared.model, declared.estimate, declared.covariance, noise)
-        facts["accuracy"] = campaign_accuracy(fitted, states).document()
+        facts["accuracy"] = campaign_accuracy(fitted).document()
+        facts["misplaced"] = misplaced(_with_base(declared, case), campaign)
     if negative:
         warnings = [
             *warnings,
             f"the compliance of joint {' and '.join(negative)} comes out negative: the declared model lacks something, so that"
             " no compliance and no accuracy are stated before the diagnosis",
         ]
-    suspicious = [*warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case, settings)]
+    wrong = [each["sentence"] for each in facts["misplaced"]]
+    suspicious = [*wrong, *warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case, settings)]
     return facts | _testable(part) | {"suspicious": [*suspicious, *repeat_warnings(training, held_out)]}
+
+
+def _with_base(declared: Fit, case: Case) -> Fit:
+    """The declared model with a base that may stand elsewhere than declared, where one is."""
+    base = case.candidates.get("base_placement")
+    if base is None or case.campaign.frame != "base":
+        return declared
+    model = replace(declared.model, effects=(*declared.model.effects, base))
+    return fit(model, case.observations, declared.noise)
 
 
 def _poses(session: np.ndarray, pose: np.ndarray) -> int:

@@ -8,14 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.accuracy import before_m
+from elastocal.application.accuracy import (
+    before_m,
+    calibrate_on_case,
+    campaign_accuracy,
+    campaign_poses,
+    judge_by_held_out,
+    set_form,
+)
 from elastocal.application.calibrated import forward, nominal_forward
-from elastocal.application.certificate.error_budget import effect_costs
-from elastocal.application.scope import calibrate_on_case, campaign_accuracy, campaign_poses, judge_by_held_out, set_form
+from elastocal.application.certificate import effect_costs
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
+from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
 from elastocal.io.json_files import read_json, write_json
@@ -86,17 +93,20 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
 
     ``accuracy`` and ``uncorrected_m``, the RMS error without a correction at the same poses, are predicted; ``cost_m`` of an
     effect is the RMS error over the campaign's poses and loads if it alone were left out of the correction. All are None where
-    the data are at fault, the cost also of an effect that is not in the final model or moves no robot.
+    the data are at fault, the cost also of an effect that is not in the final model or moves no robot. ``misplaced``: what was
+    declared wrongly, see there.
     """
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
     accuracy, uncorrected, costs = None, None, dict[str, float]()
+    wrong: list[dict[str, Any]] = []
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out)
-        accuracy = campaign_accuracy(found, case.observations.states).document()
-        uncorrected = _uncorrected_m(found, *campaign_poses(found, case.observations.states))
-        costs = effect_costs(found, *campaign_poses(found, case.observations.states))
+        accuracy = campaign_accuracy(found).document()
+        uncorrected = _uncorrected_m(found, *campaign_poses(found))
+        costs = effect_costs(found, *campaign_poses(found))
+        wrong = misplaced(diagnosis.final, case.campaign)
     effects = [effect | {"cost_m": costs.get(effect["name"])} for effect in verdict.document["effects"]]
-    stated = {"accuracy": accuracy, "uncorrected_m": uncorrected, "effects": effects}
+    stated = {"accuracy": accuracy, "uncorrected_m": uncorrected, "effects": effects, "misplaced": wrong}
     return replace(verdict, document=verdict.document | stated)
 
 

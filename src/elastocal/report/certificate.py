@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
-from elastocal.application.certificate.repeatability import ISO_CYCLES, ISO_POSES
+from elastocal.application.certificate import ISO_CYCLES, ISO_POSES
 from elastocal.counting import counted
-from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
 from elastocal.report.loop_facts import TITLES
 from elastocal.report.typesetting import compile_document, sentences
@@ -26,12 +25,9 @@ _SHARES = {
     "form of the model": "form of the model",
     "not commanded": "effects that no command contains",
 }
-_SHOWN_CHANGES = 12
 # Below the digits of any tracker.
 _NOTHING_M = 1e-7
-# Below this probability of the observed change where nothing changed, a robot counts as changed.
-_LEVEL = 0.05
-_TABLES = ("identity", "steps", "iso", "workspace", "data")
+_LISTS = ("misplaced", "identity", "steps", "iso", "workspace", "data")
 
 
 def write_certificate(path: str | Path, facts: Mapping[str, Any], figures: Iterable[str]) -> None:
@@ -47,16 +43,11 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
 
     `document`: of `loop.certificate.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
-    change = document["comparison"]
     spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": TITLES[document["verdict"]]}
-    constants = {"iso_poses": ISO_POSES, "iso_cycles": ISO_CYCLES, "changed": bool(change) and change["p_value"] < _LEVEL}
+    constants = {"iso_poses": ISO_POSES, "iso_cycles": ISO_CYCLES}
     stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken, **constants)
-    compared = {} if change is None else {"campaign": change["campaign"], "sentence": " ".join(stated["comparison"])}
-    if change is not None:
-        compared["rows"] = [_change(each) for each in change["changes"][:_SHOWN_CHANGES]]
-        compared["more"] = max(len(change["changes"]) - _SHOWN_CHANGES, 0)
     return {
-        **{name: lines if name in _TABLES else " ".join(lines) for name, lines in stated.items()},
+        **{name: lines if name in _LISTS else " ".join(lines) for name, lines in stated.items()},
         "campaign": document["campaign"],
         "robot": document["robot"],
         "decision": document["conformity"]["decision"],
@@ -64,7 +55,6 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "floor": say.length(document["noise_floor_rms_m"]),
         "budget": [[share_name(line["name"]), *_share(line)] for line in document["budget"]],
         "budget_states": counted(document["budget_states"], "state"),
-        "comparison": compared or None,
     }
 
 
@@ -80,13 +70,3 @@ def _share(line: Mapping[str, Any]) -> list[str]:
     if 0.0 < rms < _NOTHING_M:
         return [f"below {say.length(_NOTHING_M, 1)}", limits]
     return ["hidden by the tracker's noise" if line["name"] == "repeatability" and not rms else say.length(rms), limits]
-
-
-def _change(change: Mapping[str, Any]) -> list[str]:
-    """A parameter: where and what it is, before, after, the difference with its standard error, p."""
-    unit, owner = change["unit"], change["owner"]
-    where = share_name(owner) if owner in _SHARES else say.candidate_words(owner)
-    known = (change["before"], None), (change["after"], None), (change["after"] - change["before"], change["std_error"])
-    numbers = [" ".join(say.scaled(value, error, unit)) for value, error in known]
-    what = say.parameter_words(effect_of(owner), change["name"])
-    return [f"{say.capital(where)}: {what}", *numbers, say.plain(change["p_value"], 2)]

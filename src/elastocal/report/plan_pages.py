@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.planning.plan import Plan
     from elastocal.application.planning.survey import Survey
+    from elastocal.campaigns.campaign import Target
 
 _UNITS = {"deg": "°", "mm": "mm"}
 _LOADS = {0.0: "0", 1.0: "+F", -1.0: "−F"}
@@ -46,7 +47,7 @@ def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[s
     fitted = len(plan.fitted.joint_angles)
     return {
         "robot": survey.robot.name,
-        "targets": [target.name for target in survey.targets],
+        "targets": [_where(target) for target in survey.targets],
         "loaded": survey.loaded,
         "counts": [counted(fitted, "pose"), f"{len(poses) - fitted}", counted(len(rows), "measurement")],
         "heads": [*heads, *(f"F{name[1]} (N)" for name in forces), "measured"],
@@ -54,3 +55,9 @@ def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[s
         "fitted": fitted,
         "worth": " ".join(worth),
     }
+
+
+def _where(target: Target) -> str:
+    """A target with its measuring point and offset: the reflector has to sit there, or the robot is corrected elsewhere."""
+    at = target.offset_m and ", ".join(f"{1e3 * value:.2f}" for value in target.offset_m)
+    return f"{target.name} on {target.point}, " + (f"at ({at}) mm of it" if at else "at an offset that is fitted")

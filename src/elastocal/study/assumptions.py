@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.planning.criteria import mean_squares
+from elastocal.application.planning.designs import mean_squares
 from elastocal.io.storage import write_table
 from elastocal.mechanics.chain import with_inserted
 from elastocal.mechanics.kinematics import jacobians, poses

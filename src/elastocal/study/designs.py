@@ -23,9 +23,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.planning.bound import best_value
-from elastocal.application.planning.criteria import CRITERIA, Criterion, criterion, mean_squares
-from elastocal.application.planning.exchange import choose_greedily, exchange_candidates, matrix_of
+from elastocal.application.planning.designs import (
+    CRITERIA,
+    Criterion,
+    best_value,
+    choose_greedily,
+    criterion,
+    exchange_candidates,
+    matrix_of,
+    mean_squares,
+)
 from elastocal.random_streams import stream
 from elastocal.study.columns import ON_TESTS, SET, real, table, text, whole
 from elastocal.study.equation_11 import estimate_compliance, prefix_information

@@ -14,9 +14,10 @@ import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
-from elastocal.application.accuracy import find_absorbed, placement, predict_errors, scope_about
+from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import OperatingConditions
 from elastocal.application.compensation import find_joint_targets
+from elastocal.application.frames import find_absorbed, placement, scope_about
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import without_gross_errors
 from elastocal.diagnosis.settings import Settings

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from analysed_robots import analysed
 from made_surveys import made_survey
 
-from elastocal.application.planning.cell import Cell, find_allowed, link_points
+from elastocal.application.inverse_kinematics import reach_m
+from elastocal.application.planning.cell import COLUMN_SHARE, Cell, find_allowed, link_points
+from elastocal.campaigns.campaign import Target
 from elastocal.mechanics.kinematics import poses
 
 EVERYWHERE = np.array([[-5.0, 5.0], [-5.0, 5.0], [-5.0, 5.0]])
@@ -38,3 +41,24 @@ def test_a_target_behind_the_arm_is_hidden_and_one_before_it_is_seen(survey, ang
         assert not find_allowed(behind, survey.robot, survey.targets, angles[number : number + 1])["sight"][0]
     lone = Cell((), np.array([0.0, 0.0, 500.0]), 1e-6)
     assert find_allowed(lone, survey.robot, survey.targets, angles)["sight"].all()
+
+
+@pytest.mark.parametrize("name", ["kuka", "abb", "ur10", "iiwa14"])
+def test_neither_forearm_nor_target_is_below_the_floor_or_in_the_column(name):
+    robot, draws = analysed(name), np.random.default_rng(1)
+    low, high = robot.joint_limits.T
+    reported = robot.reported_angles(low + (high - low) * draws.random((2000, robot.joints)))
+    end, column = robot.chain.end_effector.name, COLUMN_SHARE * reach_m(robot)
+    targets, free = (Target("A", end, (0.0, 0.0, 0.2)),), Cell((), None, 0.02)
+    angles = robot.model_angles(reported)
+    at, turned = poses(robot.chain, angles, robot.chain.end_effector)
+    tip, forearm = at + turned @ [0.0, 0.0, 0.2], link_points(robot, angles, 2)
+    low_ones = (tip[:, 2] < 0.0) | (forearm[..., 2] < 0.0).any(axis=0)
+    found = find_allowed(Cell((), None, 0.02, 0.0, column), robot, targets, reported)
+    assert low_ones.sum() > 50 and not (found["floor"] & low_ones).any() and found["floor"].sum() > 200
+    # Half a metre below, more is allowed.
+    assert find_allowed(Cell((), None, 0.02, -0.5), robot, targets, reported)["floor"].sum() > found["floor"].sum()
+    assert all(each.all() for each in find_allowed(free, robot, targets, reported).values())
+    shoulder = link_points(robot, angles, 1)[0, :, 2]
+    inside = ((np.linalg.norm(forearm[..., :2], axis=-1) < column) & (forearm[..., 2] < shoulder)).any(axis=0)
+    assert inside.any() and not (found["column"] & inside).any() and found["column"].mean() > 0.5

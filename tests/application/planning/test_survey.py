@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.survey import accuracy_rows, information, model_of, observe
+from elastocal.application.planning.survey import SENSORS, accuracy_rows, information, model_of, observe
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
@@ -29,7 +29,7 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
     exact = replace(seen, position=position, rotation=None if seen.rotation is None else rotation)
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(6))
     found = fit(model, exact, noise, estimate)
-    rows = information(survey, some.joint_angles, some.force).rows.astype(float)
+    rows = information(survey, some.joint_angles, some.force)
     scale = np.array([p.plausible for _, p in parameters(model, estimate)])
     free = np.array([owner.startswith(("frame", "target", "joint_compliance")) for owner, _ in parameters(model, estimate)])
     prior = np.diag(np.where(free, 0.0, 1.0))
@@ -46,7 +46,7 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
         survey = replace(made_survey(), unknown_base=unknown)
         some = made_candidates(survey, 40)
         rows = accuracy_rows(survey, some.joint_angles, some.force)
-        names = information(survey, some.joint_angles, some.force).names
+        names = [(owner, parameter.name) for owner, parameter in parameters(*model_of(survey))]
         assert rows.shape == (40, 3, len(names))
         size = np.sqrt((rows**2).sum(axis=1).mean(axis=0))
         first = names.index(("joint_offset@1", "offset"))
@@ -55,3 +55,12 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
         # But for the load, which does not turn with it.
         assert (size[first] < 1e-2 * second) if unknown else (size[first] > 0.3 * second)
         assert not size[[number for number, (owner, _) in enumerate(names) if owner.startswith(("frame", "target"))]].any()
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_sensor_has_a_source_and_noise_of_what_it_reads(name):
+    sensor = SENSORS[name]
+    assert "Leica" in sensor.words or "arXiv" in sensor.words
+    assert 1e-8 <= sensor.position_m <= 0.1
+    assert ("pose" in sensor.measured) == (sensor.orientation_rad is not None)
+    assert sensor.orientation_rad is None or 1e-8 <= sensor.orientation_rad <= 0.2

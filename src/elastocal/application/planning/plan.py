@@ -1,20 +1,32 @@
-"""A plan: which configurations to measure, in which order, which to repeat and which to hold out; and what it is worth."""
+"""A plan: which configurations to measure, in which order, which to repeat and to hold out; what it is worth, and its sheet."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
-from elastocal.application.planning.bound import best_value, efficiency
 from elastocal.application.planning.cell import find_allowed
-from elastocal.application.planning.criteria import Criterion, criterion, mean_squares
-from elastocal.application.planning.exchange import add_prior, choose_greedily, exchange_candidates, matrix_of
-from elastocal.application.planning.survey import accuracy_rows, count_parameters, information
+from elastocal.application.planning.designs import (
+    Criterion,
+    add_prior,
+    best_value,
+    choose_greedily,
+    criterion,
+    efficiency,
+    exchange_candidates,
+    matrix_of,
+    mean_squares,
+)
+from elastocal.application.planning.survey import GEOMETRY, accuracy_rows, information, model_of
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
+from elastocal.campaigns.measurements import SHOWN, TICK
 from elastocal.counting import counted
 from elastocal.errors import InputError
+from elastocal.fitting.parameters import parameters
+from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
     from elastocal.application.planning.cell import Cell
@@ -26,16 +38,21 @@ _PLACES = 300
 _RANDOM = 40
 # Over the noise: what an offset of a joint of plausible size moves of a target that it moves only by rounding.
 _LEAST_SEEN = 1e-6
-# More are drawn than are asked for, since the cell forbids some.
+# More are drawn than are asked for, since the cell forbids some; in words what forbids all.
 _DRAWS = 4
+_FORBIDDEN = {
+    "boxes": "the boxes leave the arm no room",
+    "floor": "forearm or target would be below the floor (--floor, --no-floor)",
+    "column": "forearm or hand would be in the robot's column (--column)",
+    "sight": "the tracker sees the targets in none",
+}
+# From how many repeats of how many poses noise is estimated rather than declared: some sixty contrasts of positions.
+REPEATED_POSES, REPEATS = 10, 4
 
 
 @dataclass(frozen=True)
 class Loads:
-    """With what the robot is loaded.
-
-    `force_N`: 0 for none. `pulled`: by a pull in any direction; otherwise by a weight that hangs down.
-    """
+    """With what the robot is loaded, 0 for nothing: `pulled` in any direction, or by a weight that hangs down."""
 
     force_N: float
     pulled: bool
@@ -57,10 +74,7 @@ class Loads:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Configurations among which a plan is made.
-
-    `joint_angles` (N, n): as the controller reports them, rad. `force` (N, 3): N, base axes.
-    """
+    """Configurations (N, n) as the controller reports them, rad, each with a force (N, 3), N, base axes."""
 
     joint_angles: np.ndarray
     force: np.ndarray
@@ -72,13 +86,11 @@ class Candidates:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to measure.
+    """What to measure: configurations that choose the parameters, in the order of a short tour; random ones that judge them.
 
-    `fitted`, `held_out`: configurations that choose the parameters, in the order of a short tour; those that judge them, which
-    are random. `efficiency`: share of the best possible design's worth that the fitted ones are sure to have, by the criterion.
-    `accuracy_m` (poses,): root mean square error of the end effector over the workspace that the parameters' uncertainty
-    leaves, as `accuracy` counts it, with the first 1, 2, .. of them, best first. `random_m` (designs, poses): the same with
-    random configurations.
+    `efficiency`: as in `designs.efficiency`. `accuracy_m` (poses,): RMS error of the end effector over the workspace that the
+    parameters' uncertainty leaves, as `accuracy` counts it, with the first 1, 2, .. of the fitted ones, best first. `random_m`
+    (designs, poses): the same with random configurations.
     """
 
     fitted: Candidates
@@ -104,8 +116,7 @@ def find_allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int
     good = np.flatnonzero(np.all(list(fine.values()), axis=0))[:count]
     if not len(good):
         least = min(fine, key=lambda name: fine[name].mean())
-        words = {"boxes": "the boxes leave the arm no room", "sight": "the tracker sees the targets in none"}[least]
-        found = f"none of {counted(len(reported), 'configuration')} allowed: {words}"
+        found = f"none of {counted(len(reported), 'configuration')} allowed: {_FORBIDDEN[least]}"
         raise InputError("plan", least, found, "room for the arm and its targets")
     down = np.array(robot.gravity_m_s2) / np.linalg.norm(robot.gravity_m_s2)
     return Candidates(reported[good], loads.forces(len(good), down, np.random.default_rng(seed)))
@@ -121,13 +132,12 @@ def choose_plan(survey: Survey, some: Candidates, poses: int, held_out: int, kin
     if count < poses + held_out:
         found = f"{poses + held_out} of {counted(count, 'allowed configuration')}"
         raise InputError("plan", "poses", found, f"at most {count}, or more candidates")
+    listed = parameters(*model_of(survey))
     if poses < fewest_poses(survey):
-        numbers = poses * survey.numbers
-        found = f"{poses}, which measure {counted(numbers, 'number')} for {counted(count_parameters(survey), 'parameter')}"
+        found = f"{poses}, which measure {counted(poses * survey.numbers, 'number')} for {counted(len(listed), 'parameter')}"
         raise InputError("plan", "poses", found, f"at least {fewest_poses(survey)}")
-    seen = information(survey, some.joint_angles, some.force)
-    rows = seen.rows
-    if np.abs(rows[..., [owner.startswith("joint_offset") for owner, _ in seen.names]]).max() < _LEAST_SEEN:
+    rows = information(survey, some.joint_angles, some.force)
+    if np.abs(rows[..., [owner.startswith("joint_offset") for owner, _ in listed]]).max() < _LEAST_SEEN:
         raise InputError("plan", "targets", "targets that no joint moves", "a --target on what moves, off a lone axis")
     places = some.at(draws.permutation(count)[:_PLACES])
     accuracy = accuracy_rows(survey, places.joint_angles, places.force)
@@ -151,13 +161,7 @@ def choose_plan(survey: Survey, some: Candidates, poses: int, held_out: int, kin
 
 def fewest_poses(survey: Survey) -> int:
     """Poses that measure as many numbers as there are parameters, and as a campaign must have."""
-    return max(-(-count_parameters(survey) // survey.numbers), FEWEST_TRAINING_POSES)
-
-
-def count_needed_poses(curve_m: np.ndarray, accuracy_m: float) -> int | None:
-    """Fewest poses whose curve is at or below an accuracy; None where all of them are not enough."""
-    enough = np.flatnonzero(curve_m <= accuracy_m)
-    return int(enough[0]) + 1 if len(enough) else None
+    return max(-(-len(parameters(*model_of(survey))) // survey.numbers), FEWEST_TRAINING_POSES)
 
 
 def tour(joint_angles: np.ndarray, chosen: list[int]) -> list[int]:
@@ -191,3 +195,52 @@ def accuracy_curve(rows: np.ndarray, order: list[int] | np.ndarray, weight: np.n
     each = rows[order].astype(float)
     totals = add_prior(np.cumsum(each.transpose(0, 2, 1) @ each, axis=0))
     return np.sqrt(np.trace(np.linalg.solve(totals, weight), axis1=1, axis2=2).clip(min=0.0))
+
+
+def sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
+    """Rows of measurements.csv.
+
+    Returns ``pose`` (fitted ones first, from 1), ``load`` (0 without), ``repeat``, ``target``, ``done``, empty,
+    ``q1_deg..qn_deg`` (``_mm`` of prismatic joints) as the controller shows them, ``q1..qn`` the same in rad (m), wrench (N, N
+    m), and ``x, y, z`` and ``rx, ry, rz``, empty. The first poses are repeated, unloaded and under the first load: each repeat
+    is a fresh approach.
+    """
+    rows = []
+    configurations = [*zip(plan.fitted.joint_angles, plan.fitted.force, strict=True)]
+    fitted = len(configurations)
+    configurations += zip(plan.held_out.joint_angles, plan.held_out.force, strict=True)
+    endings = ["mm" if slides else "deg" for slides in survey.robot.chain.prismatic]
+    for pose, (angles, force) in enumerate(configurations, 1):
+        # What is typed at the controller is what is planned.
+        shown = {f"q{j}_{of}": round(q / SHOWN[of], 3) + 0.0 for j, (q, of) in enumerate(zip(angles, endings, strict=True), 1)}
+        exact = {name.partition("_")[0]: value * SHOWN[name.partition("_")[2]] for name, value in shown.items()}
+        for repeat in range(REPEATS if pose <= min(REPEATED_POSES, fitted) else 1):
+            for load, share in enumerate(survey.shares[: 2 if repeat else None]):
+                # Nothing pulls where no load hangs: a share of zero has no sign.
+                wrench = dict(zip(WRENCH_NAMES, (*(share * force + 0.0), 0.0, 0.0, 0.0), strict=True))
+                for target in survey.targets:
+                    head: dict[str, Any] = {"pose": pose, "load": load, "repeat": repeat, "target": target.name, TICK: ""}
+                    rows.append(head | shown | exact | wrench)
+    empty = ["x", "y", "z", *(["rx", "ry", "rz"] if survey.measured == "pose" else [])]
+    return pd.DataFrame(rows).assign(**dict.fromkeys(empty, np.nan))
+
+
+def campaign_document(name: str, robot_file: str, survey: Survey, plan: Plan) -> dict[str, Any]:
+    """Contents of the campaign.yaml that goes with a sheet. `name`: of the campaign. `robot_file`: beside it."""
+    fitted, judged = len(plan.fitted.joint_angles), len(plan.held_out.joint_angles)
+    targets = {
+        target.name: {"point": target.point, "offset_m": "unknown" if target.offset_m is None else list(target.offset_m)}
+        for target in survey.targets
+    }
+    return {
+        "campaign": name,
+        "robot": robot_file,
+        "measured": survey.measured,
+        "frame": "tracker" if survey.unknown_base else "base",
+        "targets": targets,
+        "compliance": "identify" if survey.loaded else "nominal",
+        "declared": list(GEOMETRY),
+        "noise": {"position_m": survey.position_m}
+        | ({"orientation_rad": survey.orientation_rad} if survey.measured == "pose" else {}),
+        "holdout": {"poses": list(range(fitted + 1, fitted + judged + 1))},
+    }

@@ -3,17 +3,27 @@
 The model is the one that a campaign declares: offsets of the joints, lengths and angles of the links, joint compliances where
 loads are measured, the errors of declared masses, and where tracker and reflectors are, if unknown. Sensitivities are those of
 the fit itself, at the robot file's values.
+
+Standard deviations of a sensor are half of what its maker permits as the largest error, which a tracker's manual calls typical
+[1]; the angles of its probe are from [2], those of cameras from [3].
+
+[1] Hexagon, Leica Absolute Tracker AT500 User Manual, section 2.8: transverse error at most 15 um + 6 um/m, typical results
+    half of that.
+[2] Hexagon, data sheet of the Leica T-Mac: rotation angles to 0.01 deg, which is 18 um at 100 mm.
+[3] Krumpek, O., Kroeger, O. and Mohr, S., Reproducible Optical Tracking Precision: Evaluating a Static, Near-Parallel Support
+    Structure for OptiTrack PrimeX22 Cameras, arXiv:2502.21189, 2025: 0.12 mm across the line of sight.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import find_absorbed, placement, scope_about
 from elastocal.application.calibrated import nominal_forward
+from elastocal.application.frames import BASE, ROBOT, scope_about, subtract_placement
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.elastic import joint_compliance
@@ -31,6 +41,35 @@ if TYPE_CHECKING:
 GEOMETRY = ("joint_offset", "link_geometry")
 # States that are linearized at once: their Jacobians stay in the processor's cache.
 _AT_ONCE = 1000
+# Half of 15 um + 6 um/m at 7.5 m; across the line of sight of a camera, whose poses are of markers so far apart.
+_TRACKER_M, _CAMERA_M, _MARKERS_M = 30e-6, 0.12e-3, 0.2
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Standard deviations of one component of a measurement; no orientation where positions are measured only.
+
+    `words`: which instrument it stands for. `measured`: what it reads, "position" or "pose", the usual first.
+    """
+
+    words: str
+    measured: tuple[str, ...]
+    position_m: float
+    orientation_rad: float | None
+
+
+_TRACKER = "half of MPE 15 µm + 6 µm/m"
+_CAMERA = "optical tracking, 0.12 mm across the line of sight (OptiTrack, arXiv:2502.21189), poses of markers 0.2 m apart"
+SENSORS = {
+    "tracker": Sensor(f"laser tracker and reflector at 7.5 m, {_TRACKER} (Leica AT500)", ("position",), _TRACKER_M, None),
+    "t-mac": Sensor(
+        f"laser tracker and 6DoF probe, {_TRACKER} at 7.5 m and of 0.01° (Leica T-Mac)",
+        ("pose", "position"),
+        _TRACKER_M,
+        math.radians(0.01) / 2,
+    ),
+    "camera": Sensor(_CAMERA, ("position", "pose"), _CAMERA_M, math.sqrt(2.0) * _CAMERA_M / _MARKERS_M),
+}
 
 
 @dataclass(frozen=True)
@@ -66,18 +105,6 @@ class Survey:
         return any(self.shares)
 
 
-@dataclass(frozen=True)
-class Information:
-    """What candidates tell, in units of the plausible size of each parameter.
-
-    `rows` (N, k, P): whitened sensitivities of the k numbers measured in each of N configurations; information is ``rows.T @
-    rows``. `names` (str, str): what each parameter belongs to, and its name.
-    """
-
-    rows: np.ndarray
-    names: list[tuple[str, str]]
-
-
 def model_of(survey: Survey) -> tuple[Model, Estimate]:
     """The model that a campaign of this survey declares, at the values of the robot file."""
     robot, sites = survey.robot, sites_of(survey.robot)
@@ -98,36 +125,29 @@ def model_of(survey: Survey) -> tuple[Model, Estimate]:
     return model, estimate
 
 
-def count_parameters(survey: Survey) -> int:
-    """How many parameters the model of a survey has."""
-    return len(parameters(*model_of(survey)))
-
-
-def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray, about: Estimate | None = None) -> Information:
-    """What each configuration contributes.
+def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """What each configuration contributes, in units of the plausible size of each of the `parameters` of its model.
 
     `reported_angles` (N, n): rad. `force` (N, 3): N, base axes, at the last measuring point; read at each of the shares.
-    `about`: values at which the model is linearized; those of the robot file without.
+    Returns rows (N, k, P): whitened sensitivities of the k numbers measured in each; information is ``rows.T @ rows``.
     """
     model, estimate = model_of(survey)
-    estimate = about or estimate
     named = parameters(model, estimate)
-    plausible = np.array([parameter.plausible for _, parameter in named])
-    rows = survey.rows
-    deviation = np.repeat([survey.position_m, survey.orientation_rad], 3)[:rows]
-    scale = plausible / deviation[:, None]
+    deviation = np.repeat([survey.position_m, survey.orientation_rad], 3)[: survey.rows]
+    scale = np.array([parameter.plausible for _, parameter in named]) / deviation[:, None]
     numbers = survey.numbers
     found = np.empty((len(reported_angles), numbers, len(named)))
-    for start in range(0, len(reported_angles), max(_AT_ONCE // len(survey.shares), 1)):
-        part = slice(start, start + max(_AT_ONCE // len(survey.shares), 1))
+    at_once = max(_AT_ONCE // len(survey.shares), 1)
+    for start in range(0, len(reported_angles), at_once):
+        part = slice(start, start + at_once)
         seen = observe(survey, reported_angles[part], force[part])
         line = linearize(model, estimate, seen, conditions(model, estimate, seen.states))
         found[part] = (line.sensitivities * scale).reshape(-1, numbers, len(named))
-    return Information(found, [(owner, parameter.name) for owner, parameter in named])
+    return found
 
 
 def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Sensitivities of where the end effector is, in the units of `Information`, as `accuracy` counts them.
+    """Sensitivities of where the end effector is, in the units of `information`, as `accuracy` counts them.
 
     Where the base is unknown, less its best placement over these configurations; where the offset of the reflectors on the end
     effector is, less the best constant offset there. Base and reflectors themselves do not move the robot.
@@ -141,18 +161,16 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     model, estimate = model_of(replace(alone, targets=(Target("end effector", end.name, end.offset_m),)))
     bare = replace(model, fitted_frames=False)
     seen = observe(replace(alone, targets=bare.targets), reported_angles, force)
-    moved = linearize(bare, estimate, seen, conditions(bare, estimate, seen.states)).sensitivities
-    named = parameters(bare, estimate)
-    moved = np.concatenate([moved[:, :3], np.zeros_like(moved[:, :3])], axis=1) * [p.plausible for _, p in named]
+    moved = linearize(bare, estimate, seen, conditions(bare, estimate, seen.states)).sensitivities[:, :3]
+    plausible = [parameter.plausible for _, parameter in parameters(bare, estimate)]
+    moved = np.concatenate([moved, np.zeros_like(moved)], axis=1) * plausible
     position, rotation = nominal_forward(survey.robot, reported_angles)
-    columns = placement(scope_about(position), position, rotation)
     offset = bool(there) and all(target.offset_m is None for target in there)
-    free = np.repeat([survey.unknown_base, survey.unknown_base, offset, False], 3)
-    rows = (moved - columns @ find_absorbed(columns, moved, free))[:, :3]
+    scope = replace(scope_about(position), frame=ROBOT if survey.unknown_base else BASE, offset_removed=offset)
+    rows = subtract_placement(scope, position, rotation, moved)[:, :3]
     # Behind the parameters of base and reflectors.
-    every = parameters(*model_of(survey))
-    found = np.zeros((len(rows), 3, len(every)))
-    found[..., len(every) - len(named) :] = rows
+    found = np.zeros((len(rows), 3, len(parameters(*model_of(survey)))))
+    found[..., -len(plausible) :] = rows
     return found
 
 

@@ -1,0 +1,150 @@
+"""What was declared wrongly rather than made inexactly: a target, a tool, a base, a pedestal, links of another variant.
+
+A fit takes up in lengths of links what a declaration has wrong by millimetres, and its errors on held-out poses show nothing of
+it; but the flange is then elsewhere than the reflector says. Along each axis of each place is asked whether a shift of any size
+there, beside geometry of one usual size everywhere else, makes the measurements more probable. The size of all else is the most
+probable one, as in `fitting.tolerances`: of a robot that was made badly everywhere nothing is misplaced.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.fitting.parameters import parameter_values
+from elastocal.fitting.tolerances import SIZES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.campaigns.campaign import Campaign, Target
+    from elastocal.fitting.fit_result import Fit
+
+# Usual sizes that a bad case reaches (`effects.sizes.Size.most`).
+_MOST_SIZES = 3.0
+# Least gain of the logarithm of the evidence: one declaration in twenty is wrong, along one of a dozen axes.
+_LEAST_GAIN, _MOST_AXES = 5.5, 6
+# Places that say it as well as the best, in the same unit.
+_AS_WELL = 3.0
+# What is declared wrongly is wrong by so much at least, m: millimetres, a mistaken digit; another variant by what was fitted.
+_WRONG_M = 0.03
+# From this share of its length on a shift is along one axis.
+_ALONG = 0.95
+TOOL, BASE = "tool", "base"
+_BASE, _LINK, _OFFSET = "base_placement", "link_geometry", "joint_offset"
+
+
+def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
+    """Findings, the surest first.
+
+    Returns of each ``place``: "tool", "base" or "link 3"; ``alternatives``, which say it as well; ``shift_m`` (3,) in the axes
+    of the base or of the far end of the link; ``sizes``, its length over the usual one; ``sentence``.
+    """
+    free, listed = np.flatnonzero(~fitted.held), fitted.parameters
+    effects = {effect.key: effect.effect for effect in fitted.model.effects}
+    geometry = np.array([effects.get(listed[at][0]) in (_BASE, _LINK, _OFFSET) for at in free], bool)
+    usual = np.array([listed[at][1].plausible for at in free])
+    values = parameter_values(fitted.model, fitted.estimate)[free]
+    shifts = [
+        n
+        for n in np.flatnonzero(geometry).tolist()
+        if effects[listed[free[n]][0]] != _OFFSET and listed[free[n]][1].unit == "m"
+    ]
+    if not shifts or (np.abs(values) < usual)[shifts].all():
+        return []
+    wrong_m = max(_WRONG_M, float(np.abs(values[shifts]).max()))
+    # What the measurements say, without the prior of the fit.
+    precision = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
+    weighted = precision @ values
+    precision[np.diag_indices(len(free))] -= np.where(geometry, fitted.prior_std[free] ** -2.0, 0.0)
+
+    def explained(wrong: list[int]) -> tuple[float, np.ndarray]:
+        """Log evidence with the most probable size of all else, but for a constant, and the parameters then."""
+        found = []
+        for size in SIZES:
+            prior = size * usual
+            prior[wrong] = wrong_m
+            whole = precision + np.diag(np.where(geometry, prior**-2.0, 0.0))
+            best = np.linalg.solve(whole, weighted)
+            found.append((0.5 * (weighted @ best - np.linalg.slogdet(whole)[1]) - np.log(prior[geometry]).sum(), best))
+        return max(found, key=lambda each: each[0])
+
+    def place_of(number: int) -> str:
+        owner = listed[free[number]][0]
+        tool = owner == f"{_LINK}@{campaign.robot.joints}" and any(each.offset_m is not None for each in _at_end(campaign))
+        return TOOL if tool else BASE if effects[owner] == _BASE else f"link {owner.rpartition('@')[2]}"
+
+    taken: list[int] = []
+    others: dict[str, set[str]] = {}
+    last, at = explained(taken)
+    # Along one axis of a place, or along all of them.
+    ways = [(n,) for n in shifts] + [
+        tuple(n for n in shifts if place_of(n) == place) for place in {place_of(n) for n in shifts}
+    ]
+    while len(taken) < _MOST_AXES and (left := [way for way in ways if not set(way) & set(taken)]):
+        tried = {way: explained([*taken, *way]) for way in left}
+        most = max(gain for gain, _ in tried.values())
+        if most - last < _LEAST_GAIN:
+            break
+        # Of places that say it as well: targets and tools are misplaced before bases, and these before links.
+        alike = [way for way in tried if tried[way][0] > most - _AS_WELL]
+        best = min(alike, key=lambda way: (_rank(place_of(way[0])), len(way), -tried[way][0]))
+        last, at = tried[best]
+        taken += best
+        others.setdefault(place_of(best[0]), set()).update(place_of(way[0]) for way in alike)
+    found = []
+    for place, alternatives in others.items():
+        mine = [n for n in taken if place_of(n) == place]
+        shift = np.zeros(3)
+        shift[["xyz".index(listed[free[n]][1].name[-1]) for n in mine]] = at[mine]
+        sizes = float(np.linalg.norm(shift) / usual[mine].max())
+        if sizes > _MOST_SIZES:
+            facts = {"place": place, "alternatives": sorted(alternatives - {place}), "shift_m": shift.tolist(), "sizes": sizes}
+            found.append(facts | {"sentence": _sentence(facts, campaign)})
+    return found
+
+
+def point_sentence(campaign: Campaign) -> str:
+    """Of which point a corrected robot is known: that of its end effector, as the targets on it were declared."""
+    end, targets = campaign.robot.chain.end_effector.name, _at_end(campaign)
+    if not targets:
+        names = ", ".join(f"{target.name} on {target.point}" for target in campaign.targets)
+        return (
+            f"All errors are those of {end}, on which no target was measured ({names}): what lies between is the robot file's."
+        )
+    each = [
+        target.name + (", whose offset was fitted" if target.offset_m is None else f" at {_millimetres(target.offset_m)} of it")
+        for target in targets
+    ]
+    return f"All errors are those of {end}, measured by the target {'; '.join(each)}."
+
+
+def _at_end(campaign: Campaign) -> list[Target]:
+    return [target for target in campaign.targets if target.point == campaign.robot.chain.end_effector.name]
+
+
+def _rank(place: str) -> int:
+    return {TOOL: 0, BASE: 1}.get(place, 2)
+
+
+def _millimetres(at: Sequence[float] | np.ndarray) -> str:
+    return f"({', '.join(f'{1e3 * value:.1f}' for value in at)}) mm"
+
+
+def _sentence(facts: dict[str, Any], campaign: Campaign) -> str:
+    shift, place, end = np.array(facts["shift_m"]), facts["place"], campaign.robot.chain.end_effector.name
+    largest, whole = np.abs(shift).max(), np.linalg.norm(shift)
+    along = f"along {'xyz'[np.argmax(np.abs(shift))]}" if largest > _ALONG * whole else f"by {_millimetres(shift)}"
+    length = f"{1e3 * whole:.1f} mm"
+    if place == TOOL:
+        text = f"reflector or tool sits {length} from where it is declared, {along} of {end}: the flange is not certified, the "
+        text += "reflector is"
+    elif place == BASE:
+        text = f"the base stands {length} from where it is declared, {along} of the base"
+    else:
+        text = f"{place} ends {length} from where the robot file has it, {along} of its far end: a wrong length, or another "
+        text += "variant of the robot" + (", or a wrong height of base or pedestal" if place == "link 1" else "")
+    if facts["alternatives"]:
+        text += f" (or it is {' or '.join(facts['alternatives'])}: these measurements do not distinguish them)"
+    return f"{text}. It is {facts['sizes']:.0f} times what such a length is usually off"
