@@ -143,10 +143,8 @@ def _read_task(options: _Options) -> _Task:
     noise = _read_noise(options.noise, options.orientation_noise, sensor, measured)
     survey = Survey(arm, targets, not options.base_known, measured, loads.shares, *noise)
     boxes = tuple(numbers("--box", text, 6).reshape(3, 2) for text in options.box or ())
-    for corner in boxes:
-        if (corner[:, 0] >= corner[:, 1]).any():
-            allowed = "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max"
-            raise InputError("--box", "", str(corner.ravel().tolist()), allowed)
+    if wrong := [corner.ravel().tolist() for corner in boxes if (corner[:, 0] >= corner[:, 1]).any()]:
+        raise InputError("--box", "", str(wrong[0]), "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max")
     tracker = None if options.tracker is None else numbers("--tracker", options.tracker, 3)
     accuracy = None if options.accuracy is None else length_m("--accuracy", options.accuracy)
     reach = reach_m(arm)
