@@ -79,6 +79,7 @@ def test_as_few_poses_as_reach_a_wanted_accuracy(run, tmp_path):
         (["--accuracy", "1um"], "--accuracy"),
         (["--box=-9,9,-9,9,-9,9"], "boxes"),
         (["--floor", "9"], "--no-floor"),
+        (["--floor", "high"], "--floor"),
     ],
 )
 def test_a_wrong_option_is_refused_by_its_name_and_nothing_is_written(refusal, tmp_path, words, message):

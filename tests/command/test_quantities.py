@@ -59,5 +59,5 @@ def test_every_option_that_is_a_number_has_a_range(value):
         found.add(option)
     assert found == {
         *("--mass-std", "--force", "--risk", "--seed", "--poses", "--held-out", "--candidates", "--header"),
-        *("--cores", "--floor", "--column"),
+        *("--cores", "--column"),
     }

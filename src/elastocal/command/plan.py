@@ -60,13 +60,14 @@ class _Options:
     tracker: Annotated[str | None, Option(help="Position of the tracker, x,y,z in m, base axes.")] = None
     box: Annotated[list[str] | None, Option(help="Box to keep out of: xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")] = None
     floor: Annotated[
-        float, Option(help="Height in m, base axes, that forearm and targets stay above: the plane that the base stands on.")
-    ] = 0.0
+        str, Option(help="Height in m, base axes, that forearm and targets stay above: the plane that the base stands on.")
+    ] = "0"
     no_floor: Annotated[bool, Option("--no-floor", help="Nothing is below the robot.")] = False
     column: Annotated[
         float | None,
         Option(
             min=0.0,
+            max=FARTHEST_TARGET_M,
             help="Radius in m of the robot's own column, up to its shoulder, that forearm and hand keep out of; 0 for none. "
             "Default: a tenth of the reach.",
         ),
@@ -142,15 +143,14 @@ def _read_task(options: _Options) -> _Task:
     noise = _read_noise(options.noise, options.orientation_noise, sensor, measured)
     survey = Survey(arm, targets, not options.base_known, measured, loads.shares, *noise)
     boxes = tuple(numbers("--box", text, 6).reshape(3, 2) for text in options.box or ())
-    for corner in boxes:
-        if (corner[:, 0] >= corner[:, 1]).any():
-            allowed = "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max"
-            raise InputError("--box", "", str(corner.ravel().tolist()), allowed)
+    if wrong := [corner.ravel().tolist() for corner in boxes if (corner[:, 0] >= corner[:, 1]).any()]:
+        raise InputError("--box", "", str(wrong[0]), "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max")
     tracker = None if options.tracker is None else numbers("--tracker", options.tracker, 3)
     accuracy = None if options.accuracy is None else length_m("--accuracy", options.accuracy)
     reach = reach_m(arm)
     column = COLUMN_SHARE * reach if options.column is None else options.column
-    cell = Cell(boxes, tracker, RADIUS_SHARE * reach, None if options.no_floor else options.floor, column)
+    floor = None if options.no_floor else float(numbers("--floor", options.floor, 1)[0])
+    cell = Cell(boxes, tracker, RADIUS_SHARE * reach, floor, column)
     return _Task(survey, cell, loads, sensor, accuracy)
 
 

@@ -29,6 +29,8 @@ _LEAST_GAIN, _MOST_AXES = 5.5, 6
 _AS_WELL = 3.0
 # What is declared wrongly is wrong by so much at least, m: millimetres, a mistaken digit; another variant by what was fitted.
 _WRONG_M = 0.03
+# Beyond such a turn, rad, the geometry is not linear, and what a fit has of it means nothing.
+_LARGEST_TURN = 0.1
 # From this share of its length on a shift is along one axis.
 _ALONG = 0.95
 TOOL, BASE = "tool", "base"
@@ -51,13 +53,17 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
         for n in np.flatnonzero(geometry).tolist()
         if effects[listed[free[n]][0]] != _OFFSET and listed[free[n]][1].unit == "m"
     ]
-    if not shifts or (np.abs(values) < usual)[shifts].all():
+    turns = geometry & np.array([listed[at][1].unit == "rad" for at in free], bool)
+    if not shifts or (np.abs(values) < usual)[shifts].all() or (np.abs(values[turns]) > _LARGEST_TURN).any():
         return []
     wrong_m = max(_WRONG_M, float(np.abs(values[shifts]).max()))
-    # What the measurements say, without the prior of the fit.
+    # What the measurements say, without the prior of the fit, and no more surely than the model explains them.
+    off = fitted.whitened(fitted.residual)
+    misfit = max(1.0, float((off**2).sum()) / max(off.size - len(free), 1))
     precision = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
     weighted = precision @ values
     precision[np.diag_indices(len(free))] -= np.where(geometry, fitted.prior_std[free] ** -2.0, 0.0)
+    precision, weighted = precision / misfit, weighted / misfit
 
     def explained(wrong: list[int]) -> tuple[float, np.ndarray]:
         """Log evidence with the most probable size of all else, but for a constant, and the parameters then."""
