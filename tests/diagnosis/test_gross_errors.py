@@ -7,6 +7,7 @@ from scipy.stats import binom, chi2
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.gross_errors import (
+    _Beside,
     beyond_chance,
     entries_of,
     gross_errors,
