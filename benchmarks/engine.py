@@ -21,9 +21,9 @@ from common import ROOT, Row, beside_yardstick, interleaved
 from elastocal.campaigns.importers import ur10_ipa
 from elastocal.campaigns.public_data import FOLDER_VARIABLE
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.registration import registered
+from elastocal.fitting.tolerances import estimated_noise
 from elastocal.loop.whole import cases_in
 from elastocal_proof.blind.cases import SIZES, cases_of, make_case
 from elastocal_proof.blind.folders import write_dynamic_campaign

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.case import noise_facts
-from elastocal.fitting.noise_estimation import estimated_noise
+from elastocal.fitting.tolerances import estimated_noise
 from elastocal.loop.whole import cases_in, diagnosed
 from elastocal.mechanics.sites import sites_of
 from elastocal_proof.blind.cases import Case, make_case

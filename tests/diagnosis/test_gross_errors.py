@@ -7,6 +7,7 @@ from scipy.stats import binom, chi2
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.gross_errors import (
+    _Beside,
     beyond_chance,
     entries_of,
     gross_errors,
@@ -34,6 +35,16 @@ def test_the_distance_of_a_row_is_that_from_a_fit_without_it(cases):
         found.append(gross_errors(part.declared, whole.noise, measurements, part.kept, SETTINGS).distance)
     # Weights of the robust fit differ a little, since the model lacks something.
     assert found[0][BAD] == pytest.approx(found[1][BAD], rel=0.1)
+
+
+def test_a_row_that_was_fitted_is_farther_off_than_one_of_the_same_residual_that_was_not(cases):
+    """A fit takes of the residual of its own rows, and adds to the variance of others."""
+    measurements = cases[0].campaign.measurements
+    every = np.ones(len(measurements), bool)
+    part = fitted_to(cases[0], every, SETTINGS)
+    rows = _Beside.of(part.declared.model, part.declared.estimate, measurements, part.noise, every)
+    yardstick = rows.yardstick(part.declared, part.noise, every)
+    assert (rows.distances(yardstick, every) > rows.distances(yardstick, ~every)).all()
 
 
 def test_rows_stand_out_by_chance_as_often_as_the_settings_say():

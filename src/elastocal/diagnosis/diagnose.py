@@ -228,6 +228,8 @@ def _explained(
             problem = problem.with_shapes(shapes_looked_at_closely(problem.problem, alone))
         found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
+        # Rows of a long campaign make room for the fit, and for those of the next linearisation.
+        problem = problem.without_rows
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
         # No verdict yet, and no probability: a later search, or the poses left out, may say otherwise.

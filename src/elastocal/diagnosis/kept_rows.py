@@ -12,9 +12,8 @@ from elastocal.diagnosis.evidence import scale_weights
 from elastocal.diagnosis.gross_errors import beyond_chance, gross_errors, most_by_chance
 from elastocal.diagnosis.linearize import linearized
 from elastocal.fitting.least_squares import evaluated, fit
-from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.fitting.observations import measured_in, sample_of, select_states, spread_poses, without_outlying_repeats
-from elastocal.fitting.tolerances import fit_declared
+from elastocal.fitting.tolerances import estimated_noise, fit_declared
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements

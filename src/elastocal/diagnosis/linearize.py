@@ -85,6 +85,14 @@ class Linearized:
         vars(found).update({"_fitted": self._fitted})
         return found
 
+    @property
+    def without_rows(self) -> Linearized:
+        """The same where nothing but the statistics and what goes with them is needed any more."""
+        found = replace(self)
+        kept = {name: value for name, value in vars(self).items() if name != "_fitted"}
+        vars(found).update(kept | {"products": self.products.without_rows})
+        return found
+
     @cached_property
     def units(self) -> tuple[Unit, ...]:
         """Of candidates and competitors, in the order of their columns."""

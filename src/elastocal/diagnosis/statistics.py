@@ -93,6 +93,11 @@ class Products:
         }
         return replace(self, rows=rows, **few)
 
+    @property
+    def without_rows(self) -> Products:
+        """Without what grows with the measurements; normal equations at other sizes than those met are lost with it."""
+        return replace(self, rows=self.rows.at(np.zeros(len(self.beside), bool)), beside=self.beside[:0])
+
     def by_pose(self) -> Iterator[tuple[np.ndarray, WhiteRows, np.ndarray, np.ndarray]]:
         """B_p (G, n, P + K + 1) along the principal axes of C_p, and its eigenvalues (G, n), of some poses at a time.
 

@@ -15,16 +15,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.fitting.least_squares import ON_THE_WAY, STARTED_FROM, fit
+from elastocal.fitting.noise import FINEST, Noise, chosen_noise
 from elastocal.fitting.observations import sample_of
 from elastocal.fitting.parameters import parameter_values
+from elastocal.fitting.registration import registered
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
-    from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 
 # Sizes of declared geometry, in plausible sizes: measured robots exceed data-sheet tolerances tenfold, and none is ten times
@@ -34,6 +36,27 @@ SIZES = np.geomspace(0.1, 10.0, 9)
 _FACTORS = np.geomspace(1.0, 1e4, 185)
 # Shares of a prior's variance that measurements leave below this are rounding.
 _ROUNDING = 1e-14
+
+
+# Noise that is taken before anything is known of it, m and rad.
+_ASSUMED = 1e-4
+
+
+def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
+    """Noise from repeats or as declared, from the residual of the declared model where there is neither; and warnings."""
+    start = registered(case.model, case.observations)
+    noise, warnings = chosen_noise(case.campaign, case.model, start, case.campaign.measurements)
+    if noise is None:
+        assumed = Noise("residual", _ASSUMED, _ASSUMED, np.zeros(case.campaign.robot.joints))
+        # The widest prior leaves nearly what none would leave, without parameters that nothing determines.
+        model = with_size(case.model, SIZES[-1])
+        left = fit(model, case.observations, assumed, start).residual
+        typical = [max(float(np.sqrt((part**2).mean())), FINEST) for part in (left[:, :3], left[:, -3:])]
+        noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
+        # What parameters have taken of it is given back.
+        wide = fit(model, case.observations, noise, start, settled=ON_THE_WAY)
+        noise = noise.scaled(most_probable(wide)[1])
+    return noise, warnings
 
 
 def fit_declared(model: Model, observations: Observations, noise: Noise) -> Fit:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.fitting.noise_estimation import estimated_noise
-from elastocal.fitting.tolerances import fit_declared
+from elastocal.fitting.tolerances import estimated_noise, fit_declared
 from elastocal.remainder.corrected import Plan, corrected, regressions
 from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_residuals
