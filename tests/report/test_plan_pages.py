@@ -30,8 +30,8 @@ def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
     assert boxes * len(survey.targets) == len(rows)
     # Where the reflector has to sit, which no error afterwards shows.
     known = replace(survey, targets=(Target("T", "tool0", (0.1, 0.0, 0.05)),))
-    assert "T on tool0, at (100.00, 0.00, 50.00) mm of it" in plan_facts(known, plan, rows, ["worth"])["lines"][1]
-    assert "an offset that is fitted" in facts["lines"][1]
+    assert "T on tool0, at (100.00, 0.00, 50.00) mm of it" in plan_facts(known, plan, rows, ["worth"])["targets"][0]
+    assert "an offset that is fitted" in facts["targets"][0]
 
 
 def test_the_sheet_is_typeset(tmp_path):
