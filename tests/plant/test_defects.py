@@ -12,10 +12,11 @@ from elastocal.errors import InputError
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.sites import sites_of
+from elastocal_proof.plant.arm import rotation_vector
 from elastocal_proof.plant.campaigns import schedule_of
-from elastocal_proof.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
+from elastocal_proof.plant.defects import Defect, drawn_defect, truth_of, with_defects
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE
 from elastocal_proof.plant.physical_robot import seen_poses, specimen
-from elastocal_proof.plant.tracker import rotation_vector
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
 FOREIGN = sorted(set(KINDS) - set(NAMED))
@@ -174,12 +175,3 @@ def test_an_eccentric_nest_is_the_catalogues_law_on_every_arm(name, arm, small):
     found = np.linalg.lstsq(np.column_stack(columns), change[bare, -1].ravel())[0]
     left = change[bare, -1].ravel() - np.column_stack(columns) @ found
     assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(change[bare, -1])
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_an_order_of_a_transmission_lies_between_low_integers_and_its_double_with_it(weightless, seed):
-    """Higher ones no campaign of some twenty poses can show."""
-    bad = with_defects(weightless, [Defect("transmission_order", (2,), 8e-5, seed)])
-    ((order, size, _), (double, less, _)) = bad.drives[-1].waves
-    assert 2.25 <= order <= 4.75 and 0.25 <= order % 1 <= 0.75
-    assert (double, size, less) == pytest.approx((2 * order, 8e-5, 2e-5))

@@ -5,19 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal_proof.plant.campaigns import schedule_of
-from elastocal_proof.plant.drives import WrongRatio, ZeroOffset
-from elastocal_proof.plant.gears import Asymmetric
-from elastocal_proof.plant.load_cell import LoadCell
-from elastocal_proof.plant.multibody import machine_of
+from elastocal_proof.plant.arm import rotation_vector
+from elastocal_proof.plant.campaigns import Design, schedule_of
+from elastocal_proof.plant.instruments import LoadCell
+from elastocal_proof.plant.machine import machine_of
 from elastocal_proof.plant.physical_robot import Warmth, at_rest, driven, seen_poses, specimen
-from elastocal_proof.plant.tracker import rotation_vector
 from elastocal_proof.plant.weights import declared_masses, on_stretches
 
 
 def test_castings_warm_up_behind_the_thermometer_and_reach_it():
     warmth, time = Warmth(10.0, 3000.0, 1200.0), np.linspace(0, 40000, 400)
-    shown, castings = warmth.shown(time), warmth.of_castings(time)
+    shown, castings = warmth.shown(time), 20.0 + warmth.of_castings(time)
     assert (castings[1:] < shown[1:]).all()
     assert castings[0] == shown[0] == 20.0
     np.testing.assert_allclose([shown[-1], castings[-1]], 30.0, atol=1e-3)
@@ -31,7 +29,7 @@ def test_links_grow_in_proportion_to_their_castings_warmth(weightless, small):
     grown = seen_poses(replace(weightless, expansion_per_K=1e-5), schedule)
     nominal = seen_poses(weightless, schedule)
     unloaded = schedule.load == 0
-    share = 1e-5 * (weightless.warmth.of_castings(schedule.time_s) - 20.0)
+    share = 1e-5 * weightless.warmth.of_castings(schedule.time_s)
     np.testing.assert_allclose(grown[0][unloaded], (nominal[0] * (1 + share)[:, None, None])[unloaded], atol=1e-12)
     assert np.abs(rotation_vector(grown[1] @ np.swapaxes(nominal[1], -1, -2))[unloaded]).max() < 1e-12
 
@@ -63,13 +61,31 @@ def test_weights_of_a_specimen_lie_about_the_declared_ones_within_three_deviatio
 
 
 def test_errors_of_all_drives_add_to_the_commanded_angles(weightless, schedule):
-    robot = replace(weightless, drives=(ZeroOffset(1, 2e-4), ZeroOffset(1, 3e-4), WrongRatio(3, 0, 1e-3)))
-    drive, growth, warm, offsets = driven(robot, schedule, machine_of(robot.arm, robot.structure))
+    laws = ((1, lambda done: 2e-4), (1, lambda done: 3e-4), (3, lambda done: 1e-3 * done.angle[:, 0]))
+    drive, growth, offsets = driven(
+        replace(weightless, drives=laws), schedule, machine_of(weightless.arm, weightless.structure)
+    )
     error = drive - schedule.angle
     np.testing.assert_allclose(error[:, 1], 5e-4, atol=1e-15)
     np.testing.assert_allclose(error[:, 3], 1e-3 * schedule.angle[:, 0], atol=1e-15)
     assert not np.delete(error, [1, 3], axis=1).any() and not growth.any() and not offsets
-    np.testing.assert_allclose(warm, robot.warmth.of_castings(schedule.time_s))
+
+
+@pytest.mark.parametrize(("kind", "group"), [("repeatability_rad", "approach"), ("pose_rad", "pose")])
+def test_chance_of_the_drives_is_drawn_afresh_for_each_approach_or_pose_by_the_seed(weightless, fanuc_arm, kind, group):
+    done = schedule_of(fanuc_arm, Design(poses=60, approach_each_load=False), 2)
+    robot, machine = (
+        replace(weightless, **{kind: (2e-5, 0.0, 1e-5, 0.0, 0.0, 0.0)}),
+        machine_of(fanuc_arm, weightless.structure),
+    )
+    error, again, other = (
+        driven(robot, replace(done, seed=seed), machine)[0] - done.angle for seed in (done.seed, done.seed, done.seed + 1)
+    )
+    first = np.unique(getattr(done, group), return_index=True)[1]
+    np.testing.assert_allclose(error, error[first][getattr(done, group)], atol=1e-15)
+    np.testing.assert_array_equal(error, again)
+    assert np.abs(error - other)[:, 0].min() > 0
+    np.testing.assert_allclose(error[first].std(axis=0), [2e-5, 0.0, 1e-5, 0.0, 0.0, 0.0], rtol=0.35, atol=1e-15)
 
 
 def test_expansion_changes_evenly_from_the_column_to_the_flange(weightless, schedule):
@@ -80,8 +96,9 @@ def test_expansion_changes_evenly_from_the_column_to_the_flange(weightless, sche
 
 
 def test_gears_come_to_rest_by_their_linear_springs_and_their_other_laws_together(fanuc_specimen, schedule):
-    machine, rest = at_rest(replace(fanuc_specimen, gears=(Asymmetric(1, 1e-11),)), schedule)
-    torque = rest.torque[:, machine.gear]
+    gears = ((1, lambda done, torque, unloaded: 1e-11 * torque[:, 1] ** 2),)
+    machine, rest = at_rest(replace(fanuc_specimen, gears=gears), schedule)
+    torque = rest.force[:, machine.gear]
     wanted = fanuc_specimen.compliance * torque
     wanted[:, 1] += 1e-11 * torque[:, 1] ** 2
     np.testing.assert_allclose(rest.coordinates[:, machine.gear], wanted, atol=1e-13)
