@@ -11,7 +11,8 @@ from elastocal.campaigns.holdout import split
 from elastocal.campaigns.reading import read_campaign
 from elastocal_proof.blind.carrying_out import carry_out, random_experiment
 from elastocal_proof.blind.cases import Case, make_case
-from elastocal_proof.blind.follow_up import ARMS, LADDER, POSES, folder_of
+from elastocal_proof.blind.follow_up import LADDER
+from elastocal_proof.blind.verdicts import ARMS, POSES, folder_of
 from elastocal_proof.plant.arm import arm_from_file
 
 CASE = Case("lost motion", "single", "kuka", ("lost_motion",), (50.0,), "usual", 187654321)

@@ -16,8 +16,8 @@ from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.proposal import NOTHING_AMBIGUOUS, without_poses
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in, diagnosed
-from elastocal_proof.blind import follow_up
-from elastocal_proof.blind.follow_up import ARMS, POSES, folder_of
+from elastocal_proof.blind import follow_up, verdicts
+from elastocal_proof.blind.verdicts import ARMS, POSES, folder_of
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS, BENCHMARKS = ROOT / "config" / "robots", ROOT / "benchmarks"
@@ -25,7 +25,8 @@ SEED = 1
 # Where a campaign is diagnosed, and the test below that has its verdict.
 CALLERS = {
     "src/elastocal/loop/whole.py": "the one call",
-    "src/elastocal_proof/blind/follow_up.py": "blind proof, the next experiment and follow-ups",
+    "src/elastocal_proof/blind/follow_up.py": "the next experiment",
+    "src/elastocal_proof/blind/verdicts.py": "blind proof and follow-ups",
     "src/elastocal_proof/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
     "src/elastocal_proof/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",
     "workflow/scripts/diagnose_campaign.py": "rules",
@@ -136,7 +137,7 @@ class OneCall:
 def run_of(step, tmp_path, monkeypatch, verdict, **parts):
     """Result of one step of the blind proof, and what it asked of the one call."""
     path, one_call = tmp_path / "verdicts.json", OneCall(verdict)
-    monkeypatch.setattr(follow_up, "diagnosed", one_call)
+    monkeypatch.setattr(verdicts, "diagnosed", one_call)
     params = _Named(seed=SEED, robots=ROBOTS.as_posix())
     step(_Job(output=_Named(verdicts=path.as_posix()), params=params, wildcards=_Named(block="block"), **parts))
     return json.loads(path.read_text(encoding="utf-8")), one_call.asked
@@ -154,8 +155,8 @@ def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(kind
 
 def test_blind_proof_writes_the_verdict_of_the_one_call(folder, expected, tmp_path, monkeypatch):
     blind = _Named(blind=folder.parent.as_posix())
-    verdicts, asked = run_of(follow_up.diagnose_cases, tmp_path, monkeypatch, expected, input=blind)
-    assert verdicts == [expected]
+    found, asked = run_of(verdicts.diagnose_cases, tmp_path, monkeypatch, expected, input=blind)
+    assert found == [expected]
     assert asked == [(folder.as_posix(), ROBOTS, SEED, Settings())]
 
 
@@ -166,7 +167,7 @@ def test_follow_ups_write_the_verdict_of_the_one_call(folder, expected, tmp_path
         folders.append(Path(folder_of(tmp_path / "campaigns", arm, POSES[0], "made")))
         shutil.copytree(folder, folders[-1])
     campaigns = _Named(campaigns=(tmp_path / "campaigns").as_posix())
-    anew, asked = run_of(follow_up.diagnose_follow_ups, tmp_path, monkeypatch, expected, input=campaigns)
+    anew, asked = run_of(verdicts.diagnose_follow_ups, tmp_path, monkeypatch, expected, input=campaigns)
     assert asked == [(path.as_posix(), ROBOTS, SEED, Settings()) for path in folders]
     assert anew == [{"campaign": "made", "arm": arm, "poses": POSES[0], "verdict": expected} for arm in ARMS]
 

@@ -60,7 +60,7 @@ rule diagnose_cases:
     input:
         blind=rules.make_cases.output.blind,
         manifest=rules.seal_cases.output.manifest,
-        sources=sources("elastocal_proof.blind.follow_up.diagnose_cases"),
+        sources=sources("elastocal_proof.blind.verdicts.diagnose_cases"),
     output:
         verdicts="results/blind/{block}.json",
     log:
@@ -68,7 +68,7 @@ rule diagnose_cases:
     benchmark:
         "results/timings/diagnose_cases/{block}.tsv"
     params:
-        step="elastocal_proof.blind.follow_up.diagnose_cases",
+        step="elastocal_proof.blind.verdicts.diagnose_cases",
         seed=config["seed"],
         robots=f"{CONFIG}/robots",
     script:
@@ -240,7 +240,7 @@ rule carry_out_follow_ups:
 rule diagnose_follow_ups:
     input:
         campaigns=rules.carry_out_follow_ups.output.campaigns,
-        sources=sources("elastocal_proof.blind.follow_up.diagnose_follow_ups"),
+        sources=sources("elastocal_proof.blind.verdicts.diagnose_follow_ups"),
     output:
         verdicts="results/blind/follow_up/{block}.json",
     log:
@@ -248,7 +248,7 @@ rule diagnose_follow_ups:
     benchmark:
         "results/timings/diagnose_follow_ups/{block}.tsv"
     params:
-        step="elastocal_proof.blind.follow_up.diagnose_follow_ups",
+        step="elastocal_proof.blind.verdicts.diagnose_follow_ups",
         seed=config["seed"],
         robots=f"{CONFIG}/robots",
     script:

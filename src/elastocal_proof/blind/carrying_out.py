@@ -15,7 +15,8 @@ import pandas as pd
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal_proof.blind.cases import Case, cases_of, defects_of, yardstick_of
 from elastocal_proof.blind.folders import write_blind_campaign
-from elastocal_proof.blind.follow_up import ARMS, LADDER, POSES, folder_of
+from elastocal_proof.blind.follow_up import LADDER
+from elastocal_proof.blind.verdicts import ARMS, POSES, folder_of
 from elastocal_proof.plant.campaigns import Design, continued, schedule_of
 from elastocal_proof.plant.defects import with_defects
 from elastocal_proof.plant.random_numbers import stream

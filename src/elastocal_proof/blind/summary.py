@@ -14,8 +14,8 @@ from elastocal.io.json_files import read_json
 from elastocal.random_streams import stream
 from elastocal_proof.blind.cases import GEAR_GRAVITY, PROOF, SEVERAL_JOINTS, TUNED, UNDECLARED
 from elastocal_proof.blind.folders import load_ground_truth
-from elastocal_proof.blind.follow_up import ARMS, POSES
 from elastocal_proof.blind.scores import NONE, headed, intervals_of, leading, outcome, rate, score
+from elastocal_proof.blind.verdicts import ARMS, POSES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
