@@ -56,12 +56,6 @@ def test_a_measuring_point_behind_a_fixed_rotation_is_turned_and_placed_by_it():
     np.testing.assert_allclose(second.rotation, [[0, -1, 0], [0, 0, -1], [1, 0, 0]], atol=1e-15)
 
 
-def test_compliances_and_limits_are_in_radians():
-    arm = arm_of()
-    np.testing.assert_allclose(arm.compliance, [1e-6, 2e-6])
-    np.testing.assert_allclose(arm.limits, [[-np.pi / 2, np.pi]] * 2)
-
-
 @pytest.mark.parametrize("chain", ["Rz(q1) Tx(1)", "Rz(q1) Tx(1) [A] Tx(0.1)", "[A] Rz(q1)"])
 def test_a_chain_without_a_measuring_point_at_its_end_is_refused(chain):
     with refused("my.yaml", "chain", "measuring point"):

@@ -35,16 +35,6 @@ def test_a_defect_changes_the_measurements_and_neither_the_schedule_nor_the_nois
     assert at_shoulder.max() < 1e-4 * 4.0
 
 
-def test_noise_of_the_measurements_is_the_trackers(fanuc_specimen, small):
-    design = replace(small, poses=40)
-    schedule = schedule_of(fanuc_specimen.arm, design, 2)
-    noisy = measured_table(fanuc_specimen, design, schedule)[0]
-    silent = replace(fanuc_specimen, tracker=Tracker(sigma_m=0.0, sigma_rad=0.0))
-    clean = measured_table(silent, design, schedule)[0]
-    for axis in "xyz":
-        assert np.std(noisy[axis] - clean[axis]) == pytest.approx(60e-6, rel=0.06)
-
-
 def test_a_repeat_comes_from_the_same_side_and_a_ladder_without_moves_from_one(fanuc_arm, small):
     for each in (True, False):
         schedule = schedule_of(fanuc_arm, replace(small, approach_each_load=each), 2)

@@ -172,12 +172,36 @@ def test_what_is_warm_grows_with_the_castings_and_is_even_on_average(weightless)
     assert abs(growth @ arm.lengths_m) < 1e-9 * arm.lengths_m.sum() and np.ptp(growth) == pytest.approx(2 * 1.2e-5)
     across = with_defects(weightless, [Defect("temperature_gradient", (2,), 1.2e-5, 1)])
     time = np.array([0.0, 2000.0, 1e6])
-    bends = np.array([law(replace_time(time)) for _, law in across.offsets])
+    bends = np.array([law(Times(time)) for _, law in across.offsets])
     # Its whole bend is the growth of one side less that of the other over the width of a quarter metre.
     total = np.hypot(bends[0::2].sum(axis=0), bends[1::2].sum(axis=0))
     np.testing.assert_allclose(total, 1.2e-5 * arm.lengths_m[2] / 0.25 * weightless.warmth.of_castings(time), atol=1e-15)
 
 
-class replace_time:  # noqa: N801 - stands for a schedule of which the times alone are asked
+class Times:
+    """Stands for a schedule of which the times alone are asked."""
+
     def __init__(self, time_s):
         self.time_s = time_s
+
+
+@pytest.mark.parametrize("number", [1, 4])
+def test_a_runout_shifts_an_axis_once_a_turn_across_it_and_twice_across_both_and_leans_by_as_much_at_its_edge(
+    weightless, number
+):
+    robot, angle = with_defects(weightless, [Defect("bearing_runout", (number,), 3e-5, 2)]), np.linspace(0, 2 * np.pi, 65)[:-1]
+    assert robot.structure.loose == (number,) and robot.structure.tilt == {number: (0.0, 0.0)}
+    turning = Angles(np.tile(angle[:, None], 6))
+    for name, law in robot.offsets:
+        kind, which = name[:-3], int(name[-1])
+        waves = np.abs(np.fft.rfft(law(turning)))
+        assert np.argmax(waves) == which + 1
+        assert 2 * waves.max() / len(angle) == pytest.approx({"shift": 3e-5, "tilt": 3e-5 / 0.15}[kind])
+    assert [name for name, _ in robot.offsets] == [f"{kind}{number}_{which}" for which in (0, 1) for kind in ("shift", "tilt")]
+
+
+class Angles:
+    """Stands for a schedule of which the angles alone are asked."""
+
+    def __init__(self, angle):
+        self.angle = angle

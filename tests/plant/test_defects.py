@@ -132,28 +132,6 @@ def test_a_defect_is_refused_where_it_cannot_be_or_is_too_large(fanuc_specimen):
             with_defects(fanuc_specimen, [wrong])
 
 
-@pytest.mark.parametrize("joint", [1, 4])
-def test_a_runout_moves_what_turns_with_the_joint_to_and_fro_once_and_twice_a_turn(weightless, schedule, joint):
-    """And by its lean: at the joint itself by its shifts alone, across each other, once a turn the one and twice the other."""
-    bad = with_defects(weightless, [Defect("bearing_runout", (joint,), 3e-5, 2)])
-    # Under a load the levers change too.
-    bare = schedule.load == 0
-    change = np.linalg.norm(seen_poses(bad, schedule)[0] - seen_poses(weightless, schedule)[0], axis=2)[bare]
-    names = weightless.arm.points
-    before = [names.index(name) for name in ("2DoF", "3DoF")] if joint == 4 else []
-    assert not change[:, before].any()
-    # [4DoF] of joint 4 lies on it; of joint 1 every target is far away.
-    near = change[:, names.index("4DoF")]
-    assert (near > 0).all()
-    if joint == 4:
-        # (cos(q - a)^2 + cos(2 q - b)^2): one, and waves of 2 q and 4 q with amplitudes of a half.
-        angle = schedule.angle[bare, 3]
-        waves = np.column_stack([*(wave(order * angle) for order in (2, 4) for wave in (np.cos, np.sin))])
-        found, left = np.linalg.lstsq(waves, (near / 3e-5) ** 2 - 1.0)[:2]
-        assert len(angle) > 6 and left < 1e-5
-        np.testing.assert_allclose(np.linalg.norm(found.reshape(2, 2), axis=1), 0.5, rtol=1e-2)
-
-
 def test_an_eccentric_nest_is_the_catalogues_law_on_every_arm(name, arm, small):
     """Across the axis of the last joint, whichever that is of the target's frame, and of the flange's target alone."""
     robot = specimen(arm, 4, weighs=False)

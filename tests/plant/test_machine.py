@@ -21,7 +21,6 @@ from elastocal.mechanics.links import extended_chain, spring_compliance
 from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.robot import Link, Tube
 from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import usual_force_N
 from elastocal_proof.plant.machine import (
     Compensator,
     Loading,
@@ -31,7 +30,6 @@ from elastocal_proof.plant.machine import (
     equilibrium,
     machine_of,
 )
-from elastocal_proof.plant.weights import declared_masses, on_stretches
 
 # One joint about y, its link forwards along x, and a measuring point at its end.
 LEVER = arm_of("Ry(q1) Tx(1.0) [A]", compliance_urad_per_Nm=[50.0])
@@ -92,21 +90,6 @@ def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_a
     assert_unloaded_poses_alike(arm, robot, angles)
     wanted = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
     np.testing.assert_allclose(deflections(arm, angles, wrench), wanted, atol=2e-8)
-
-
-def test_joint_springs_deflect_all_points_as_the_reduced_model_to_second_order(arm, name):
-    robot = analysed(name)
-    angles, wrench = angles_and_wrenches(arm, usual_force_N(arm))
-    # Of a heavy arm under a kilonewton 1; deflections of second order go with its square.
-    more = arm.softness * arm.load_share
-    linear = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
-    rest = deflections(arm, angles, wrench) - linear
-    metres = np.linalg.norm(rest[..., :3], axis=-1)
-    # Second order: theta F L / K, a thousandth of millimetres. The FANUC's first joint is the softest of them.
-    assert np.sqrt((metres**2).mean(axis=1)).max() < 6e-6 * more**2
-    halved = deflections(arm, angles, 0.5 * wrench) - 0.5 * linear
-    # And nothing of first order: a quarter of it remains at half the force.
-    np.testing.assert_allclose(halved[..., :3], 0.25 * rest[..., :3], atol=2e-8 * more**3)
 
 
 def test_a_tube_in_segments_bends_twists_and_stretches_as_the_catalogues_cantilever():
@@ -200,48 +183,6 @@ def test_forces_do_the_work_that_moving_each_coordinate_takes(fanuc_arm):
     np.testing.assert_allclose(force, wanted, atol=1e-3)
 
 
-def test_base_springs_and_bearing_tilt_deflect_as_springs_of_the_chain():
-    arm, robot = arm_from_file(ROBOTS / "kuka.yaml"), analysed("kuka")
-    angles, wrench = angles_and_wrenches(arm, force=10.0)
-    base, tilt = np.array([3e-8, 2e-8, 1e-8, 4e-8, 5e-8, 2e-8]), (2e-7, 3e-7)
-    found = deflections(arm, angles, wrench, structure=Structure(base=tuple(base), tilt={2: tilt}))
-    wanted = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
-    flange = poses(robot.chain, angles, robot.chain.end_effector)[0]
-    shoulder = poses(robot.chain, angles, replace(robot.chain.end_effector, after=3))
-    force, moment = wrench[:, :3], wrench[:, 3:]
-    foot_turn = base[3:] * (moment + np.cross(flange, force))
-    at_shoulder = moment + np.cross(flange - shoulder[0], force)
-    # Behind joint 2, which turns about y, axes x and z of the frame that it carries.
-    arm_frame = poses(robot.chain, angles, replace(robot.chain.end_effector, after=4))[1]
-    across = ((tilt[0], arm_frame[..., 0]), (tilt[1], arm_frame[..., 2]))
-    tilted = sum(c * (at_shoulder * axis).sum(axis=1)[:, None] * axis for c, axis in across)
-    for number, point in enumerate(robot.chain.points):
-        position = poses(robot.chain, angles, point)[0]
-        moved = base[:3] * force + np.cross(foot_turn, position) + np.cross(tilted, position - shoulder[0])
-        assert np.abs(found[number] - wanted[number] - np.hstack([moved, foot_turn + tilted])).max() < 3e-9
-
-
-def test_declared_centres_stand_in_the_frame_that_turns_with_their_joint(arm):
-    """The foot that gives under the moment of all weights leans as pinocchio's levers say."""
-    declared, (angles, wrench) = declared_masses(arm), angles_and_wrenches(arm)
-    tilt = 5e-9 * arm.softness
-    structure = Structure(base=(0.0, 0.0, 0.0, tilt, tilt, 0.0), masses=on_stretches(declared, arm))
-    found = at_rest(arm, angles, 0.0 * wrench, structure=structure, compliance=1e-15 * arm.compliance)[1].position[:, -1]
-    still = forces_at(machine_of(arm, Structure()), angles)[1][:, -1]
-    for state in range(10):
-        frame, moment = pin.SE3.Identity(), np.zeros(3)
-        for link in range(arm.joints + 1):
-            if link:
-                before = arm.stretches[link - 1]
-                frame = frame * pin.SE3(
-                    before.rotation @ pin.exp3(angles[state, link - 1] * arm.axes[link - 1]), before.vector_m
-                )
-            for mass in (mass for mass in declared if mass.link == link):
-                moment += np.cross(frame.act(np.array(mass.centre_m)), mass.mass_kg * DOWN)
-        wanted = np.cross(tilt * moment * [1.0, 1.0, 0.0], still[state])
-        np.testing.assert_allclose(found[state] - still[state], wanted, atol=3e-3 * np.abs(found - still).max())
-
-
 def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
     mass, angles = 200.0, np.array([[-1.0], [0.0], [0.7], [np.pi / 2]])
     machine, found = at_rest(LEVER, angles, np.zeros((4, 6)), Structure(masses=(Mass(1, mass, 0.8),)))
@@ -250,14 +191,6 @@ def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
     wanted = [brentq(lambda t, q=q: t - 50e-6 * moment * np.cos(q + t), -1.0, 1.0, xtol=1e-15) for q in angles[:, 0]]
     np.testing.assert_allclose(found.coordinates[:, machine.gear[0]], wanted, atol=1e-11)
     np.testing.assert_allclose(found.position[:, 0, 2], -np.sin(angles[:, 0] + wanted), atol=1e-11)
-
-
-def test_a_force_acts_at_the_deflected_flange_and_a_moment_wherever_it_is():
-    wrench = np.array([[300.0, 0.0, -800.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 500.0, 0.0]])
-    found = at_rest(LEVER, np.zeros((2, 1)), wrench)[1].coordinates[:, 1]
-    # (cos t, 0, -sin t) x (300, 0, -800) about y.
-    bent = brentq(lambda t: t - 50e-6 * (-300.0 * np.sin(t) + 800.0 * np.cos(t)), -1.0, 1.0, xtol=1e-15)
-    np.testing.assert_allclose(found, [bent, 50e-6 * 500.0], atol=1e-11)
 
 
 def test_a_structural_spring_yields_by_its_compliance_its_law_and_its_offset():
