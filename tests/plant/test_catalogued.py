@@ -132,6 +132,8 @@ def test_hysteresis_goes_round_a_closed_loop_that_takes_energy_however_finely_lo
     assert path[2] == pytest.approx(path[4], abs=1e-3)
     up, down = (-wound(np.array([path[end]]), np.array([change]) / 300.0) for end, change in ((1, 500.0), (2, -500.0)))
     assert down - up > 0.3
+    # Unloading starts along the straight line of slope 1.
+    np.testing.assert_allclose(wound(np.array([0.5, -0.5]), np.array([-0.3, 0.3])), [0.2, -0.2], atol=1e-12)
     halves = wound(wound(np.array([1.0]), np.array([-0.7])), np.array([-0.7]))
     np.testing.assert_allclose(wound(np.array([1.0]), np.array([-1.4])), halves, atol=1e-4)
 

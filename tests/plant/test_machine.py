@@ -314,6 +314,13 @@ def test_wrong_dimensions_are_at_the_far_end_of_their_stretch_and_carry_on(tubes
     np.testing.assert_allclose(data.site("B").xpos, [1.0, 0.02, 0.4] + turn @ [0.5, 0.0, 0.0], atol=1e-14)
 
 
+def test_a_wrong_turn_is_about_the_axes_at_the_far_end_of_its_stretch():
+    arm = arm_of("Rz(q1) Tx(1) Rx(90deg) Ry(q2) Tx(0.5) [B]")
+    data = at(machine_of(arm, Structure(wrong_turns={1: (0.0, 0.0, 0.1)})))
+    wanted = pin.exp3(np.array([np.pi / 2, 0.0, 0.0])) @ pin.exp3(np.array([0.0, 0.0, 0.1]))
+    np.testing.assert_allclose(data.site("B").xpos, [1.0, 0.0, 0.0] + wanted @ [0.5, 0.0, 0.0], atol=1e-14)
+
+
 def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_inside_an_elastic_one():
     arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
     data = at(machine_of(arm, Structure(wrong_vectors_m={1: (0.0, 0.02, 0.0)}, wrong_turns={1: (0.0, 0.0, 0.1)})))
