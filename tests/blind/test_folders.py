@@ -23,13 +23,11 @@ from elastocal_proof.blind.folders import (
 )
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.defects import Defect, truth_of, with_defects
+from elastocal_proof.plant.defects import Defect, truth_of
 from elastocal_proof.plant.instruments import Tracker
 from elastocal_proof.plant.machine import Structure
 from elastocal_proof.plant.physical_robot import specimen
 from elastocal_proof.plant.weights import declared_masses
-
-FILES = ["campaign.yaml", "measurements.parquet", "robot.yaml"]
 
 
 @pytest.fixture(scope="module")
@@ -68,14 +66,6 @@ def test_angles_stand_in_the_folder_as_the_controller_shows_them(tmp_path, small
     np.testing.assert_allclose(measurements.joint_angles[::4], schedule_of(robot.arm, small, 2).angle, atol=1e-12)
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_measurements(tmp_path, fanuc_specimen, small):
-    for folder, seed in (("a", 2), ("b", 2), ("c", 3)):
-        made(tmp_path / folder, fanuc_specimen, small, seed)
-    bytes_of = [(tmp_path / folder / "measurements.parquet").read_bytes() for folder in "abc"]
-    assert bytes_of[0] == bytes_of[1]
-    assert bytes_of[0] != bytes_of[2]
-
-
 def test_covariates_may_be_left_out_and_declared_noise_may_be_wrong(tmp_path, fanuc_specimen, small):
     design = replace(
         small,
@@ -106,17 +96,6 @@ def test_outliers_are_listed_in_the_sealed_record_and_nowhere_else(tmp_path, fan
     found = {(int(row) // 4, names[bad.measurements.target[row]]) for row in np.flatnonzero(off)}
     assert found == {tuple(entry) for entry in record["outliers"]}
     assert found
-
-
-def test_the_folder_is_the_same_with_and_without_a_defect_but_for_the_measurements(tmp_path, fanuc_specimen, small):
-    defect = Defect("lost_motion", (2,), 1e-4, 1)
-    made(tmp_path / "good", fanuc_specimen, small)
-    made(tmp_path / "bad", with_defects(fanuc_specimen, [defect]), small)
-    assert sorted(path.name for path in (tmp_path / "bad").iterdir()) == FILES
-    assert (tmp_path / "good/campaign.yaml").read_bytes() == (tmp_path / "bad/campaign.yaml").read_bytes()
-    content = b"".join(path.read_bytes() for path in (tmp_path / "bad").iterdir())
-    for word in (b"lost_motion", b"defect", b"truth", b"seed"):
-        assert word not in content
 
 
 def test_the_record_is_sealed_outside_of_the_folder_by_its_hash(tmp_path, fanuc_specimen):
