@@ -42,6 +42,11 @@ def test_each_split_has_a_table_in_which_the_best_is_bold(page):
     assert page.count("**") == 2 * 6
 
 
+def test_a_split_that_no_data_set_has_is_left_out():
+    page = written(league_table(made_results(splits=("random", "session")), ROBOTS, "geometry", 1))
+    assert "Random poses" in page and "another session" in page and "Blocks of joint space" not in page
+
+
 def test_improbable_mechanisms_and_figures_of_other_data_are_left_out(page):
     assert "link weight" in page and "payload" not in page
     assert "somebody" in page and "three" not in page

@@ -46,7 +46,7 @@ def league_page(
     file that each lacks.
     """
     words = {name: method.words or name for name, method in methods.items()}
-    best = table.groupby(["data", "split"])["rms_mm"].transform("min")
+    table = table.assign(best=table.groupby(["data", "split"])["rms_mm"].transform("min"))
 
     def error(each: Row) -> str:
         rms, low, high, most = (_shown(each[key], each["rms_mm"]) for key in ("rms_mm", "rms_low_mm", "rms_high_mm", "max_mm"))
@@ -61,7 +61,7 @@ def league_page(
     parts = [f"Left out: {_words(name)}, as {file} is missing." for name, file in missing.items()]
     parts.append(_lead(table, {name for name, method in methods.items() if method.physics == DIAGNOSIS}))
     for split, title in _TITLES.items():
-        mine = table[table["split"] == split].assign(best=best)
+        mine = table[table["split"] == split]
         if len(mine):
             counts = mine.loc[mine.groupby("data")["rms_mm"].idxmin(), "method"].map(words).value_counts()
             each = ", ".join(f"{name} {count}" for name, count in counts.items())
