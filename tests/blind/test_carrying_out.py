@@ -1,6 +1,5 @@
 """A further experiment does what was proposed, on the same robot, and changes nothing that was read before."""
 
-
 import numpy as np
 import pytest
 import yaml
