@@ -24,8 +24,9 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.registration import registered
 from elastocal.fitting.tolerances import estimated_noise
+from elastocal.io.documents import read_document
 from elastocal.loop.whole import cases_in
-from elastocal_proof.blind.cases import SIZES, cases_of, make_case
+from elastocal_proof.blind.cases import cases_of, make_case
 from elastocal_proof.blind.folders import write_dynamic_campaign
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.defects import Defect, with_defects
@@ -117,7 +118,7 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
 
 def _case(work: Path, cases: int) -> Row:
     # Development cases: those of the proof stay unseen.
-    some = cases_of(SIZES["development"], SEED)[:cases]
+    some = cases_of(read_document(ROOT / "config" / "blind.yaml"), "development", SEED)[:cases]
     for case in some:
         make_case(case, work / "blind", work / "sealed", ROBOTS)
     # The first pays for the imports.

@@ -10,8 +10,8 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.tolerances import estimated_noise
 from elastocal.loop.loading import load_campaign
-from elastocal_proof.blind.case_rows import EXACT_ALIASES
 from elastocal_proof.blind.cases import Case, make_case
+from elastocal_proof.blind.scores import EXACT_ALIASES
 
 pytestmark = pytest.mark.slow
 
@@ -40,7 +40,7 @@ def seen(request, tmp_path_factory):
     """What every candidate makes of the measurements of a robot without an effect, off the declared model."""
     folder = tmp_path_factory.mktemp(request.param)
     # Of an arm whose file tells no weights: where it does, weights absorb some of what is compared here.
-    made = Case("aliases", "none", request.param, (), (), "weight_compensated", 314159)
+    made = Case("aliases", "none", request.param, (), (), "weight_compensated", 314159, changes={"weighs": False})
     make_case(made, folder / "blind", folder / "sealed", ROBOTS)
     descriptions, training, _ = load_campaign((folder / "blind" / made.name).as_posix(), ROBOTS.as_posix())
     case = case_from(descriptions, columns_of(training))

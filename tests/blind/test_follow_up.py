@@ -1,29 +1,14 @@
-"""Which cases are followed up, when to stop, and that nothing sealed is opened on the way."""
+"""Which cases are followed up, and what the proposal of the next experiment is asked with."""
 
-import json
-import subprocess
-import sys
-
+import numpy as np
 import pytest
-from made_folders import made_folder, made_table
+from made_folders import made_folder
 
-from elastocal_proof.blind.follow_up import ARMS, POSES, diagnosed_anew, diagnosed_until_named, folder_name, followed_up
-
-WATCHED = """
-import json, sys
-opened = []
-sys.addaudithook(lambda event, details: opened.append(str(details[0])) if event == "open" else None)
-from elastocal_proof.blind.follow_up import diagnosed_anew
-from elastocal_proof.blind.proposed import proposed
-from elastocal.loop.whole import diagnosed
-folder, again, robots = sys.argv[1:]
-verdict = diagnosed(folder, robots, 1)
-effect = verdict["effects"][0]
-frame = proposed(folder, robots, 3, (0.0, 1.0), 1)
-anew = diagnosed_anew(again, lambda path: diagnosed(path, robots, 1))
-modules = [name for name in sys.modules if name.startswith(("elastocal_proof.plant", "elastocal_proof.blind.cases", "mujoco"))]
-print(json.dumps({"opened": opened, "modules": modules, "states": len(frame), "said": effect, "anew": len(anew)}))
-"""
+from elastocal.campaigns.reading import read_campaign
+from elastocal.diagnosis.next_experiment import Proposal
+from elastocal_proof.blind import follow_up as module
+from elastocal_proof.blind.follow_up import followed_up, proposed
+from elastocal_proof.blind.verdicts import POSES
 
 
 def said(name, word, *alternatives):
@@ -38,50 +23,59 @@ def test_the_first_classes_by_name_are_followed_up_whatever_the_order():
     assert followed_up(verdicts[3:], 2) == []
 
 
-def test_more_is_measured_until_a_single_name_is_said():
-    words = {"five": "class", "ten": "named", "twenty": "class"}
-    verdicts = diagnosed_until_named({5: "five", 10: "ten", 20: "twenty"}, lambda folder: said(folder, words[folder]))
-    assert {poses: verdict["verdict"] for poses, verdict in verdicts.items()} == {5: "class", 10: "named"}
-    never = diagnosed_until_named({5: "five", 20: "twenty"}, lambda folder: said(folder, words[folder]))
-    assert list(never) == [5, 20]
+def made_proposal(joints, poses, ladder, draws):
+    """Angles and loads anywhere, as a search would leave them."""
+    count = np.arange(poses, dtype=float)
+    wrench = np.tile([0.0, 0.0, -500.0, 0.0, 0.0, 0.0], (poses, 1))
+    angles = draws.uniform(-1, 1, (poses, joints))
+    return Proposal(
+        angles, wrench, None, np.zeros(poses, bool), ladder, ("6DoF",), count, count, 1.0, 9, ("a",), ("b",), (), ""
+    )
 
 
-def test_each_case_of_a_block_is_diagnosed_anew_in_each_arm(tmp_path):
-    for case in ("case_b", "case_a"):
-        for arm in ARMS:
-            for poses in POSES:
-                (tmp_path / folder_name(arm, poses) / case).mkdir(parents=True)
-    looked = []
+@pytest.fixture
+def asked(monkeypatch):
+    """What the diagnosis and the search were asked, neither of which runs."""
+    heard = []
 
-    def diagnose(folder):
-        looked.append(folder)
-        return said(folder.rsplit("/", 1)[1], "named" if "proposed" in folder else "class")
+    def diagnose(case, settings, seed):
+        heard.append({"case": case, "diagnosis seed": seed})
+        return "diagnosis"
 
-    anew = diagnosed_anew(tmp_path.as_posix(), diagnose)
-    keys = [(entry["campaign"], entry["arm"], entry["poses"]) for entry in anew]
-    one = [("proposed", POSES[0]), *(("random", poses) for poses in POSES)]
-    assert keys == [(case, *rest) for case in ("case_a", "case_b") for rest in one]
-    assert all(entry["verdict"]["campaign"] == entry["campaign"] for entry in anew)
-    assert len(looked) == len(anew)
-    assert diagnosed_anew((tmp_path / "nothing").as_posix(), diagnose) == []
+    def propose(diagnosis, limits, settings, draws, poses, ladder):
+        heard[-1] |= {"diagnosis": diagnosis, "limits": limits, "ladder": ladder}
+        heard[-1]["proposal"] = made_proposal(len(limits), poses, ladder, draws)
+        return heard[-1]["proposal"]
+
+    monkeypatch.setattr(module, "diagnose", diagnose)
+    monkeypatch.setattr(module, "propose", propose)
+    return heard
 
 
-@pytest.mark.slow
-def test_proposing_and_diagnosing_anew_open_no_sealed_file_and_know_no_plant(kuka, config_folder, tmp_path):
-    table = made_table(kuka, "case_1", offset_of_joint_3=6e-4)
-    folder = made_folder(tmp_path / "blind" / "case_1", kuka, "case_1", table=table)
-    for arm in ARMS:
-        for poses in POSES:
-            made_folder(tmp_path / "again" / folder_name(arm, poses) / "case_1", kuka, "case_1", table=table)
-    sealed = tmp_path / "sealed" / "case_1.json"
-    sealed.parent.mkdir()
-    sealed.write_text("{}", encoding="utf-8")
-    again, robots = (tmp_path / "again").as_posix(), (config_folder / "robots").as_posix()
-    command = [sys.executable, "-c", WATCHED, folder.as_posix(), again, robots]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert not done.returncode, done.stderr
-    told = json.loads(done.stdout)
-    assert told["anew"] >= 2 and told["states"] == (3 if told["said"]["alternatives"] else 0)
-    assert sum(path.endswith("campaign.yaml") for path in told["opened"]) > 2
-    assert not [path for path in told["opened"] if "sealed" in path]
-    assert told["modules"] == []
+@pytest.fixture
+def folder(kuka, tmp_path):
+    return made_folder(tmp_path / "case_1", kuka, "case_1", holdout={"poses": [2, 5]})
+
+
+def test_no_held_out_pose_reaches_the_diagnosis_from_which_poses_are_proposed(asked, folder, config_folder):
+    proposed(folder, config_folder / "robots", 4)
+    everything = read_campaign(folder, config_folder / "robots").measurements
+    seen = set(asked[0]["case"].observations.states.pose.tolist())
+    assert seen == set(everything.pose.tolist()) - {2, 5}
+    assert asked[0]["diagnosis seed"] == 4 and asked[0]["diagnosis"] == "diagnosis"
+
+
+def test_as_many_poses_as_wanted_are_looked_for_within_the_joint_limits_on_the_given_ladder(asked, folder, config_folder, kuka):
+    table = proposed(folder, config_folder / "robots", 4)
+    np.testing.assert_array_equal(asked[0]["limits"], kuka.joint_limits)
+    assert asked[0]["ladder"] == module.LADDER and len(table) == max(POSES)
+
+
+def test_poses_follow_from_the_seed_and_differ_between_campaigns(asked, folder, config_folder, kuka, tmp_path):
+    other = made_folder(tmp_path / "case_2", kuka, "case_2")
+    first, again, seed, name = (
+        proposed(where, config_folder / "robots", seed).q1.tolist()
+        for where, seed in ((folder, 4), (folder, 4), (folder, 5), (other, 4))
+    )
+    assert first == again
+    assert first != seed and first != name

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_blind_documents import PLAN
 from scipy.stats import multivariate_normal
 
 from elastocal_proof.blind import limit as module
-from elastocal_proof.blind.cases import Counts, cases_of, design_of, specimen_of, yardstick_of
+from elastocal_proof.blind.cases import cases_of, yardstick_of
 from elastocal_proof.blind.limit import limit, log_bayes_factors, signals_of
-from elastocal_proof.plant.defects import KINDS
+from elastocal_proof.plant.kinds import KINDS
 
 pytestmark = pytest.mark.slow
 
@@ -20,8 +21,8 @@ SOME = ("force_bias", "joint_tilt", "setup_step", "tracker_scale")
 @pytest.fixture(scope="module")
 def cases():
     """A single defect at 200 for each of some kinds, and a pair, on the arm that is solved fastest."""
-    counts = Counts(none=0, single=1, outside=0, pair=1, setting=0, levels=(200.0,), robots=("kuka",), purpose="limit")
-    return cases_of(counts, 3)
+    parts = [{"robots": ["kuka"], "single": 1, "levels": [200.0], "pair": 1}]
+    return cases_of(PLAN | {"sizes": {"some": {"purpose": "limit", "parts": parts}}}, "some", 3)
 
 
 @pytest.fixture
@@ -46,8 +47,8 @@ def test_bayes_factors_are_ratios_of_normal_densities():
 
 def test_signals_have_length_one_and_a_place_for_each_location_that_shows(cases):
     case = cases[0]
-    robot = specimen_of(case, ROBOTS)
-    yardstick = yardstick_of(case, robot, design_of(case))
+    robot = case.specimen(ROBOTS)
+    yardstick = yardstick_of(case, robot)
     signals = signals_of(yardstick, robot, ("setup_step", "joint_tilt", "force_scale"), 1)
     # A scale of the forces is absorbed by the compliances, but for the weights.
     assert [kind for kind in signals.kinds if kind != "force_scale"] == [
@@ -59,8 +60,8 @@ def test_signals_have_length_one_and_a_place_for_each_location_that_shows(cases)
 
 def test_the_residual_of_a_faultless_robot_is_noise_of_size_one(cases):
     case = cases[0]
-    robot = specimen_of(case, ROBOTS)
-    residual = yardstick_of(case, robot, design_of(case)).residual(robot)
+    robot = case.specimen(ROBOTS)
+    residual = yardstick_of(case, robot).residual(robot)
     # Of some 3000 numbers 98 % have a mean square within 1/17 of one, and few are absorbed.
     assert (residual**2).mean() == pytest.approx(1.0, abs=0.08)
 
@@ -68,7 +69,7 @@ def test_the_residual_of_a_faultless_robot_is_noise_of_size_one(cases):
 @pytest.mark.parametrize("effect", SOME)
 def test_a_defect_that_shows_well_is_detected_and_named(cases, few, effect):
     case = next(case for case in cases if case.effects == (effect,))
-    found = limit(case, ROBOTS)
+    found = limit(PLAN, case, ROBOTS)
     assert found["detected"] and found["right"] and found["mechanisms"] == [effect]
     assert found["probability"] > 0.9
 
@@ -76,13 +77,13 @@ def test_a_defect_that_shows_well_is_detected_and_named(cases, few, effect):
 def test_a_pair_is_named_and_what_hardly_shows_is_not_detected(cases, few):
     single = next(case for case in cases if case.effects == (SOME[2],))
     both = replace(single, effects=(SOME[0], SOME[2]), levels=(200.0, 200.0), group="pair")
-    found = limit(both, ROBOTS)
+    found = limit(PLAN, both, ROBOTS)
     assert found["right"] and found["mechanisms"] == [SOME[0], SOME[2]]
-    assert not limit(replace(single, levels=(0.5,)), ROBOTS)["detected"]
+    assert not limit(PLAN, replace(single, levels=(0.5,)), ROBOTS)["detected"]
 
 
 def test_a_sixth_of_the_cases_that_targets_compare_with_is_in_the_sample(monkeypatch):
-    monkeypatch.setattr(module, "limit", lambda case, robots_folder: {"right": True})
+    monkeypatch.setattr(module, "limit", lambda plan, case, robots_folder: {"right": True})
 
     def in_sample(seed, group="single", level=50.0, of="retained"):
         truth = {
@@ -98,7 +99,7 @@ def test_a_sixth_of_the_cases_that_targets_compare_with_is_in_the_sample(monkeyp
             },
             "defects": [{"of": of}],
         }
-        return module.limit_of_sample(truth, ROBOTS) is not None
+        return module.limit_of_sample(PLAN, truth, ROBOTS) is not None
 
     drawn = sum(in_sample(seed) for seed in range(600))
     # Of a binomial distribution, 99.9 %.

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS
+from made_blind_documents import PLAN
 from scipy.stats import chi2
 
 from elastocal.effects.catalogue import candidates_on
@@ -37,7 +38,16 @@ def test_frames_of_a_load_error_are_variants_and_bands_of_orders_are_parts(kuka)
 
 def made(folder, *effects, level=200.0, setting="weight_compensated"):
     """A case of a seed of its own: its truth and its folder; of an arm that weighs nothing, for the engine of the loop."""
-    case = Case("/".join((*effects, setting)), "single", "kuka", effects, (level,) * len(effects), setting, 271828)
+    case = Case(
+        "/".join((*effects, setting)),
+        "single",
+        "kuka",
+        effects,
+        (level,) * len(effects),
+        setting,
+        271828,
+        changes=PLAN["settings"][setting],
+    )
     make_case(case, folder / "blind", folder / "sealed", ROBOTS)
     truth = json.loads((folder / "sealed" / f"{case.name}.json").read_text(encoding="utf-8"))
     return truth, (folder / "blind" / case.name).as_posix()

@@ -1,66 +1,190 @@
-"""A verdict is counted for what it is worth."""
+"""A verdict is counted for what it is worth: its words, its errors, its probabilities and its intervals."""
 
+import numpy as np
 import pytest
-from made_verdicts import truth, verdict_of
+from made_blind_documents import PLAN, effect, frame, oracle, said, silence, truth, verdict
+from scipy.stats import binomtest
 
-from elastocal_proof.blind.scores import outcome
+from elastocal_proof.blind.scores import intervals_of, is_true, outcome, rate, score, stated
 
 TILTED = {"misplaced": {"shift_m": [0.0, 0.0, 2e-4], "turn_rad": [3e-4, 0.0, 0.0]}}
+PAYLOAD, NOTHING = truth(("payload",)), truth()
+PAIR = truth(("payload",), ("joint_tilt", 2), group="pair")
+RIGHT = {"detected", "exact", "named_right", "holds_truth"}
 OUTCOMES = {
-    "a base that is misplaced": (truth(group="setting") | TILTED, verdict_of("named", "base_placement"), set()),
-    "a base that is not": (truth(group="setting"), verdict_of("named", "base_placement"), {"detected", "wrong_name"}),
-    "another name beside a misplaced base": (
-        truth(group="setting") | TILTED,
-        verdict_of("several", "base_placement", "payload"),
-        {"detected", "wrong_name"},
-    ),
-    "right name beside a misplaced base": (
-        truth("payload", group="setting") | TILTED,
-        verdict_of("several", "base_placement", "payload"),
-        {"detected", "exact", "named_right", "holds_truth"},
-    ),
-    "right name": (truth("payload"), verdict_of("named", "payload"), {"detected", "exact", "named_right", "holds_truth"}),
-    "wrong name": (truth("payload"), verdict_of("named", "link_weight"), {"detected", "wrong_name"}),
-    "class that holds it": (
-        truth("payload"),
-        verdict_of("class", "link_weight", alternatives=["payload"]),
+    "a base that is misplaced": (truth(group="setting") | TILTED, said("named", "base_placement"), set()),
+    "a base that is not": (NOTHING, said("named", "base_placement"), {"detected", "wrong_name"}),
+    "another name beside it": (NOTHING | TILTED, said("several", "base_placement", "payload"), {"detected", "wrong_name"}),
+    "right name beside it": (PAYLOAD | TILTED, said("several", "base_placement", "payload"), RIGHT),
+    "right name": (PAYLOAD, said("named", "payload"), RIGHT),
+    "wrong name": (PAYLOAD, said("named", "link_weight"), {"detected", "wrong_name"}),
+    "class that holds it": (PAYLOAD, said("class", "link_weight", alternatives=["payload"]), {"detected", "holds_truth"}),
+    "variant": (
+        truth(("force_bias",)),
+        said("class", "payload", alternatives=["force_bias[base axes]"]),
         {"detected", "holds_truth"},
     ),
-    "variant among the alternatives": (
-        truth("force_bias"),
-        verdict_of("class", "payload", alternatives=["force_bias[base axes]"]),
-        {"detected", "holds_truth"},
-    ),
-    "missed": (truth("payload"), verdict_of("adequate"), set()),
-    "silence where nothing is": (truth(group="none"), verdict_of("adequate"), set()),
-    "false alarm": (truth(group="none"), verdict_of("named", "payload"), {"detected", "wrong_name"}),
-    "one of two": (truth("payload", "joint_tilt", group="pair"), verdict_of("named", "payload"), {"detected", "wrong_name"}),
-    "both of two": (
-        truth("payload", "joint_tilt", group="pair"),
-        verdict_of("several", "joint_tilt", "payload"),
-        {"detected", "exact", "holds_truth"},
-    ),
-    "one effect and another that is not there": (
-        truth("payload"),
-        verdict_of("several", "payload", "link_weight"),
-        {"detected"},
-    ),
-    "right name that does not explain enough": (truth("payload"), verdict_of("unexplained", "payload"), {"detected"}),
+    "missed": (PAYLOAD, said("adequate"), set()),
+    "silence where nothing is": (NOTHING, said("adequate"), set()),
+    "false alarm": (NOTHING, said("named", "payload"), {"detected", "wrong_name"}),
+    "one of two": (PAIR, said("named", "payload"), {"detected", "wrong_name"}),
+    "both of two": (PAIR, said("several", "joint_tilt", "payload"), {"detected", "exact", "holds_truth"}),
+    "one that is not there": (PAYLOAD, said("several", "payload", "link_weight"), {"detected"}),
+    "not enough": (PAYLOAD, said("unexplained", "payload"), {"detected"}),
     "two classes that hold both": (
-        truth("payload", "joint_tilt", group="pair"),
-        verdict_of("several", "link_weight", "payload", alternatives=["payload@2", "joint_tilt@1"]),
+        PAIR,
+        said("several", "link_weight", "payload", alternatives=["payload@2", "joint_tilt@1"]),
         {"detected", "holds_truth"},
     ),
-    "two classes that hold but one": (
-        truth("payload", "joint_tilt", group="pair"),
-        verdict_of("several", "link_weight", "link_geometry", alternatives=["payload"]),
-        {"detected"},
-    ),
+    "two that hold one": (PAIR, said("several", "link_weight", "link_geometry", alternatives=["payload"]), {"detected"}),
 }
 
 
 @pytest.mark.parametrize("name", OUTCOMES)
 def test_outcome_is(name):
-    sealed, verdict, expected = OUTCOMES[name]
-    row = outcome(sealed, verdict)
-    assert {key for key, value in row.items() if value is True} == expected
+    sealed, found, expected = OUTCOMES[name]
+    assert {key for key, value in outcome(PLAN, sealed, found).items() if value is True} == expected
+
+
+def test_robots_of_the_plan_that_were_tuned_on_prove_nothing():
+    assert [outcome(PLAN, truth(robot=robot), silence())["robots"] for robot in ("kuka", "m900ib700")] == ["tuned", "proof"]
+
+
+@pytest.mark.parametrize("hits, cases", [(0, 10), (1, 3), (7, 20), (59, 59), (150, 400)])
+def test_the_interval_of_a_share_is_the_exact_one_of_the_binomial(hits, cases):
+    found, exact = rate([True] * hits + [False] * (cases - hits)), binomtest(hits, cases).proportion_ci(0.95, "exact")
+    assert (found["hits"], found["cases"], found["rate"]) == (hits, cases, pytest.approx(hits / cases))
+    assert (found["low"], found["high"]) == pytest.approx((exact.low, exact.high), rel=1e-9)
+    assert np.isnan(rate([])["rate"]) and (rate([])["low"], rate([])["high"]) == (0.0, 1.0)
+
+
+def test_right_place_is_the_right_effect_at_the_right_joints():
+    several = truth(("joint_offset", 3), ("joint_offset", 5))
+    for document, joints, right in (
+        (truth(("joint_offset", 3)), (3,), True),
+        (truth(("joint_offset", 3)), (4,), False),
+        (several, (3, 5), True),
+        (several, (3,), False),
+    ):
+        assert score(PLAN, document, verdict("named", effect("joint_offset", *joints)), oracle())["right_place"] == right
+
+
+GREW = "the RMS error of the validation poses grew from 0.100 to 0.110 mm"
+OTHER = "2 of 9 validation poses lie outside the range of the fitted poses: errors there are extrapolated"
+
+
+@pytest.mark.parametrize(
+    ("reduction", "warnings", "adopted", "expected"),
+    [
+        ((-0.14, -0.06), [], True, (True, False, True, True)),
+        ((-0.14, -0.06), [GREW], True, (True, True, False, True)),
+        # A word about something else is no warning of this.
+        ((-0.14, -0.06), [OTHER], True, (True, False, True, True)),
+        ((-0.25, 0.05), [], True, (False, False, False, False)),
+        ((-0.14, -0.06), [], False, (True, False, True, False)),
+    ],
+)
+def test_worse_is_beyond_two_standard_errors_and_counts_where_something_was_adopted(reduction, warnings, adopted, expected):
+    found = verdict(
+        "named", effect("payload", adopted=adopted), before=1e-4, after=1.1e-4, reduction=reduction, warnings=warnings
+    )
+    row = score(PLAN, PAYLOAD, found, oracle())
+    assert tuple(row[name] for name in ("worse", "warned", "worse_unwarned", "worse_adopted")) == expected
+
+
+def test_exact_aliases_are_told_by_the_truth_its_joints_and_the_robot():
+    places = [("transmission_harmonic", 2), ("transmission_harmonic", 3), ("link_weight", 2), ("link_weight", 2, 3)]
+    assert frame(*((truth(place), silence(), oracle()) for place in places)).exact_alias.tolist() == [True, False, True, False]
+    # An arm that has no compensator has no alias of it.
+    assert not score(PLAN, truth(places[0], robot="panda"), silence(), oracle())["exact_alias"]
+
+
+def test_a_fault_of_the_data_that_ended_a_diagnosis_has_no_errors_and_states_nothing():
+    row = score(PLAN, PAYLOAD, verdict("named", effect("wrong_unit")) | {"heldout": None}, None)
+    assert np.isnan(row["after_rms_m"]) and not row["worse"] and np.isnan(row["stated"]) and np.isnan(row["oracle_rms_m"])
+
+
+def test_a_covariate_that_is_not_recorded_hides_what_needs_it():
+    hidden = truth(("hysteresis", 1), design={"covariates": ["time"]})
+    assert (
+        score(PLAN, hidden, silence(), None)["hidden"] and not score(PLAN, truth(("hysteresis", 1)), silence(), None)["hidden"]
+    )
+
+
+FOREIGN = truth(("outside:refraction",), group="outside")
+ABSORBED = truth(("force_scale",))
+ABSORBED["defects"][0]["of"] = "raw"
+
+
+@pytest.mark.parametrize(
+    ("document", "mechanisms", "so"),
+    [
+        (PAYLOAD, ("payload",), True),
+        (PAYLOAD, ("payload", "joint_tilt"), False),
+        # A related mechanism is not that one.
+        (PAYLOAD, ("payload", "other"), False),
+        (PAYLOAD, (), False),
+        (NOTHING, (), True),
+        (NOTHING, ("other",), False),
+        (FOREIGN, ("payload", "other"), True),
+        (FOREIGN, ("payload",), False),
+        (PAIR, ("joint_tilt", "payload"), True),
+        (NOTHING | TILTED, ("base_placement",), True),
+        (truth(("joint_offset", 2), ("joint_offset", 4), group="several_joints"), ("joint_offset",), True),
+        (ABSORBED, (), True),
+        (ABSORBED, ("force_scale",), False),
+    ],
+)
+def test_true_is_the_exact_set_of_mechanisms_and_outside_of_the_catalogue_every_set_with_other(document, mechanisms, so):
+    assert is_true(mechanisms, document) == so
+
+
+@pytest.mark.parametrize(
+    ("shares", "size"), [((0.6, 0.3, 0.06, 0.04), 3), ((0.6, 0.3), 2), ((0.97, 0.03), 1), ((0.3, 0.6, 0.1), 3)]
+)
+def test_the_credible_set_is_the_smallest_that_reaches_95_per_cent(shares, size):
+    sets = [{"mechanisms": [name], "probability": share} for name, share in zip("abcd", shares, strict=False)]
+    found = stated(PAYLOAD, {"probabilities": {"sets": sets, "nothing": 0.0, "alarm_p_value": 0.5}})
+    assert (found["set_size"], found["stated"]) == (size, max(shares))
+    assert found["set_probability"] == pytest.approx(sum(sorted(shares, reverse=True)[:size]))
+
+
+def of_effect(document, found):
+    return [row for row in intervals_of(PLAN, document, found) if row["effect"] != "joint_compliance"]
+
+
+def with_parameters(document, *values):
+    for defect, value in zip(document["defects"], values, strict=True):
+        defect["parameters"] = {"offset": value}
+    return document
+
+
+def test_an_interval_holds_what_lies_within_two_standard_errors_of_the_right_effect_at_the_right_joint():
+    offset = with_parameters(truth(("joint_offset", 3)), 3e-4)
+    for value, holds in ((3.19e-4, True), (3.21e-4, False), (2.81e-4, True), (2.79e-4, False)):
+        (row,) = of_effect(offset, verdict("named", effect("joint_offset", 3, parameters=[("offset", value, 1e-5)])))
+        assert row["holds"] == holds
+    there = [("offset", 3e-4, 1e-5)]
+    assert not of_effect(offset, verdict("named", effect("link_geometry", 3)))
+    assert not of_effect(offset, verdict("named", effect("joint_offset", 4, parameters=there)))
+    assert not of_effect(offset, verdict("named", effect("joint_offset", 3, parameters=[("offset", 0.0, 0.0)])))
+    # Student's t is wider where the noise has few degrees of freedom.
+    few = verdict("named", effect("joint_offset", 3, parameters=[("offset", 3.3e-4, 1e-5)]), freedom=3)
+    assert of_effect(offset, few)[0]["holds"]
+
+
+def test_of_one_mechanism_at_several_joints_each_joint_is_compared_with_its_own():
+    document = with_parameters(truth(("joint_offset", 2), ("joint_offset", 3), group="several_joints"), 1e-4, 2e-4)
+    found = effect("joint_offset", 2, 3)
+    found["parameters"] = [
+        {"name": f"joint_offset@{joint} offset", "value": value, "std_error": 1e-6, "held": False}
+        for joint, value in ((2, 1e-4), (3, 2e-4))
+    ]
+    assert [(row["true"], row["holds"]) for row in of_effect(document, verdict("named", found))] == [(1e-4, True), (2e-4, True)]
+
+
+def test_compliances_count_whatever_was_found_in_the_usual_setting():
+    for document, found in ((NOTHING, silence()), (PAYLOAD, said("named", "payload")), (PAYLOAD, silence())):
+        assert len(intervals_of(PLAN, document, found)) == 6
+    assert not any(row["holds"] for row in intervals_of(PLAN, NOTHING, silence(compliance=1.3)))
+    assert intervals_of(PLAN, truth(setting="force_3kN"), silence()) == []

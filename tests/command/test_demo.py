@@ -27,7 +27,7 @@ def run(elastocal, monkeypatch, tmp_path):
     monkeypatch.setattr(demo, "workplace", lambda: tmp_path)
     missed = {name: np.full(3, off) for name, off in (("uncorrected", 2e-3), ("corrected", 1e-4), ("noise alone", 9e-5))}
     for name, result in (("fill_sheet", 12), ("write_milling_path", 50), ("measured_errors", missed)):
-        monkeypatch.setattr(f"elastocal_proof.blind.rehearsal_files.{name}", lambda *_, result=result: result)
+        monkeypatch.setattr(f"elastocal_proof.blind.rehearsal.{name}", lambda *_, result=result: result)
     monkeypatch.setattr("elastocal.campaigns.reading.read_descriptions", lambda *_: ({}, ""))
 
     def ended(*words, **other):

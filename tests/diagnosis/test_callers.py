@@ -8,17 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from loop_scripts import ANALYSIS, Files, _Job, _Named, run_loop, run_script
+from loop_scripts import ANALYSIS, Files, _Job, _Named, run_loop
 from made_folders import PLAN, made_folder, made_table
 
 from elastocal.diagnosis import judge as judging
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.next_experiment import NOTHING_AMBIGUOUS, Proposal
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop import whole
 from elastocal.loop.whole import cases_in, diagnosed
-from elastocal_proof.blind import proposed
-from elastocal_proof.blind.follow_up import ARMS, POSES, folder_name
+from elastocal_proof.blind import follow_up, verdicts
+from elastocal_proof.blind.verdicts import ARMS, POSES, folder_of
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS, BENCHMARKS = ROOT / "config" / "robots", ROOT / "benchmarks"
@@ -26,15 +25,12 @@ SEED = 1
 # Where a campaign is diagnosed, and the test below that has its verdict.
 CALLERS = {
     "src/elastocal/loop/whole.py": "the one call",
-    "src/elastocal_proof/blind/proposed.py": "the next experiment",
-    "src/elastocal_proof/blind/follow_up.py": "follow-ups",
+    "src/elastocal_proof/blind/follow_up.py": "the next experiment",
+    "src/elastocal_proof/blind/verdicts.py": "blind proof and follow-ups",
     "src/elastocal_proof/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
     "src/elastocal_proof/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",
-    "src/elastocal_proof/blind/stated_accuracy.py": "the same, and compares what is stated of the correction",
     "src/elastocal/loop/diagnosis_tables.py": "rules",
-    "workflow/scripts/diagnose_cases.py": "blind proof",
-    "workflow/scripts/diagnose_follow_ups.py": "follow-ups",
-    "workflow/scripts/diagnose_league_folds.py": "makes the call on the training poses of each fold of the league",
+    "src/elastocal_proof/league/methods.py": "makes the call on the training poses of each fold of the league",
     "benchmarks/engine.py": "benchmark of the engine",
 }
 
@@ -138,13 +134,12 @@ class OneCall:
         return self.verdict
 
 
-def run_of(script, tmp_path, monkeypatch, verdict, **parts):
-    """Result of one script of the blind proof, and what it asked of the one call."""
-    path, one_call = tmp_path / f"{script}.json", OneCall(verdict)
-    monkeypatch.setattr(whole, "diagnosed", one_call)
-    output, log = _Named(verdicts=path.as_posix()), [(tmp_path / f"{script}.log").as_posix()]
+def run_of(step, tmp_path, monkeypatch, verdict, **parts):
+    """Result of one step of the blind proof, and what it asked of the one call."""
+    path, one_call = tmp_path / "verdicts.json", OneCall(verdict)
+    monkeypatch.setattr(verdicts, "diagnosed", one_call)
     params = _Named(seed=SEED, robots=ROBOTS.as_posix())
-    run_script(script, _Job(output=output, params=params, wildcards=_Named(block="block"), log=log, **parts))
+    step(_Job(output=_Named(verdicts=path.as_posix()), params=params, wildcards=_Named(block="block"), **parts))
     return json.loads(path.read_text(encoding="utf-8")), one_call.asked
 
 
@@ -160,8 +155,8 @@ def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(kind
 
 def test_blind_proof_writes_the_verdict_of_the_one_call(folder, expected, tmp_path, monkeypatch):
     blind = _Named(blind=folder.parent.as_posix())
-    verdicts, asked = run_of("diagnose_cases", tmp_path, monkeypatch, expected, input=blind)
-    assert verdicts == [expected]
+    found, asked = run_of(verdicts.diagnose_cases, tmp_path, monkeypatch, expected, input=blind)
+    assert found == [expected]
     assert asked == [(folder.as_posix(), ROBOTS, SEED, Settings())]
 
 
@@ -169,10 +164,10 @@ def test_follow_ups_write_the_verdict_of_the_one_call(folder, expected, tmp_path
     """On the fewest further poses of each arm, for there a single name is the verdict."""
     folders = []
     for arm in ARMS:
-        folders.append(tmp_path / "campaigns" / folder_name(arm, POSES[0]) / "made")
+        folders.append(Path(folder_of(tmp_path / "campaigns", arm, POSES[0], "made")))
         shutil.copytree(folder, folders[-1])
     campaigns = _Named(campaigns=(tmp_path / "campaigns").as_posix())
-    anew, asked = run_of("diagnose_follow_ups", tmp_path, monkeypatch, expected, input=campaigns)
+    anew, asked = run_of(verdicts.diagnose_follow_ups, tmp_path, monkeypatch, expected, input=campaigns)
     assert asked == [(path.as_posix(), ROBOTS, SEED, Settings()) for path in folders]
     assert anew == [{"campaign": "made", "arm": arm, "poses": POSES[0], "verdict": expected} for arm in ARMS]
 
@@ -180,9 +175,9 @@ def test_follow_ups_write_the_verdict_of_the_one_call(folder, expected, tmp_path
 def test_next_experiment_is_proposed_for_the_same_diagnosis(folder, monkeypatch):
     asked = []
     none = Proposal((), reason=NOTHING_AMBIGUOUS)
-    monkeypatch.setattr(proposed, "diagnose", lambda *parts: asked.append(parts) or "the diagnosis")
-    monkeypatch.setattr(proposed, "propose", lambda diagnosis, *rest: asked.append(diagnosis) or none)
-    proposed.proposed(folder, ROBOTS, 2, (0.0, 1.0), SEED)
+    monkeypatch.setattr(follow_up, "diagnose", lambda *parts: asked.append(parts) or "the diagnosis")
+    monkeypatch.setattr(follow_up, "propose", lambda diagnosis, *rest: asked.append(diagnosis) or none)
+    follow_up.proposed(folder, ROBOTS, SEED)
     (case, *rest), diagnosis = asked
     assert rest == [Settings(), SEED] and diagnosis == "the diagnosis"
     same_case(case, cases_in(folder, ROBOTS)[0])

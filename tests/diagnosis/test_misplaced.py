@@ -6,8 +6,7 @@ from analysed_robots import ROBOTS, analysed
 from misdeclared import misdeclared_folder
 
 from elastocal.diagnosis.misplaced import misplaced, point_sentence
-from elastocal.fitting.noise_estimation import estimated_noise
-from elastocal.fitting.tolerances import fit_declared
+from elastocal.fitting.tolerances import estimated_noise, fit_declared
 from elastocal.loop.overview import overview
 from elastocal.loop.whole import cases_in
 

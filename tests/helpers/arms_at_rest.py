@@ -5,11 +5,9 @@ import re
 import numpy as np
 
 from elastocal_proof.plant.arm import arm_from_document
-from elastocal_proof.plant.multibody import machine_of
-from elastocal_proof.plant.statics import Loading, equilibrium
-from elastocal_proof.plant.structure import Structure
+from elastocal_proof.plant.machine import Loading, Structure, equilibrium, machine_of
 
-STATES = 100
+STATES = 40
 
 
 def arm_of(chain, **more):
@@ -36,10 +34,13 @@ def angles_and_wrenches(arm, force=1000.0, seed=0):
 
 def at_rest(arm, angles, wrench, structure=None, compliance=None):
     compliance = arm.compliance if compliance is None else compliance
-    machine = machine_of(arm, structure or Structure(), compliance)
+    machine = machine_of(arm, structure or Structure())
     loading = Loading(angles, wrench, np.zeros((len(angles), arm.joints + 1)))
     return machine, equilibrium(machine, loading, lambda torque, unloaded: compliance * torque)
 
 
-def loading_of(angles):
-    return Loading(angles, np.zeros((len(angles), 6)), np.zeros((len(angles), angles.shape[1] + 1)))
+def forces_at(machine, angles):
+    """On the gears, and poses of the measuring points, where the drives stand at some angles and no spring has yielded."""
+    growth = np.zeros((len(angles), angles.shape[1] + 1))
+    force, position, rotation = machine.forces(driven_to(machine, angles), growth)
+    return force[:, machine.gear], position, rotation

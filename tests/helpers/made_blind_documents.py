@@ -1,9 +1,13 @@
-"""Ground truths, verdicts and oracles of blind cases as documents, without making any case."""
+"""Ground truths, verdicts and oracles of blind cases as documents, without making any case; and the plan that counts them."""
 
 import pandas as pd
+from analysed_robots import ROBOTS
 
-from elastocal_proof.blind.case_rows import case_row
+from elastocal.io.documents import read_document
+from elastocal_proof.blind.scores import intervals_of, score
+from elastocal_proof.blind.summary import summarize
 
+PLAN = read_document(ROBOTS.parent / "blind.yaml")
 JOINTS = 6
 
 
@@ -21,13 +25,8 @@ def truth(*places, group=None, level=50.0, robot="m900ib700", setting="usual", *
         }
         for effect, *joints in places
     ]
-    case = {
-        "group": group,
-        "robot": robot,
-        "setting": setting,
-        "effects": [defect["effect"] for defect in defects],
-        "levels": [level] * len(defects),
-    }
+    effects = [effect for effect, *_ in places]
+    case = {"group": group, "robot": robot, "setting": setting, "effects": effects, "levels": [level] * len(defects)}
     return {
         "campaign": "case_x",
         "case": case,
@@ -71,6 +70,11 @@ def verdict(word, *effects, before=2e-4, after=1e-4, reduction=(0.4, 0.6), warni
     }
 
 
+def said(word, *names, alternatives=()):
+    """A verdict by its word and names."""
+    return verdict(word, *(effect(name, alternatives=alternatives) for name in names))
+
+
 def silence(**changes):
     return verdict("adequate", before=1e-4, after=1e-4, reduction=(0.0, 0.0), **changes)
 
@@ -81,4 +85,10 @@ def oracle(p_value=1e-6, rms=1e-4):
 
 def frame(*entries):
     """Rows of cases.csv of (ground truth, verdict, oracle), with a limit behind them where there is one."""
-    return pd.DataFrame([case_row(*entry) for entry in entries])
+    return pd.DataFrame([score(PLAN, *entry) for entry in entries])
+
+
+def summary(*entries):
+    """The summary of such entries by robots and quantity."""
+    spans = pd.DataFrame([row for document, found, *_ in entries for row in intervals_of(PLAN, document, found)])
+    return summarize(PLAN, frame(*entries), spans, 1).set_index(["robots", "quantity"])

@@ -6,9 +6,7 @@ from made_remainders import smoothly_wrong_folder
 
 from elastocal.campaigns.columns import columns_of
 from elastocal.loop.loading import load_whole_campaign
-from elastocal_proof.league.folds import dealt
-from elastocal_proof.league.rounds import DataSet
-from elastocal_proof.league.table import Result
+from elastocal_proof.league.folds import DataSet, dealt
 
 
 def made_data_set(folder, robot, robots_folder, poses=24, **changes):
@@ -31,10 +29,10 @@ def made_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
 
 
 def made_results(data=("one", "two"), splits=("random", "blocks", "session")):
-    """Results of three methods: geometry, one half as wrong, and one that states intervals."""
-    found = []
+    """Entries of three methods, by data set, split and method: geometry, one half as wrong, and one that states intervals."""
+    found = {}
     for number, name in enumerate(data):
         for split in splits:
             for method, size, std in (("geometry", 2e-4, None), ("half", 1e-4, None), ("process", 1.2e-4, 1.2e-4)):
-                found.append(Result(name, split, method, made_entries(size, 30 + 10 * number, number + 1, std)))
+                found[name, split, method] = made_entries(size, 30 + 10 * number, number + 1, std)
     return found

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 from made_audits import forge
-from made_blind_documents import effect, oracle, truth, verdict
+from made_blind_documents import PLAN, effect, frame, oracle, truth, verdict
 from made_leagues import made_entries
 
 from elastocal import __version__
@@ -15,18 +15,15 @@ from elastocal.io.data_frames import write_csv
 from elastocal.io.storage import write_table
 from elastocal.random_streams import stream
 from elastocal_proof.blind import schemas as of_blind
-from elastocal_proof.blind.bad_rows_summary import judge_cases, summarize
-from elastocal_proof.blind.calibration import reliability, statements
-from elastocal_proof.blind.case_rows import case_row
+from elastocal_proof.blind.bad_rows import judge_cases, summarize
 from elastocal_proof.blind.closed_loop import MODELS, PARTS
 from elastocal_proof.blind.closed_loop_summary import case_errors, goals, summary
-from elastocal_proof.blind.confusion import confused
-from elastocal_proof.blind.coverage import covered, intervals_of
-from elastocal_proof.blind.power import powers
-from elastocal_proof.blind.targets import by_setting, summarized
+from elastocal_proof.blind.scores import intervals_of
+from elastocal_proof.blind.summary import rates, reliability
+from elastocal_proof.blind.summary import summarize as summarize_cases
 from elastocal_proof.league.folds import dealt
 from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
-from elastocal_proof.league.table import Result, league_table, mechanism_table
+from elastocal_proof.league.table import league_table, mechanism_table
 
 SEED = 1
 LEAGUE = {
@@ -103,18 +100,14 @@ def _blind(folder):
     (folder / "results/blind/some_1.json").write_text(json.dumps([said for _, said, _ in entries]), encoding="utf-8")
     known = {document["campaign"]: {"oracle": found, "limit": None} for document, _, found in entries}
     (folder / "results/blind/oracle/some_1.json").write_text(json.dumps(known), encoding="utf-8")
-    cases = pd.DataFrame([case_row(*entry) for entry in entries])
-    spans = pd.DataFrame([row for document, said, _ in entries for row in intervals_of(document, said)])
-    stated = statements((document, said) for document, said, _ in entries)
+    cases = frame(*entries)
+    spans = pd.DataFrame([row for document, said, _ in entries for row in intervals_of(PLAN, document, said)])
     tables = {
         "cases": cases,
-        "probabilities": stated,
-        "reliability": reliability(stated),
-        "summary": summarized(cases, spans, stated, SEED),
-        "settings": by_setting(cases),
-        "confusion": confused(cases),
-        "power": powers(cases),
-        "coverage": covered(spans),
+        "intervals": spans,
+        "rates": rates(cases),
+        "reliability": reliability(cases),
+        "summary": summarize_cases(PLAN, cases, spans, SEED),
     }
     for name, table in tables.items():
         write_csv(folder / f"reports/blind/{name}.csv", table)
@@ -192,12 +185,12 @@ def _league(folder):
     # Of the measurements an audit looks at which there are.
     angles = {f"q{joint + 1}": measured.joint_angles[:, joint] for joint in range(measured.joint_angles.shape[1])}
     made[["session", "pose", "load", "target"]].assign(**angles).to_parquet(folder / "results/league/one/measurements.parquet")
-    results = []
+    results = {}
     for method, size, std in (("geometry", 2e-4, None), ("half", 1e-4, None), ("process", 1.2e-4, 1.2e-4)):
         entries = made_entries(size, 40, len(method), std).assign(fold=folds["random"][made["pose"]])
         columns = {name: entries[name].to_numpy() for name in entries}
         write_table(folder / f"results/league/one/random/{method}.parquet", ENTRIES, [columns], _ORIGIN)
-        results.append(Result("one", "random", method, entries))
+        results["one", "random", method] = entries
     found = pd.DataFrame(
         {"fold": [1, 2, 3, 4, 1], "mechanism": ["payload"] * 4 + ["other"], "probability": [0.9, 0.8, 1, 1, 0.2], "share": 0.3}
     )

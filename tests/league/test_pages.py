@@ -1,7 +1,5 @@
 """The page of the league has every figure in words that a stranger knows."""
 
-from dataclasses import replace
-
 import pandas as pd
 import pytest
 from made_leagues import made_results
@@ -44,6 +42,11 @@ def test_each_split_has_a_table_in_which_the_best_is_bold(page):
     assert page.count("**") == 2 * 6
 
 
+def test_a_split_that_no_data_set_has_is_left_out():
+    page = written(league_table(made_results(splits=("random", "session")), ROBOTS, "geometry", 1))
+    assert "Random poses" in page and "another session" in page and "Blocks of joint space" not in page
+
+
 def test_improbable_mechanisms_and_figures_of_other_data_are_left_out(page):
     assert "link weight" in page and "payload" not in page
     assert "somebody" in page and "three" not in page
@@ -54,7 +57,7 @@ def test_the_page_says_first_how_often_a_diagnosis_leads_and_how_surely(page):
     assert "has the smallest RMS error in 6 of 6 rows, in 6 with 95 % confidence" in page
     assert "; another has it in 0, in 0 with that confidence." in page
     # The same entries under two names: one of them is smallest, and neither is ahead for certain.
-    twins = [replace(each, method="half") for each in results if each.method == "geometry"]
-    table = league_table([each for each in results if each.method == "geometry"] + twins, ROBOTS, "geometry", 1)
+    twins = {(*key[:2], name): part for key, part in results.items() if key[2] == "geometry" for name in ("geometry", "half")}
+    table = league_table(twins, ROBOTS, "geometry", 1)
     assert "has the smallest RMS error in 0 of 6 rows, in 0 with" in written(table)
     assert "; another has it in 6, in 0 with that confidence." in written(table)

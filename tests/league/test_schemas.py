@@ -3,7 +3,7 @@
 import pytest
 
 from elastocal_proof.league import schemas
-from elastocal_proof.league.folds import WITHIN
+from elastocal_proof.league.folds import BLOCKS, RANDOM
 
 
 @pytest.mark.parametrize("schema", [schemas.FOLDS, schemas.FITS, schemas.MECHANISMS, schemas.ENTRIES])
@@ -13,4 +13,4 @@ def test_columns_are_named_once_and_say_what_they_are(schema):
 
 
 def test_each_split_of_one_data_set_has_its_folds():
-    assert set(WITHIN) <= {column.name for column in schemas.FOLDS.columns}
+    assert {RANDOM, BLOCKS} <= {column.name for column in schemas.FOLDS.columns}

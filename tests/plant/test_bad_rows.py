@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal_proof.plant.arm import arm_from_file, turned
-from elastocal_proof.plant.bad_rows import HELD_POINT, KINDS, with_bad_rows
+from elastocal_proof.plant.arm import arm_from_file, rotation_vector, turned
+from elastocal_proof.plant.bad_rows import HELD_POINT, SLIPS, with_bad_rows
 from elastocal_proof.plant.campaigns import Design, measured_table, schedule_of
 from elastocal_proof.plant.physical_robot import specimen
-from elastocal_proof.plant.tracker import rotation_vector
 
 DESIGN = Design(poses=20, held_out=6, ladder=(0.0, 1.0), repeats=2, repeated_poses=3, points=("3DoF", "flange"), covariates=())
 READ = {"x", "y", "z", "rx", "ry", "rz"}
@@ -41,7 +40,7 @@ def changed(before, after):
     return columns, set(np.concatenate([off[name] for name in columns]).tolist()) if columns else set()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SLIPS)
 @pytest.mark.parametrize("seed", range(5))
 def test_a_slip_changes_its_columns_in_its_rows_and_no_others(campaign, kind, seed):
     before = {name: column.copy() for name, column in campaign[0].items()}

@@ -12,10 +12,11 @@ from elastocal.errors import InputError
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.sites import sites_of
+from elastocal_proof.plant.arm import rotation_vector
 from elastocal_proof.plant.campaigns import schedule_of
-from elastocal_proof.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
+from elastocal_proof.plant.defects import Defect, drawn_defect, truth_of, with_defects
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE
 from elastocal_proof.plant.physical_robot import seen_poses, specimen
-from elastocal_proof.plant.tracker import rotation_vector
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
 FOREIGN = sorted(set(KINDS) - set(NAMED))
@@ -131,28 +132,6 @@ def test_a_defect_is_refused_where_it_cannot_be_or_is_too_large(fanuc_specimen):
             with_defects(fanuc_specimen, [wrong])
 
 
-@pytest.mark.parametrize("joint", [1, 4])
-def test_a_runout_moves_what_turns_with_the_joint_to_and_fro_once_and_twice_a_turn(weightless, schedule, joint):
-    """And by its lean: at the joint itself by its shifts alone, across each other, once a turn the one and twice the other."""
-    bad = with_defects(weightless, [Defect("bearing_runout", (joint,), 3e-5, 2)])
-    # Under a load the levers change too.
-    bare = schedule.load == 0
-    change = np.linalg.norm(seen_poses(bad, schedule)[0] - seen_poses(weightless, schedule)[0], axis=2)[bare]
-    names = weightless.arm.points
-    before = [names.index(name) for name in ("2DoF", "3DoF")] if joint == 4 else []
-    assert not change[:, before].any()
-    # [4DoF] of joint 4 lies on it; of joint 1 every target is far away.
-    near = change[:, names.index("4DoF")]
-    assert (near > 0).all()
-    if joint == 4:
-        # (cos(q - a)^2 + cos(2 q - b)^2): one, and waves of 2 q and 4 q with amplitudes of a half.
-        angle = schedule.angle[bare, 3]
-        waves = np.column_stack([*(wave(order * angle) for order in (2, 4) for wave in (np.cos, np.sin))])
-        found, left = np.linalg.lstsq(waves, (near / 3e-5) ** 2 - 1.0)[:2]
-        assert len(angle) > 6 and left < 1e-5
-        np.testing.assert_allclose(np.linalg.norm(found.reshape(2, 2), axis=1), 0.5, rtol=1e-2)
-
-
 def test_an_eccentric_nest_is_the_catalogues_law_on_every_arm(name, arm, small):
     """Across the axis of the last joint, whichever that is of the target's frame, and of the flange's target alone."""
     robot = specimen(arm, 4, weighs=False)
@@ -174,12 +153,3 @@ def test_an_eccentric_nest_is_the_catalogues_law_on_every_arm(name, arm, small):
     found = np.linalg.lstsq(np.column_stack(columns), change[bare, -1].ravel())[0]
     left = change[bare, -1].ravel() - np.column_stack(columns) @ found
     assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(change[bare, -1])
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_an_order_of_a_transmission_lies_between_low_integers_and_its_double_with_it(weightless, seed):
-    """Higher ones no campaign of some twenty poses can show."""
-    bad = with_defects(weightless, [Defect("transmission_order", (2,), 8e-5, seed)])
-    ((order, size, _), (double, less, _)) = bad.drives[-1].waves
-    assert 2.25 <= order <= 4.75 and 0.25 <= order % 1 <= 0.75
-    assert (double, size, less) == pytest.approx((2 * order, 8e-5, 2e-5))

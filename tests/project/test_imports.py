@@ -23,7 +23,7 @@ SCRIPTS = {
     ),
     "reading": ("elastocal.loop.loading", _NEVER | {"jsonschema", "pandas", "rich", "typer", "scipy"}),
     "loop": ("elastocal.loop.diagnosis_tables elastocal.loop.whole", _NEVER | _BY_DOCUMENTS | {"pandas"}),
-    "blind": ("diagnose_cases", _NEVER | _BY_DOCUMENTS | {"pandas"}),
+    "blind": ("elastocal_proof.blind.verdicts", _NEVER | _BY_DOCUMENTS | {"pandas"}),
 }
 _HELP = """
 from contextlib import redirect_stdout, suppress

@@ -6,7 +6,7 @@ pytestmark = pytest.mark.slow
 BLIND = ("blind", "--config", "blind=smoke")
 # All that an analyst does: none of these may have a truth among its inputs.
 ANALYSIS = {"diagnose_cases", "propose_follow_ups", "diagnose_follow_ups"}
-AFTERWARDS = {"seal_cases", "oracle_cases", "score_cases", "score_follow_ups", "score_sweep"}
+AFTERWARDS = {"seal_cases", "oracle_cases", "score_cases", "score_follow_ups"}
 SEALED = "data/sealed/smoke_1"
 
 
@@ -36,39 +36,46 @@ def test_a_finished_proof_has_nothing_to_do(small_proof):
 
 
 def test_every_table_and_figure_is_there(small_proof):
-    tables = ["cases", "confusion", "coverage", "power", "probabilities", "reliability", "settings", "summary", "undetectable"]
-    assert set(small_proof.files("reports/blind/*.csv")) >= {f"reports/blind/{name}.csv" for name in tables}
-    figures = ["confusion", "coverage", "errors", "power", "reliability", "sweep", "targets"]
+    tables = ["cases", "follow_up", "follow_up_cases", "intervals", "rates", "reliability", "summary", "sweep"]
+    assert small_proof.files("reports/blind/*.csv") == [f"reports/blind/{name}.csv" for name in tables]
     for kind in ("pdf", "png"):
-        assert small_proof.files(f"reports/blind/figures/*.{kind}") == [
-            f"reports/blind/figures/{name}.{kind}" for name in figures
-        ]
-    assert small_proof.path("reports/blind/blind.pdf").read_bytes().startswith(b"%PDF")
+        found = [f"reports/blind/figures/{name}.{kind}" for name in ("power", "reliability", "targets")]
+        assert small_proof.files(f"reports/blind/figures/*.{kind}") == found
+    assert "Targets of the blind proof" in small_proof.path("reports/blind/targets.md").read_text(encoding="utf-8")
     assert len(small_proof.path("reports/blind/cases.csv").read_text(encoding="utf-8").splitlines()) == 1 + 4
 
 
 EDITS = {
-    "the scores": ("src/elastocal_proof/blind/scores.py", {"score_cases", "compile_blind_report"}),
-    "the targets": ("src/elastocal_proof/blind/targets.py", {"score_cases", "draw_blind_targets", "compile_blind_report"}),
+    "the scores": ("src/elastocal_proof/blind/scores.py", {"score_cases", "draw_blind", "write_blind_page"}),
+    "the figures of the proof": ("src/elastocal_proof/blind/summary.py", {"score_cases", "draw_blind", "write_blind_page"}),
     "the oracle": ("src/elastocal_proof/blind/oracle.py", {"oracle_cases", "score_cases"}),
+    "a target": ("config/blind.yaml", {"score_cases", "write_blind_page"}),
 }
 
 
 @pytest.mark.parametrize("edit", EDITS)
 def test_edit_reruns_scores_and_no_diagnosis_of(edit, copy):
     path, expected = EDITS[edit]
-    copy.edit(path)
+    if edit == "a target":
+        copy.replace(path, "upper limit below 4 %, high: 0.04", "upper limit below 5 %, high: 0.05")
+    else:
+        copy.edit(path)
     planned = rules(copy.planned(*BLIND))
     assert planned >= expected
     assert not planned & ({"make_cases", "seal_cases"} | ANALYSIS)
 
 
-def test_a_figure_reruns_itself_and_the_report(copy):
-    copy.edit("src/elastocal_proof/figures/blind_errors.py")
-    assert rules(copy.planned(*BLIND)) == {"draw_blind_errors", "compile_blind_report", "blind"}
+def test_a_picture_reruns_itself_alone(copy):
+    copy.edit("src/elastocal_proof/figures/blind.py")
+    assert rules(copy.planned(*BLIND)) == {"draw_blind", "blind"}
 
 
-@pytest.mark.parametrize("module", ["oracle", "targets"])
+def test_a_size_that_the_plan_does_not_have_is_refused_in_one_line(copy):
+    ended = copy.snakemake("-n", "blind", "--config", "blind=huge")
+    assert ended.returncode != 0 and "blind: found 'huge'; allowed: smoke, quick, development, full" in ended.stderr
+
+
+@pytest.mark.parametrize("module", ["oracle", "summary"])
 def test_a_truth_that_was_edited_ends_in_one_line_with_its_file(copy, module):
     truth = copy.files(f"{SEALED}/*.json")[0]
     copy.append(truth, "\n")

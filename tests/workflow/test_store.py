@@ -86,7 +86,7 @@ def test_the_targets_that_are_named_are_described_and_uploaded_and_no_others(sma
     cases = proof.files("data/blind/smoke_1/*/*", "data/sealed/smoke_1/*.json")
     assert len(cases) > 10 and set(cases) <= described
     assert not set(cases) & set(uploaded(bucket, BLIND))
-    assert {"reports/blind/blind.pdf", "results/blind/smoke_1.json"} <= described & set(uploaded(bucket, BLIND))
+    assert {"reports/blind/targets.md", "results/blind/smoke_1.json"} <= described & set(uploaded(bucket, BLIND))
     assert proof.files("data/simulated/*") == []
 
 

@@ -18,8 +18,15 @@ import numpy as np
 from elastocal.campaigns.measurements import CSV
 from elastocal.campaigns.reading import read_descriptions, read_robot
 from elastocal.errors import InputError
-from elastocal_proof.blind.rehearsal import hidden_robot, hidden_words, with_misplaced_base
-from elastocal_proof.blind.rehearsal_files import fill_sheet, lose_beam, measured_errors, write_milling_path
+from elastocal_proof.blind.rehearsal import (
+    fill_sheet,
+    hidden_robot,
+    hidden_words,
+    lose_beam,
+    measured_errors,
+    with_misplaced_base,
+    write_milling_path,
+)
 
 ROBOTS = Path("config/robots")
 

@@ -9,7 +9,7 @@ BAD_ROWS = config["bad_rows"]
 rule compare_verdicts:
     input:
         robot=f"{CONFIG}/robots/{{robot}}.yaml",
-        sources=sources("compare_verdicts.py"),
+        sources=sources("elastocal_proof.blind.bad_rows.compare_verdicts"),
     output:
         slips="results/bad_rows/{robot}.parquet",
     log:
@@ -17,16 +17,17 @@ rule compare_verdicts:
     benchmark:
         "results/timings/compare_verdicts/{robot}.tsv"
     params:
+        step="elastocal_proof.blind.bad_rows.compare_verdicts",
         each=BAD_ROWS["each"],
         seed=config["seed"],
     script:
-        "../scripts/compare_verdicts.py"
+        "../scripts/run_step.py"
 
 
 rule summarize_bad_rows:
     input:
         slips=expand(rules.compare_verdicts.output.slips, robot=BAD_ROWS["robots"]),
-        sources=sources("summarize_bad_rows.py"),
+        sources=sources("elastocal_proof.blind.bad_rows.summarize_bad_rows"),
     output:
         cases="reports/bad_rows/cases.csv",
         summary=shown(
@@ -41,9 +42,10 @@ rule summarize_bad_rows:
     benchmark:
         "results/timings/summarize_bad_rows.tsv"
     params:
+        step="elastocal_proof.blind.bad_rows.summarize_bad_rows",
         robots=BAD_ROWS["robots"],
     script:
-        "../scripts/summarize_bad_rows.py"
+        "../scripts/run_step.py"
 
 
 rule bad_rows:

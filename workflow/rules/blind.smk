@@ -1,20 +1,28 @@
 """The blind proof: sealed cases on an independent plant, diagnosed without their ground truths, scored with them.
 
-`snakemake -j2 blind` makes the size quick; `--config blind=full` the whole. Writes data/blind/, data/sealed/,
-results/blind/{block}.json and reports/blind/manifest.sha256. What is sealed is read by seal_cases here and, after the diagnosis, by
-oracle_cases, score_cases and score_follow_ups.
+`snakemake -j2 blind` makes the size quick; `--config blind=full` the whole; cases, sizes and targets stand in config/blind.yaml. Writes
+data/blind/, data/sealed/, results/blind/ and reports/blind/. What is sealed is read by seal_cases and, after the diagnosis, by
+oracle_cases, score_cases and score_follow_ups. The loop goes once more on cases that end in a class: propose, carry out on the same
+plant, diagnose anew, score (blind_follow_up). Rules of the analyst (diagnose_.., propose_..) run in processes of their own, which get
+campaigns and verdicts alone; carry_out_follow_ups finds the robot by the name of the case.
 """
 
-BLIND_BLOCKS = {"smoke": 1, "quick": 10, "development": 20, "full": 60}[config["blind"]]
-# Those of the proof among them are used by the size full alone.
-BLIND_ROBOTS = ["kuka", "fanuc", "abb", "iiwa14", "gp180", "panda", "m900ib700"]
-BLIND = [f"{config['blind']}_{number}" for number in range(1, BLIND_BLOCKS + 1)]
+from elastocal.io.documents import read_document
+
+PLAN = read_document(f"{CONFIG}/blind.yaml")
+if config["blind"] not in PLAN["sizes"]:
+    sys.exit(f"config.yaml: blind: found {config['blind']!r}; allowed: {', '.join(PLAN['sizes'])}")
+BLIND_SIZE = PLAN["sizes"][config["blind"]]
+# All that the cases follow from: another target or another size makes none anew.
+CASES = {key: PLAN[key] for key in ("tuned", "absent", "settings", "sweep", "limit")} | {"sizes": {config["blind"]: BLIND_SIZE}}
+BLIND = [f"{config['blind']}_{number + 1}" for number in range(BLIND_SIZE["blocks"])]
+BLIND_ROBOTS = list(dict.fromkeys(robot for part in BLIND_SIZE["parts"] for robot in part["robots"]))
 
 
 rule make_cases:
     input:
         robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=BLIND_ROBOTS),
-        sources=sources("make_cases.py"),
+        sources=sources("elastocal_proof.blind.cases.make_cases"),
     output:
         blind=directory("data/blind/{block}"),
         sealed=directory("data/sealed/{block}"),
@@ -23,33 +31,36 @@ rule make_cases:
     benchmark:
         "results/timings/make_cases/{block}.tsv"
     params:
+        step="elastocal_proof.blind.cases.make_cases",
+        plan=CASES,
         size=config["blind"],
         number=lambda wildcards: int(wildcards.block.rsplit("_", 1)[1]),
-        blocks=BLIND_BLOCKS,
         seed=config["seed"],
     script:
-        "../scripts/make_cases.py"
+        "../scripts/run_step.py"
 
 
 rule seal_cases:
     input:
         sealed=expand(rules.make_cases.output.sealed, block=BLIND),
-        sources=sources("seal_cases.py"),
+        sources=sources("elastocal_proof.blind.folders.seal_cases"),
     output:
         manifest="reports/blind/manifest.sha256",
     log:
         "results/logs/seal_cases.log",
     benchmark:
         "results/timings/seal_cases.tsv"
+    params:
+        step="elastocal_proof.blind.folders.seal_cases",
     script:
-        "../scripts/seal_cases.py"
+        "../scripts/run_step.py"
 
 
 rule diagnose_cases:
     input:
         blind=rules.make_cases.output.blind,
         manifest=rules.seal_cases.output.manifest,
-        sources=sources("diagnose_cases.py"),
+        sources=sources("elastocal_proof.blind.verdicts.diagnose_cases"),
     output:
         verdicts="results/blind/{block}.json",
     log:
@@ -57,7 +68,225 @@ rule diagnose_cases:
     benchmark:
         "results/timings/diagnose_cases/{block}.tsv"
     params:
+        step="elastocal_proof.blind.verdicts.diagnose_cases",
         seed=config["seed"],
         robots=f"{CONFIG}/robots",
     script:
-        "../scripts/diagnose_cases.py"
+        "../scripts/run_step.py"
+
+
+rule oracle_cases:
+    input:
+        blind=rules.make_cases.output.blind,
+        sealed=rules.make_cases.output.sealed,
+        manifest=rules.seal_cases.output.manifest,
+        verdicts=rules.diagnose_cases.output.verdicts,
+        sources=sources("elastocal_proof.blind.oracle.oracle_cases"),
+    output:
+        oracle="results/blind/oracle/{block}.json",
+    log:
+        "results/logs/oracle_cases/{block}.log",
+    benchmark:
+        "results/timings/oracle_cases/{block}.tsv"
+    params:
+        step="elastocal_proof.blind.oracle.oracle_cases",
+        plan=CASES,
+        seed=config["seed"],
+        robots=f"{CONFIG}/robots",
+    script:
+        "../scripts/run_step.py"
+
+
+rule score_cases:
+    input:
+        sealed=expand(rules.make_cases.output.sealed, block=BLIND),
+        manifest=rules.seal_cases.output.manifest,
+        verdicts=expand(rules.diagnose_cases.output.verdicts, block=BLIND),
+        oracles=expand(rules.oracle_cases.output.oracle, block=BLIND),
+        sources=sources("elastocal_proof.blind.summary.score_cases"),
+    output:
+        cases="reports/blind/cases.csv",
+        intervals="reports/blind/intervals.csv",
+        summary=shown(
+            "reports/blind/summary.csv", "blind_targets", "Blind proof", shows="Every figure beside its target", kind="table"
+        ),
+        rates=shown(
+            "reports/blind/rates.csv", "blind_power", "Blind proof", shows="Rates by group, truth and size", kind="table"
+        ),
+        sweep=shown("reports/blind/sweep.csv", "blind_sweep", "Blind proof", shows="How near relatives are named", kind="table"),
+        reliability="reports/blind/reliability.csv",
+    log:
+        "results/logs/score_cases.log",
+    benchmark:
+        "results/timings/score_cases.tsv"
+    params:
+        step="elastocal_proof.blind.summary.score_cases",
+        plan=PLAN,
+        seed=config["seed"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule draw_blind:
+    input:
+        summary=rules.score_cases.output.summary,
+        reliability=rules.score_cases.output.reliability,
+        rates=rules.score_cases.output.rates,
+        sources=sources("elastocal_proof.figures.blind.draw_blind"),
+    output:
+        targets=shown(
+            "reports/blind/figures/targets.png", "blind_targets", "Blind proof", shows="Figures against targets", kind="figure"
+        ),
+        reliability=shown(
+            "reports/blind/figures/reliability.png",
+            "blind_reliability",
+            "Blind proof",
+            shows="Probabilities against frequencies",
+            kind="figure",
+        ),
+        power=shown(
+            "reports/blind/figures/power.png", "blind_power", "Blind proof", shows="What is detected by size", kind="figure"
+        ),
+        targets_pdf="reports/blind/figures/targets.pdf",
+        reliability_pdf="reports/blind/figures/reliability.pdf",
+        power_pdf="reports/blind/figures/power.pdf",
+    log:
+        "results/logs/draw_blind.log",
+    benchmark:
+        "results/timings/draw_blind.tsv"
+    params:
+        step="elastocal_proof.figures.blind.draw_blind",
+    script:
+        "../scripts/run_step.py"
+
+
+rule write_blind_page:
+    input:
+        summary=rules.score_cases.output.summary,
+        cases=rules.score_cases.output.cases,
+        robots=rules.make_cases.input.robots,
+        sources=sources("elastocal_proof.report.blind_page.write_blind_page"),
+    output:
+        page="reports/blind/targets.md",
+    log:
+        "results/logs/write_blind_page.log",
+    benchmark:
+        "results/timings/write_blind_page.tsv"
+    params:
+        step="elastocal_proof.report.blind_page.write_blind_page",
+        plan=PLAN,
+        size=config["blind"],
+        seed=config["seed"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule blind_pictures:
+    """Pictures and the table of docs/, from a finished proof."""
+    input:
+        page=rules.write_blind_page.output.page,
+        figures=expand("reports/blind/figures/{figure}.png", figure=["targets", "reliability", "power"]),
+    output:
+        page="docs/blind_tables.md",
+        figures=expand("docs/blind_{figure}.png", figure=["targets", "reliability", "power"]),
+    log:
+        "results/logs/blind_pictures.log",
+    benchmark:
+        "results/timings/blind_pictures.tsv"
+    shell:
+        "(cp {input.page} {output.page}; for one in {input.figures}; do cp $one docs/blind_$(basename $one); done) 2> {log}"
+
+
+rule propose_follow_ups:
+    input:
+        blind=rules.make_cases.output.blind,
+        verdicts=rules.diagnose_cases.output.verdicts,
+        sources=sources("elastocal_proof.blind.follow_up.propose_follow_ups"),
+    output:
+        proposals="results/blind/proposed/{block}.csv",
+    log:
+        "results/logs/propose_follow_ups/{block}.log",
+    benchmark:
+        "results/timings/propose_follow_ups/{block}.tsv"
+    params:
+        step="elastocal_proof.blind.follow_up.propose_follow_ups",
+        most=BLIND_SIZE["followed_up"],
+        seed=config["seed"],
+        robots=f"{CONFIG}/robots",
+    script:
+        "../scripts/run_step.py"
+
+
+rule carry_out_follow_ups:
+    input:
+        proposals=rules.propose_follow_ups.output.proposals,
+        robots=rules.make_cases.input.robots,
+        sources=sources("elastocal_proof.blind.carrying_out.carry_out_follow_ups"),
+    output:
+        campaigns=directory("data/follow_up/{block}"),
+    log:
+        "results/logs/carry_out_follow_ups/{block}.log",
+    benchmark:
+        "results/timings/carry_out_follow_ups/{block}.tsv"
+    params:
+        step="elastocal_proof.blind.carrying_out.carry_out_follow_ups",
+        plan=CASES,
+        size=config["blind"],
+        seed=config["seed"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule diagnose_follow_ups:
+    input:
+        campaigns=rules.carry_out_follow_ups.output.campaigns,
+        sources=sources("elastocal_proof.blind.verdicts.diagnose_follow_ups"),
+    output:
+        verdicts="results/blind/follow_up/{block}.json",
+    log:
+        "results/logs/diagnose_follow_ups/{block}.log",
+    benchmark:
+        "results/timings/diagnose_follow_ups/{block}.tsv"
+    params:
+        step="elastocal_proof.blind.verdicts.diagnose_follow_ups",
+        seed=config["seed"],
+        robots=f"{CONFIG}/robots",
+    script:
+        "../scripts/run_step.py"
+
+
+rule score_follow_ups:
+    input:
+        sealed=expand(rules.make_cases.output.sealed, block=BLIND),
+        manifest=rules.seal_cases.output.manifest,
+        first=expand(rules.diagnose_cases.output.verdicts, block=BLIND),
+        proposals=expand(rules.propose_follow_ups.output.proposals, block=BLIND),
+        anew=expand(rules.diagnose_follow_ups.output.verdicts, block=BLIND),
+        sources=sources("elastocal_proof.blind.summary.score_follow_ups"),
+    output:
+        rates=shown(
+            "reports/blind/follow_up.csv", "blind_follow_up", "Blind proof", shows="Names after further poses", kind="table"
+        ),
+        cases="reports/blind/follow_up_cases.csv",
+    log:
+        "results/logs/score_follow_ups.log",
+    benchmark:
+        "results/timings/score_follow_ups.tsv"
+    params:
+        step="elastocal_proof.blind.summary.score_follow_ups",
+        plan=PLAN,
+    script:
+        "../scripts/run_step.py"
+
+
+rule blind_follow_up:
+    input:
+        rules.score_follow_ups.output,
+
+
+rule blind:
+    input:
+        rules.score_cases.output,
+        rules.draw_blind.output,
+        rules.write_blind_page.output,
+        rules.score_follow_ups.output if BLIND_SIZE["followed_up"] else [],

@@ -10,7 +10,7 @@ CLOSED_LOOP = config["closed_loop"]
 rule close_loop:
     input:
         robot=f"{CONFIG}/robots/{{robot}}.yaml",
-        sources=sources("close_loop.py"),
+        sources=sources("elastocal_proof.blind.closed_loop.close_loop"),
     output:
         moved="results/closed_loop/{robot}.parquet",
     log:
@@ -18,18 +18,19 @@ rule close_loop:
     benchmark:
         "results/timings/close_loop/{robot}.tsv"
     params:
+        step="elastocal_proof.blind.closed_loop.close_loop",
         each=CLOSED_LOOP["each"],
         slips=CLOSED_LOOP["slips"],
         seed=config["seed"],
     script:
-        "../scripts/close_loop.py"
+        "../scripts/run_step.py"
 
 
 rule summarize_closed_loop:
     input:
         moved=expand(rules.close_loop.output.moved, robot=CLOSED_LOOP["robots"]),
         robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=CLOSED_LOOP["robots"]),
-        sources=sources("summarize_closed_loop.py"),
+        sources=sources("elastocal_proof.blind.closed_loop_summary.summarize_closed_loop"),
     output:
         errors="reports/closed_loop/cases.csv",
         summary=shown(
@@ -40,6 +41,23 @@ rule summarize_closed_loop:
             kind="table",
         ),
         goals="reports/closed_loop/goals.csv",
+    log:
+        "results/logs/summarize_closed_loop.log",
+    benchmark:
+        "results/timings/summarize_closed_loop.tsv"
+    params:
+        step="elastocal_proof.blind.closed_loop_summary.summarize_closed_loop",
+        robots=CLOSED_LOOP["robots"],
+        seed=config["seed"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule draw_closed_loop:
+    input:
+        summary=rules.summarize_closed_loop.output.summary,
+        sources=sources("elastocal_proof.figures.closed_loop.draw_closed_loop"),
+    output:
         figure="reports/closed_loop/closed_loop.pdf",
         picture=shown(
             "reports/closed_loop/closed_loop.png",
@@ -49,20 +67,19 @@ rule summarize_closed_loop:
             kind="figure",
         ),
     log:
-        "results/logs/summarize_closed_loop.log",
+        "results/logs/draw_closed_loop.log",
     benchmark:
-        "results/timings/summarize_closed_loop.tsv"
+        "results/timings/draw_closed_loop.tsv"
     params:
-        robots=CLOSED_LOOP["robots"],
-        seed=config["seed"],
+        step="elastocal_proof.figures.closed_loop.draw_closed_loop",
     script:
-        "../scripts/summarize_closed_loop.py"
+        "../scripts/run_step.py"
 
 
 rule state_accuracy:
     input:
         robot=f"{CONFIG}/robots/{{robot}}.yaml",
-        sources=sources("state_accuracy.py"),
+        sources=sources("elastocal_proof.blind.closed_loop.state_accuracy"),
     output:
         stated="results/closed_loop/stated/{robot}_{frame}.csv",
     log:
@@ -72,16 +89,17 @@ rule state_accuracy:
     wildcard_constraints:
         frame="base|tracker",
     params:
+        step="elastocal_proof.blind.closed_loop.state_accuracy",
         each=CLOSED_LOOP["stated"],
         seed=config["seed"],
     script:
-        "../scripts/state_accuracy.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_coverage:
     input:
         stated=expand(rules.state_accuracy.output.stated, robot=CLOSED_LOOP["robots"], frame=["base", "tracker"]),
-        sources=sources("tabulate_coverage.py"),
+        sources=sources("elastocal_proof.blind.closed_loop_summary.tabulate_coverage"),
     output:
         cases="reports/closed_loop/stated.csv",
         coverage="reports/closed_loop/coverage.csv",
@@ -89,11 +107,14 @@ rule tabulate_coverage:
         "results/logs/tabulate_coverage.log",
     benchmark:
         "results/timings/tabulate_coverage.tsv"
+    params:
+        step="elastocal_proof.blind.closed_loop_summary.tabulate_coverage",
     script:
-        "../scripts/tabulate_coverage.py"
+        "../scripts/run_step.py"
 
 
 rule closed_loop:
     input:
         rules.summarize_closed_loop.output,
+        rules.draw_closed_loop.output,
         rules.tabulate_coverage.output,

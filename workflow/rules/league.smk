@@ -16,7 +16,7 @@ wildcard_constraints:
 rule deal_league_folds:
     input:
         files=lambda wildcards: files_of_campaign(wildcards.data),
-        sources=sources("deal_league_folds.py"),
+        sources=sources("elastocal_proof.league.folds.deal_league_folds"),
     output:
         descriptions="results/league/{data}/campaign.json",
         measurements="results/league/{data}/measurements.parquet",
@@ -26,12 +26,13 @@ rule deal_league_folds:
     benchmark:
         "results/timings/deal_league_folds/{data}.tsv"
     params:
+        step="elastocal_proof.league.folds.deal_league_folds",
         folder="data/campaigns/{data}",
         robots=f"{CONFIG}/robots",
         folds=LEAGUE["folds"],
         seed=config["seed"],
     script:
-        "../scripts/deal_league_folds.py"
+        "../scripts/run_step.py"
 
 
 rule diagnose_league_folds:
@@ -39,7 +40,7 @@ rule diagnose_league_folds:
         descriptions=rules.deal_league_folds.output.descriptions,
         measurements=rules.deal_league_folds.output.measurements,
         folds=rules.deal_league_folds.output.folds,
-        sources=sources("diagnose_league_folds.py"),
+        sources=sources("elastocal_proof.league.methods.diagnose_league_folds"),
     output:
         facts="results/league/{data}/{split}/diagnoses.json",
         fits="results/league/{data}/{split}/fits.parquet",
@@ -49,9 +50,10 @@ rule diagnose_league_folds:
     benchmark:
         "results/timings/diagnose_league_folds/{data}/{split}.tsv"
     params:
+        step="elastocal_proof.league.methods.diagnose_league_folds",
         seed=config["seed"],
     script:
-        "../scripts/diagnose_league_folds.py"
+        "../scripts/run_step.py"
 
 
 rule enter_league:
@@ -61,7 +63,7 @@ rule enter_league:
         folds=league_files("folds"),
         facts=diagnosis_file("facts"),
         fits=diagnosis_file("fits"),
-        sources=sources("enter_league.py"),
+        sources=sources("elastocal_proof.league.methods.enter_league"),
     output:
         entries="results/league/{data}/{split}/{method}.parquet",
     log:
@@ -69,10 +71,11 @@ rule enter_league:
     benchmark:
         "results/timings/enter_league/{data}/{split}/{method}.tsv"
     params:
+        step="elastocal_proof.league.methods.enter_league",
         method=lambda wildcards: LEAGUE["methods"][wildcards.method],
         seed=config["seed"],
     script:
-        "../scripts/enter_league.py"
+        "../scripts/run_step.py"
 
 
 rule tabulate_league:
@@ -82,7 +85,7 @@ rule tabulate_league:
             rules.diagnose_league_folds.output.mechanisms, [key for key in rounds_of(wildcards.league) if key[1] == "random"]
         ),
         published=f"{CONFIG}/league/published.csv",
-        sources=sources("tabulate_league.py"),
+        sources=sources("elastocal_proof.figures.league.tabulate_league"),
     output:
         league=shown("reports/league/{league}/league.csv", "league", "League", shows="Errors of all methods", kind="table"),
         costs="reports/league/{league}/costs.csv",
@@ -101,6 +104,7 @@ rule tabulate_league:
     benchmark:
         "results/timings/tabulate_league/{league}.tsv"
     params:
+        step="elastocal_proof.figures.league.tabulate_league",
         entered=lambda wildcards: entry_keys(wildcards.league),
         rounds=lambda wildcards: rounds_of(wildcards.league),
         missing=lambda wildcards: missing_of(wildcards.league),
@@ -111,7 +115,7 @@ rule tabulate_league:
         folds=LEAGUE["folds"],
         seed=config["seed"],
     script:
-        "../scripts/tabulate_league.py"
+        "../scripts/run_step.py"
 
 
 rule league_small:

@@ -44,8 +44,7 @@ def demo(
 
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_descriptions, read_robot
-    from elastocal_proof.blind.rehearsal import hidden_robot, hidden_words
-    from elastocal_proof.blind.rehearsal_files import fill_sheet, measured_errors, write_milling_path
+    from elastocal_proof.blind.rehearsal import fill_sheet, hidden_robot, hidden_words, measured_errors, write_milling_path
 
     robots, console = pipeline() / "config" / "robots", Console(stderr=True)
     file = robots / f"{_ROBOT}.yaml"

@@ -18,7 +18,7 @@ _OF_USE = ("adequate", "named", "class", "several")
 _REPORTS = {
     "reports/paper.pdf": "the paper, regenerated",
     "reports/study.pdf": "the study",
-    "reports/blind/blind.pdf": "the blind proof",
+    "reports/blind/targets.md": "the blind proof",
 }
 
 

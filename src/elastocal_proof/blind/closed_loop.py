@@ -3,7 +3,8 @@
 Each wanted pose is commanded five times: as the robot file has the arm, by a calibration of the geometry alone, by the declared
 model (geometry and springs), by the model that the diagnosis found, and by the plant itself, whose equilibrium is inverted by
 Newton's method as `compensation` inverts a model. What the last leaves is the floor: noise of the tracker and repeatability.
-Nobody's model has seen any of these poses.
+Nobody's model has seen any of these poses. Beside it stands what is stated of the corrected robot's accuracy, and whether the
+plant keeps it.
 """
 
 from __future__ import annotations
@@ -14,11 +15,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import OperatingConditions, calibrate_by_fit, nominal_forward
 from elastocal.application.compensation import find_joint_targets
-from elastocal.application.inverse_kinematics import SOLVED_M, find_beyond_limits, refine
+from elastocal.application.frames import find_absorbed, placement, scope_about
+from elastocal.campaigns.reading import read_robot
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import without_gross_errors
 from elastocal.diagnosis.settings import Settings
@@ -28,57 +31,60 @@ from elastocal.exchange.target_path import OK
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states
 from elastocal.fitting.tolerances import fit_declared
+from elastocal.io.data_frames import write_csv
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import write_table
 from elastocal.loop.whole import calibrated_by, cases_in
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.validation.conformity import predicted_conformity
+from elastocal_proof.blind import schemas
 from elastocal_proof.blind.folders import write_blind_campaign
-from elastocal_proof.blind.rehearsal import ERRORS_OF_GEOMETRY, hidden_robot, reached
+from elastocal_proof.blind.rehearsal import ERRORS_OF_GEOMETRY, bow, hidden_robot, reached, with_misplaced_base
 from elastocal_proof.plant.bad_rows import HELD_POINT, ZEROS, with_bad_rows
 from elastocal_proof.plant.campaigns import Design, schedule_of, usual_force_N
-from elastocal_proof.plant.defects import KINDS
-from elastocal_proof.plant.drives import Repeatability
+from elastocal_proof.plant.kinds import KINDS
 from elastocal_proof.plant.random_numbers import stream
-from elastocal_proof.plant.tracker import misplaced_base
 from elastocal_proof.plant.weights import declared_masses
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any
 
-    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.mechanics.robot import Robot
     from elastocal_proof.plant.bad_rows import BadReading
+    from elastocal_proof.plant.campaigns import Table
     from elastocal_proof.plant.physical_robot import PhysicalRobot
-
-    _Commanded = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE = "uncorrected", "geometry", "declared", "found", "true"
 MODELS = (UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE)
 UNLOADED, LOADED, MILLING = "unloaded", "loaded", "milling"
 PARTS = (UNLOADED, LOADED, MILLING)
+# Of what an accuracy is stated: random poses without and with load together, and a path.
+STATED_OF = {"random": (UNLOADED, LOADED), MILLING: (MILLING,)}
 # Wanted poses of each part.
 _POSES, _PATH = 40, 60
 # Share of the joint limits from which they are drawn: what a cell uses.
 _REACH = 0.8
-# On an arm of 140 kg and more; of smaller arms in proportion, as `usual_force_N`.
-_MILLING_N, _USUAL_N = 500.0, 1000.0
-# Of the path over the reach of the arm: 0.5 m on one of 2.5 m.
-_PATH_SHARE = 0.2
-# Postures that are tried for a path that stays within the limits.
-_TRIES = 200
+# Of the force of milling over the usual one, and of its path over the reach of the arm: 0.5 m on one of 2.5 m.
+_MILLING_SHARE, _PATH_SHARE = 0.5, 0.2
 # Newton's steps on the plant: each leaves a hundredth or less.
 _STEPS = 5
 # Effects by the approach, which no command of a path states.
 _BY_APPROACH = ("hysteresis",)
 CAMPAIGN = Design(declared=ERRORS_OF_GEOMETRY)
+# Tolerances that a shop floor asks for, evenly on the logarithm: some robots keep them and some do not.
+_TOLERANCES_M = (1.5e-5, 6e-5)
+_RISK = 0.05
+_STATED = ("rms_m", "rms_bound_m", "worst_m", "worst_bound_m", "form_m", "left_out_m")
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Poses that the robot shall reach.
+    """Poses that a robot shall reach.
 
     `part` (N,) of str. `position`, `rotation` (N, 3), (N, 3, 3): m, base axes. `wrench` (N, 6). `start` (N, n): joint angles of
     the rigid robot, as the controller shows them, rad.
@@ -91,86 +97,60 @@ class Wanted:
     start: np.ndarray
 
 
-def hidden_effects(robot: PhysicalRobot) -> list[str]:
-    """Defects with which the loop is closed: all that move the robot, need no covariate and can be on this arm."""
-    known = catalogue()
-    return sorted(
-        name
-        for name, kind in KINDS.items()
-        if name in known
-        and known[name].moves_robot
-        and not kind.needs
-        and name not in (*ERRORS_OF_GEOMETRY, *_BY_APPROACH)
-        and kind.locations(robot.arm)
-    )
+@dataclass(frozen=True)
+class Measured:
+    """A robot with one hidden defect, measured and diagnosed, and what it shall reach.
 
-
-def closed_loop(
-    robot_file: str | Path, robots_folder: str | Path, effect: str, seed: int, slips: bool = False
-) -> dict[str, np.ndarray]:
-    """One robot with one hidden defect, from campaign to corrected targets that were measured.
-
-    `effect`: hidden, of plausible size at a joint that is drawn, beside errors of geometry, gears and weights. `slips`: whether
-    the base is a little tilted against where it is declared, and the beam was lost in one row. What is wanted, and whether the
-    robot reached it, is then of the declared base. Returns one row for each wanted pose and model, columns as `schema` has
-    them.
+    `plant`: with its defects. `declared`: as the analyst knows it. `training`: what was fitted; `held_out`: what was not.
     """
-    plant, _ = hidden_robot(robot_file, seed, [effect])
+
+    plant: PhysicalRobot
+    declared: Robot
+    training: Case
+    held_out: Case
+    found: Diagnosis
+    wanted: Wanted
+
+
+def cases(robot_file: str | Path, seed: int, each: int) -> Iterator[tuple[str, int]]:
+    """Hidden effects and seeds of all cases on one robot, `each` of every effect that the loop can be closed with.
+
+    These move the robot, need no covariate and can be on this arm.
+    """
+    arm, known = hidden_robot(robot_file, seed)[0].arm, catalogue()
+    for effect, kind in sorted(KINDS.items()):
+        moves = effect in known and known[effect].moves_robot and not kind.needs and kind.locations(arm)
+        for number in range(each if moves and effect not in (*ERRORS_OF_GEOMETRY, *_BY_APPROACH) else 0):
+            yield effect, int(stream(seed, f"closed loop {Path(robot_file).stem} {effect} {number}").integers(2**31))
+
+
+def measure(robot_file: Path, effect: str, seed: int, frame: str = "base", slips: bool = False) -> Measured:
+    """Measure and diagnose one robot.
+
+    `robot_file`: its folder holds those that a campaign may name. `effect`: hidden, of plausible size at a joint that is drawn,
+    beside errors of geometry, gears and weights. `slips`: whether the base is a little tilted against where it is declared, and
+    the beam was lost in one fitted row.
+    """
+    plant, design, draws = (
+        hidden_robot(robot_file, seed, [effect])[0],
+        replace(CAMPAIGN, frame=frame),
+        stream(seed, "lost beam"),
+    )
     if slips:
-        plant = replace(plant, tracker=replace(plant.tracker, misplaced=misplaced_base(stream(seed, "tilted base"))))
-    training, held_out = measured_cases(plant, robot_file, robots_folder, CAMPAIGN, seed, slips)
-    found = diagnose(training, Settings(), seed)
-    robot = training.campaign.robot
-    wanted = wanted_poses(robot, plant, seed)
-    operating = OperatingConditions(wanted.wrench)
-    count = len(wanted.part)
-    models = {
-        GEOMETRY: calibrate_by_fit(_geometry(training, found), replace(robot, masses=())),
-        DECLARED: calibrate_by_fit(found.declared, robot),
-        FOUND: calibrated_by(found, without_gross_errors(found, held_out)[1]),
-    }
-    commanded: dict[str, _Commanded] = {UNCORRECTED: (wanted.start, np.zeros(count), np.ones(count, bool))}
-    commanded |= {name: _by_model(model, wanted, operating) for name, model in models.items()}
-    commanded[TRUE] = _by_plant(plant, robot, wanted, seed)
-    rows = [
-        _moved(plant, wanted, commands, seed) | {"model": name, "predicted_std_m": stated, "corrected": good}
-        for name, (commands, stated, good) in commanded.items()
-    ]
-    named = effect in {entry["name"] for entry in found.document["effects"] if entry["adopted"]}
-    head = {"effect": effect, "seed": seed, "verdict": found.document["verdict"], "named": named}
-    return {name: np.concatenate([np.broadcast_to((head | row)[name], count) for row in rows]) for name in (*head, *rows[0])}
-
-
-def measured_cases(
-    plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, design: Design, seed: int, lost_beam: bool = False
-) -> tuple[Case, Case]:
-    """Training and held-out part of a campaign of the plant, by way of its folder; perhaps with a fitted row that was lost."""
+        plant = with_misplaced_base(plant, seed)
     schedule, declared = schedule_of(plant.arm, design, seed), declared_masses(plant.arm)
-    draws = stream(seed, "lost beam")
 
-    def lost(table: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[BadReading]]:
-        """One lost row, of a pose that is fitted."""
-        kind, held_out = str(draws.choice([ZEROS, HELD_POINT])), design.poses - design.held_out
+    def lost(table: Table) -> tuple[Table, list[BadReading]]:
+        kind, fitted = str(draws.choice([ZEROS, HELD_POINT])), design.poses - design.held_out
         tries = iter(lambda: with_bad_rows(table, plant, schedule, kind, 1, draws), None)
-        return next((bad, lost) for bad, lost in tries if table["pose"][lost[0].rows[0]] < held_out)
+        return next((bad, slip) for bad, slip in tries if table["pose"][slip[0].rows[0]] < fitted)
 
     with tempfile.TemporaryDirectory() as folder:
-        write_blind_campaign(
-            Path(folder), "closed_loop", robot_file, plant, design, schedule, declared, slipped=lost if lost_beam else None
-        )
-        return cases_in(folder, robots_folder)
-
-
-def _geometry(case: Case, found: Diagnosis) -> Fit:
-    """A calibration of the geometry alone: a rigid arm, fitted to where no load acts but its weight."""
-    campaign = case.campaign
-    rigid = replace(
-        campaign, robot=replace(campaign.robot, masses=(), compliance=np.zeros(campaign.robot.joints)), compliance="nominal"
-    )
-    bare = declared_model(rigid)
-    model = bare.with_effects(declared_candidates(campaign.declared, bare.sites, "closed loop"))
-    unloaded = np.asarray(~case.observations.states.wrench.any(axis=1))
-    return fit_declared(model, select_states(case.observations, unloaded), found.declared.noise)
+        slipped = lost if slips else None
+        write_blind_campaign(folder, "closed_loop", robot_file, plant, design, schedule, declared, slipped=slipped)
+        training, held_out = cases_in(folder, robot_file.parent)
+    robot = training.campaign.robot
+    return Measured(plant, robot, training, held_out, diagnose(training, Settings(), seed), wanted_poses(robot, plant, seed))
 
 
 def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
@@ -188,7 +168,7 @@ def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
     along = np.gradient(path_position, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     # Half against the feed and the rest upwards off the part.
-    process = (force * _MILLING_N / _USUAL_N) * (-np.sqrt(0.5) * along + np.sqrt(0.5) * np.array([0.0, 0.0, 1.0]))
+    process = force * _MILLING_SHARE * (-np.sqrt(0.5) * along + np.sqrt(0.5) * np.array([0.0, 0.0, 1.0]))
     return Wanted(
         np.repeat(PARTS, (_POSES, _POSES, _PATH)),
         np.concatenate([position, path_position]),
@@ -198,51 +178,65 @@ def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
     )
 
 
-def bow(robot: Robot, length_m: float, count: int, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A path in a level plane at one orientation, in a posture that keeps within the limits, as for milling.
+def closed_loop(robot_file: Path, effect: str, seed: int, slips: bool = False) -> dict[str, np.ndarray]:
+    """One robot, from campaign to corrected targets that were measured; arguments as of `measure`.
 
-    `count`: of its poses. `draws`: of where it lies. Returns `position`, `rotation` (count, 3), (count, 3, 3): m, base axes;
-    `reported_angles` (count, n): of the rigid robot, rad.
+    What is wanted, and whether the robot reached it, is of the declared base. Returns one row for each wanted pose and model,
+    columns as `schemas.closed_loop` has them.
     """
-    low, high = robot.joint_limits.T
-    share = np.linspace(-0.5, 0.5, count)[:, None]
-    for _ in range(_TRIES):
-        middle = (low + (high - low) * (0.5 + 0.5 * (draws.random(robot.joints) - 0.5)))[None]
-        heading = draws.uniform(0.0, 2.0 * np.pi)
-        ahead, aside = np.array([np.cos(heading), np.sin(heading), 0.0]), np.array([-np.sin(heading), np.cos(heading), 0.0])
-        at, turned = nominal_forward(robot, robot.reported_angles(middle))
-        position = at + length_m * (share * ahead + share**2 * aside)
-        rotation = np.broadcast_to(turned, (count, 3, 3))
-        angles, left = refine(robot, position, rotation, np.repeat(middle, count, axis=0))
-        smooth = np.abs(np.diff(angles, axis=0)).max() < 0.1
-        if left.max() < SOLVED_M and not find_beyond_limits(robot, angles).any() and smooth:
-            return position, rotation, robot.reported_angles(angles)
-    raise RuntimeError(f"{robot.name}: no posture in {_TRIES} in which the path lies within the limits")
+    made = measure(robot_file, effect, seed, slips=slips)
+    robot, wanted, count = made.declared, made.wanted, len(made.wanted.part)
+    operating = OperatingConditions(wanted.wrench)
+    models = {
+        GEOMETRY: calibrate_by_fit(_geometry(made.training, made.found), replace(robot, masses=())),
+        DECLARED: calibrate_by_fit(made.found.declared, robot),
+        FOUND: calibrated_by(made.found, without_gross_errors(made.found, made.held_out)[1]),
+    }
+    # Commands, the errors that a model states, and whether a pose could be corrected.
+    commanded = {UNCORRECTED: (wanted.start, np.zeros(count), np.ones(count, bool))}
+    for name, model in models.items():
+        targets = find_joint_targets(model, wanted.position, wanted.rotation, operating, wanted.start)
+        stated = predict_errors(model, targets.joint_angles, operating, draws=0).error_m
+        commanded[name] = targets.joint_angles, stated, targets.status == OK
+    commanded[TRUE] = _by_plant(made, seed)
+    rows = [
+        _moved(made, commands, seed) | {"model": name, "predicted_std_m": stated, "corrected": good}
+        for name, (commands, stated, good) in commanded.items()
+    ]
+    named = effect in {entry["name"] for entry in made.found.document["effects"] if entry["adopted"]}
+    head = {"effect": effect, "seed": seed, "verdict": made.found.document["verdict"], "named": named}
+    return {name: np.concatenate([np.broadcast_to((head | row)[name], count) for row in rows]) for name in (*head, *rows[0])}
 
 
-def _by_model(calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions) -> _Commanded:
-    """Commands by a model, the errors that it states, and whether a pose could be corrected."""
-    found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
-    return found.joint_angles, predict_errors(calibrated, found.joint_angles, operating, draws=0).error_m, found.status == OK
+def _geometry(case: Case, found: Diagnosis) -> Fit:
+    """A calibration of the geometry alone: a rigid arm, fitted to where no load acts but its weight."""
+    campaign = case.campaign
+    rigid = replace(campaign.robot, masses=(), compliance=np.zeros(campaign.robot.joints))
+    bare = declared_model(replace(campaign, robot=rigid, compliance="nominal"))
+    model = bare.with_effects(declared_candidates(campaign.declared, bare.sites, "closed loop"))
+    unloaded = np.asarray(~case.observations.states.wrench.any(axis=1))
+    return fit_declared(model, select_states(case.observations, unloaded), found.declared.noise)
 
 
-def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> _Commanded:
-    """As `_by_model`, by Newton's method on the plant without its chance, which states no error."""
-    certain = replace(plant, drives=tuple(law for law in plant.drives if not isinstance(law, Repeatability)))
-    commands = wanted.start.copy()
+def _by_plant(made: Measured, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Commands by Newton's method on the plant without its chance, which states no error, and whether they succeed."""
+    robot, wanted = made.declared, made.wanted
+    certain, commands = replace(made.plant, repeatability_rad=()), wanted.start.copy()
     inverse = np.linalg.pinv(jacobians(robot.chain, robot.model_angles(commands), robot.chain.end_effector))
+
+    def off() -> np.ndarray:
+        return pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
+
     for _ in range(_STEPS):
-        off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
-        step = (inverse @ off[..., None])[..., 0]
-        commands = robot.reported_angles(robot.model_angles(commands) + step)
-    off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
-    return commands, np.zeros(len(off)), np.linalg.norm(off[:, :3], axis=1) < 1e-6
+        commands = robot.reported_angles(robot.model_angles(commands) + (inverse @ off()[..., None])[..., 0])
+    return commands, np.zeros(len(commands)), np.linalg.norm(off()[:, :3], axis=1) < 1e-6
 
 
-def _moved(plant: PhysicalRobot, wanted: Wanted, commands: np.ndarray, seed: int) -> dict[str, Any]:
+def _moved(made: Measured, commands: np.ndarray, seed: int) -> dict[str, Any]:
     """What the robot does with its commands, with chance of its own."""
-    position, rotation = reached(plant, commands, wanted.wrench, seed + 1)
-    read, _, _ = plant.tracker.read(position[:, None], rotation[:, None], stream(seed, "measured again"))
+    wanted = made.wanted
+    position, rotation = reached(made.plant, commands, wanted.wrench, seed + 1)
+    read, _, _ = made.plant.tracker.read(position[:, None], rotation[:, None], stream(seed, "measured again"))
     return {
         "part": wanted.part,
         "pose": np.arange(len(wanted.part)),
@@ -252,8 +246,49 @@ def _moved(plant: PhysicalRobot, wanted: Wanted, commands: np.ndarray, seed: int
     }
 
 
-def cases(robot_file: str | Path, seed: int, each: int) -> Iterator[tuple[str, int]]:
-    """Hidden effects and seeds of all cases on one robot, `each` of every effect."""
-    for effect in hidden_effects(hidden_robot(robot_file, seed)[0]):
-        for number in range(each):
-            yield effect, int(stream(seed, f"closed loop {Path(robot_file).stem} {effect} {number}").integers(2**31))
+def stated_accuracy(robot_file: Path, effect: str, seed: int, frame: str) -> list[dict[str, Any]]:
+    """For each of `STATED_OF` what is predicted, bounded and decided of one corrected robot's error, and what it is.
+
+    True errors are those of the plant at corrected targets, without the tracker's noise: in the base's frame where the campaign
+    knew it, else after the best rigid placement over the random poses.
+    """
+    made = measure(robot_file, effect, seed, frame)
+    plant, wanted, operating = made.plant, made.wanted, OperatingConditions(made.wanted.wrench)
+    calibrated = calibrated_by(made.found, without_gross_errors(made.found, made.held_out)[1])
+    targets = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+    good = targets.status == OK
+    off = reached(plant, targets.joint_angles, wanted.wrench, seed + 1)[0] - wanted.position
+    if frame != "base":
+        over = good & (wanted.part != MILLING)
+        columns = placement(scope_about(wanted.position[over]), wanted.position, wanted.rotation)
+        field = np.concatenate([off, np.zeros_like(off)], axis=1)[..., None]
+        off = (field - columns @ find_absorbed(columns[over], field[over], np.repeat([True, True, False, False], 3)))[:, :3, 0]
+    tolerance = float(np.exp(stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))))
+    rows = []
+    for part, members in STATED_OF.items():
+        mine = good & np.isin(wanted.part, members)
+        prediction = predict_errors(calibrated, targets.joint_angles[mine], operating.part(mine))
+        stated, distance = prediction.accuracy(part), np.linalg.norm(off[mine], axis=1)
+        decided = predicted_conformity(prediction.rms_m, stated.poses, tolerance, _RISK)
+        rows.append(
+            {"robot": robot_file.stem, "effect": effect, "seed": seed, "frame": frame, "part": part}
+            | {"verdict": made.found.document["verdict"], "poses": stated.poses}
+            | {name: getattr(stated, name) for name in _STATED}
+            | {"true_rms_m": float(np.sqrt((distance**2).mean())), "true_worst_m": float(distance.max())}
+            | {"tolerance_m": tolerance, "decision": decided.decision}
+        )
+    return rows
+
+
+def close_loop(job: Any) -> None:
+    """All cases of the closed loop on one robot, as one table."""
+    robot, asked = Path(job.input.robot), job.params
+    blocks = (closed_loop(robot, *case, slips=asked.slips) for case in cases(robot, asked.seed, asked.each))
+    write_table(job.output.moved, schemas.closed_loop(read_robot(robot).joints), blocks, provenance(asked, **job.wildcards))
+
+
+def state_accuracy(job: Any) -> None:
+    """What is stated of the accuracy of each robot of the closed loop, beside the truth."""
+    robot, frame = Path(job.input.robot), job.wildcards.frame
+    rows = [row for case in cases(robot, job.params.seed, job.params.each) for row in stated_accuracy(robot, *case, frame)]
+    write_csv(job.output.stated, pd.DataFrame(rows))

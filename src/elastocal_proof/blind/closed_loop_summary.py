@@ -1,23 +1,30 @@
-"""How far the corrected robot misses, by part and model, with intervals over cases; and whether that is the floor."""
+"""How far the corrected robot misses, by part and model, with intervals over cases; and whether that is what was stated."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
+from elastocal.campaigns.reading import read_robot
+from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.random_streams import stream
-from elastocal_proof.blind.closed_loop import FOUND, MODELS, PARTS, TRUE
+from elastocal_proof.blind import schemas
+from elastocal_proof.blind.closed_loop import FOUND, MODELS, PARTS, STATED_OF, TRUE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from typing import Any
 
 _REPLICATES = 2000
 # The goal where the effect was named: so many times what the true model leaves.
 GOAL = 1.2
 _CASE = ["robot", "effect", "seed"]
+# Verdicts under which one model stands for the robot.
+_SETTLED = ("named", "adequate")
 
 
 def case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -29,8 +36,7 @@ def case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     square predicted. Poses that some model could not correct are left out for all.
     """
     frame = pd.concat([table.assign(robot=robot) for robot, table in tables.items()], ignore_index=True)
-    pose = [*_CASE, "part", "pose"]
-    frame = frame[frame.groupby(pose)["corrected"].transform("all")]
+    frame = frame[frame.groupby([*_CASE, "part", "pose"])["corrected"].transform("all")]
     key, columns = [*_CASE, "verdict", "named", "part", "model"], ["measured_error_m", "reached_error_m", "predicted_std_m"]
     means = (frame[columns] ** 2).groupby([frame[name] for name in key]).mean().unstack("model")
     measured, reached, predicted = (means[name] for name in columns)
@@ -50,21 +56,18 @@ def summary(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
         for part in PARTS:
             mine = errors[(errors["part"] == part) & ((errors["robot"] == robot) | (robot == "all"))]
             draws = stream(seed, robot, f"closed loop {part}", 0).integers(len(mine), size=(_REPLICATES, len(mine)))
-            squares = {model: mine[model].to_numpy() ** 2 for model in MODELS}
-            drawn = {model: np.sqrt(values[draws].mean(axis=1)) for model, values in squares.items()}
-            reached = {model: mine[f"{model}_reached"].to_numpy() ** 2 for model in MODELS}
+
+            def drawn(name: str, mine: pd.DataFrame = mine, draws: np.ndarray = draws) -> tuple[float, np.ndarray]:
+                squares = mine[name].to_numpy() ** 2
+                return float(np.sqrt(squares.mean())), np.sqrt(squares[draws].mean(axis=1))
+
+            floor = drawn(TRUE)
             for model in MODELS:
-                ratio = drawn[model] / drawn[TRUE]
-                rows.append(
-                    {"robot": robot, "part": part, "model": model, "cases": len(mine)}
-                    | _with_limits("rms_mm", 1e3 * np.sqrt(squares[model].mean()), 1e3 * drawn[model])
-                    | _with_limits("over_floor", np.sqrt(squares[model].mean() / squares[TRUE].mean()), ratio)
-                    | _with_limits(
-                        "reached_mm",
-                        1e3 * np.sqrt(reached[model].mean()),
-                        1e3 * np.sqrt(reached[model][draws].mean(axis=1)),
-                    )
-                )
+                (rms, many), (reached, many_reached) = drawn(model), drawn(f"{model}_reached")
+                row = {"robot": robot, "part": part, "model": model, "cases": len(mine)}
+                row |= _with_limits("rms_mm", 1e3 * rms, 1e3 * many)
+                row |= _with_limits("over_floor", rms / floor[0], many / floor[1])
+                rows.append(row | _with_limits("reached_mm", 1e3 * reached, 1e3 * many_reached))
     return pd.DataFrame(rows)
 
 
@@ -92,6 +95,53 @@ def goals(errors: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def coverage(rows: pd.DataFrame) -> pd.DataFrame:
+    """How often the truth is below the stated bounds, and how often it denies a decision, with Clopper-Pearson intervals.
+
+    `rows`: of `stated_accuracy`. Returns one row for each frame (and all), part, kind of verdict (and all) and question:
+    ``cases, hits, share, low, high``, and the root of mean true over mean predicted squares.
+    """
+    settled, always = rows["verdict"].isin(_SETTLED), rows["verdict"].notna()
+    questions = {
+        "rms below its 95 % bound": (always, rows["true_rms_m"] <= rows["rms_bound_m"]),
+        "worst below its 95 % bound": (always, rows["true_worst_m"] <= rows["worst_bound_m"]),
+        "pass that the truth denies": (rows["decision"] == "pass", rows["true_rms_m"] > rows["tolerance_m"]),
+        "fail that the truth denies": (rows["decision"] == "fail", rows["true_rms_m"] <= rows["tolerance_m"]),
+    }
+    found = []
+    for frame in ("base", "tracker", "all"):
+        for part in STATED_OF:
+            for verdict, chosen in (("one model", settled), ("several, class, unexplained", ~settled), ("all", always)):
+                mine = chosen & (rows["part"] == part) & ((rows["frame"] == frame) | (frame == "all"))
+                squares = [(rows.loc[mine, name] ** 2).mean() for name in ("true_rms_m", "rms_m")]
+                for question, (asked, hit) in questions.items():
+                    cases, hits = int((mine & asked).sum()), int((mine & asked & hit).sum())
+                    low, high = proportion_confint(hits, cases, method="beta") if cases else (0.0, 1.0)
+                    found.append(
+                        {"frame": frame, "part": part, "verdict": verdict, "question": question, "cases": cases, "hits": hits}
+                        | {"share": hits / max(cases, 1), "low": low, "high": high}
+                        | {"true_over_predicted": float(np.sqrt(squares[0] / squares[1]))}
+                    )
+    return pd.DataFrame(found)
+
+
 def _with_limits(name: str, value: float, drawn: np.ndarray) -> dict[str, float]:
     low, high = np.quantile(drawn, [0.025, 0.975])
     return {name: float(value), f"{name}_low": float(low), f"{name}_high": float(high)}
+
+
+def summarize_closed_loop(job: Any) -> None:
+    """Errors of the closed loop: by case, and together with intervals."""
+    joints = [read_robot(Path(robot)).joints for robot in job.input.robots]
+    files = zip(job.params.robots, job.input.moved, joints, strict=True)
+    errors = case_errors({robot: read_frame(path, schemas.closed_loop(count)) for robot, path, count in files})
+    write_csv(job.output.errors, errors)
+    write_csv(job.output.summary, summary(errors, job.params.seed))
+    write_csv(job.output.goals, goals(errors))
+
+
+def tabulate_coverage(job: Any) -> None:
+    """How often stated accuracies hold: all cases, and their coverage with intervals."""
+    rows = pd.concat([pd.read_csv(path) for path in job.input.stated], ignore_index=True)
+    write_csv(job.output.cases, rows)
+    write_csv(job.output.coverage, coverage(rows))

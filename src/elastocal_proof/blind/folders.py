@@ -17,49 +17,19 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.json_files import read_json
-from elastocal_proof.plant.campaigns import Design, measured_table
-from elastocal_proof.plant.dynamic import DYNAMIC, dynamic_table
+from elastocal_proof.plant.campaigns import DYNAMIC, Design, dynamic_table, measured_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from elastocal_proof.plant.arm import Arm, LinkMass
     from elastocal_proof.plant.bad_rows import BadReading
+    from elastocal_proof.plant.campaigns import Table
     from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
 
-    Table = dict[str, np.ndarray]
     Slip = Callable[[Table], tuple[Table, list[BadReading]]]
 
 ROBOT_FILE = "robot.yaml"
-
-
-def robot_document(
-    document: Mapping[str, Any],
-    arm: Arm,
-    declared: Sequence[LinkMass],
-    gravity_m_s2: Iterable[float],
-    undeclared: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Contents of the campaign's own robot file.
-
-    `document`: of the robot file of which this is a specimen. `declared`: weights as they are declared to the analyst; where
-    there are none, the file has no masses. `undeclared`: keys that it lacks.
-    """
-    absent = ("masses", "gravity_m_s2", "compensator", "payload_kg", *undeclared)
-    described = {key: value for key, value in document.items() if key not in absent}
-    if declared:
-        described["masses"] = [
-            {"link": m.link, "mass_kg": m.mass_kg, "centre_m": list(m.centre_m), "relative_std": m.relative_std}
-            for m in declared
-        ]
-    described |= {
-        "gravity_m_s2": list(gravity_m_s2),
-        "payload_kg": round(arm.payload_kg, 1),
-        "gear_ratio": list(arm.gear_ratio),
-    }
-    if arm.compensated:
-        described["compensator"] = document.get("compensator", {"joint": 2, "kind": "spring"})
-    return described
 
 
 def campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
@@ -126,10 +96,9 @@ def write_dynamic_campaign(
     seed: int,
     declared: Sequence[LinkMass] = (),
 ) -> None:
-    """Measure a moving arm, and write what the analyst gets: for benchmarks of many measurements.
+    """Measure a robot by a tracker in its dynamic mode, without a load; arguments as in `write_blind_campaign`.
 
-    `folder`, `name`, `robot_file`, `robot`, `declared`: as in `write_blind_campaign`. `measurements`: at 1,000 a second,
-    without a load.
+    Compliances are held at those of the robot file, beside errors of geometry, and random poses held out.
     """
     document = campaign_document(name, robot.arm, DYNAMIC) | {
         "compliance": "nominal",
@@ -148,9 +117,20 @@ def write_robot(
     declared: Sequence[LinkMass],
     undeclared: Sequence[str] = (),
 ) -> None:
-    """Write the campaign's own robot file; see `robot_document`."""
-    nominal = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
-    document = robot_document(nominal, robot.arm, declared, robot.structure.gravity_m_s2, undeclared)
+    """Write the campaign's own robot file.
+
+    `robot_file`: of which this is a specimen. `declared`: weights as they are declared to the analyst; where there are none,
+    the file has no masses. `undeclared`: keys that it lacks.
+    """
+    arm, nominal = robot.arm, yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
+    absent = ("masses", "gravity_m_s2", "compensator", "payload_kg", *undeclared)
+    document = {key: value for key, value in nominal.items() if key not in absent}
+    if declared:
+        document["masses"] = [asdict(mass) | {"centre_m": list(mass.centre_m)} for mass in declared]
+    document |= {"gravity_m_s2": list(robot.structure.gravity_m_s2), "payload_kg": round(arm.payload_kg, 1)}
+    document["gear_ratio"] = list(arm.gear_ratio)
+    if arm.compensated:
+        document["compensator"] = nominal.get("compensator", {"joint": 2, "kind": "spring"})
     write_text(Path(folder) / ROBOT_FILE, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))
 
 
@@ -169,18 +149,29 @@ def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_ground_truth(files: Iterable[Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
+def seal_cases(job: Any) -> None:
+    """The commitment that is published before any diagnosis: a line ``sha256  name`` for each ground truth."""
+    files = sorted(_sealed_in(job.input.sealed), key=lambda file: file.name)
+    lines = [f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in files]
+    write_text(job.output.manifest, "".join(lines))
+
+
+def load_ground_truth(folders: Iterable[str | Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
     """Read sealed files, for the scores and the oracle only, whose hashes are those that were published.
 
-    `manifest`: a line ``sha256 name`` for each. Returns sealed documents by the name of the case, in its order. Raises
-    `InputError`: a file is not the one whose hash was published.
+    Returns sealed documents by the name of the case, in its order. Raises `InputError`: a file is not the one whose hash was
+    published.
     """
     lines = Path(manifest).read_text(encoding="utf-8").splitlines()
     published = {name: digest for digest, name in map(str.split, lines)}
     truths = {}
-    for file in sorted(files, key=lambda file: file.name):
+    for file in sorted(_sealed_in(folders), key=lambda file: file.name):
         found = hashlib.sha256(file.read_bytes()).hexdigest()
         if published.get(file.name) != found:
             raise InputError(file, "", f"SHA-256 {found}", f"{published.get(file.name)}, as sealed")
         truths[file.stem] = read_json(file)
     return truths
+
+
+def _sealed_in(folders: Iterable[str | Path]) -> list[Path]:
+    return [file for folder in folders for file in Path(folder).glob("*.json")]

@@ -20,27 +20,19 @@ import numpy as np
 
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.settings import Settings
-from elastocal_proof.blind.cases import NAMED, Case, defects_of, design_of, impossible_on, specimen_of, yardstick_of
-from elastocal_proof.plant.defects import KINDS, Defect, with_defects
+from elastocal_proof.blind.cases import NAMED, Case, absent_on, defects_of, yardstick_of
+from elastocal_proof.plant.defects import Defect, with_defects
+from elastocal_proof.plant.kinds import KINDS
 from elastocal_proof.plant.random_numbers import stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
+    from elastocal_proof.blind.cases import Plan
     from elastocal_proof.plant.physical_robot import PhysicalRobot
     from elastocal_proof.plant.sizing import Yardstick
 
-# Groups and levels of the targets that are shares of the limit: by what the diagnosis is counted there, by what the best
-# analyst, and in words.
-COMPARED = {
-    ("single", 25.0): ("detected", "limit_detected", "detected at 25"),
-    ("single", 50.0): ("named_right", "limit_right", "right name alone at 50"),
-    ("pair", 50.0): ("exact", "limit_right", "both of two effects at 50 each"),
-    ("pair", 200.0): ("exact", "limit_right", "both of two effects at 200 each"),
-}
-# Of their cases those for which it is worked out, as one takes twenty seconds.
-_SHARE = 1 / 6
 # Of each kind at each location: as many as its details have directions, within a factor of two.
 _DRAWS = 8
 # Of the null distribution.
@@ -60,26 +52,26 @@ class Signals:
     units: np.ndarray
 
 
-def limit_of_sample(truth: Mapping[str, Any], robots_folder: str | Path) -> dict[str, Any] | None:
+def limit_of_sample(plan: Plan, truth: Mapping[str, Any], robots_folder: str | Path) -> dict[str, Any] | None:
     """As `limit`, of a case that is in the sample; None of others. `truth`: a sealed document."""
-    stated = truth["case"]
+    stated, asked = truth["case"], plan["limit"]
     case = Case(**stated | {name: tuple(stated[name]) for name in ("effects", "levels")})
-    drawn = stream(case.seed, "sample of the limit").random() < _SHARE
+    drawn = stream(case.seed, "sample of the limit").random() < 1 / asked["one_in"]
     absorbed = any(defect["of"] == "raw" for defect in truth["defects"])
-    compared = (case.group, *case.levels[:1]) in COMPARED
-    return limit(case, robots_folder) if drawn and compared and not absorbed else None
+    compared = [case.group, *case.levels[:1]] in asked["of"]
+    return limit(plan, case, robots_folder) if drawn and compared and not absorbed else None
 
 
-def limit(case: Case, robots_folder: str | Path) -> dict[str, Any]:
+def limit(plan: Plan, case: Case, robots_folder: str | Path) -> dict[str, Any]:
     """What the best analyst says of one case with one effect of the catalogue, or with two.
 
     Returns ``detected`` at the level of the diagnosis, ``mechanisms`` that are most probable, their ``probability``, ``right``.
     Sets of mechanisms are equally probable, and so are the locations of each.
     """
-    robot, design = specimen_of(case, robots_folder), design_of(case)
-    yardstick = yardstick_of(case, robot, design)
-    bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])
-    signals = signals_of(yardstick, robot, [kind for kind in NAMED if kind not in impossible_on(case.robot)], case.seed)
+    robot = case.specimen(robots_folder)
+    yardstick = yardstick_of(case, robot)
+    bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, yardstick)])
+    signals = signals_of(yardstick, robot, [kind for kind in NAMED if kind not in absent_on(plan, case.robot)], case.seed)
     sets, columns = _hypotheses(case, signals)
     residual = yardstick.residual(bad)
     flat = signals.units.reshape(len(residual), -1)

@@ -20,9 +20,12 @@ from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, noise_from
 from elastocal.fitting.tolerances import fit_declared
+from elastocal.io.json_files import read_json, write_json
 from elastocal.loop.whole import cases_in
 from elastocal.validation.fitted_range import outside_poses
-from elastocal_proof.plant.defects import OUTSIDE
+from elastocal_proof.blind.folders import load_ground_truth
+from elastocal_proof.blind.limit import limit_of_sample
+from elastocal_proof.plant.kinds import OUTSIDE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -126,3 +129,13 @@ def _outcome(members: Iterable[Candidate], p_value: float, heldout: Mapping[str,
         "detected": p_value < LEVEL,
         "heldout": heldout,
     }
+
+
+def oracle_cases(job: Any) -> None:
+    """What the oracle and the best analyst do on a block of blind cases, once they are diagnosed."""
+    verdicts, robots = {verdict["campaign"]: verdict for verdict in read_json(job.input.verdicts)}, job.params.robots
+    found = {}
+    for name, truth in load_ground_truth([job.input.sealed], job.input.manifest).items():
+        informed = oracle(truth, verdicts[name], f"{job.input.blind}/{name}", robots, job.params.seed)
+        found[name] = {"oracle": informed, "limit": limit_of_sample(job.params.plan, truth, robots)}
+    write_json(job.output.oracle, found, allow_nan=False)

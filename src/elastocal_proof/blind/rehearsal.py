@@ -5,6 +5,7 @@ To rehearse a calibration, from the robot's file to the corrected robot, before 
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,39 +14,46 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from elastocal.application.calibrated import nominal_forward
+from elastocal.application.inverse_kinematics import SOLVED_M, find_beyond_limits, refine
 from elastocal.errors import InputError
-from elastocal.mechanics.components import WRENCH
+from elastocal.exchange.csv_dialect import LARGEST_BYTES
+from elastocal.exchange.target_path import read_target_path
+from elastocal.io.atomic_writes import atomic_write, check_places
+from elastocal.io.texts import read_text
+from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import at_joints, listed, physical_name
-from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
-from elastocal_proof.plant.drives import Repeatability
+from elastocal_proof.plant.arm import arm_from_file, rotation_vector
+from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, lever_of, usual_force_N
+from elastocal_proof.plant.defects import Defect, drawn_defect, with_defects
+from elastocal_proof.plant.instruments import misplaced_base
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE
 from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, seen_poses, specimen
 from elastocal_proof.plant.random_numbers import stream
-from elastocal_proof.plant.tracker import misplaced_base, rotation_vector
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
+    from elastocal.mechanics.robot import Robot
     from elastocal_proof.plant.arm import Arm
 
 # What every arm has that was never calibrated, at each of its joints, beside other gears and weights than its file says.
-_NOT_TURNED = (0.0, 0.0, 0.0)
 ERRORS_OF_GEOMETRY = ("joint_offset", "link_geometry")
 _COMPENSATORS = ("compensator_stiffness", "compensator_torque")
 # 10 µm at the end of an arm of 2 m.
 _JOINT_REPEATABILITY_RAD = 5e-6
-_SECONDS_PER_STATE = 25.0
 _STATE = ["pose", "load", "repeat"]
-_WRENCH = [name for name, _, _ in WRENCH]
+# A path to mill: its width over the reach, and its poses; postures that are tried until it stays within the limits.
+_BOW, _BOW_POSES, _TRIES = 0.2, 50, 200
 
 
 def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ()) -> tuple[PhysicalRobot, list[Defect]]:
     """The robot that stands in.
 
-    `robot_file`: of which it is a specimen. `effects`: keys of `defects.KINDS`, each at a joint that is drawn; one effect that
-    is drawn by default. Returns `defects`: for whoever wants to compare them with the verdict afterwards. Raises `InputError`:
-    an effect that this arm cannot have.
+    `robot_file`: of which it is a specimen. `effects`: keys of `KINDS`, each at a joint that is drawn; one effect that is drawn
+    by default. Returns `defects`: for whoever wants to compare them with the verdict afterwards. Raises `InputError`: an effect
+    that this arm cannot have.
     """
     arm = arm_from_file(robot_file)
     possible = sorted(
@@ -59,19 +67,28 @@ def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ())
     # Nobody's catalogue offers a compensator to an arm whose file has none.
     if "compensator:" not in Path(robot_file).read_text(encoding="utf-8"):
         possible = [name for name in possible if name not in _COMPENSATORS]
-    chosen = tuple(effects) or (possible[stream(seed, "hidden effect").integers(len(possible))],)
-    defects = [*_errors_of_geometry(arm, seed), *(drawn_defect(name, arm, seed) for name in chosen)]
-    robot = specimen(arm, seed)
-    robot = replace(robot, drives=(*robot.drives, Repeatability((_JOINT_REPEATABILITY_RAD,) * arm.joints)))
+    chosen, draws = tuple(effects), stream(seed, "errors of geometry")
+    if not chosen:
+        chosen = (possible[stream(seed, "hidden effect").integers(len(possible))],)
+    of_geometry = [
+        Defect(name, joints, KINDS[name].plausible_on(arm) * draws.uniform(), seed + 1 + place)
+        for name in ERRORS_OF_GEOMETRY
+        for place, joints in enumerate(KINDS[name].locations(arm))
+    ]
+    defects = [*of_geometry, *(drawn_defect(name, arm, seed) for name in chosen)]
+    robot = replace(specimen(arm, seed), repeatability_rad=(_JOINT_REPEATABILITY_RAD,) * arm.joints)
     return with_defects(robot, defects), defects
 
 
 def hidden_words(defects: Sequence[Defect], effects: Sequence[str]) -> str:
     """What `hidden_robot` hid of effects that were asked for, or drew; the small errors that every robot has stand before."""
-    return listed(
-        f"{physical_name(defect.effect)}{at_joints(defect.effect, defect.joints)}"
-        for defect in defects[-max(len(effects), 1) :]
-    )
+    hidden = defects[-max(len(effects), 1) :]
+    return listed(f"{physical_name(defect.effect)}{at_joints(defect.effect, defect.joints)}" for defect in hidden)
+
+
+def with_misplaced_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
+    """The robot beside a tracker whose frame of the base is off by some 0.3 mrad and 0.2 mm."""
+    return replace(robot, tracker=replace(robot.tracker, misplaced=misplaced_base(stream(seed, "tilted base"))))
 
 
 def filled_sheet(
@@ -84,7 +101,7 @@ def filled_sheet(
     errors. Returns the same rows. Raises `InputError`: a column that is missing or no number, a target that the campaign does
     not have, or a moment that is not that of the row's force at a lever.
     """
-    require_numbers(sheet, [*_STATE, *(f"q{j + 1}" for j in range(robot.arm.joints)), *_WRENCH], source)
+    require_numbers(sheet, [*_STATE, *(f"q{j + 1}" for j in range(robot.arm.joints)), *WRENCH_NAMES], source)
     if "target" not in sheet:
         raise InputError(source, "columns", "no 'target'", "the target of each row")
     strangers = sheet[~sheet["target"].isin(list(document["targets"]))]
@@ -93,23 +110,116 @@ def filled_sheet(
         raise InputError(source, f"target, line {strangers.index[0] + 2}", found, ", ".join(document["targets"]))
     states = sheet.drop_duplicates(_STATE)
     number = pd.MultiIndex.from_frame(states[_STATE]).get_indexer(pd.MultiIndex.from_frame(sheet[_STATE]))
-    schedule = _schedule(robot.arm, states, seed, source)
-    position, rotation = seen_poses(robot, schedule)
-    names = list(document["targets"])
-    at = [robot.arm.points.index(document["targets"][name]["point"]) for name in names]
-    targets = document["targets"].items()
-    offsets = np.array([_stated(target["offset_m"], seed, f"reflector {name}", 0.1) for name, target in targets])
-    mounts = [_stated(target.get("rotation", _NOT_TURNED), seed, f"mount {name}", np.pi / 2) for name, target in targets]
-    turns = Rotation.from_rotvec(mounts).as_matrix()
+    position, rotation = seen_poses(robot, _schedule(robot.arm, states, seed, source))
+    targets = document["targets"]
+    at = [robot.arm.points.index(target["point"]) for target in targets.values()]
+
+    def where(value: str | Sequence[float], name: str, within: float) -> np.ndarray:
+        # A draw within bounds where the campaign does not know.
+        return stream(seed, name).uniform(-within, within, 3) if isinstance(value, str) else np.array(value, float)
+
+    offsets = np.array([where(target["offset_m"], f"reflector {name}", 0.1) for name, target in targets.items()])
+    mounts = [where(each.get("rotation", np.zeros(3)), f"mount {name}", np.pi / 2) for name, each in targets.items()]
     position = position[:, at] + (rotation[:, at] @ offsets[..., None])[..., 0]
-    position, rotation, _ = robot.tracker.read(position, rotation[:, at] @ turns, stream(seed, "readings"))
+    rotation = rotation[:, at] @ Rotation.from_rotvec(mounts).as_matrix()
+    position, rotation, _ = robot.tracker.read(position, rotation, stream(seed, "readings"))
     if document["frame"] == "tracker":
         position, rotation = robot.tracker.in_own_frame(position, rotation)
-    seen = number, pd.Index(names).get_indexer(sheet["target"])
+    seen = number, pd.Index(list(targets)).get_indexer(sheet["target"])
     measured = dict(zip("xyz", position[seen].T, strict=True))
     if document["measured"] == "pose":
         measured |= dict(zip(("rx", "ry", "rz"), rotation_vector(rotation[seen]).T, strict=True))
     return sheet.assign(**measured)
+
+
+def fill_sheet(path: Path, document: Mapping[str, Any], robot: PhysicalRobot, seed: int) -> int:
+    """Fill the measurement sheet at `path` as `filled_sheet` does; returns how many measurements it has now."""
+    check_places(path)
+    filled = filled_sheet(_read_table(path), document, robot, seed, path.as_posix())
+    _write_table(path, filled)
+    return len(filled)
+
+
+def lose_beam(path: Path, seed: int) -> int:
+    """Read zeros, as after a lost beam, in one row of a filled sheet, which is drawn; returns its line."""
+    sheet = _read_table(path)
+    row = int(stream(seed, "lost beam").integers(len(sheet)))
+    sheet.loc[row, [name for name in ("x", "y", "z", "rx", "ry", "rz") if name in sheet]] = 0.0
+    _write_table(path, sheet)
+    return row + 2
+
+
+def write_milling_path(path: Path, declared: Robot, robot: PhysicalRobot, seed: int) -> int:
+    """Write wanted poses along a bow as for milling, under half the usual force of such a robot; returns how many."""
+    check_places(path)
+    at, turned, angles = bow(declared, _BOW * robot.arm.reach_m, _BOW_POSES, np.random.default_rng(seed))
+    force = np.tile([0.0, 0.0, usual_force_N(robot.arm) / 2, 0.0, 0.0, 0.0], (len(at), 1))
+    names = ["x", "y", "z", "rx", "ry", "rz", *WRENCH_NAMES, *(f"q{j + 1}" for j in range(len(angles[0])))]
+    columns = np.column_stack([at, Rotation.from_matrix(turned).as_rotvec(), force, angles])
+    _write_table(path, pd.DataFrame(columns, columns=names))
+    return len(at)
+
+
+def measured_errors(path: Path, targets: Path, robot: PhysicalRobot, seed: int) -> dict[str, np.ndarray]:
+    """Distances (N,), m, of where the tracker sees the robot from the wanted poses, in the campaign's frame of the base.
+
+    Commanded by "uncorrected" and by "corrected" targets; "noise alone" is what the tracker's noise and the robot's
+    repeatability leave of an exact model. `path`: the wanted poses. `targets`: what `elastocal correct` wrote for them.
+    """
+    wanted, table, source = read_target_path(path, robot.arm.joints), _read_table(targets), targets.as_posix()
+    if len(table) != len(wanted):
+        raise InputError(source, "rows", str(len(table)), f"{len(wanted)}, the poses of {path}")
+    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
+    off = {}
+    for name, ending in (("uncorrected", "_uncorrected"), ("corrected", "")):
+        columns = [f"q{joint}{ending}" for joint in range(1, robot.arm.joints + 1)]
+        require_numbers(table, columns, source)
+        angles = table[columns].to_numpy(float)
+        visits = [reached(robot, angles, wrench, number, source) for number in (seed, seed + 1)]
+        position, rotation = (part[:, None] for part in visits[0])
+        noise = robot.tracker.read(position, rotation, stream(seed, "noise along a path"))[0][:, 0] - visits[0][0]
+        off[name] = np.linalg.norm(visits[0][0] + noise - wanted.position, axis=1)
+        # Half the square of the difference of two visits is the repeatability's.
+        off["noise alone"] = np.linalg.norm(noise + (visits[0][0] - visits[1][0]) / np.sqrt(2.0), axis=1)
+    return off
+
+
+def reached(
+    robot: PhysicalRobot, shown: np.ndarray, wrench: np.ndarray, seed: int, source: str = "commands"
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the end effector comes to rest.
+
+    `shown` (N, n): commanded joint angles as the controller shows them, rad; each is approached afresh. `wrench` (N, 6): at the
+    last measuring point, base axes; N, N m. `seed`: of the repeatability of the drives. `source`: named in errors. Returns
+    `position` (N, 3): m, in the frame that is declared as the base's; without the tracker's noise; `rotation` (N, 3, 3). Raises
+    `InputError`: as in `filled_sheet`.
+    """
+    columns = dict(zip([*(f"q{j + 1}" for j in range(shown.shape[1])), *WRENCH_NAMES], [*shown.T, *wrench.T], strict=True))
+    rows = pd.DataFrame(columns | {"pose": np.arange(len(shown)), "load": 0, "repeat": 0})
+    position, rotation = seen_poses(robot, _schedule(robot.arm, rows, seed, source))
+    return position[:, -1], rotation[:, -1]
+
+
+def bow(robot: Robot, length_m: float, count: int, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A path in a level plane at one orientation, in a posture that keeps within the limits, as for milling.
+
+    `count`: of its poses. `draws`: of where it lies. Returns `position`, `rotation` (count, 3), (count, 3, 3): m, base axes;
+    `reported_angles` (count, n): of the rigid robot, rad.
+    """
+    low, high = robot.joint_limits.T
+    share = np.linspace(-0.5, 0.5, count)[:, None]
+    for _ in range(_TRIES):
+        middle = (low + (high - low) * (0.5 + 0.5 * (draws.random(robot.joints) - 0.5)))[None]
+        heading = draws.uniform(0.0, 2.0 * np.pi)
+        ahead, aside = np.array([np.cos(heading), np.sin(heading), 0.0]), np.array([-np.sin(heading), np.cos(heading), 0.0])
+        at, turned = nominal_forward(robot, robot.reported_angles(middle))
+        position = at + length_m * (share * ahead + share**2 * aside)
+        rotation = np.broadcast_to(turned, (count, 3, 3))
+        angles, left = refine(robot, position, rotation, np.repeat(middle, count, axis=0))
+        smooth = np.abs(np.diff(angles, axis=0)).max() < 0.1
+        if left.max() < SOLVED_M and not find_beyond_limits(robot, angles).any() and smooth:
+            return position, rotation, robot.reported_angles(angles)
+    raise RuntimeError(f"{robot.name}: no posture in {_TRIES} in which the path lies within the limits")
 
 
 def require_numbers(table: pd.DataFrame, names: Sequence[str], source: str) -> None:
@@ -123,89 +233,37 @@ def require_numbers(table: pd.DataFrame, names: Sequence[str], source: str) -> N
             raise InputError(source, f"{name}, line {row + 2}", repr(table[name].iloc[row]), "a number")
 
 
-def with_misplaced_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
-    """The robot beside a tracker whose frame of the base is off by some 0.3 mrad and 0.2 mm."""
-    return replace(robot, tracker=replace(robot.tracker, misplaced=misplaced_base(stream(seed, "tilted base"))))
-
-
-def with_lost_beam(sheet: pd.DataFrame, seed: int) -> tuple[pd.DataFrame, int]:
-    """A filled sheet in which one row, which is drawn, reads zeros as after a lost beam; and its place."""
-    row = int(stream(seed, "lost beam").integers(len(sheet)))
-    damaged = sheet.copy()
-    damaged.loc[damaged.index[row], [name for name in ("x", "y", "z", "rx", "ry", "rz") if name in sheet]] = 0.0
-    return damaged, row
-
-
-def errors_along_path(
-    robot: PhysicalRobot, shown: np.ndarray, wrench: np.ndarray, wanted: np.ndarray, seed: int, source: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Distances of where the tracker sees the robot from where it is wanted (N, 3), m, in the tracker's frame of the base.
-
-    Other arguments as in `reached`. Returns those (N,), and what the tracker's noise and the robot's repeatability leave where
-    the robot is commanded by an exact model (N,): half the square of the difference of two visits is the repeatability's.
-    """
-    visits = [reached(robot, shown, wrench, number, source) for number in (seed, seed + 1)]
-    position, rotation = (part[:, None] for part in visits[0])
-    noise = robot.tracker.read(position, rotation, stream(seed, "noise along a path"))[0][:, 0] - visits[0][0]
-    repeatability = (visits[0][0] - visits[1][0]) / np.sqrt(2.0)
-    errors = visits[0][0] + noise - wanted, noise + repeatability
-    return np.linalg.norm(errors[0], axis=1), np.linalg.norm(errors[1], axis=1)
-
-
-def reached(
-    robot: PhysicalRobot, shown: np.ndarray, wrench: np.ndarray, seed: int, source: str = "commands"
-) -> tuple[np.ndarray, np.ndarray]:
-    """Where the end effector comes to rest.
-
-    `shown` (N, n): commanded joint angles as the controller shows them, rad; each is approached afresh. `wrench` (N, 6): at the
-    last measuring point, base axes; N, N m. `seed`: of the repeatability of the drives. `source`: named in errors. Returns
-    `position` (N, 3): m, in the frame that is declared as the base's; without the tracker's noise; `rotation` (N, 3, 3). Raises
-    `InputError`: as in `filled_sheet`.
-    """
-    columns = dict(zip([*(f"q{j + 1}" for j in range(shown.shape[1])), *_WRENCH], [*shown.T, *wrench.T], strict=True))
-    rows = pd.DataFrame(columns | {"pose": np.arange(len(shown)), "load": 0, "repeat": 0})
-    position, rotation = seen_poses(robot, _schedule(robot.arm, rows, seed, source))
-    return position[:, -1], rotation[:, -1]
-
-
-def _errors_of_geometry(arm: Arm, seed: int) -> list[Defect]:
-    draws = stream(seed, "errors of geometry")
-    return [
-        Defect(name, joints, KINDS[name].plausible_on(arm) * draws.uniform(), seed + 1 + place)
-        for name in ERRORS_OF_GEOMETRY
-        for place, joints in enumerate(KINDS[name].locations(arm))
-    ]
-
-
 def _schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedule:
-    shown = states[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(float)
-    force, moment = np.split(states[_WRENCH].to_numpy(float), 2, axis=1)
-    square = (force**2).sum(axis=1, keepdims=True)
-    lever = np.divide(np.cross(force, moment), square, out=np.zeros_like(force), where=square > 0)
+    wrench, count = states[list(WRENCH_NAMES)].to_numpy(float), len(states)
+    (force, moment), lever = np.split(wrench, 2, axis=1), lever_of(wrench)
     wrong = np.abs(np.cross(lever, force) - moment).max(axis=1) > 1e-6 * (1.0 + np.abs(moment).max(axis=1))
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(source, f"moment of row {row + 1}", str(moment[row].tolist()), "the moment of the force at a lever")
-    count = len(states)
     approach = [f"approach{j}" for j in range(1, arm.joints + 1)]
     drawn = stream(seed, "approaches").choice([-1, 1], (count, arm.joints))
     sense = states[approach].fillna(0).to_numpy(int) if set(approach) <= set(states) else np.zeros_like(drawn)
     return Schedule(
-        arm.angles_shown_as(shown),
-        force,
-        lever,
-        states["pose"].to_numpy(int),
-        states["load"].to_numpy(int),
-        states["repeat"].to_numpy(int),
-        np.arange(count),
-        np.where(sense == 0, drawn, sense),
-        np.full(count, -1),
-        _SECONDS_PER_STATE * np.arange(1, count + 1),
-        np.ones(count, bool),
-        seed,
+        angle=arm.angles_shown_as(states[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(float)),
+        force=force,
+        lever=lever,
+        **{name: states[name].to_numpy(int) for name in _STATE},
+        approach=np.arange(count),
+        sense=np.where(sense == 0, drawn, sense),
+        previous=np.full(count, -1),
+        time_s=SECONDS_PER_STATE * np.arange(1, count + 1),
+        training=np.ones(count, bool),
+        seed=seed,
     )
 
 
-def _stated(value: str | Sequence[float], seed: int, name: str, within: float) -> np.ndarray:
-    """What a campaign states of a target's place or mount (3,), or a draw within bounds where it does not know."""
-    return stream(seed, name).uniform(-within, within, 3) if isinstance(value, str) else np.array(value, float)
+def _read_table(path: Path) -> pd.DataFrame:
+    try:
+        return pd.read_csv(io.StringIO(read_text(path, LARGEST_BYTES)))
+    except (pd.errors.EmptyDataError, pd.errors.ParserError) as error:
+        raise InputError(path.as_posix(), "table", str(error).strip().splitlines()[-1], "columns under one header") from error
+
+
+def _write_table(path: Path, table: pd.DataFrame) -> None:
+    with atomic_write(path) as partial:
+        table.to_csv(partial, index=False)

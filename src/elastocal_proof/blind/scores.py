@@ -1,4 +1,7 @@
-"""What the verdict on a case is worth, given its ground truth."""
+"""What the verdict on a case is worth, given its ground truth: one row a case, and its intervals of parameters.
+
+Everything is counted from these rows, by the figures of the plan; see `summary`.
+"""
 
 from __future__ import annotations
 
@@ -6,75 +9,67 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.stats import norm
+from scipy.stats import t as t_distribution
+from statsmodels.stats.proportion import proportion_confint
 
+from elastocal.diagnosis.judge import ABOUT_ERRORS
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 from elastocal.effects.protocol import effect_of
-from elastocal_proof.blind.cases import TUNED as TUNED_ON
+from elastocal_proof.blind.cases import PROOF, TUNED, absent_on
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+    from elastocal_proof.blind.cases import Plan
+
+    Document = Mapping[str, Any]
 
 NONE = "none"
-# The two kinds of robots: those on which it is proved, and those on which the method was tuned.
-PROOF, TUNED = "proof", "tuned"
-SILENT = (ADEQUATE, NOT_TESTABLE)
+# What a diagnosis calls mechanisms that the catalogue does not have.
+OTHER = "other"
+COMPLIANCE = "joint_compliance"
 # The effect by which a diagnosis says that the base is not where it is declared.
 _MISPLACED = "base_placement"
+# A scale of the forces is an alias of the compliances, of which weights that are known to a tenth leave next to nothing.
+_SCALE = "force_scale"
+# Effects that lie wholly within another effect or the joint compliances, by effect and joints of the ground truth, with what it
+# is not distinguishable from. Left out are aliases that a known frame, known targets and points at the elbow and wrist resolve:
+# offset of joint 1 and base, last link and tool, tilt of joint 1 and base, coupling of joints 2 and 3 and upper arm.
+EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {
+    (_SCALE, ()): COMPLIANCE,
+    ("compensator_torque", (2,)): "transmission_harmonic",
+    ("transmission_harmonic", (2,)): "compensator_torque",
+    ("link_weight", (2,)): "compensator_torque",
+}
+_STD_ERRORS = 2.0
+_CREDIBLE = 0.95
+_STATED = ("stated", "top", "correct", "held", "set_size", "set_probability", "nothing", "alarm_p_value")
+_COVARIATES = {need for kind in KINDS.values() for need in kind.needs}
 
 
-def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """What a verdict is worth, given the ground truth.
+def rate(hits: Iterable[bool]) -> dict[str, float]:
+    """A share with its Clopper-Pearson interval [1] of 95 %.
 
-    Whether each true effect is held by another one of those found is an assignment problem [1].
+    `hits`: one a case. Returns ``hits``, ``cases``, ``rate``, ``low``, ``high``; without cases the rate is not a number and the
+    interval all there is.
 
-    `truth`: a sealed document. `verdict`: as verdict.json. Returns of the case: where it belongs, what was true, what the
-    verdict was. ``exact``: the names found are the true ones; ``named_right``: so, and the verdict states no other name beside
-    it; ``holds_truth``: as many effects were found as were made, and each true one is the name of another of them or among its
-    alternatives; ``wrong_name``: one wrong name is stated alone.
-
-    [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
+    [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
+        Biometrika 26, 1934.
     """
-    kind, effects = judged_apart_from_setup(truth, verdict)
-    names, true = [effect["name"] for effect in effects], list(truth["case"]["effects"])
-    stated = bool(true) and kind in (NAMED, CLASS, SEVERAL)
-    right = stated and sorted(names) == sorted(true)
-    return head_of(truth) | {
-        "verdict": kind,
-        "found": " + ".join(names) or NONE,
-        "detected": kind not in SILENT,
-        "exact": right,
-        "named_right": right and kind == NAMED,
-        "holds_truth": stated and _each_is_held(true, effects),
-        "wrong_name": kind == NAMED and names != true,
-    }
+    hits = [bool(hit) for hit in hits]
+    count, cases = sum(hits), len(hits)
+    low, high = proportion_confint(count, cases, 0.05, "beta") if cases else (0.0, 1.0)
+    share = count / cases if cases else float("nan")
+    low, high = 0.0 if count == 0 else float(low), 1.0 if count == cases else float(high)
+    return {"hits": count, "cases": cases, "rate": share, "low": low, "high": high}
 
 
-def head_of(truth: Mapping[str, Any]) -> dict[str, Any]:
-    """Where a case belongs and what is true of it; `truth`: a sealed document."""
-    case = truth["case"]
-    head = {"case": truth["campaign"], "group": case["group"], "robot": case["robot"], "robots": kind_of(case["robot"])}
-    head |= {"setting": case["setting"], "truth": " + ".join(case["effects"]) or NONE}
-    return head | {"level": max(case["levels"], default=0.0)}
-
-
-def wrong_setup(truth: Mapping[str, Any]) -> set[str]:
-    """Mechanisms of the set-up that a case has beside what it is about: right to find, and no fault not to name."""
-    return {_MISPLACED} if "misplaced" in truth else set()
-
-
-def judged_apart_from_setup(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> tuple[str, list[Mapping[str, Any]]]:
-    """Verdict and effects without those of `wrong_setup`."""
-    kind, effects = verdict["verdict"], list(verdict["effects"])
-    kept = [effect for effect in effects if effect["name"] not in wrong_setup(truth)]
-    if len(kept) == len(effects):
-        return kind, effects
-    one = CLASS if kept and kept[0]["alternatives"] else NAMED
-    return (ADEQUATE, one, SEVERAL)[min(len(kept), 2)], kept
-
-
-def kind_of(robot: str) -> str:
-    """Whether a robot belongs to the proof or was tuned on."""
-    return TUNED if robot in TUNED_ON else PROOF
+def headed(head: str, hits: Iterable[bool]) -> dict[str, float]:
+    """The figures of a rate under a name: ``<head>``, ``<head>_low``, ``<head>_high``."""
+    found = rate(hits)
+    return {head: found["rate"], f"{head}_low": found["low"], f"{head}_high": found["high"]}
 
 
 def leading(kinds: Iterable[str]) -> str:
@@ -82,9 +77,221 @@ def leading(kinds: Iterable[str]) -> str:
     return PROOF if PROOF in set(kinds) else TUNED
 
 
-def _each_is_held(true: Sequence[str], effects: Sequence[Mapping[str, Any]]) -> bool:
-    if len(true) != len(effects):
-        return False
+def score(
+    plan: Plan, truth: Document, verdict: Document, oracle: Document | None = None, limit: Document | None = None
+) -> dict[str, Any]:
+    """One row of cases.csv: what the verdict is worth, how large the effect was, which errors were left, what was stated.
+
+    `truth`: a sealed document. `verdict`: as verdict.json. `oracle`, `limit`: of `oracle.oracle` and `limit.limit`, where the
+    case has one.
+    """
+    defects, robot, (_, effects) = truth["defects"], truth["case"]["robot"], _apart_from_setup(truth, verdict)
+    unrecorded = _COVARIATES - set(truth["design"]["covariates"])
+    aliases = [EXACT_ALIASES.get((defect["effect"], tuple(defect["joints"]))) for defect in defects]
+    return (
+        outcome(plan, truth, verdict)
+        | {
+            "joints": " + ".join("-".join(map(str, defect["joints"])) for defect in defects),
+            "right_place": places(defects, "effect") == places(effects, "name"),
+            # Within another one that the robot can have, by the ground truth alone.
+            "exact_alias": any(alias and alias not in absent_on(plan, robot) for alias in aliases),
+            "hidden": any(set(KINDS[defect["effect"]].needs) & unrecorded for defect in defects),
+        }
+        | _size(truth)
+        | _errors(verdict)
+        | {
+            "oracle_p_value": np.nan if oracle is None else oracle["p_value"],
+            "oracle_detected": np.nan if oracle is None else float(oracle["detected"]),
+            "oracle_rms_m": np.nan if oracle is None else oracle["heldout"]["rms_m"],
+        }
+        | {f"limit_{name}": np.nan if limit is None else float(limit[name]) for name in ("detected", "right")}
+        | stated(truth, verdict)
+    )
+
+
+def outcome(plan: Plan, truth: Document, verdict: Document) -> dict[str, Any]:
+    """Where a case belongs, what was true, what the verdict was.
+
+    Returns ``exact``: the names found are the true ones; ``named_right``: so, and the verdict states no other name beside it;
+    ``holds_truth``: as many effects were found as were made, and each true one is the name of another of them or among its
+    alternatives, which is an assignment problem [1]; ``wrong_name``: one wrong name is stated alone.
+
+    [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
+    """
+    case, (kind, effects) = truth["case"], _apart_from_setup(truth, verdict)
+    names, true = [effect["name"] for effect in effects], list(case["effects"])
+    claims = bool(true) and kind in (NAMED, CLASS, SEVERAL)
+    right = claims and sorted(names) == sorted(true)
     meant = [{effect["name"], *map(effect_of, effect["alternatives"])} for effect in effects]
-    held = np.array([[name in names for names in meant] for name in true], bool)
-    return bool(held[linear_sum_assignment(~held)].all())
+    held = np.array([[name in each for each in meant] for name in true], bool)
+    return {
+        "case": truth["campaign"],
+        "group": case["group"],
+        "robot": case["robot"],
+        "robots": TUNED if case["robot"] in plan["tuned"] else PROOF,
+        "setting": case["setting"],
+        "truth": " + ".join(true) or NONE,
+        "level": max(case["levels"], default=0.0),
+        "verdict": kind,
+        "found": " + ".join(names) or NONE,
+        "detected": kind not in (ADEQUATE, NOT_TESTABLE),
+        "exact": right,
+        "named_right": right and kind == NAMED,
+        "holds_truth": claims and len(true) == len(names) and bool(held[linear_sum_assignment(~held)].all()),
+        "wrong_name": kind == NAMED and names != true,
+    }
+
+
+def _wrong_setup(truth: Document) -> set[str]:
+    """Mechanisms of the set-up that a case has beside what it is about: right to find, and no fault not to name."""
+    return {_MISPLACED} if "misplaced" in truth else set()
+
+
+def _apart_from_setup(truth: Document, verdict: Document) -> tuple[str, list[Document]]:
+    """Verdict and effects without those of the set-up."""
+    kind, effects = verdict["verdict"], list(verdict["effects"])
+    kept = [effect for effect in effects if effect["name"] not in _wrong_setup(truth)]
+    if len(kept) == len(effects):
+        return kind, effects
+    one = CLASS if kept and kept[0]["alternatives"] else NAMED
+    return (ADEQUATE, one, SEVERAL)[min(len(kept), 2)], kept
+
+
+def places(effects: Iterable[Document], name: str) -> dict[str, set[int]]:
+    """Joints of each effect; those of one mechanism at several joints together."""
+    found: dict[str, set[int]] = {}
+    for effect in effects:
+        found.setdefault(effect[name], set()).update(effect["joints"])
+    return found
+
+
+def _size(truth: Document) -> dict[str, Any]:
+    """How large the effects are; for several the squares add up."""
+    defects = truth["defects"]
+    raw, retained = (sum(defect["signal"][kind] for defect in defects) for kind in ("raw", "retained"))
+    rms_m = float(np.sqrt(sum(defect["signal"]["rms_m"] ** 2 for defect in defects)))
+    by_raw = any(defect["of"] == "raw" for defect in defects)
+    return {
+        # Of what all these effects' levels are the non-centrality.
+        "level_of": "raw" if by_raw else "retained",
+        # What the model absorbs whatever its size is no question of level.
+        "absorbed": by_raw or [defect["effect"] for defect in defects] == [_SCALE],
+        "raw": raw,
+        "retained": retained,
+        "signal_rms_m": rms_m,
+        "signal_over_noise": rms_m / (np.sqrt(3.0) * truth["noise"]["sigma_m"]),
+        "times_plausible": max((defect["share_of_plausible"] for defect in defects), default=np.nan),
+    }
+
+
+def _errors(verdict: Document) -> dict[str, Any]:
+    """Held-out errors, and whether they got worse by more than chance with an effect that was adopted."""
+    held = verdict["heldout"] or {"before": {"rms_m": np.nan}, "after": {"rms_m": np.nan}}
+    before, after, floor = held["before"]["rms_m"], held["after"]["rms_m"], held.get("noise_floor_rms_m")
+    reduction, std_error = 1.0 - after / before, held.get("reduction_std_error", np.nan)
+    worse = bool(reduction + _STD_ERRORS * std_error < 0.0)
+    # A fault of the data ends a diagnosis before any model is fitted.
+    warned = bool(verdict["heldout"]) and any(ABOUT_ERRORS in warning for warning in verdict["warnings"])
+    adopted = bool(verdict["heldout"]) and any(effect.get("adopted", False) for effect in verdict["effects"])
+    return {
+        "before_rms_m": before,
+        "after_rms_m": after,
+        "noise_floor_rms_m": np.nan if floor is None else floor,
+        "reduction": reduction,
+        "reduction_std_error": std_error,
+        "adopted": adopted,
+        "worse": worse,
+        # A warning does not excuse it, as there always is one.
+        "worse_adopted": adopted and worse,
+        "warned": warned,
+        "worse_unwarned": worse and not warned,
+    }
+
+
+def stated(truth: Document, verdict: Document) -> dict[str, Any]:
+    """What was stated of a case in probabilities, and whether it is so.
+
+    A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is "nothing". Returns ``stated``, probability of
+    the most probable set of mechanisms; ``top``, that set; ``correct``, whether it is the true one; ``held``, whether the
+    smallest set of hypotheses that reaches 95 %, or all of them where they do not, holds the true one; ``set_size``, of how
+    many these are, and ``set_probability``, what they reach; ``nothing``; ``alarm_p_value``. All not a number where nothing was
+    stated, as with a fault of the data.
+    """
+    probabilities = verdict.get("probabilities")
+    if not probabilities or not probabilities["sets"]:
+        return dict.fromkeys(_STATED, np.nan)
+    sets = [(frozenset(entry["mechanisms"]), entry["probability"]) for entry in probabilities["sets"]]
+    ranked = sorted(sets, key=lambda entry: -entry[1])
+    reached = np.cumsum([probability for _, probability in ranked])
+    believed, (top, probability) = ranked[: int(np.searchsorted(reached, _CREDIBLE)) + 1], ranked[0]
+    return {
+        "stated": probability,
+        "top": " + ".join(sorted(top)) or NONE,
+        "correct": is_true(top, truth),
+        "held": any(is_true(mechanisms, truth) for mechanisms, _ in believed),
+        "set_size": len(believed),
+        "set_probability": sum(share for _, share in believed),
+        "nothing": probabilities["nothing"],
+        "alarm_p_value": probabilities["alarm_p_value"],
+    }
+
+
+def is_true(mechanisms: Collection[str], truth: Document) -> bool:
+    """Whether a set of mechanisms is what is true of a case.
+
+    Of a mechanism that the catalogue does not have every set that holds "other" is true; one that the joint compliances absorb
+    at any size is as good as nothing, and no measurement could distinguish the two.
+    """
+    effects = truth["case"]["effects"]
+    if any(effect.startswith(OUTSIDE) for effect in effects):
+        return OTHER in mechanisms
+    absorbed = {defect["effect"] for defect in truth["defects"] if defect["of"] == "raw"}
+    return set(mechanisms) - _wrong_setup(truth) == set(effects) - absorbed
+
+
+def intervals_of(plan: Plan, truth: Document, verdict: Document) -> list[dict[str, Any]]:
+    """Every interval of 95 % of a verdict that has a true value to hold, in the usual setting.
+
+    Wald intervals, with quantiles of Student's t where the noise has degrees of freedom. Returns joint compliances, whatever
+    was found; parameters of an effect that was found at the right joints, whatever was found beside it. A parameter that the
+    data do not identify has no interval.
+    """
+    case = truth["case"]
+    if case["setting"] != "usual":
+        return []
+    freedom = verdict["noise"]["degrees_of_freedom"]
+    width = t_distribution.ppf(0.975, freedom) if freedom else norm.ppf(0.975)
+    springs = verdict["compliance_urad_per_Nm"]
+    of_springs = zip(truth["compliance_urad_per_Nm"], springs["after"], springs["std_error"], strict=True)
+    values = [(COMPLIANCE, f"c{j}", true, value, error) for j, (true, value, error) in enumerate(of_springs, 1) if error > 0]
+    for defect in truth["defects"]:
+        for effect in verdict["effects"]:
+            if effect["name"] == defect["effect"]:
+                values += _comparable(defect, effect)
+    head: dict[str, Any] = {
+        "robots": TUNED if case["robot"] in plan["tuned"] else PROOF,
+        "truth": " + ".join(case["effects"]) or NONE,
+    }
+    head |= {
+        "foreign": any(effect.startswith(OUTSIDE) for effect in case["effects"]),
+        "level": max(case["levels"], default=0.0),
+    }
+    return [
+        head
+        | {"effect": effect, "parameter": name, "true": true, "value": value, "std_error": error}
+        | {"holds": bool(abs(value - true) <= width * error)}
+        for effect, name, true, value, error in values
+    ]
+
+
+def _comparable(defect: Document, effect: Document) -> list[tuple[str, str, float, float, float]]:
+    """Parameters of an effect that the plant's law has too, where it was found at the right joints."""
+    found = []
+    for parameter in effect["parameters"]:
+        key, _, name = parameter["name"].rpartition(" ")
+        # Such as ``cross_compliance@2+5[variant]``.
+        where = key.partition("[")[0].partition("@")[2]
+        joints: Sequence[int] = [int(joint) for joint in where.split("+")] if where else []
+        if list(joints) == defect["joints"] and name in defect["parameters"] and not parameter["held"]:
+            found.append((defect["effect"], name, defect["parameters"][name], parameter["value"], parameter["std_error"]))
+    return found

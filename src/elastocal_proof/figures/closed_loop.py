@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.ticker import StrMethodFormatter
 
-from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.figures.style import PALETTE, panels, save, styled
+from elastocal.io.origin import Origin
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
 _WORDS = {
@@ -45,3 +46,8 @@ def closed_loop(table: pd.DataFrame) -> Figure:
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=max(len(robots), 1))
     return figure
+
+
+def draw_closed_loop(job: Any) -> None:
+    """The picture, from reports/closed_loop/closed_loop.csv."""
+    save(closed_loop(pd.read_csv(job.input.summary)), job.output.figure, job.output.picture, Origin(**job.config["origin"]))

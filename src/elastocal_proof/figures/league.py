@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, StrMethodFormatter
 
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.figures.style import PALETTE, note, panels, styled
+from elastocal.figures.style import PALETTE, note, panels, save, styled
+from elastocal.io.atomic_writes import write_text
+from elastocal.io.data_frames import read_frame, write_csv
+from elastocal.io.origin import Origin
 from elastocal.report.words import physical_name
+from elastocal_proof.league.folds import RANDOM
+from elastocal_proof.league.methods import Method
+from elastocal_proof.league.pages import league_page
+from elastocal_proof.league.schemas import ENTRIES, MECHANISMS
+from elastocal_proof.league.table import cost_table, league_table, mechanism_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import pandas as pd
     from matplotlib.figure import Figure
-
-    from elastocal_proof.league.methods import Method
 
 _SPLITS = {"random": "random poses", "blocks": "blocks of joint space", "session": "another session"}
 _MARKERS = "osD^vP*X"
@@ -103,3 +111,28 @@ def mechanism_picture(table: pd.DataFrame) -> Figure:
 def _with_size(table: pd.DataFrame, name: str) -> str:
     poses = table.loc[(table["data"] == name) & (table["split"] == "random"), "poses"]
     return f"{name.replace('_', ' ')}\n{poses.iloc[0]} poses" if len(poses) else name.replace("_", " ")
+
+
+def tabulate_league(job: Any) -> None:
+    """The league as tables, a page and pictures: errors, costs, and which mechanisms real robots have."""
+    asked, output, origin = job.params, job.output, Origin(**job.config["origin"])
+    methods = {name: Method(**described) for name, described in asked.methods.items()}
+    keys, rounds = ([tuple(key) for key in each] for each in (asked.entered, asked.rounds))
+    entries = {key: read_frame(path, ENTRIES) for key, path in zip(keys, job.input.entries, strict=True)}
+    steps = [("enter_league", key) for key in keys] + [("diagnose_league_folds", key) for key in rounds]
+    timings: Any = {
+        key: pd.read_csv(Path(asked.timings, step, *key).with_suffix(".tsv"), sep="\t").iloc[0] for step, key in steps
+    }
+    folds = {key[:2]: int(part["fold"].max()) for key, part in entries.items()}
+    random = [data for data, split in rounds if split == RANDOM]
+    found = {data: read_frame(path, MECHANISMS) for data, path in zip(random, job.input.mechanisms, strict=True)}
+    table, costs = league_table(entries, asked.robots, asked.reference, asked.seed), cost_table(timings, folds, methods)
+    mechanisms = mechanism_table(found, asked.robots, asked.folds)
+    for path, one in ((output.league, table), (output.costs, costs), (output.mechanisms, mechanisms)):
+        write_csv(path, one)
+    page = league_page(table, costs, mechanisms, pd.read_csv(job.input.published), methods, asked.missing)
+    write_text(output.page, page)
+    for name, file in asked.missing.items():
+        print(f"left out of the league: {name}, as {file} is missing in ELASTOCAL_DATA", file=sys.stderr)
+    save(league_picture(table, methods), output.picture_pdf, output.picture_png, origin)
+    save(mechanism_picture(mechanisms), output.mechanisms_pdf, output.mechanisms_png, origin)

@@ -12,10 +12,12 @@ from elastocal_proof.league.folds import BLOCKS, RANDOM, SESSION
 from elastocal_proof.league.methods import DIAGNOSIS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from typing import Any
 
     from elastocal_proof.league.methods import Method
+
+    Row = Mapping[Any, Any]
 
 _TITLES = {
     RANDOM: "Random poses held out",
@@ -44,22 +46,54 @@ def league_page(
     file that each lacks.
     """
     words = {name: method.words or name for name, method in methods.items()}
+    table = table.assign(best=table.groupby(["data", "split"])["rms_mm"].transform("min"))
+
+    def error(each: Row) -> str:
+        rms, low, high, most = (_shown(each[key], each["rms_mm"]) for key in ("rms_mm", "rms_low_mm", "rms_high_mm", "max_mm"))
+        return f"{f'**{rms}**' if each['rms_mm'] == each['best'] else rms} ({low}–{high}), {most}"
+
+    def covered(each: Row) -> str:
+        return f"{100 * each['covered']:.1f} %"
+
+    def cost(each: Row) -> str:
+        return f"{each['seconds_per_fold']:.1f} s, {each['memory_MB']:.0f} MB"
+
     parts = [f"Left out: {_words(name)}, as {file} is missing." for name, file in missing.items()]
     parts.append(_lead(table, {name for name, method in methods.items() if method.physics == DIAGNOSIS}))
     for split, title in _TITLES.items():
         mine = table[table["split"] == split]
         if len(mine):
-            parts += [f"## {title}", _winners(mine, words), folded(_ERRORS, _error_table(mine, words))]
-    parts += ["## Intervals", _coverage_sentence(table, words), folded(_COVERED, _coverage(table, words))]
+            counts = mine.loc[mine.groupby("data")["rms_mm"].idxmin(), "method"].map(words).value_counts()
+            each = ", ".join(f"{name} {count}" for name, count in counts.items())
+            winners = f"Smallest RMS error of {counted(int(counts.sum()), 'data set')}: {each}."
+            parts += [f"## {title}", winners, folded(_ERRORS, _wide(mine, ["data", "poses"], words, error))]
+    stated = table.dropna(subset="covered")
+    parts += ["## Intervals", _coverage_sentence(stated, words)]
+    parts += [folded(_COVERED, _wide(stated, ["data", "split"], words, covered))]
     parts += ["## Published figures", _published(published, table)]
     parts += ["## Mechanisms", folded(_FOUND, _mechanisms(mechanisms))]
-    parts += ["## Cost", folded(_SPENT, _costs(costs, words))]
+    parts += ["## Cost", folded(_SPENT, _wide(costs[costs["split"] == RANDOM], ["data"], words, cost))]
     return "\n\n".join(parts) + "\n"
 
 
 def folded(title: str, table: str) -> str:
     """A table that a reader opens, under a title, as the Markdown of GitHub and of MyST."""
     return f"<details><summary>{title}</summary>\n\n{table}\n\n</details>"
+
+
+def markdown(rows: list[dict[str, Any]]) -> str:
+    """A table of which each row has its cells by the heads of their columns."""
+    return pd.DataFrame(rows).fillna("").to_markdown(index=False, disable_numparse=True) if rows else "None."
+
+
+def _wide(table: pd.DataFrame, heads: list[str], words: Mapping[str, str], cell: Callable[[Row], str]) -> str:
+    """A row for each of `heads`, a column for each method."""
+    rows: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for each in table.to_dict("records"):
+        key = tuple(each[head] for head in heads)
+        named = {head: _words(each[head]) if head == "data" else each[head] for head in heads}
+        rows.setdefault(key, named)[words[each["method"]]] = cell(each)
+    return markdown([*rows.values()])
 
 
 def _lead(table: pd.DataFrame, ours: set[str]) -> str:
@@ -76,91 +110,42 @@ def _lead(table: pd.DataFrame, ours: set[str]) -> str:
     )
 
 
-def _winners(table: pd.DataFrame, words: Mapping[str, str]) -> str:
-    """How often each method has the smallest RMS error on one split."""
-    best = table.loc[table.groupby("data")["rms_mm"].idxmin(), "method"].map(words)
-    counts = best.value_counts()
-    each = ", ".join(f"{name} {count}" for name, count in counts.items())
-    return f"Smallest RMS error of {counted(len(best), 'data set')}: {each}."
-
-
-def _coverage_sentence(table: pd.DataFrame, words: Mapping[str, str]) -> str:
+def _coverage_sentence(stated: pd.DataFrame, words: Mapping[str, str]) -> str:
     """The middle of the coverages of each method, and their range."""
-    covered = table.dropna(subset="covered").groupby("method", sort=False)["covered"]
     each = [
         f"{words[str(name)]} {100 * part.median():.0f} % (from {100 * part.min():.0f} to {100 * part.max():.0f})"
-        for name, part in covered
+        for name, part in stated.groupby("method", sort=False)["covered"]
     ]
     return f"Median over data sets and splits: {'; '.join(each)}."
 
 
-def _error_table(table: pd.DataFrame, words: Mapping[str, str]) -> str:
-    """Errors of all methods on one split, a row for each data set, as Markdown.
-
-    `table`: rows of `table.league_table` of one split. `words`: methods by what they are called.
-    """
-    rows = []
-    for name in dict.fromkeys(table["data"]):
-        part = table[table["data"] == name].to_dict("records")
-        row: dict[str, Any] = {"data": _words(name), "poses": part[0]["poses"]}
-        best = min(each["rms_mm"] for each in part)
-        for each in part:
-            digits = _digits(each["rms_mm"])
-            rms, low, high, most = (f"{each[key]:.{digits}f}" for key in ("rms_mm", "rms_low_mm", "rms_high_mm", "max_mm"))
-            shown = f"**{rms}**" if each["rms_mm"] == best else rms
-            row[words[each["method"]]] = f"{shown} ({low}–{high}), {most}"
-        rows.append(row)
-    return markdown(rows)
-
-
-def _coverage(table: pd.DataFrame, words: Mapping[str, str]) -> str:
-    rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for each in table.dropna(subset="covered").to_dict("records"):
-        row = rows.setdefault((each["data"], each["split"]), {"data": _words(each["data"]), "split": each["split"]})
-        row[words[each["method"]]] = f"{100 * each['covered']:.1f} %"
-    return markdown(list(rows.values()))
-
-
 def _published(published: pd.DataFrame, table: pd.DataFrame) -> str:
     ours = table[table["split"] == RANDOM].groupby("data")["rms_mm"].min().to_dict()
-    rows = [
-        {"data": _words(each["data"]), "published, mm": each["rms_mm"], "what": each["what"], "source": each["source"]}
-        | {"best here, RMS of unseen poses, mm": f"{ours[each['data']]:.{_digits(ours[each['data']])}f}", "why": each["why"]}
-        for each in published.to_dict("records")
-        if each["data"] in ours
-    ]
+    rows = []
+    for each in published[published["data"].isin(list(ours))].to_dict("records"):
+        best = ours[each["data"]]
+        row = {"data": _words(each["data"]), "published, mm": each["rms_mm"], "what": each["what"], "source": each["source"]}
+        rows.append(row | {"best here, RMS of unseen poses, mm": _shown(best, best), "why": each["why"]})
     return markdown(rows)
 
 
 def _mechanisms(table: pd.DataFrame) -> str:
+    place = {name: number for number, name in enumerate(dict.fromkeys(table["data"]))}
     shown = table[table["probability_high"] >= _LEAST_PROBABLE].sort_values("share", ascending=False)
+    shown = shown.sort_values("data", key=lambda data: data.map(place), kind="stable")
     rows = []
-    for name in dict.fromkeys(table["data"]):
-        for each in shown[shown["data"] == name].to_dict("records"):
-            share, low, high = (100 * each[key] for key in ("share", "share_low", "share_high"))
-            row = {"data": _words(name), "mechanism": _words(each["mechanism"])}
-            row["probability"] = f"{each['probability']:.2f} ({each['probability_low']:.2f}–{each['probability_high']:.2f})"
-            rows.append(row | {"share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"})
+    for each in shown.to_dict("records"):
+        share, low, high = (100 * each[key] for key in ("share", "share_low", "share_high"))
+        row = {"data": _words(each["data"]), "mechanism": _words(each["mechanism"])}
+        row["probability"] = f"{each['probability']:.2f} ({each['probability_low']:.2f}–{each['probability_high']:.2f})"
+        rows.append(row | {"share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"})
     return markdown(rows)
-
-
-def _costs(costs: pd.DataFrame, words: Mapping[str, str]) -> str:
-    rows: dict[str, dict[str, Any]] = {}
-    for each in costs[costs["split"] == RANDOM].to_dict("records"):
-        row = rows.setdefault(each["data"], {"data": _words(each["data"])})
-        row[words[each["method"]]] = f"{each['seconds_per_fold']:.1f} s, {each['memory_MB']:.0f} MB"
-    return markdown(list(rows.values()))
 
 
 def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def markdown(rows: list[dict[str, Any]]) -> str:
-    """A table of which each row has its cells by the heads of their columns."""
-    return pd.DataFrame(rows).fillna("").to_markdown(index=False, disable_numparse=True) if rows else "None."
-
-
-def _digits(value: float) -> int:
-    """Decimals that show three significant digits of a figure in mm, at most four."""
-    return int(np.clip(2 - np.floor(np.log10(value)), 0, 4)) if value > 0 else 3
+def _shown(value: float, scale: float) -> str:
+    """A figure in mm with the decimals that show three significant digits of another, at most four."""
+    return f"{value:.{int(np.clip(2 - np.floor(np.log10(scale)), 0, 4)) if scale > 0 else 3}f}"

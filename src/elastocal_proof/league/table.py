@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,27 +18,17 @@ if TYPE_CHECKING:
 
     from elastocal_proof.league.methods import Method
 
+    # Rows of the entries table by data set, split and method.
+    Entries = Mapping[tuple[str, str, str], pd.DataFrame]
+
 _REPLICATES = 1000
-_AXES = ("x", "y", "z")
+_POSE = ["set", "session", "pose"]
 
 
-@dataclass(frozen=True)
-class Result:
-    """Entries of one method on one data set and split.
-
-    `entries`: rows of the entries table.
-    """
-
-    data: str
-    split: str
-    method: str
-    entries: pd.DataFrame
-
-
-def league_table(results: Sequence[Result], robots: Mapping[str, Sequence[str]], reference: str, seed: int) -> pd.DataFrame:
+def league_table(entries: Entries, robots: Mapping[str, Sequence[str]], reference: str, seed: int) -> pd.DataFrame:
     """One row for each data set, split and method.
 
-    `results`: all methods of a data set and split predict the same poses. `robots`: data sets by the names of their robots.
+    `entries`: all methods of a data set and split predict the same poses. `robots`: data sets by the names of their robots.
     `reference`: method whose RMS the others' are divided by. `seed`: of the bootstrap over poses. Returns ``robot, data, split,
     method, poses``; ``rms_mm`` with 95 % limits over poses, ``p95_mm``, ``max_mm`` and the share of all poses that stay below
     it at 95 % confidence; ``ratio``, the RMS over that of the reference on the same poses, with 95 % limits; ``ratio_to_best``
@@ -48,46 +37,47 @@ def league_table(results: Sequence[Result], robots: Mapping[str, Sequence[str]],
     """
     robot_of = {data: robot for robot, names in robots.items() for data in names}
     rows: list[dict[str, Any]] = []
-    for data, split in dict.fromkeys((result.data, result.split) for result in results):
-        mine = [result for result in results if (result.data, result.split) == (data, split)]
-        errors = [_errors(result.entries) for result in mine]
-        first = next(number for number, result in enumerate(mine) if result.method == reference)
-        limits, reductions = intervals(errors, _REPLICATES, stream(seed, data, f"league {split}", 0), first)
+    for data, split in dict.fromkeys(key[:2] for key in entries):
+        mine = {method: part for (name, way, method), part in entries.items() if (name, way) == (data, split)}
+        errors = [_errors(part) for part in mine.values()]
         rms = np.array([summary(error.distance)["rms_m"] for error in errors])
-        best = int(np.argmin(rms))
-        to_best = intervals(errors, _REPLICATES, stream(seed, data, f"league {split}", 1), best)[1]
-        for number, (result, error, limit) in enumerate(zip(mine, errors, limits, strict=True)):
-            figures = summary(error.distance)
-            row: dict[str, Any] = {"robot": robot_of[data], "data": data, "split": split, "method": result.method}
-            row |= {"poses": error.poses, "rms_mm": 1e3 * rms[number]}
-            row |= {"rms_low_mm": 1e3 * limit["rms_m"][0], "rms_high_mm": 1e3 * limit["rms_m"][1]}
+        places = {"ratio": list(mine).index(reference), "ratio_to_best": int(np.argmin(rms))}
+        limits, over = intervals(errors, _REPLICATES, stream(seed, data, f"league {split}", 0), places["ratio"])
+        to_best = intervals(errors, _REPLICATES, stream(seed, data, f"league {split}", 1), places["ratio_to_best"])[1]
+        for number, (method, part) in enumerate(mine.items()):
+            figures, (low, high) = summary(errors[number].distance), limits[number]["rms_m"]
+            row: dict[str, Any] = {"robot": robot_of[data], "data": data, "split": split, "method": method}
+            row |= {
+                "poses": errors[number].poses,
+                "rms_mm": 1e3 * rms[number],
+                "rms_low_mm": 1e3 * low,
+                "rms_high_mm": 1e3 * high,
+            }
             row |= {"p95_mm": 1e3 * figures["p95_m"], "max_mm": 1e3 * figures["max_m"]}
-            row |= {"share_below_max": share_below_largest(error.poses), "ratio": rms[number] / rms[first]}
-            row |= {"ratio_low": 1.0 - reductions[number].high, "ratio_high": 1.0 - reductions[number].low}
-            row |= {"ratio_to_best": rms[number] / rms[best]}
-            row |= {"ratio_to_best_low": 1.0 - to_best[number].high, "ratio_to_best_high": 1.0 - to_best[number].low}
-            rows.append(row | {"covered": _covered(result.entries), "outside": _outside(result.entries)})
+            row |= {"share_below_max": share_below_largest(errors[number].poses)}
+            for (name, place), reduction in zip(places.items(), (over, to_best), strict=True):
+                ends = {f"{name}_low": 1.0 - reduction[number].high, f"{name}_high": 1.0 - reduction[number].low}
+                row |= {name: rms[number] / rms[place]} | ends
+            outside = part.groupby(_POSE)["outside_range"].first().mean()
+            rows.append(row | {"covered": _covered(part), "outside": float(outside)})
     return pd.DataFrame(rows)
 
 
 def cost_table(
-    timings: Mapping[tuple[str, str, str], Mapping[str, float]],
-    diagnosed: Mapping[tuple[str, str], Mapping[str, float]],
-    folds: Mapping[tuple[str, str], int],
-    methods: Mapping[str, Method],
+    timings: Mapping[tuple[str, ...], Mapping[str, float]], folds: Mapping[tuple[str, str], int], methods: Mapping[str, Method]
 ) -> pd.DataFrame:
     """What each method costs; one that builds on a diagnosis bears its cost too.
 
-    `timings` (str, str, str): by data set, split and method: ``seconds`` of a core and ``memory_MB`` at most, for all folds.
-    `diagnosed` (str, str): the same of the diagnoses, by data set and split. `folds` (str, str): folds of a data set and split.
-    Returns ``data, split, method, seconds_per_fold, memory_MB``; tuning of a method included.
+    `timings`: by data set, split and method, and of the diagnoses by data set and split: ``cpu_time``, seconds of a core, and
+    ``max_rss``, MB at most, for all folds. `folds`: of a data set and split. Returns ``data, split, method, seconds_per_fold,
+    memory_MB``; tuning of a method included.
     """
     rows = []
-    for (data, split, method), own in timings.items():
-        parts = [own, diagnosed[data, split]] if methods[method].physics == DIAGNOSIS else [own]
-        seconds = sum(part["seconds"] for part in parts) / folds[data, split]
-        memory = max(part["memory_MB"] for part in parts)
-        rows.append({"data": data, "split": split, "method": method, "seconds_per_fold": seconds, "memory_MB": memory})
+    for data, split, method in (key for key in timings if len(key) == 3):
+        parts = [timings[data, split, method]] + [timings[data, split]] * (methods[method].physics == DIAGNOSIS)
+        seconds = sum(part["cpu_time"] for part in parts) / folds[data, split]
+        row = {"data": data, "split": split, "method": method, "seconds_per_fold": seconds}
+        rows.append(row | {"memory_MB": max(part["max_rss"] for part in parts)})
     return pd.DataFrame(rows)
 
 
@@ -99,29 +89,22 @@ def mechanism_table(found: Mapping[str, pd.DataFrame], robots: Mapping[str, Sequ
     fold that does not list a mechanism counts as probability and share 0.
     """
     rows = []
-    for robot, names in robots.items():
-        for data in names:
-            for mechanism, part in found[data].groupby("mechanism", sort=True):
-                row = {"robot": robot, "data": data, "mechanism": mechanism}
-                for name in ("probability", "share"):
-                    values = np.zeros(folds)
-                    values[: len(part)] = part[name]
-                    row |= {name: values.mean(), f"{name}_low": values.min(), f"{name}_high": values.max()}
-                rows.append(row)
+    for robot, data in ((robot, data) for robot, names in robots.items() for data in names):
+        for mechanism, part in found[data].groupby("mechanism", sort=True):
+            row = {"robot": robot, "data": data, "mechanism": mechanism}
+            for name in ("probability", "share"):
+                values = np.zeros(folds)
+                values[: len(part)] = part[name]
+                row |= {name: values.mean(), f"{name}_low": values.min(), f"{name}_high": values.max()}
+            rows.append(row)
     return pd.DataFrame(rows)
 
 
 def _errors(entries: pd.DataFrame) -> Errors:
-    pose = groups_of(entries[["set", "session", "pose"]].to_numpy())[1]
-    return Errors(np.linalg.norm(entries[[f"d{axis}" for axis in _AXES]].to_numpy(), axis=1), pose)
+    distance = np.linalg.norm(entries[["dx", "dy", "dz"]].to_numpy(), axis=1)
+    return Errors(distance, groups_of(entries[_POSE].to_numpy())[1])
 
 
 def _covered(entries: pd.DataFrame) -> float:
-    off = np.abs(entries[[f"d{axis}" for axis in _AXES]].to_numpy())
-    stated = entries[[f"std_{axis}" for axis in _AXES]].to_numpy()
+    off, stated = np.abs(entries[["dx", "dy", "dz"]].to_numpy()), entries[["std_x", "std_y", "std_z"]].to_numpy()
     return float((off < NORMAL_WIDTH * stated).mean()) if np.isfinite(stated).all() else float("nan")
-
-
-def _outside(entries: pd.DataFrame) -> float:
-    poses = entries.groupby(["set", "session", "pose"])["outside_range"].first()
-    return float(poses.mean())

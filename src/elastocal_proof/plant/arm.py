@@ -8,17 +8,21 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
 from scipy.constants import g as standard_gravity
+from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
 
 _RELATIVE_STD = 0.1
 # What counts as heavy, and gears as stiff as a heavy arm's.
@@ -32,10 +36,7 @@ _WORD = re.compile(r"([TR])([xyz])\((-?)([\w.]+)\)|\[([^\]]+)\]")
 
 @dataclass(frozen=True)
 class Point:
-    """A measuring point on a stretch.
-
-    `position_m` (3,): in the frame at the near end of the stretch. `rotation` (3, 3).
-    """
+    """A measuring point on a stretch: its place (3,) and rotation (3, 3) in the frame at the near end of the stretch."""
 
     name: str
     position_m: np.ndarray
@@ -101,10 +102,15 @@ class Arm:
         """Number of drives, n."""
         return len(self.axes)
 
+    @cached_property
+    def lengths_m(self) -> np.ndarray:
+        """Of all stretches, (n + 1,)."""
+        return np.array([np.linalg.norm(stretch.vector_m) for stretch in self.stretches])
+
     @property
     def reach_m(self) -> float:
         """Length of all that joint 1 carries, stretched out."""
-        return float(sum(np.linalg.norm(stretch.vector_m) for stretch in self.stretches[1:]))
+        return float(sum(self.lengths_m[1:]))
 
     @property
     def payload_kg(self) -> float:
@@ -113,7 +119,7 @@ class Arm:
 
     @property
     def gear_ratio(self) -> tuple[float, ...]:
-        """Turns of the motor for one of each joint, tuple of float; usual ones where the file has none."""
+        """Turns of the motor for one of each joint; usual ones where the file has none."""
         return self.ratios or tuple(_USUAL_RATIOS[joint % len(_USUAL_RATIOS)] for joint in range(self.joints))
 
     @property
@@ -152,10 +158,44 @@ def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm
     `source`: named in errors. Raises `InputError`: a word of the chain that is none, a drive that shifts or that stands in two
     places, or a chain that does not end in a measuring point.
     """
-    lengths, stretches = document.get("lengths_m", {}), []
+    stretches, axes = _stretches_of(document["chain"], document.get("lengths_m", {}), source)
+    n, shown = len(axes), document.get("reported_joints", {})
+    arm = Arm(
+        document["name"],
+        stretches,
+        axes,
+        1e-6 * np.array(document.get("compliance_urad_per_Nm", np.zeros(n)), float),
+        np.radians(np.array(document.get("joint_limits_deg", [[-360.0, 360.0]] * n), float)),
+        np.array(shown.get("matrix", np.eye(n)), float),
+        np.radians(np.array(shown.get("offset_deg", np.zeros(n)), float)),
+        tuple(
+            LinkMass(
+                int(entry["link"]),
+                float(entry["mass_kg"]),
+                tuple(map(float, entry["centre_m"])),
+                float(entry.get("relative_std", _RELATIVE_STD)),
+            )
+            for entry in document.get("masses", ())
+        ),
+        tuple(map(float, document.get("gravity_m_s2", (0.0, 0.0, -standard_gravity)))),
+        document.get("payload_kg"),
+        # A file that declares no weights declares no compensator either.
+        "compensator" in document or "masses" not in document,
+        tuple(document.get("gear_ratio", ())),
+    )
+    if "compliance_urad_per_Nm" in document:
+        return arm
+    behind = np.cumsum(arm.lengths_m[:0:-1])[::-1]
+    weight = standard_gravity * max(arm.payload_kg, _LEAST_KG)
+    return replace(arm, compliance=_WIND_UP_RAD / (weight * np.maximum(behind, _SHORTEST_LEVER_M)))
+
+
+def _stretches_of(chain: str, lengths: Mapping[str, float], source: str) -> tuple[tuple[Stretch, ...], np.ndarray]:
+    """Cut a chain at its drives."""
+    stretches: list[Stretch] = []
     axes: list[np.ndarray] = []
     position, rotation, points = np.zeros(3), np.eye(3), []
-    for word in document["chain"].split():
+    for word in chain.split():
         match = _WORD.fullmatch(word)
         if match is None:
             raise InputError(source, "chain", repr(word), "T or R of x, y, z, or a [POINT]")
@@ -176,62 +216,15 @@ def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm
             position, rotation, points = np.zeros(3), np.eye(3), []
     if not points or not np.array_equal(points[-1].position_m, position):
         raise InputError(source, "chain", "no measuring point at its end", "a chain that ends in one")
-    stretches.append(Stretch(position, rotation, tuple(points)))
-    n, shown = len(axes), document.get("reported_joints", {})
-    arm = Arm(
-        document["name"],
-        tuple(stretches),
-        np.array(axes),
-        1e-6 * np.array(document.get("compliance_urad_per_Nm", np.zeros(n)), float),
-        np.radians(np.array(document.get("joint_limits_deg", [[-360.0, 360.0]] * n), float)),
-        np.array(shown.get("matrix", np.eye(n)), float),
-        np.radians(np.array(shown.get("offset_deg", np.zeros(n)), float)),
-        tuple(_link_mass(entry) for entry in document.get("masses", ())),
-        tuple(map(float, document.get("gravity_m_s2", (0.0, 0.0, -standard_gravity)))),
-        document.get("payload_kg"),
-        # A file that declares no weights declares no compensator either.
-        "compensator" in document or "masses" not in document,
-        tuple(document.get("gear_ratio", ())),
-    )
-    return arm if "compliance_urad_per_Nm" in document else replace(arm, compliance=_usual_compliance(arm))
+    return (*stretches, Stretch(position, rotation, tuple(points))), np.array(axes)
 
 
-def _usual_compliance(arm: Arm) -> np.ndarray:
-    behind = np.cumsum([np.linalg.norm(stretch.vector_m) for stretch in reversed(arm.stretches[1:])])[::-1]
-    weight = standard_gravity * max(arm.payload_kg, _LEAST_KG)
-    return _WIND_UP_RAD / (weight * np.maximum(behind, _SHORTEST_LEVER_M))
+def turned(vector: ArrayLike) -> np.ndarray:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad."""
+    return Rotation.from_rotvec(np.array(vector, float)).as_matrix()
 
 
-def _link_mass(entry: Mapping[str, Any]) -> LinkMass:
-    centre = tuple(map(float, entry["centre_m"]))
-    return LinkMass(int(entry["link"]), float(entry["mass_kg"]), centre, float(entry.get("relative_std", _RELATIVE_STD)))
-
-
-def link_frames(arm: Arm, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frames behind the rotation of each drive.
-
-    `angles` (S, n): rad. Returns `origin` (S, n + 1, 3): of link 0, the column, and of each link behind it, base axes, m;
-    `rotation` (S, n + 1, 3, 3).
-    """
-    origin, rotation = [np.zeros((len(angles), 3))], [np.broadcast_to(np.eye(3), (len(angles), 3, 3))]
-    for joint, (stretch, axis) in enumerate(zip(arm.stretches[:-1], arm.axes, strict=True)):
-        origin.append(origin[-1] + rotation[-1] @ stretch.vector_m)
-        rotation.append(rotation[-1] @ stretch.rotation @ turned(angles[:, joint, None] * axis))
-    return np.stack(origin, axis=1), np.stack(rotation, axis=1)
-
-
-def turned(vector: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a rotation vector by Rodrigues' formula [1], R = I + sin a K + (1 - cos a) K^2.
-
-    `vector` (..., 3): rad. Returns (..., 3, 3).
-
-    [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
-    """
-    vector = np.asarray(vector, float)
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(vector, -1, 0)
-    zero = np.zeros_like(x)
-    skew = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
-    # sin(a)/a and (1 - cos a)/a^2 without a division by nothing.
-    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-    return np.eye(3) + first * skew + second * skew @ skew
+def rotation_vector(rotation: np.ndarray) -> np.ndarray:
+    """Rotation vectors (..., 3), rad, of rotation matrices (..., 3, 3); angles up to and at a half turn."""
+    # A product of two rotations is one but for rounding, which needs no other to be found for it.
+    return Rotation.from_matrix(np.array(rotation), assume_valid=True).as_rotvec()

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, read_poses
+from elastocal_proof.plant.arm import rotation_vector
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, read_poses, seen_poses
 from elastocal_proof.plant.random_numbers import stream
-from elastocal_proof.plant.tracker import rotation_vector
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal_proof.plant.arm import Arm
 
+    Table = dict[str, np.ndarray]
+
 COVARIATES = ("approach", "time", "temperature")
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 # Stands for the last measuring point of any arm.
 FLANGE = "flange"
+SECONDS_PER_STATE = 25.0
+# Of further poses, how long after the last state the first one comes.
+_PAUSE_S = 3600.0
 # On arms of such a reach a lever of half a metre is usual.
 _LONG_M = 2.5
+# Waves of each joint's path in the tracker's dynamic mode: how many, and between which periods.
+_WAVES, _PERIODS_S = 5, (30.0, 240.0)
+_AT_ONCE = 20_000
 
 
 @dataclass(frozen=True)
@@ -48,7 +57,7 @@ class Design:
     repeats: int = 4
     repeated_poses: int = 10
     approach_each_load: bool = True
-    seconds_per_state: float = 25.0
+    seconds_per_state: float = SECONDS_PER_STATE
     points: tuple[str, ...] = ()
     covariates: tuple[str, ...] = COVARIATES
     declared_noise: tuple[float, float] | None = None
@@ -63,9 +72,19 @@ class Design:
         return tuple(arm.points[-1] if point == FLANGE else point for point in self.points) or arm.points
 
 
+DYNAMIC = Design(points=(FLANGE,), measured="position", covariates=("time",))
+
+
 def usual_force_N(arm: Arm) -> float:  # noqa: N802 - units in names keep their case
     """A kilonewton on arms that carry 140 kg and more, and as much less on smaller ones."""
     return 1000.0 * arm.load_share
+
+
+def lever_of(wrench: np.ndarray) -> np.ndarray:
+    """The shortest levers (S, 3) at which the forces of wrenches (S, 6) have their moments, m; none where there is no force."""
+    force, moment = wrench[:, :3], wrench[:, 3:]
+    square = (force**2).sum(axis=1, keepdims=True)
+    return np.divide(np.cross(force, moment), square, out=np.zeros_like(force), where=square > 0)
 
 
 def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
@@ -75,112 +94,134 @@ def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
     angles = low + (high - low) * (0.5 + design.reach * (draws.random((design.poses, arm.joints)) - 0.5))
     direction = draws.standard_normal((design.poses, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    states: list[tuple[int, int, int]] = []
-    moves: list[int] = []
-    previous: list[int] = []
-    for place in range(design.poses):
-        for again in range(design.repeats if place < design.repeated_poses else 1):
-            for rung in range(len(design.ladder) if again == 0 else min(2, len(design.ladder))):
-                fresh = design.approach_each_load or rung == 0
-                previous.append(-1 if fresh else len(states) - 1)
-                moves.append(moves[-1] + fresh if moves else 0)
-                states.append((place, rung, again))
+    states = [
+        (place, rung, again)
+        for place in range(design.poses)
+        for again in range(design.repeats if place < design.repeated_poses else 1)
+        for rung in range(len(design.ladder) if again == 0 else min(2, len(design.ladder)))
+    ]
     pose, load, repeat = np.array(states).T
-    approach = np.array(moves)
+    fresh = design.approach_each_load | (load == 0)
     # A repeat comes from the same side, so that it is one: what differs between repeats is then chance and not friction.
     sense = draws.choice([-1, 1], (design.poses, len(design.ladder), arm.joints))
-    sense = sense[pose, load if design.approach_each_load else 0 * load]
     largest = design.force_times * (usual_force_N(arm) if design.force_N is None else design.force_N)
     force = largest * np.array(design.ladder)[load, None] * direction[pose]
-    lever = np.broadcast_to(min(arm.reach_m / _LONG_M, 1.0) * np.array(design.lever_m), force.shape)
-    time = design.seconds_per_state * np.arange(1, len(states) + 1)
-    training = pose < design.poses - design.held_out
+    number = np.arange(len(states))
     return Schedule(
-        angles[pose], force, lever, pose, load, repeat, approach, sense, np.array(previous), time, training, int(seed)
+        angle=angles[pose],
+        force=force,
+        lever=np.broadcast_to(min(arm.reach_m / _LONG_M, 1.0) * np.array(design.lever_m), force.shape),
+        pose=pose,
+        load=load,
+        repeat=repeat,
+        approach=fresh.cumsum() - 1,
+        sense=sense[pose, load if design.approach_each_load else 0 * load],
+        previous=np.where(fresh, -1, number - 1),
+        time_s=design.seconds_per_state * (number + 1),
+        training=pose < design.poses - design.held_out,
+        seed=int(seed),
     )
 
 
-def continued(
-    schedule: Schedule,
-    angle: np.ndarray,
-    wrench: np.ndarray,
-    seconds_per_state: float = 25.0,
-    pause_s: float = 3600.0,
-    ladder: Sequence[float] = (0.0, 1.0),
-) -> Schedule:
-    """A schedule with further states after it, such as a proposed experiment; nothing of what was done before changes.
+def continued(schedule: Schedule, angle: np.ndarray, wrench: np.ndarray, ladder: Sequence[float]) -> Schedule:
+    """A schedule with further poses after it, such as a proposed experiment; nothing of what was done before changes.
 
-    `angle` (E, n): rad; equal rows that follow each other are one pose. `wrench` (E, 6): as it shall be shown, N, N m at the
-    flange, base axes; the moment is that of the force at a lever. `seconds_per_state`, `pause_s`: pace, and how long after the
-    last state the first one comes. `ladder`: shares of its load at which each row is read, 0 first. Returns each further state
-    is approached afresh and none is held out. Each new pose starts without a load, as load 0.
+    `angle` (E, n): rad, each another pose. `wrench` (E, 6): as it shall be shown, N, N m at the flange, base axes; the moment
+    is that of the force at a lever. `ladder`: shares of its load at which each pose is read, 0 first. Each further state is
+    approached afresh and none is held out.
     """
     draws = stream(schedule.seed, f"continued after {len(schedule.pose)} states")
-    angle, wrench = np.asarray(angle, float), np.asarray(wrench, float)
-    new = np.concatenate([[True], (np.diff(angle, axis=0) != 0).any(axis=1)])
-    pose = int(schedule.pose.max()) + np.cumsum(new)
-    rows: list[tuple[int, float]] = []
-    load: list[int] = []
-    for row, first in enumerate(new):
-        if first:
-            rows.append((row, 0.0))
-            load.append(0)
-        for part in ladder[1:] if wrench[row].any() else ():
-            rows.append((row, part))
-            load.append(load[-1] + 1)
-    state, share = np.array([row for row, _ in rows]), np.array([part for _, part in rows])[:, None]
-    force, moment = wrench[state, :3], wrench[state, 3:]
-    square = (force**2).sum(axis=1, keepdims=True)
-    lever = np.divide(np.cross(force, moment), square, out=np.zeros_like(force), where=square > 0)
-    count = np.arange(1, len(state) + 1)
-    return replace(
-        schedule,
-        angle=np.concatenate([schedule.angle, angle[state]]),
-        force=np.concatenate([schedule.force, share * force]),
-        lever=np.concatenate([schedule.lever, lever]),
-        pose=np.concatenate([schedule.pose, pose[state]]),
-        load=np.concatenate([schedule.load, np.array(load)]),
-        repeat=np.concatenate([schedule.repeat, np.zeros(len(state), int)]),
-        approach=np.concatenate([schedule.approach, schedule.approach.max() + count]),
-        sense=np.concatenate([schedule.sense, draws.choice([-1, 1], (len(state), angle.shape[1]))]),
-        previous=np.concatenate([schedule.previous, np.full(len(state), -1)]),
-        time_s=np.concatenate([schedule.time_s, schedule.time_s[-1] + pause_s + seconds_per_state * count]),
-        training=np.concatenate([schedule.training, np.ones(len(state), bool)]),
-    )
+    rungs = [range(len(ladder) if loaded else 1) for loaded in np.any(wrench, axis=1).tolist()]
+    row, load = (np.array(column) for column in zip(*((n, rung) for n, each in enumerate(rungs) for rung in each), strict=True))
+    count = np.arange(1, len(row) + 1)
+    further: dict[str, Any] = {
+        "angle": angle[row],
+        "force": np.array(ladder)[load, None] * wrench[row, :3],
+        "lever": lever_of(wrench)[row],
+        "pose": int(schedule.pose.max()) + 1 + row,
+        "load": load,
+        "repeat": 0 * row,
+        "approach": schedule.approach.max() + count,
+        "sense": draws.choice([-1, 1], (len(row), angle.shape[1])),
+        "previous": 0 * row - 1,
+        "time_s": schedule.time_s[-1] + _PAUSE_S + SECONDS_PER_STATE * count,
+        "training": row >= 0,
+    }
+    further = {name: np.concatenate([getattr(schedule, name), new]) for name, new in further.items()}
+    return replace(schedule, **further)
 
 
-def measured_table(
-    robot: PhysicalRobot, design: Design, schedule: Schedule
-) -> tuple[dict[str, np.ndarray], list[tuple[int, str]]]:
-    """Columns of the file of measurements.
-
-    Returns `table` (rows,); `outliers` (int, str): state and target of every measurement that is one.
-    """
+def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> tuple[Table, list[tuple[int, str]]]:
+    """Columns of the file of measurements (rows,); and state and target of every measurement that is an outlier."""
     position, rotation, outlier = read_poses(robot, schedule)
     if design.frame == "tracker":
         position, rotation = robot.tracker.in_own_frame(position, rotation)
-    arm, shown = robot.arm, robot.arm.shown_angles(schedule.angle)
-    joints, wrench = range(1, arm.joints + 1), schedule.shown_wrench
-    points = design.targets_on(arm)
-    common = {"pose": schedule.pose, "load": schedule.load, "repeat": schedule.repeat}
-    after = {f"q{j}": shown[:, j - 1] for j in joints} | dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), wrench.T, strict=True))
+    points, arm = design.targets_on(robot.arm), robot.arm
+    at, joints = [arm.points.index(name) for name in points], range(1, arm.joints + 1)
+
+    def each(column: np.ndarray) -> np.ndarray:
+        # State by state, as a tracker goes round its targets.
+        return np.repeat(column, len(points), axis=0)
+
+    table = {name: each(getattr(schedule, name)) for name in ("pose", "load", "repeat")}
+    table |= {"target": np.tile(points, len(schedule.pose))}
+    table |= dict(zip([f"q{j}" for j in joints], each(arm.shown_angles(schedule.angle)).T, strict=True))
+    table |= dict(zip(WRENCH, each(schedule.shown_wrench).T, strict=True))
+    table |= dict(zip("xyz", position[:, at].reshape(-1, 3).T, strict=True))
+    if design.measured == "pose":
+        table |= dict(zip(("rx", "ry", "rz"), rotation_vector(rotation[:, at]).reshape(-1, 3).T, strict=True))
     covariates = {
-        "approach": {f"approach{j}": schedule.sense[:, j - 1].astype(float) for j in joints},
-        "time": {"time_s": schedule.time_s},
-        "temperature": {"temperature_c": robot.warmth.shown(schedule.time_s)},
+        "approach": dict(zip([f"approach{j}" for j in joints], each(schedule.sense.astype(float)).T, strict=True)),
+        "time": {"time_s": each(schedule.time_s)},
+        "temperature": {"temperature_c": each(robot.warmth.shown(schedule.time_s))},
     }
-    parts = []
-    for name in points:
-        target = arm.points.index(name)
-        part = common | {"target": np.full(len(wrench), name)} | after | dict(zip("xyz", position[:, target].T, strict=True))
-        if design.measured == "pose":
-            part |= dict(zip(("rx", "ry", "rz"), rotation_vector(rotation[:, target]).T, strict=True))
-        for covariate in design.covariates:
-            part |= covariates[covariate]
-        parts.append(part)
-    table = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
-    # State by state, as a tracker goes round its targets.
-    order = np.argsort(np.tile(np.arange(len(wrench)), len(points)), kind="stable")
+    for covariate in design.covariates:
+        table |= covariates[covariate]
     # Minus zeros are products of the ladder's zero and mean nothing.
-    table = {name: column[order] + 0.0 if column.dtype.kind == "f" else column[order] for name, column in table.items()}
-    return table, [(int(state), arm.points[target]) for state, target in np.argwhere(outlier) if arm.points[target] in points]
+    table = {name: column + 0.0 if column.dtype.kind == "f" else column for name, column in table.items()}
+    return table, [(int(state), arm.points[target]) for state, target in np.argwhere(outlier) if target in at]
+
+
+def dynamic_table(robot: PhysicalRobot, measurements: int, seed: int, rate_hz: float = 1000.0) -> Table:
+    """Columns (measurements,) of the file of a tracker in its dynamic mode, as `measured_table` has them.
+
+    One target on the flange is read while the arm moves without a load, each measurement a pose of its own. Quasi-static: the
+    arm yields under its own weight and to its drives' errors as at rest, and what acceleration does is left out; so the path is
+    slow: a few waves of incommensurable periods of each joint within its limits.
+    """
+    arm, time = robot.arm, np.arange(1, measurements + 1) / rate_hz
+    draws, shape = stream(seed, "moving path"), (_WAVES, robot.arm.joints)
+    frequency = 2.0 * np.pi / np.exp(draws.uniform(np.log(_PERIODS_S[0]), np.log(_PERIODS_S[1]), shape))
+    phase, weight = draws.uniform(0.0, 2.0 * np.pi, shape), draws.uniform(0.5, 1.0, shape)
+    # Slower waves are the larger ones, so that no joint hurries.
+    weight = weight / frequency
+    low, high = arm.limits.T
+    size = 0.5 * (high - low) * weight / weight.sum(axis=0)
+    angle, position = np.empty((measurements, arm.joints)), np.empty((measurements, 1, 3))
+    for start in range(0, measurements, _AT_ONCE):
+        part = slice(start, start + _AT_ONCE)
+        turns = time[part, None, None] * frequency + phase
+        angle[part] = 0.5 * (low + high) + (size * np.sin(turns)).sum(axis=1)
+        sense = np.sign((size * frequency * np.cos(turns)).sum(axis=1)).astype(int)
+        still, nothing = np.zeros((len(turns), 3)), np.zeros(len(turns), int)
+        moving = Schedule(
+            angle[part],
+            still,
+            still,
+            nothing,
+            nothing,
+            nothing,
+            approach=nothing,
+            sense=sense,
+            previous=nothing - 1,
+            time_s=time[part],
+            training=nothing == 0,
+            seed=seed,
+        )
+        position[part] = seen_poses(robot, moving)[0][:, -1:]
+    facing = np.broadcast_to(np.eye(3), (measurements, 1, 3, 3))
+    read, shown, count = robot.tracker.read(position, facing, stream(seed, "readings"))[0], arm.shown_angles(angle), len(time)
+    table = {"pose": np.arange(count), "load": np.zeros(count, int), "repeat": np.zeros(count, int)}
+    table |= {"target": np.full(count, arm.points[-1])} | {f"q{j + 1}": shown[:, j] for j in range(arm.joints)}
+    table |= {name: np.zeros(count) for name in WRENCH}
+    return table | dict(zip("xyz", read[:, 0].T, strict=True)) | {"time_s": time}

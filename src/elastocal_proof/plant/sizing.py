@@ -19,18 +19,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import mujoco
 import numpy as np
 
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, read_poses, seen_at_rest, seen_poses
-from elastocal_proof.plant.tracker import rotation_vector
+from elastocal_proof.plant.arm import rotation_vector
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, read_poses, seen_poses
 from elastocal_proof.plant.weights import allowed_centre_std_m
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from elastocal_proof.plant.arm import LinkMass
-    from elastocal_proof.plant.multibody import Machine
-    from elastocal_proof.plant.statics import Equilibrium
+    from elastocal_proof.plant.machine import Machine
 
 _ROUNDS = 12
 # Below this share of the largest a direction is second order and rounding.
@@ -65,17 +65,25 @@ class Yardstick:
         targets: Iterable[int] | None = None,
         orientation: bool = True,
         free_frame: bool = False,
-        declared: Iterable[LinkMass] = (),
+        declared: Sequence[LinkMass] = (),
     ) -> None:
         self.robot, self.schedule, self.orientation = robot, schedule, orientation
         self.targets = list(range(len(robot.arm.points)) if targets is None else targets)
-        machine, self._rest = at_rest(robot, schedule)
-        self.poses = seen_at_rest(robot, schedule, self._rest)
-        self._turns = _per_turn(machine, self._rest)
-        columns = [self._turned_by(joint, self._rest.torque[:, machine.gear[joint]]) for joint in range(robot.arm.joints)]
+        machine, rest = at_rest(robot, schedule)
+        self._start = rest.coordinates[:, machine.gear]
+        self.poses = robot.tracker.seen(rest.position, rest.rotation, schedule.time_s, schedule.angle[:, -1])
+        jacobian, torques = _responses(machine, rest.coordinates, robot, declared)
+        springs = [np.eye(robot.arm.joints)[joint] * rest.force[:, machine.gear] for joint in range(robot.arm.joints)]
+        columns, weights = (
+            [self._flat(np.einsum("stij,sj->sti", jacobian[:, self.targets], turn)) for turn in turns]
+            for turns in (springs, [robot.compliance * torque for torque in torques])
+        )
         if free_frame:
-            columns += self._frame_columns()
-        weights = [self._turned_by(None, turn) for turn in _turns_of_weights(machine, self._rest, robot, declared)]
+            position = self.poses[0][:, self.targets]
+            for axis in np.eye(3):
+                along, nothing = np.broadcast_to(axis, position.shape), np.zeros_like(position)
+                columns.append(self._flat(np.concatenate([along, nothing], axis=-1)))
+                columns.append(self._flat(np.concatenate([np.cross(axis, position), along], axis=-1)))
         height = len(columns[0])
         # A column of nothing, such as the compliance of a joint that no load turns, absorbs nothing.
         columns = [column / np.linalg.norm(column) for column in columns if column.any()]
@@ -85,32 +93,23 @@ class Yardstick:
         stacked[height:, len(columns) :] = np.eye(len(weights))
         self._absorbed, self._priors = np.linalg.qr(stacked)[0], len(weights)
 
-    def change(self, robot: PhysicalRobot) -> np.ndarray:
-        """Change of the measurements against the faultless robot in standard deviations, ndarray (S, targets, 3 or 6)."""
-        return self._whitened(*self._change(robot))
+    def seen_and_left(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
+        """A robot's change in the measurements that are not held out, and what the declared model cannot absorb of it, (M,).
+
+        Both in standard deviations; the last entries of the second are the weights, in theirs, that absorb the rest.
+        """
+        return self._with_left(self._apart(*seen_poses(robot, self.schedule, self._start)))
 
     def residual(self, robot: PhysicalRobot) -> np.ndarray:
-        """As `left`, of a robot's measurements with the noise that they have in its campaign."""
-        position, rotation, _ = read_poses(robot, self.schedule, self._rest)
-        return self._with_left(self._whitened(*self._apart(position, rotation)))[1]
+        """What cannot be absorbed of a robot's measurements with the noise that they have in its campaign."""
+        return self._with_left(self._apart(*read_poses(robot, self.schedule, self._start)[:2]))[1]
 
     def signal(self, robot: PhysicalRobot) -> Signal:
         """How a robot differs from the faultless one."""
-        metres, radians = self._change(robot)
-        seen, left = self._with_left(self._whitened(metres, radians))
-        rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in (metres, radians)]
+        apart = self._apart(*seen_poses(robot, self.schedule, self._start))
+        seen, left = self._with_left(apart)
+        rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in np.split(apart, 2, axis=-1)]
         return Signal(float(seen @ seen), float(left @ left), *rms)
-
-    def left(self, robot: PhysicalRobot) -> np.ndarray:
-        """What the declared model cannot absorb of a robot's change in the measurements that are not held out, ndarray (M,).
-
-        Its last entries are the weights, in their standard deviations, that absorb the rest.
-        """
-        return self.seen_and_left(robot)[1]
-
-    def seen_and_left(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
-        """A robot's change in the measurements that are not held out, and what is left of it as in `left`."""
-        return self._with_left(self.change(robot))
 
     def angle_deg(self, robot: PhysicalRobot, others: Iterable[PhysicalRobot]) -> float:
         """Principal angle [1] between what is left of a robot and all that others make together, in any proportion.
@@ -121,7 +120,7 @@ class Yardstick:
         [1] Björck, Å. and Golub, G. H., Numerical methods for computing angles between linear subspaces, Mathematics of
             Computation 27, 1973.
         """
-        mine, theirs = self.left(robot), np.array([self.left(other) for other in others])
+        mine, theirs = self.seen_and_left(robot)[1], np.array([self.seen_and_left(other)[1] for other in others])
         theirs = theirs[theirs.any(axis=1)]
         if not len(theirs):
             return 90.0
@@ -129,75 +128,55 @@ class Yardstick:
         share = float(np.linalg.norm(directions[size > _SAME * size[0]] @ mine) / np.linalg.norm(mine))
         return float(np.degrees(np.arccos(min(share, 1.0))))
 
-    def _with_left(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        seen = change[self.schedule.training].ravel()
+    def _apart(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        """Difference of poses of all points to those of the faultless robot, (S, targets, 6), m and rad."""
+        turns = rotation_vector(rotation @ np.swapaxes(self.poses[1], -1, -2))
+        return np.concatenate([position - self.poses[0], turns], axis=-1)[:, self.targets]
+
+    def _flat(self, apart: np.ndarray) -> np.ndarray:
+        """Changes (S, targets, 6) as the analysis counts them: in standard deviations, of the poses that are not held out."""
+        tracker = self.robot.tracker
+        metres = apart[..., :3] / tracker.sigma_at(self.poses[0])[:, self.targets, None]
+        radians = apart[..., 3:] / tracker.sigma_rad
+        kept = np.concatenate([metres, radians], axis=-1) if self.orientation else metres
+        return kept[self.schedule.training].ravel()
+
+    def _with_left(self, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        seen = self._flat(apart)
         whole = np.append(seen, np.zeros(self._priors))
         return seen, whole - self._absorbed @ (self._absorbed.T @ whole)
 
-    def _change(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
-        return self._apart(*seen_poses(robot, self.schedule, self._rest))
 
-    def _apart(self, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        position_0, rotation_0 = self.poses
-        relative = rotation @ np.swapaxes(rotation_0, -1, -2)
-        return (position - position_0)[:, self.targets], rotation_vector(relative)[:, self.targets]
-
-    def _whitened(self, metres: np.ndarray, radians: np.ndarray) -> np.ndarray:
-        parts = [metres / self.robot.tracker.sigma_at(self.poses[0])[:, self.targets, None]]
-        if self.orientation:
-            parts.append(radians / self.robot.tracker.sigma_rad)
-        return np.concatenate(parts, axis=-1)
-
-    def _turned_by(self, joint: int | None, turn: np.ndarray) -> np.ndarray:
-        """Change of the measurements, to first order, where one gear, or each of them, turns by so much (S,) or (S, n) more."""
-        metres, radians = self._turns
-        if joint is None:
-            turn = turn[:, None, :, None]
-            metres, radians = (metres * turn).sum(axis=2), (radians * turn).sum(axis=2)
-        else:
-            turn = turn[:, None, None]
-            metres, radians = metres[:, :, joint] * turn, radians[:, :, joint] * turn
-        return self._whitened(metres[:, self.targets], radians[:, self.targets])[self.schedule.training].ravel()
-
-    def _frame_columns(self) -> list[np.ndarray]:
-        position = self.poses[0][self.schedule.training][:, self.targets]
-        sigma = self.robot.tracker.sigma_at(position)[..., None]
-        columns = []
-        for axis in np.eye(3):
-            shifted, turned = [np.broadcast_to(axis, position.shape) / sigma], [np.cross(axis, position) / sigma]
-            if self.orientation:
-                shifted.append(np.zeros_like(position))
-                turned.append(np.broadcast_to(axis, position.shape) / self.robot.tracker.sigma_rad)
-            columns += [np.concatenate(parts, axis=-1).ravel() for parts in (shifted, turned)]
-        return columns
-
-
-def _per_turn(machine: Machine, rest: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
-    """Movement of all targets per turn of each gear, two ndarray (S, targets, n, 3): m/rad, and axes where it turns them."""
-    where, gear = rest.where, machine.gear
-    axis, arm = where.axis[:, None, gear], where.position[:, :, None] - where.anchor[:, None, gear]
-    body = machine.model.site_bodyid[list(machine.sites.values())]
-    moves = machine.beyond[gear][:, body].T[None, :, :, None]
-    return moves * np.cross(axis, arm), moves * axis
-
-
-def _turns_of_weights(
-    machine: Machine, rest: Equilibrium, robot: PhysicalRobot, declared: Iterable[LinkMass]
-) -> list[np.ndarray]:
-    """Turns of all gears per standard deviation of each mass and each component of its centre, list of ndarray (S, n)."""
-    where, gear, pull = rest.where, machine.gear, np.array(robot.structure.gravity_m_s2)
-    reach_m = robot.arm.reach_m
-    found = []
-    for mass in declared:
-        link = machine.links[mass.link]
-        turn, moves = where.body_rotation[:, link], machine.beyond[gear, link]
-        place = where.body[:, link] + turn @ np.array(mass.centre_m)
-        levers = [(place[:, None] - where.anchor[:, gear]) * mass.relative_std * mass.mass_kg]
-        levers += [turn[:, None, :, axis] * mass.mass_kg * allowed_centre_std_m(mass, reach_m) for axis in range(3)]
-        for lever in levers:
-            torque = (where.axis[:, gear] * np.cross(lever, pull)).sum(axis=2) * moves
-            found.append(robot.compliance * torque)
-    return found
+def _responses(
+    machine: Machine, coordinates: np.ndarray, robot: PhysicalRobot, declared: Sequence[LinkMass]
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """To first order, at rest: Jacobians of all measuring points for turns of the gears, (S, points, 6, n); and torques on the
+    gears per standard deviation of each mass and of each component of its centre, (S, n) each."""
+    model, data, gear = machine.model, mujoco.MjData(machine.model), machine.gear
+    shift, turn, count = np.empty((3, model.nv)), np.empty((3, model.nv)), len(coordinates)
+    jacobian = np.empty((count, len(machine.sites), 6, len(gear)))
+    # Of the centres of mass.
+    moves, turns = np.empty((2, len(declared), count, 3, len(gear)))
+    axes = np.empty((len(declared), count, 3, 3))
+    for state, row in enumerate(coordinates):
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        for point, site in enumerate(machine.sites):
+            mujoco.mj_jacSite(model, data, shift, turn, site)
+            jacobian[state, point, :3], jacobian[state, point, 3:] = shift[:, gear], turn[:, gear]
+        for number, mass in enumerate(declared):
+            link = machine.links[mass.link]
+            axes[number, state] = data.xmat[link].reshape(3, 3)
+            mujoco.mj_jac(model, data, shift, turn, data.xpos[link] + axes[number, state] @ mass.centre_m, link)
+            moves[number, state], turns[number, state] = shift[:, gear], turn[:, gear]
+    torques = []
+    for number, mass in enumerate(declared):
+        weight = mass.mass_kg * np.array(model.opt.gravity)
+        torques.append(mass.relative_std * (weight @ moves[number]))
+        moment = np.cross(axes[number], weight, axisa=1, axisc=1) * allowed_centre_std_m(mass, robot.arm.reach_m)
+        torques += [np.einsum("si,sij->sj", moment[..., axis], turns[number]) for axis in range(3)]
+    return jacobian, torques
 
 
 def size_for(
@@ -207,12 +186,12 @@ def size_for(
     target: float,
     quantity: str = "retained",
     largest: float = np.inf,
-) -> tuple[float, Signal]:
+) -> float:
     """Size of a defect at which its non-centrality is as wanted.
 
     `robot_of_size`: robot with the defect of a given size. `start`: a size to begin with. `target`: non-centrality. `quantity`:
-    one of "retained", "raw". `largest`: no larger size is tried. Returns `signal`: as it came out. Raises `ValueError`: no size
-    has it to one per cent: the defect is absorbed whatever its size, saturates, or would be larger than allowed.
+    one of "retained", "raw". `largest`: no larger size is tried. Raises `ValueError`: no size has it to one per cent: the
+    defect is absorbed whatever its size, saturates, or would be larger than allowed.
 
     The non-centrality of a linear effect grows with the square of its size; the secant of the logarithms allows for others.
     """
@@ -225,7 +204,7 @@ def size_for(
         if value <= 1e-6 * signal.raw or not np.isfinite(value):
             break
         if abs(value / target - 1.0) < 0.01:
-            return size, signal
+            return size
         if last is not None and last[0] != size:
             slope = np.log(value / last[1]) / np.log(size / last[0])
             exponent = slope if 0.3 < slope < 8.0 else 2.0

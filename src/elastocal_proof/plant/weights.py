@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal_proof.plant.arm import Arm, LinkMass, Stretch, link_frames
-from elastocal_proof.plant.structure import Mass
+from elastocal_proof.plant.arm import Arm, LinkMass
+from elastocal_proof.plant.machine import Mass, Structure, machine_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
 # Mass of an arm by rated load (kg) times reach (m): m = 3.2 (P R)^0.92 goes through an arm of 30 kg for 14 kg at 0.82 m and has
 # 1380 kg for 270 kg at 2.7 m, where a data sheet has 1130: a size to be expected, not the mass of one machine.
@@ -36,25 +36,23 @@ def declared_masses(arm: Arm) -> tuple[LinkMass, ...]:
     total = _SCALE_KG * (arm.payload_kg * arm.reach_m) ** _POWER
     falling = _FALL ** np.arange(arm.joints - 1)
     shares = [_FOOT, _CAROUSEL, *((1.0 - _FOOT - _CAROUSEL) * falling / falling.sum())]
+    # Centres before the middle of the link, and a little to the side, where the motors sit; to the millimetre.
+    aside = np.array([0.0, _ASIDE * arm.reach_m, 0.0])
+    centres = [tuple(np.round(_ALONG * stretch.vector_m + aside, 3).tolist()) for stretch in arm.stretches]
     return tuple(
-        LinkMass(link, round(float(share * total), 1), _guessed_centre(stretch, arm.reach_m), _GUESSED_STD)
-        for link, (share, stretch) in enumerate(zip(shares, arm.stretches, strict=True))
+        LinkMass(link, round(float(share * total), 1), centre, _GUESSED_STD)
+        for link, (share, centre) in enumerate(zip(shares, centres, strict=True))
     )
 
 
-def _guessed_centre(stretch: Stretch, reach_m: float) -> tuple[float, ...]:
-    """Before the middle of the link, and a little to the side, where the motors sit; mm."""
-    return tuple(np.round(_ALONG * stretch.vector_m + [0.0, _ASIDE * reach_m, 0.0], 3).tolist())
-
-
-def centre_std_m(mass: LinkMass) -> float:
-    """Standard deviation of each component of a declared centre of mass, m."""
-    return mass.relative_std * max(float(np.linalg.norm(mass.centre_m)), _SHORTEST_LEVER_M)
+def centre_std_m(mass: LinkMass, least_m: float = _SHORTEST_LEVER_M) -> float:
+    """Standard deviation of each component of a declared centre of mass, m: its share of the centre's distance."""
+    return mass.relative_std * max(float(np.linalg.norm(mass.centre_m)), least_m)
 
 
 def allowed_centre_std_m(mass: LinkMass, reach_m: float) -> float:
     """Standard deviation that an analyst must allow each component of a centre, who does not know how far aside it lies, m."""
-    return mass.relative_std * max(float(np.linalg.norm(mass.centre_m)), _WIDTH_OF_REACH * reach_m)
+    return centre_std_m(mass, _WIDTH_OF_REACH * reach_m)
 
 
 def true_masses(masses: Iterable[LinkMass], draws: np.random.Generator) -> tuple[LinkMass, ...]:
@@ -68,14 +66,10 @@ def true_masses(masses: Iterable[LinkMass], draws: np.random.Generator) -> tuple
 
 
 def off_the_line(masses: Iterable[LinkMass], arm: Arm, largest_m: float, draws: np.random.Generator) -> tuple[LinkMass, ...]:
-    """Centres moved off the lines of their links by up to a distance across each, as nobody declared.
-
-    `largest_m`: of each of the two components across the link.
-    """
+    """Centres moved off the lines of their links by up to a distance in each direction across, as nobody declared."""
     found = []
     for mass in masses:
-        move = draws.uniform(-largest_m, largest_m, 3)
-        vector = arm.stretches[mass.link].vector_m
+        move, vector = draws.uniform(-largest_m, largest_m, 3), arm.stretches[mass.link].vector_m
         if vector.any():
             along = vector / np.linalg.norm(vector)
             move = move - (move @ along) * along
@@ -93,25 +87,12 @@ def on_stretches(masses: Iterable[LinkMass], arm: Arm) -> tuple[Mass, ...]:
     return tuple(found)
 
 
-def gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: Sequence[float], angles: np.ndarray) -> np.ndarray:
-    """Torque of the links' weight on each drive, by levers.
-
-    `angles` (S, n): rad. Returns (S, n): N m.
-    """
-    origin, rotation = link_frames(arm, angles)
-    torque = np.zeros(angles.shape)
-    for mass in masses:
-        centre = mass.along * arm.stretches[mass.stretch].vector_m + np.array(mass.aside_m)
-        place, force = origin[:, mass.stretch] + rotation[:, mass.stretch] @ centre, mass.mass_kg * np.array(gravity_m_s2)
-        for joint in range(mass.stretch):
-            axis = rotation[:, joint + 1] @ arm.axes[joint]
-            torque[:, joint] += (np.cross(place - origin[:, joint + 1], force) * axis).sum(axis=1)
-    return torque
-
-
-def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: Sequence[float]) -> np.ndarray:
-    """Root mean square of `gravity_torque` over the arm's range of angles, ndarray (n,), N m."""
+def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: tuple[float, ...]) -> np.ndarray:
+    """Root mean square torque of the links' weight on each drive over the arm's range of angles, (n,), N m."""
     low, high = arm.limits.T
+    machine = machine_of(arm, Structure(masses=tuple(masses), gravity_m_s2=gravity_m_s2))
+    coordinates = np.zeros((_POSES, machine.model.nq))
     # The same poses for all, of no campaign.
-    angles = low + (high - low) * np.random.default_rng(0).random((_POSES, arm.joints))
-    return np.sqrt((gravity_torque(arm, masses, gravity_m_s2, angles) ** 2).mean(axis=0))
+    coordinates[:, machine.drive] = low + (high - low) * np.random.default_rng(0).random((_POSES, arm.joints))
+    torque = machine.forces(coordinates, np.zeros((_POSES, arm.joints + 1)))[0][:, machine.gear]
+    return np.sqrt((torque**2).mean(axis=0))

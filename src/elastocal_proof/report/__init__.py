@@ -1,1 +1,1 @@
-"""The report of the blind proof as PDF: facts and sentences for the Typst template that stands beside them."""
+"""The blind proof as a page of the documentation."""

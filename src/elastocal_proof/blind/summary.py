@@ -1,0 +1,362 @@
+"""The figures of the proof, each beside its target: one counter for all that the plan lists, and the tables of its pictures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from scipy.stats import bootstrap
+
+from elastocal.diagnosis.verdict import CLASS
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import read_json
+from elastocal.random_streams import stream
+from elastocal_proof.blind.cases import GEAR_GRAVITY, PROOF, SEVERAL_JOINTS, TUNED, UNDECLARED
+from elastocal_proof.blind.folders import load_ground_truth
+from elastocal_proof.blind.scores import NONE, headed, intervals_of, leading, outcome, rate, score
+from elastocal_proof.blind.verdicts import ARMS, POSES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from elastocal_proof.blind.cases import Plan
+
+    Tables = Mapping[str, pd.DataFrame]
+    Figure = Mapping[str, Any]
+
+_RESAMPLES, _SEVERAL_AT_ONCE = 2000, 200
+# Held-out errors this near to the oracle's count as its own.
+WITHIN = 1.05
+_BINS = 10
+BY_THE_BEST, OVER_THE_BEST = ", by the best analyst", ", over the best analyst's, on the same cases"
+# Non-centrality at which nine of ten experiments resolve two alternatives at odds of 19 to 1.
+PROMISE = 16.0
+_COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "promised", "arm", "poses_added"]
+_COLUMNS += ["verdict", "found", "named_right", "holds_truth", "wrong_name"]
+# A single name can be right for one effect of the catalogue that measurements can show.
+_ONE_EFFECT = ("single", "setting", "sweep", SEVERAL_JOINTS, GEAR_GRAVITY, UNDECLARED)
+# What may come of a case of the sweep: the right name, a class that contains it, a wrong single name, or anything else.
+OUTCOMES = ("right", "class", "wrong", "other")
+# Upper ends of the bins of the angle between near relatives, degrees.
+_ANGLES = (5.0, 10.0, 20.0, 40.0, 90.0)
+_RELIABILITY = ["robots", "group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
+_COUNTED = ("detected", "holds_truth", "named_right", "wrong_name", "oracle_detected")
+_SIZES = ("signal_rms_m", "signal_over_noise", "times_plausible")
+
+
+def with_target(summary: pd.DataFrame) -> pd.DataFrame:
+    """The figures that have a target, of a summary as it is made or as it is read."""
+    return summary[summary.target.fillna("").ne("")]
+
+
+def rows_of(table: pd.DataFrame) -> Iterator[Any]:
+    """Rows of a table; their attributes are its columns."""
+    return table.itertuples()
+
+
+def summarize(plan: Plan, cases: pd.DataFrame, intervals: pd.DataFrame, seed: int) -> pd.DataFrame:
+    """Every figure of the plan beside its target.
+
+    `cases`: of `scores.score`. `intervals`: of `scores.intervals_of`. `seed`: of the bootstrap. Returns one row for each kind
+    of robots and figure: rates with Clopper-Pearson intervals, ratios with percentile bootstrap intervals [1] over cases.
+    ``target_low`` and ``target_high`` are the range that the target leaves; ``holds`` is empty where there is no target or no
+    case.
+
+    [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3, Chapman and Hall, 1993.
+    """
+    rows: list[dict[str, Any]] = []
+    cases = cases.assign(as_oracle=cases.after_rms_m / cases.oracle_rms_m <= WITHIN)
+    for robots in (PROOF, TUNED):
+        mine = cases[cases.robots == robots]
+        if len(mine):
+            of_these = intervals[intervals.robots == robots] if len(intervals) else intervals
+            tables = {"cases": mine, "statements": mine[mine.stated.notna()], "intervals": of_these}
+            rows += [{"robots": robots} | row for figure in plan["figures"] for row in _counted(plan, figure, tables, seed)]
+    return pd.DataFrame(rows)
+
+
+def of_each_robot(plan: Plan, cases: pd.DataFrame, seed: int) -> dict[str, pd.DataFrame]:
+    """As `summarize`, of each robot of the leading kind by itself, by its name; without intervals of parameters."""
+    mine = cases[cases.robots == leading(cases.robots)]
+    return {str(name): summarize(plan, part, pd.DataFrame(), seed) for name, part in mine.groupby("robot")}
+
+
+def _counted(plan: Plan, figure: Figure, tables: Tables, seed: int) -> Iterator[dict[str, Any]]:
+    """Rows of one entry of the plan's figures."""
+    table = tables[figure.get("table", "cases")]
+    if figure.get("table") == "intervals" and not len(table):
+        return
+    chosen = table.query(figure["of"]) if "of" in figure else table
+    if figure.get("each") == "hard":
+        for name, changes in plan["settings"].items():
+            if changes.get("hard"):
+                part = chosen[chosen.setting == name]
+                yield from _measured(figure, part, figure["words"].format(setting=setting_words(plan, name)), True, seed)
+    elif "by" in figure:
+        for level, part in chosen.groupby(figure["by"]):
+            for entry in figure["parts"]:
+                judged = level in entry.get("levels", [level])
+                yield from _measured(entry, part, entry["words"].format(at=f"at {level:g}"), judged, seed)
+    elif len(chosen) or not figure.get("if_any"):
+        yield from _measured(figure, chosen, figure["words"], True, seed)
+
+
+def setting_words(plan: Plan, setting: str) -> str:
+    """A setting of the cases as people read it."""
+    return str(plan["settings"].get(setting, {}).get("words", setting.replace("_", " ")))
+
+
+def _measured(figure: Figure, part: pd.DataFrame, words: str, judged: bool, seed: int) -> Iterator[dict[str, Any]]:
+    target = figure.get("target") if judged else None
+    measure = figure.get("measure")
+    if measure is None:
+        among = part.query(figure["among"]) if "among" in figure else part
+        yield _row(words, rate(among[str(figure["hits"])]), target)
+    elif measure == "over_limit":
+        sampled = part[part.limit_right.notna()]
+        yield _row(f"{words}{BY_THE_BEST}", rate(sampled[str(figure["best"])] == 1.0), None)
+        hits = sampled[figure["hits"]].to_numpy(float), sampled[figure["best"]].to_numpy(float)
+        found = _bootstrapped(hits, _ratio_of_sums, stream(seed, "blind", f"{words} over the limit", 0))
+        yield _row(f"{words}{OVER_THE_BEST}", found, target)
+    elif measure in ("calibration_error", "by_chance"):
+        yield _row(words, calibration(part, seed)[measure], target)
+    elif measure in ("median_ratio", "mean_ratio"):
+        ratio = (part.after_rms_m / part.oracle_rms_m).to_numpy()
+        name, statistic = ("median", np.median) if measure == "median_ratio" else ("mean", np.mean)
+        yield _row(words, _bootstrapped((ratio,), statistic, stream(seed, "blind", f"{name} ratio", 0)), target)
+    elif measure == "removed":
+        before, after, best = (part[name].to_numpy() ** 2 for name in ("before_rms_m", "after_rms_m", "oracle_rms_m"))
+        draws = stream(seed, "blind", f"removed at {part.level.iloc[0]:g}", 0)
+        yield _row(words, _bootstrapped((before - after, before - best), _ratio_of_sums, draws), target)
+    else:
+        raise ValueError(f"no measure {measure!r}")
+
+
+def _row(words: str, found: Mapping[str, Any], target: Mapping[str, Any] | None) -> dict[str, Any]:
+    aim = {"words": "", "low": np.nan, "high": np.nan} | ({"low": 0.0, "high": 1.0} | dict(target) if target else {})
+    holds = None
+    if target and found["cases"]:
+        holds = bool(aim["low"] <= found["rate"] <= aim["high"] and not found["high"] >= aim.get("below", np.inf))
+    ends = {"target": aim["words"], "target_low": aim["low"], "target_high": aim["high"], "holds": holds}
+    return {"quantity": words} | dict(found) | ends
+
+
+def _ratio_of_sums(removed: np.ndarray, removable: np.ndarray, axis: int = -1) -> np.ndarray:
+    removable = removable.sum(axis=axis)
+    # Where knowing the effect does not help there is nothing to reach.
+    return removed.sum(axis=axis) / np.where(removable > 0, removable, np.nan)
+
+
+def _bootstrapped(
+    samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray], draws: np.random.Generator
+) -> dict[str, Any]:
+    """A statistic with its interval of 95 % over cases."""
+    value = float(statistic(*samples)) if len(samples[0]) else np.nan
+    low = high = np.nan
+    if len(samples[0]) > 1 and np.isfinite(value):
+        found = bootstrap(
+            samples,
+            statistic,
+            n_resamples=_RESAMPLES,
+            batch=_SEVERAL_AT_ONCE,
+            vectorized=True,
+            paired=True,
+            method="percentile",
+            rng=draws,
+        ).confidence_interval
+        low, high = found.low, found.high
+    return {"hits": None, "cases": len(samples[0]), "rate": value, "low": float(low), "high": float(high)}
+
+
+def calibration_error(probability: np.ndarray, correct: np.ndarray) -> np.ndarray:
+    """Expected calibration error: sum over bins of n_b / n |mean stated - share correct|.
+
+    `probability` (..., n): stated, 0 to 1. `correct` (..., n) of bool. Returns (...,). As defined in [1] and [2]. Even of
+    verdicts that are calibrated it is not 0, for the share of few cases scatters.
+
+    [1] Naeini, M. P., Cooper, G. F. and Hauskrecht, M., Obtaining well calibrated probabilities using Bayesian binning, AAAI
+        Conference on Artificial Intelligence, 2015.
+    [2] Guo, C., Pleiss, G., Sun, Y. and Weinberger, K. Q., On calibration of modern neural networks, International Conference
+        on Machine Learning, 2017.
+    """
+    probability, correct = np.broadcast_arrays(np.asarray(probability, float), np.asarray(correct, float))
+    if probability.shape[-1] == 0:
+        return np.full(probability.shape[:-1], np.nan)
+    which = _bin_of(probability)
+    return sum(np.abs(((probability - correct) * (which == b)).sum(axis=-1)) for b in range(_BINS)) / probability.shape[-1]
+
+
+def calibration(rows: pd.DataFrame, seed: int) -> dict[str, dict[str, Any]]:
+    """The expected calibration error, and its mean for verdicts that are calibrated, at the same stated probabilities.
+
+    `rows`: cases of which something was stated. Returns ``calibration_error`` with a basic bootstrap interval [1] of 95 % over
+    cases; ``by_chance``, outcomes drawn by what is stated, as in consistency resampling [2], where what is stated is drawn too.
+
+    [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 5.2, Cambridge University Press,
+        1997.
+    [2] Bröcker, J. and Smith, L. A., Increasing the reliability of reliability diagrams, Weather and Forecasting 22, 2007.
+    """
+    probability, correct = rows.stated.to_numpy(float), rows.correct.to_numpy(bool)
+    error, low, high, chance = float(calibration_error(probability, correct)), np.nan, np.nan, np.nan
+    if len(rows) > 1:
+        draws = stream(seed, "blind", "calibration error", 0)
+        picked = draws.integers(len(rows), size=(_RESAMPLES, len(rows)))
+        again = calibration_error(probability[picked], correct[picked])
+        # The basic interval: a resample of a calibrated sample is less calibrated, by what the sample is already.
+        low, high = np.maximum(2.0 * error - np.quantile(again, [0.975, 0.025]), 0.0)
+        chance = float(calibration_error(probability, draws.random((_RESAMPLES, len(rows))) < probability).mean())
+    found = {"hits": None, "cases": len(rows), "low": float(low), "high": float(high), "rate": error}
+    return {"calibration_error": found, "by_chance": found | {"low": np.nan, "high": np.nan, "rate": chance}}
+
+
+def reliability(cases: pd.DataFrame) -> pd.DataFrame:
+    """Data of the reliability diagram [1].
+
+    Returns one row for each kind of robots, group of cases (``all`` for all of them) and bin that has a case: its ends, the
+    mean of what was stated and the share that was so, with a Clopper-Pearson interval.
+
+    [1] Murphy, A. H. and Winkler, R. L., Reliability of subjective probability forecasts of precipitation and temperature,
+        Applied Statistics 26, 1977.
+    """
+    rows, found = cases[cases.stated.notna()], []
+    for robots in (PROOF, TUNED):
+        mine = rows[rows.robots == robots]
+        for group in ("all", *sorted(set(mine.group))):
+            part = mine if group == "all" else mine[mine.group == group]
+            which = _bin_of(part.stated.to_numpy(float))
+            for number in sorted(set(which.tolist())):
+                inside = part[which == number]
+                ends = {"from": number / _BINS, "to": (number + 1) / _BINS, "stated": inside.stated.mean()}
+                found.append({"robots": robots, "group": group} | ends | rate(inside.correct))
+    return pd.DataFrame(found, columns=_RELIABILITY)
+
+
+def _bin_of(probability: np.ndarray) -> np.ndarray:
+    return np.clip((np.asarray(probability) * _BINS).astype(int), 0, _BINS - 1)
+
+
+def rates(cases: pd.DataFrame) -> pd.DataFrame:
+    """Shares of what came of the cases, with their intervals, and medians of their sizes.
+
+    Returns one row for each kind of robots, group, truth, setting and level, and for ``all`` truths of a group together but
+    those of which the model absorbs everything. What an oracle would do is empty where no model of the catalogue has the
+    effect.
+    """
+    keys, found = ["robots", "group", "truth", "setting", "level", "hidden"], []
+    together = cases[cases.level_of == "retained"].assign(truth="all")
+    for values, part in pd.concat([cases, together]).groupby(keys):
+        row = dict(zip(keys, values, strict=True)) | {"level_of": part.level_of.iloc[0], "cases": len(part)}
+        for name in _COUNTED:
+            row |= headed(name, part[name].dropna())
+        row |= {name: part[name].median() for name in _SIZES}
+        found.append(row | {"retained_share": (part.retained / part.raw).median() ** 0.5})
+    return pd.DataFrame(found)
+
+
+def swept(cases: pd.DataFrame, truths: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """How an effect is named against the angle at which its near relative stands to it, on the plant.
+
+    `truths`: sealed documents by the name of the case. Returns shares of `OUTCOMES` in each bin of the angle, with their
+    intervals, for each pair and for all.
+    """
+    rows = cases[cases.group == "sweep"]
+    relatives = [truths[name]["alternative"] for name in rows.case]
+    pair = [" / ".join(sorted((true, each["effect"]))) for true, each in zip(rows.truth, relatives, strict=True)]
+    angle = np.array([each["angle_deg"] for each in relatives], float)
+    of_class = (rows.verdict == "class") & rows.holds_truth
+    found = np.select([of_class, rows.named_right, rows.wrong_name], ["class", "right", "wrong"], "other")
+    bins = np.array(_ANGLES)[np.minimum(np.searchsorted(_ANGLES, angle), len(_ANGLES) - 1)]
+    table = pd.DataFrame({"pair": pair, "angle_up_to_deg": bins, "outcome": found})
+    shares = []
+    for (name, end), part in pd.concat([table.assign(pair="all"), table]).groupby(["pair", "angle_up_to_deg"], sort=False):
+        row: dict[str, Any] = {"pair": name, "angle_up_to_deg": end, "cases": len(part)}
+        for each in OUTCOMES:
+            row |= headed(each, part.outcome == each)
+        shares.append(row)
+    columns = ["pair", "angle_up_to_deg", "cases", *(f"{name}{end}" for name in OUTCOMES for end in ("", "_low", "_high"))]
+    return pd.DataFrame(shares, columns=columns).sort_values(["pair", "angle_up_to_deg"], ignore_index=True)
+
+
+def followed(
+    plan: Plan,
+    truths: Mapping[str, Mapping[str, Any]],
+    first: Mapping[str, Mapping[str, Any]],
+    anew: Sequence[Mapping[str, Any]],
+    proposals: pd.DataFrame,
+) -> pd.DataFrame:
+    """Score of the verdict on each case followed up, after each number of poses.
+
+    `truths`, `first`: sealed documents, and verdicts on the campaigns as they were, by the name of the case. `anew`: of
+    `diagnosed_anew`. `proposals`: as they were made; ``promised`` is the separation from the nearest alternative that one
+    promises with all its poses, none where it leaves alternatives aside. Returns one row for each case, arm and number of
+    poses, 0 among them. After a single name no more is measured, and it stands.
+    """
+    promised: dict[str, float] = {}
+    if "separation" in proposals:
+        whole = proposals["indistinguishable"].fillna("") == ""
+        nearest = proposals["separation"].where(whole, 0.0).groupby(proposals["case"]).max()
+        promised = {str(case): float(separation) for case, separation in nearest.items()}
+    verdicts = {(entry["campaign"], entry["arm"], entry["poses"]): entry["verdict"] for entry in anew}
+    rows = []
+    for name in sorted({entry["campaign"] for entry in anew}):
+        for arm in ARMS:
+            verdict = first[name]
+            for poses in (0, *POSES):
+                verdict = verdicts.get((name, arm, poses), verdict)
+                row = {"arm": arm, "poses_added": poses, "promised": promised[name]}
+                rows.append(row | outcome(plan, truths[name], verdict))
+    return pd.DataFrame(rows, columns=_COLUMNS)
+
+
+def follow_up_rates(cases: pd.DataFrame) -> pd.DataFrame:
+    """How often the name is right, with its interval, for each kind of robots, cases, arm and number of poses.
+
+    `cases`: of `followed`. ``of``: cases with one effect; those of them whose proposal promises as much separation as the
+    verdict asks for, the others being aliases, exact ones or nearly so; and all others. Columns right_name to high are
+    shares of the cases, the others counts.
+    """
+    one = cases["group"].isin(_ONE_EFFECT) & ~cases["truth"].isin((NONE, "force_scale"))
+    kinds = {"one effect": one, "promising": one & (cases["promised"] >= PROMISE), "other": ~one}
+    rows = []
+    for of, chosen in kinds.items():
+        for (robots, arm, poses), part in cases[chosen].groupby(["robots", "arm", "poses_added"]):
+            right, still, wrong = rate(part["named_right"]), (part["verdict"] == CLASS).sum(), part["wrong_name"].sum()
+            row = {
+                "robots": robots,
+                "of": of,
+                "arm": arm,
+                "poses_added": poses,
+                "cases": len(part),
+                "right_name": right["rate"],
+            }
+            row |= {"low": right["low"], "high": right["high"], "still_class": still, "wrong_name": wrong}
+            rows.append(row | {"other_verdict": len(part) - right["hits"] - still - wrong})
+    columns = ["robots", "of", "arm", "poses_added", "cases", "right_name", "low", "high"]
+    return pd.DataFrame(rows, columns=[*columns, "still_class", "wrong_name", "other_verdict"])
+
+
+def score_cases(job: Any) -> None:
+    """The sealed ground truth against the verdicts."""
+    plan, truths = job.params.plan, load_ground_truth(job.input.sealed, job.input.manifest)
+    verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
+    oracles = {name: found for path in job.input.oracles for name, found in read_json(path).items()}
+    cases = pd.DataFrame([score(plan, truth, verdicts[name], **oracles[name]) for name, truth in truths.items()])
+    intervals = pd.DataFrame([row for name, truth in truths.items() for row in intervals_of(plan, truth, verdicts[name])])
+    write_csv(job.output.cases, cases)
+    write_csv(job.output.intervals, intervals)
+    write_csv(job.output.rates, rates(cases))
+    write_csv(job.output.reliability, reliability(cases))
+    write_csv(job.output.summary, summarize(plan, cases, intervals, job.params.seed))
+    write_csv(job.output.sweep, swept(cases, truths))
+
+
+def score_follow_ups(job: Any) -> None:
+    """How often the name is right after further poses: the sealed ground truth against the verdict then."""
+    truths = load_ground_truth(job.input.sealed, job.input.manifest)
+    first = {verdict["campaign"]: verdict for path in job.input.first for verdict in read_json(path)}
+    anew = [entry for path in job.input.anew for entry in read_json(path)]
+    proposals = pd.concat([pd.read_csv(path) for path in job.input.proposals], ignore_index=True)
+    cases = followed(job.params.plan, truths, first, anew, proposals)
+    write_csv(job.output.cases, cases)
+    write_csv(job.output.rates, follow_up_rates(cases))

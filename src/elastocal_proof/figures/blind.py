@@ -1,0 +1,173 @@
+"""Pictures of the blind proof: every figure against its target, stated probabilities against frequencies, power by size."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from elastocal.figures.style import PALETTE, ink_on, note, panels, save, styled
+from elastocal.io.origin import Origin
+from elastocal_proof.blind.cases import PROOF, TUNED
+from elastocal_proof.blind.scores import leading
+from elastocal_proof.blind.summary import rows_of, with_target
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D", "robots on which it was developed")}
+_AIM = "#cfe8d5"
+_LINE = 40
+_PER_CENT, _FARTHEST = 100.0, 10.0
+_PANELS = {
+    "oracle_detected": "the oracle\ndetects",
+    "detected": "detected",
+    "holds_truth": "right name, alone\nor in a class",
+    "named_right": "right name alone",
+}
+# Never black, so that the numbers can be read everywhere.
+_SHARES = LinearSegmentedColormap.from_list("shares", ["#ffffff", "#c6dbef", "#4292c6", "#08519c"])
+_LEAST_WRITTEN = 0.045
+_ALL = "all"
+
+
+@styled
+def rates_and_targets(summary: pd.DataFrame) -> Figure:
+    """Every figure that has a target, with its interval and the range that the target leaves.
+
+    `summary`: of reports/blind/summary.csv.
+    """
+    aimed = with_target(summary)
+    ratio = aimed.quantity.str.contains("over the oracle")
+    names = [list(dict.fromkeys(part.quantity)) for part in (aimed[~ratio], aimed[ratio])]
+    # Shares of what the best analyst finds may exceed all of it.
+    largest = max(102.0, 1.05 * _PER_CENT * np.nanmax(aimed[~ratio].high.to_numpy(float), initial=0.0))
+    heights = [max(len(part), 1) for part in names]
+    figure, axes = panels(2, 1, 32 + 7.4 * sum(heights), height_ratios=heights)
+    _dots(axes[0, 0], aimed[~ratio], names[0], lambda value: _PER_CENT * value)
+    axes[0, 0].set(xlim=(-2, largest), xlabel="share of cases, or of what the best analyst finds (%)")
+    _dots(axes[1, 0], aimed[ratio], names[1], lambda value: _PER_CENT * (value - 1.0))
+    farthest = np.nanmax(np.abs(_PER_CENT * (aimed[ratio][["rate", "low", "high"]].to_numpy(float) - 1.0)), initial=6.0)
+    axes[1, 0].set(xlim=(-1.1 * farthest, 1.1 * farthest), xlabel="held-out RMS above the oracle's (%)")
+    looks = [look for robots, look in LOOKS.items() if robots in set(aimed.robots)]
+    handles: list[Artist] = [
+        Line2D([], [], color=color, marker=marker, markersize=4.5, linewidth=1.2, label=label) for color, marker, label in looks
+    ]
+    handles.append(Patch(color=_AIM, label="target"))
+    figure.legend(handles=handles, title="bars are 95 % intervals", title_fontsize=7.5, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _dots(axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[float], float]) -> None:
+    robots = [key for key in LOOKS if key in set(rows.robots)]
+    for aim in rows_of(rows.drop_duplicates("quantity")):
+        place: float = names.index(aim.quantity)
+        # A target without an upper end goes as far as anything is drawn.
+        low, high = scaled(aim.target_low), scaled(min(aim.target_high, _FARTHEST))
+        # A target of a single value is a line that can be seen.
+        axis.barh(place, max(high - low, 0.8), left=low - (0.4 if high == low else 0.0), height=0.86, color=_AIM, zorder=0)
+    for number, key in enumerate(robots):
+        color, marker, _ = LOOKS[key]
+        for row in rows_of(rows[rows.robots == key]):
+            place = names.index(row.quantity) + 0.32 * (number - (len(robots) - 1) / 2)
+            if not np.isfinite(row.rate):
+                # The interval of nothing is everything, which would look like a result.
+                at = "axes fraction", "data"
+                axis.annotate("no cases", (0.01, place), xycoords=at, va="center", color=color, fontsize=7)
+                continue
+            axis.plot([scaled(row.low), scaled(row.high)], [place, place], color=color, linewidth=1.2)
+            axis.plot(scaled(row.rate), place, marker, color=color, markersize=4.2)
+    axis.set(yticks=range(len(names)), ylim=(len(names) - 0.4, -0.6))
+    axis.set_yticklabels([textwrap.fill(name, _LINE) for name in names], fontsize=7)
+    axis.grid(visible=False, axis="y")
+    axis.set_axisbelow(True)
+
+
+@styled
+def reliability_diagram(reliability: pd.DataFrame) -> Figure:
+    """Shares of cases whose most probable set of mechanisms is true, against what was stated, and numbers of cases.
+
+    `reliability`: of reports/blind/reliability.csv.
+    """
+    rows = reliability[reliability.group == _ALL]
+    if rows.empty:
+        return note("No verdict of this run states a probability.")
+    figure, axes = panels(2, 1, 118, height_ratios=(3, 1), sharex=True)
+    shares, counts = axes[0, 0], axes[1, 0]
+    shares.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=":")
+    present = [robots for robots in LOOKS if robots in set(rows.robots)]
+    for number, robots in enumerate(present):
+        color, marker, label = LOOKS[robots]
+        part = rows[rows.robots == robots]
+        errors = [part.rate - part.low, part.high - part.rate]
+        shares.errorbar(part.stated, part.rate, errors, color=color, marker=marker, markersize=4.5, linewidth=1.2, label=label)
+        width = (part["to"] - part["from"]) * 0.8 / len(present)
+        left = part["from"] + 0.1 * (part["to"] - part["from"]) + number * width
+        counts.bar(left, part.cases, width, align="edge", color=color)
+    shares.set(xlim=(0, 1), ylim=(0, 1), ylabel="share of cases in which it is true")
+    counts.set(yscale="log", xlabel="stated probability of the most probable mechanisms", ylabel="cases")
+    shares.legend(loc="upper left")
+    return figure
+
+
+@styled
+def power_map(rates: pd.DataFrame) -> Figure:
+    """Shares detected and named for each effect and size, beside the oracle that knows the effect.
+
+    `rates`: of reports/blind/rates.csv.
+    """
+    single = rates[(rates.robots == leading(rates.robots)) & (rates.group == "single")]
+    if single.empty:
+        return note("This run has no case with one effect.")
+    table, levels = single.set_index(["truth", "level"]), sorted(single.level.unique())
+    at_largest = single[single.level == max(levels)].set_index("truth")["named_right"]
+    effects = sorted((name for name in at_largest.index if name != _ALL), key=lambda name: (-at_largest[name], name))
+    effects += [_ALL] * (_ALL in set(single.truth))
+    figure, axes = panels(1, len(_PANELS), 34 + 4.6 * len(effects), sharey=True)
+    for axis, (column, title) in zip(axes[0], _PANELS.items(), strict=True):
+        shares = table[column].reindex(pd.MultiIndex.from_product([effects, levels])).to_numpy(float)
+        _heat(axis, shares.reshape(len(effects), len(levels)))
+        axis.set(xticks=range(len(levels)), yticks=range(len(effects)), title=title, xlabel="non-centrality")
+        axis.set_xticklabels([f"{level:g}" for level in levels])
+        if _ALL in effects:
+            axis.axhline(len(effects) - 1.5, color="black", linewidth=0.8)
+    raw = set(single[single.level_of == "raw"].truth)
+    known = {_ALL: "all effects"}
+    labels = [known.get(name, name.replace("_", " ")) + (" *" if name in raw else "") for name in effects]
+    axes[0, 0].set_yticklabels(labels, fontsize=7)
+    words = "Numbers are shares of cases in %."
+    if raw:
+        words += "\n* Wholly absorbed by the joint compliances: the size is that before absorption; not among all effects."
+    figure.supxlabel(words, fontsize=7)
+    return figure
+
+
+def _heat(axis: Axes, shares: np.ndarray) -> None:
+    axis.imshow(np.ma.masked_invalid(shares), cmap=_SHARES, vmin=0, vmax=1, interpolation="nearest", aspect="auto")
+    for row, column in np.argwhere(np.nan_to_num(shares) >= _LEAST_WRITTEN):
+        ink, text = ink_on(_SHARES(shares[row, column])), f"{_PER_CENT * shares[row, column]:.0f}"
+        axis.text(column, row, text, ha="center", va="center", fontsize=6.5, color=ink)
+    axis.tick_params(length=0)
+    axis.grid(visible=False)
+    axis.spines[:].set_visible(False)
+
+
+def draw_blind(job: Any) -> None:
+    """All pictures of the proof, by their names."""
+    drawn: dict[str, tuple[Callable[[Any], Figure], str]] = {
+        "targets": (rates_and_targets, "summary"),
+        "reliability": (reliability_diagram, "reliability"),
+        "power": (power_map, "rates"),
+    }
+    for name, (draw, table) in drawn.items():
+        figure = draw(pd.read_csv(job.input[table]))
+        save(figure, job.output[f"{name}_pdf"], job.output[name], Origin(**job.config["origin"]))

@@ -1,0 +1,377 @@
+"""Defects that the catalogue has, as functions of robot, size, draws of their details, and joints from 0.
+
+Laws are those of machines rather than of regressions: a dead band with edges, a stiffness that steps, a hysteresis with a
+history; none is the catalogue's formula where a machine would do otherwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal_proof.plant.instruments import Drift, Move
+from elastocal_proof.plant.kinds import (
+    TURN,
+    Applied,
+    Draws,
+    built,
+    direction,
+    drawn_frame,
+    driven,
+    each_joint,
+    each_link,
+    each_pair,
+    geared,
+    kind,
+    named,
+    nowhere,
+    shoulder,
+    sign,
+    stiff_by_angle,
+    usual_torque_Nm,
+    waving,
+    weighed,
+    weighing_links,
+    wrong_cell,
+)
+from elastocal_proof.plant.machine import Compensator, Mass, TaperedTube
+from elastocal_proof.plant.weights import declared_masses, on_stretches
+
+if TYPE_CHECKING:
+    from elastocal_proof.plant.physical_robot import DriveLaw, PhysicalRobot, Schedule
+
+# Radius of a bearing, and how thick a link is.
+_BEARING_M, _LINK_M = 0.15, 0.25
+# In the first half of the training poses, with repeats and without, at a state in 25 s.
+_KNOCKED_S = (700.0, 2000.0)
+_HISTORY_STEPS = 48
+
+# Geometry
+
+
+@kind("joint_offset", "rad", 3e-4, each_joint)
+def joint_offset(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    size = size * sign(draws)
+    return driven(robot, joint, lambda done: np.full(len(done.angle), size)), {"offset": size}
+
+
+@kind("link_geometry", "m", 3e-4, each_joint)
+def link_geometry(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """A wrong vector, and a wrong turn of as many milliradians as it has millimetres."""
+    vector, turn, old = size * direction(draws), size * direction(draws), robot.structure
+    vectors, turns = old.wrong_vectors_m | {joint + 1: tuple(vector)}, old.wrong_turns | {joint + 1: tuple(turn)}
+    # The catalogue counts along the axes at the far end of the link.
+    parameters = named("d", robot.arm.stretches[joint + 1].rotation.T @ vector) | named("r", turn)
+    return built(robot, wrong_vectors_m=vectors, wrong_turns=turns), parameters
+
+
+# A wrong wavelength, at which the frame of the base was measured too.
+kind("tracker_scale", "1", 2e-5, nowhere)(
+    lambda robot, size, draws: (replace(robot, tracker=replace(robot.tracker, scale=size)), {"scale": size})
+)
+# Gravity
+
+
+@kind("link_weight", "kg", 100.0, weighed, scale=(0.0, 1.0))
+def link_weight(robot: PhysicalRobot, size: float, draws: Draws, *joints: int) -> Applied:
+    """Weight of the upper arm, which turns joint 2, of the forearm, which turns the elbow too, or of all links.
+
+    By the joints that it turns: of one link beside its line, or of all as their masses are declared.
+    """
+    arm, old = robot.arm, robot.structure.masses
+    link = weighing_links(arm).get(tuple(joint + 1 for joint in joints))
+    if link is not None:
+        along, aside = draws.uniform(0.25, 0.6), tuple(draws.uniform(-0.06, 0.06, 3))
+        return built(robot, masses=(*old, Mass(link, size, along, aside))), {}
+    masses = [mass for mass in on_stretches(declared_masses(arm), arm) if mass.stretch > 1]
+    total = sum(mass.mass_kg for mass in masses)
+    return built(robot, masses=(*old, *(replace(mass, mass_kg=size * mass.mass_kg / total) for mass in masses))), {}
+
+
+@kind("payload", "kg", 25.0, nowhere, scale=(0.0, 1.0))
+def payload(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    centre = 0.15 * direction(draws)
+    heavier = built(robot, payload=Mass(robot.arm.joints, size, 1.0, tuple(centre)))
+    return heavier, {"mass": size} | named("moment_", size * centre)
+
+
+@kind("compensator_torque", "N/m", 1e5, shoulder)
+def compensator_torque(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """A coil spring whose pull the controller does not know."""
+    anchor = (-draws.uniform(0.25, 0.4), 0.0, -draws.uniform(0.1, 0.3))
+    crank = (draws.uniform(0.12, 0.22), 0.0, draws.uniform(-0.08, 0.08))
+    return built(robot, compensator=Compensator(anchor, crank, size, draws.uniform(0.2, 0.35))), {}
+
+
+# Transmission
+
+
+@kind("transmission_harmonic", "rad", 8e-5, each_joint)
+def transmission_harmonic(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """An eccentric wheel that turns with the joint: an order of 1 or 2 but for creep, and half as much of its double."""
+    order, phases = draws.choice([1, 2]) * draws.uniform(0.98, 1.02), draws.uniform(0, TURN, 2)
+    other = 2 * order if order < 1.5 else order / 2
+    return waving(robot, joint, (order, size, phases[0]), (other, 0.5 * size, phases[1])), {}
+
+
+@kind("transmission_ratio", "rad/rad", 3e-4, each_joint)
+def transmission_ratio(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """Of the joint's own ratio, or what the joint before it turns along."""
+    of = joint if joint == 0 else joint - int(draws.integers(2))
+    size = size * sign(draws)
+    return driven(robot, joint, lambda done: size * done.angle[:, of]), {f"per_q{of + 1}": size}
+
+
+@kind("bearing_runout", "m", 3e-5, each_joint)
+def bearing_runout(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """The axis of a joint moves to and fro by `size`, once a turn across it and twice across both; so it wobbles at its edge.
+
+    An axis that circled once with the joint, or against it, would be a link of other dimensions.
+    """
+    phases, old, number = draws.uniform(0, TURN, 4), robot.structure, joint + 1
+    tilt = old.tilt | {number: old.tilt.get(number, (0.0, 0.0))}
+
+    def runout(order: int, size: float, phase: float) -> DriveLaw:
+        return lambda done: size * np.cos(order * done.angle[:, joint] - phase)
+
+    laws = []
+    for which, order in enumerate((1, 2)):
+        laws.append((f"shift{number}_{which}", runout(order, size, phases[which])))
+        laws.append((f"tilt{number}_{which}", runout(order, size / _BEARING_M, phases[2 + which])))
+    loose = built(robot, loose=tuple({*old.loose, number}), tilt=tilt)
+    return replace(loose, offsets=(*robot.offsets, *laws)), {}
+
+
+@kind("motor_eccentricity", "rad", 6e-5, each_joint)
+def motor_eccentricity(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """A wheel on the motor's shaft: once and twice a turn of the motor, which is no whole number of turns of the joint."""
+    order, phases = robot.arm.gear_ratio[joint], draws.uniform(0, TURN, 2)
+    return waving(robot, joint, (order, size, phases[0]), (2.0 * order, 0.4 * size, phases[1])), {}
+
+
+@kind("transmission_order", "rad", 8e-5, each_joint)
+def transmission_order(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """A planet or a cage: an order between two integers, and a quarter as much of its double.
+
+    No higher than some twenty poses can show; `short_waves` are.
+    """
+    order, phases = draws.integers(2, 5) + draws.uniform(0.25, 0.75), draws.uniform(0, TURN, 2)
+    return waving(robot, joint, (order, size, phases[0]), (2.0 * order, 0.25 * size, phases[1])), {}
+
+
+# Elasticity
+
+
+@kind("link_elasticity", "1/(N m^2)", 1e-7, each_link, scale=(1.0, 0.0))
+def link_elasticity(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """A tapered tube that also shears and stretches, as a thin-walled one of a quarter metre does."""
+    bending, gyration = 1.0 / size, 0.25**2 / 8.0
+    axial = bending / gyration
+    tube = TaperedTube(bending, 0.77 * bending, axial, 0.5 * axial / 2.6, draws.uniform(0.1, 0.35))
+    return built(robot, tubes=robot.structure.tubes | {joint + 1: tube}), {}
+
+
+@kind("joint_tilt", "rad/(N m)", 2e-7, each_joint, scale=(1.0, 0.0))
+def joint_tilt(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    values = size * draws.uniform(0.4, 1.0, 2)
+    across = [axis for axis, part in zip("xyz", robot.arm.axes[joint], strict=True) if abs(part) < 0.5]
+    return built(robot, tilt=robot.structure.tilt | {joint + 1: tuple(values)}), named("tilt_about_", values, across)
+
+
+@kind("base_compliance", "rad/(N m)", 6e-8, nowhere, scale=(1.0, 0.0))
+def base_compliance(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    """Anchor bolts: the two tilts and the two shifts differ a little."""
+    uneven, horizontal, vertical = draws.uniform(0.85, 1.15, 4), 0.2 * size, 0.1 * size
+    base = (horizontal * uneven[0], horizontal * uneven[1], vertical, size * uneven[2], size * uneven[3], 0.0)
+    return built(robot, base=base), {"vertical": vertical}
+
+
+@kind("cross_compliance", "rad/(N m)", 8e-8, each_pair, scale=(1.0, 0.0))
+def cross_compliance(robot: PhysicalRobot, size: float, draws: Draws, one: int, other: int) -> Applied:
+    """Two gears in one housing: theta_i = c tau_j, theta_j = c tau_i."""
+    size = size * sign(draws)
+    coupled = ((one, lambda _, torque, __: size * torque[:, other]), (other, lambda _, torque, __: size * torque[:, one]))
+    return replace(robot, gears=(*robot.gears, *coupled)), {"compliance": size}
+
+
+kind("joint_dependent_stiffness", "1", 0.1, each_joint, largest=0.8)(
+    lambda robot, size, draws, joint: (stiff_by_angle(robot, joint, joint, size, draws.uniform(0, TURN)), {})
+)
+
+
+@kind("compensator_stiffness", "N/m", 3e6, shoulder)
+def compensator_stiffness(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """Stiffness that a coil spring adds at the shoulder, whose torque the controller has taken care of.
+
+    With anchor at distance a, crank at L and free length s0, s^2 = a^2 + L^2 - 2 a L cos(u), u = q - u0, the spring stores
+    k (s - s0)^2 / 2, whose second derivative is k_c = k a L [cos u (1 - s0/s) + (a L sin^2 u) s0 / s^3].
+    theta = (1 / (1/c + k_c) - c) tau.
+    """
+    anchor, crank, free = draws.uniform(0.3, 0.5), draws.uniform(0.15, 0.22), draws.uniform(0.15, 0.3)
+    zero, compliance, product = draws.uniform(-np.pi, np.pi), robot.compliance[joint], anchor * crank
+
+    def turn(done: Schedule, torque: np.ndarray) -> np.ndarray:
+        u = done.angle[:, joint] - zero
+        s = np.sqrt(anchor**2 + crank**2 - 2.0 * product * np.cos(u))
+        added = size * product * (np.cos(u) * (1.0 - free / s) + product * np.sin(u) ** 2 * free / s**3)
+        return (1.0 / (1.0 / compliance + added) - compliance) * torque
+
+    return geared(robot, joint, turn), {}
+
+
+@kind("flange_flexibility", "rad/(N m)", 2e-7, nowhere, scale=(1.0, 0.0))
+def flange_flexibility(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    """A tool changer between flange and target: it turns in three directions, and shifts by a tenth of a metre's lever."""
+    turns, shifts = size * draws.uniform(0.4, 1.0, 3), 0.01 * size * draws.uniform(0.4, 1.0, 3)
+    flange = np.array(robot.structure.flange or (0.0,) * 6) + np.concatenate([shifts, turns])
+    return built(robot, flange=tuple(flange)), named("shift_", shifts) | named("turn_", turns)
+
+
+# Gearboxes
+
+
+@kind("stiffening", "1", 0.3, each_joint, largest=0.95)
+def stiffening(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """Teeth that come to bear one after another: beyond each of three torques the compliance falls by a third of its share.
+
+    theta = - sum_k d sign(tau) max(|tau| - tau_k, 0).
+    """
+    starts = usual_torque_Nm(robot, joint) * np.sort(draws.uniform(0.1, 0.8, 3))
+    drop = size * robot.compliance[joint] / 3
+
+    def turn(done: Schedule, torque: np.ndarray) -> np.ndarray:
+        return -np.sign(torque) * drop * np.maximum(np.abs(torque)[:, None] - starts, 0.0).sum(axis=1)
+
+    return geared(robot, joint, turn), {}
+
+
+@kind("lost_motion", "rad", 7e-5, each_joint)
+def lost_motion(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """Play between flanks that only a seal's weak spring bridges: theta = D clip(tau / tau_t, -1, 1).
+
+    In series with the gear's spring, so that beyond the torque tau_t that closes the gap the flanks lie on each other and the
+    play adds a constant D, half of the gap.
+    """
+    closing = usual_torque_Nm(robot, joint) * draws.uniform(0.02, 0.1)
+    return geared(robot, joint, lambda _, torque: size * np.clip(torque / closing, -1.0, 1.0)), {"half_play": size}
+
+
+@kind("hysteresis", "rad", 5e-5, each_joint, needs=("approach",))
+def hysteresis(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """Friction that remembers, theta = -h z, with z by the Bouc-Wen model over a torque tau_h; see `wound`.
+
+    Friction holds back: an arm that came in the sense s stays behind its drive, z = s with all of its friction wound up. Each
+    change of the load then moves z along a loop that depends on the order of loads and not on their speed. h / tau_h must be
+    less than the gear's compliance, or the arm would recede from a push. Under load part of the wound-up friction turns round,
+    so that the mean half width is less than that at rest. The catalogue's half width is counted along the approach, and
+    friction is against it.
+    """
+    over = usual_torque_Nm(robot, joint) * draws.uniform(2.0, 6.0)
+
+    def turn(done: Schedule, torque: np.ndarray, unloaded: np.ndarray) -> np.ndarray:
+        z, now = done.sense[:, joint].astype(float), torque[:, joint]
+        fresh = done.previous < 0
+        z[fresh] = wound(z[fresh], (now - unloaded[:, joint])[fresh] / over)
+        # A state follows one of a smaller number, so that in order each finds its past done.
+        for state in np.flatnonzero(~fresh):
+            before = done.previous[state]
+            z[state] = wound(z[before : before + 1], (now[state : state + 1] - now[before]) / over)[0]
+        return -size * z
+
+    return replace(robot, gears=(*robot.gears, (joint, turn))), {"half_width": -size}
+
+
+def wound(z: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Friction z (S,) of the Bouc-Wen model [1] after the torque, over tau_h, has changed steadily by `change` (S,).
+
+    dz = dx (1 - z^2 (sign(z dx) + 1) / 2): unloading starts along the straight line of slope 1. By the midpoint method.
+
+    [1] Wen, Y.-K., Method for random vibration of hysteretic systems, Journal of the Engineering Mechanics Division ASCE 102,
+        1976.
+    """
+    step = change / _HISTORY_STEPS
+
+    def slope(z: np.ndarray) -> np.ndarray:
+        return 1.0 - z**2 * (0.5 * np.sign(z * step) + 0.5)
+
+    for _ in range(_HISTORY_STEPS):
+        z = np.clip(z + step * slope(z + 0.5 * step * slope(z)), -1.0, 1.0)
+    return z
+
+
+# Load
+
+
+kind("force_scale", "1", 0.02, nowhere, largest=0.1)(
+    lambda robot, size, draws: (replace(robot, cell=replace(robot.cell, scale=1.0 / (1.0 + size) - 1.0)), {"scale": size})
+)
+
+
+@kind("force_misalignment", "rad", 0.02, nowhere)
+def force_misalignment(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    turn = size * direction(draws)
+    return wrong_cell(robot, "turn", draws, named("about_", turn), turn_rad=tuple(turn))
+
+
+@kind("force_bias", "N", 20.0, nowhere, scale=(0.0, 1.0))
+def force_bias(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    """What is felt beyond what is shown is minus the bias of the display."""
+    felt = size * direction(draws)
+    return wrong_cell(robot, "bias", draws, named("along_", felt), bias_N=tuple(-felt))
+
+
+@kind("application_point", "m", 0.02, nowhere)
+def application_point(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    shift, frame = size * direction(draws), drawn_frame(robot, "shift", draws)
+    return replace(robot, cell=replace(robot.cell, shift_m=tuple(shift), in_flange=frame)), named("shift_", shift)
+
+
+# Drift
+
+
+@kind("frame_drift", "m/h", 1e-4, nowhere, needs=("time",))
+def frame_drift(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    """A stand that settles over hours, and so drifts less at the end than at the start."""
+    drift = Drift(tuple(size * direction(draws)), tuple(0.5 * size * direction(draws)), draws.uniform(3.0, 8.0))
+    return replace(robot, tracker=replace(robot.tracker, drift=drift)), {}
+
+
+# The castings follow the thermometer with a lag, which the catalogue's law by temperature does not know.
+kind("thermal_growth", "1/K", 1.2e-5, nowhere, needs=("temperature",))(
+    lambda robot, size, draws: (replace(robot, expansion_per_K=size), {})
+)
+
+
+@kind("setup_step", "m", 1e-3, nowhere)
+def setup_step(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    """The tracker's stand is knocked between two rows: a shift, and a turn about the stand of as much at three metres."""
+    move = Move(draws.uniform(*_KNOCKED_S), tuple(size * direction(draws)), tuple(size / 3.0 * direction(draws)))
+    return replace(robot, tracker=replace(robot.tracker, move=move)), {}
+
+
+@kind("temperature_gradient", "1/K", 1.2e-5, lambda arm: [(), *each_link(arm)], needs=("temperature",))
+def temperature_gradient(robot: PhysicalRobot, size: float, draws: Draws, *joints: int) -> Applied:
+    """Motors at the foot and a cold tip, beside what the arm grows on average; or a link that is warmer on one side."""
+    arm, size, warmth = robot.arm, size * sign(draws), robot.warmth
+    if not joints:
+        share = np.linspace(1.0, -1.0, arm.joints + 1)
+        mean = share @ arm.lengths_m / arm.lengths_m.sum()
+        return replace(robot, gradient_per_K=tuple(np.array(robot.gradient_per_K) + size * (share[[0, -1]] - mean))), {}
+    link, about = joints[0] + 1, draws.uniform(0, TURN)
+    pieces, tubes = robot.structure.segments, {link: TaperedTube(np.inf, np.inf)} | robot.structure.tubes
+    bend = size * arm.lengths_m[link] / _LINK_M / pieces
+
+    def warm(per_kelvin: float) -> DriveLaw:
+        return lambda done: per_kelvin * warmth.of_castings(done.time_s)
+
+    parts = [warm(bend * np.cos(about)), warm(bend * np.sin(about))]
+    laws = ((f"link{link}_{piece}_bend{which}", parts[which]) for piece in range(pieces) for which in range(2))
+    return replace(built(robot, tubes=tubes), offsets=(*robot.offsets, *laws)), {}
+
+
+@kind("nest_eccentricity", "m", 1e-4, nowhere)
+def nest_eccentricity(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    turns = robot.arm.stretches[-1].rotation.T @ robot.arm.axes[-1]
+    return replace(robot, tracker=replace(robot.tracker, nest=(size, int(np.argmax(np.abs(turns)))))), {}

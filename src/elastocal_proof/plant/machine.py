@@ -1,0 +1,383 @@
+"""An arm as a MuJoCo model [1], and where it comes to rest.
+
+Each drive is a commanded hinge and, in series, a hinge that springs; foot, bearings and flange spring too, and elastic links
+are Timoshenko beams [2] lumped into segments. Kinematics and the forces on all coordinates are MuJoCo's; what a spring yields
+under its force is the plant's own law, so the model itself has no joint stiffness.
+
+[1] Todorov, E., Erez, T. and Tassa, Y., MuJoCo: a physics engine for model-based control, IEEE/RSJ International Conference on
+    Intelligent Robots and Systems, 2012.
+[2] Timoshenko, S. P., On the correction for shear of the differential equation for transverse vibrations of prismatic bars,
+    Philosophical Magazine 41, 1921.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from scipy.constants import g as standard_gravity
+from scipy.spatial.transform import Rotation
+
+from elastocal.errors import InputError
+from elastocal_proof.plant.arm import Arm, Stretch, turned
+
+# Start of the names of some structural springs, and what they deflect by, beyond their compliance, under a force (S,).
+StructureLaw = tuple[str, Callable[[np.ndarray], np.ndarray]]
+# MuJoCo wants mass in each moving body; this weighs nothing beside a load of newtons.
+_NOTHING_KG = 1e-12
+_SWEEPS = 60
+# Of the largest deflection: a hundredth of a picometre of millimetres.
+_TOLERANCE = 1e-11
+_NOWHERE = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class TaperedTube:
+    """An elastic link: a thin-walled tube that gets thinner towards its far end.
+
+    `bending_Nm2`, `torsion_Nm2`: E I and G J at its near end. `axial_N`, `shear_N`: E A and k G A; inf where the link does not
+    stretch or shear. `taper`: share of the diameter that is lost at the far end; E I and G J go with its third power, E A and k
+    G A with itself.
+    """
+
+    bending_Nm2: float
+    torsion_Nm2: float
+    axial_N: float = np.inf
+    shear_N: float = np.inf
+    taper: float = 0.0
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A weight on a stretch.
+
+    `stretch`: 0 is the column, n the flange. `along`: where on the stretch, 0 at its near end, 1 at its far end. `aside_m`: and
+    how far off the line, in the frame at the near end.
+    """
+
+    stretch: int
+    mass_kg: float
+    along: float = 0.5
+    aside_m: tuple[float, ...] = _NOWHERE
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """A coil spring from the carousel to the upper arm: pull = stiffness (length - free length).
+
+    `anchor_m`: fixed end, from the shoulder, in the frame that turns with joint 1. `crank_m`: moving end, from the shoulder, in
+    the frame of the upper arm.
+    """
+
+    anchor_m: tuple[float, ...]
+    crank_m: tuple[float, ...]
+    stiffness_N_per_m: float
+    free_length_m: float
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Everything of an arm that its robot file does not declare. The default is an arm of drives alone.
+
+    `base`: compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)). `flange`: the same between the last
+    stretch and the flange, in the flange's frame. `tilt` (float, float): of a joint, from 1: compliances across its axis,
+    rad/(N m), in the order of the remaining axes. `loose`: joints, from 1, whose bearings let the arm shift across the axis, by
+    what `PhysicalRobot.offsets` say. `tubes`: elastic stretches. `segments`: into how many rigid pieces an elastic stretch is
+    cut. `payload`: its place counts from the flange: ``aside_m`` in the flange's frame. `wrong_vectors_m`, `wrong_turns`: of a
+    stretch: by how much its vector and its far end's rotation vector (rad) differ from the robot file. `gravity_m_s2`: in the
+    axes of the base.
+    """
+
+    base: tuple[float, ...] = ()
+    flange: tuple[float, ...] = ()
+    tilt: dict[int, tuple[float, float]] = field(default_factory=dict)
+    loose: tuple[int, ...] = ()
+    tubes: dict[int, TaperedTube] = field(default_factory=dict)
+    segments: int = 6
+    masses: tuple[Mass, ...] = ()
+    payload: Mass | None = None
+    compensator: Compensator | None = None
+    wrong_vectors_m: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    wrong_turns: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    gravity_m_s2: tuple[float, ...] = (0.0, 0.0, -standard_gravity)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A compiled model and where in it what is.
+
+    `drive`, `gear` (n,) of int: coordinates that are commanded, and those that spring behind them. `springs`: structural
+    coordinates by name, such as ``base_x``, ``tilt2_0``, ``link3_4_bend0``. `compliance` (coordinates,): of structural springs,
+    m/N or rad/(N m); zero elsewhere. `sites` (points,) of int: measuring points, the flange last. `links` (n + 1,) of int:
+    bodies of the foot and of the links behind the drives. `body_stretch`, `site_stretch` (bodies,) of int, (all sites,):
+    stretch of whose vector the place of each body and site is a part.
+    """
+
+    model: mujoco.MjModel
+    drive: np.ndarray
+    gear: np.ndarray
+    springs: dict[str, int]
+    compliance: np.ndarray
+    sites: np.ndarray
+    links: np.ndarray
+    body_stretch: np.ndarray
+    site_stretch: np.ndarray
+
+    def forces(
+        self, coordinates: np.ndarray, growth: np.ndarray, wrench: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Generalized forces of weight, compensator and a wrench on all coordinates, and where the measuring points are.
+
+        `coordinates` (S, coordinates). `growth` (S, n + 1): relative growth of all lengths of each stretch. `wrench` (S, 6): at
+        the flange, base axes. Returns `force` (S, coordinates), N m, N; `position`, `rotation` (S, points, 3),
+        (S, points, 3, 3).
+        """
+        model, data, flange = self.model, mujoco.MjData(self.model), self.sites[-1]
+        count, body = len(coordinates), model.site_bodyid[flange]
+        force, weight, push = np.empty((count, model.nv)), np.empty(model.nv), np.zeros(model.nv)
+        position, rotation = np.empty((count, model.nsite, 3)), np.empty((count, model.nsite, 9))
+        bodies, sites = model.body_pos.copy(), model.site_pos.copy()
+        changed = np.any(np.diff(growth, axis=0, prepend=0.0), axis=1).tolist()
+        # MuJoCo's own arrays, seen through views that follow each call.
+        place, points, turns, springs = data.qpos, data.site_xpos, data.site_xmat, data.qfrc_passive
+        try:
+            for state, row in enumerate(coordinates):
+                if changed[state]:
+                    model.body_pos[:] = bodies * (1.0 + growth[state, self.body_stretch, None])
+                    model.site_pos[:] = sites * (1.0 + growth[state, self.site_stretch, None])
+                place[:] = row
+                mujoco.mj_kinematics(model, data)
+                mujoco.mj_comPos(model, data)
+                mujoco.mj_rne(model, data, 0, weight)
+                if model.ntendon:
+                    mujoco.mj_tendon(model, data)
+                    mujoco.mj_passive(model, data)
+                position[state], rotation[state] = points, turns
+                if wrench is not None:
+                    push[:] = 0.0
+                    mujoco.mj_applyFT(model, data, wrench[state, :3], wrench[state, 3:], points[flange], body, push)
+                force[state] = push + springs - weight
+        finally:
+            model.body_pos[:], model.site_pos[:] = bodies, sites
+        return force, position[:, self.sites], rotation.reshape(count, -1, 3, 3)[:, self.sites]
+
+
+class _Tree:
+    """Bodies so far; the frame in which the next one is placed; the springs' compliances by name."""
+
+    def __init__(self, structure: Structure) -> None:
+        self.spec = mujoco.MjSpec()
+        self.spec.option.gravity = list(structure.gravity_m_s2)
+        self.body, self.position, self.rotation = self.spec.worldbody, np.zeros(3), np.eye(3)
+        self.compliance: dict[str, float] = {}
+
+    def descend(self, name: str) -> None:
+        """New body at the current frame."""
+        x, y, z, w = Rotation.from_matrix(self.rotation).as_quat()
+        nothing = {"ipos": _NOWHERE, "mass": _NOTHING_KG, "inertia": [_NOTHING_KG] * 3, "explicitinertial": True}
+        self.body = self.body.add_body(name=name, pos=self.position, quat=[w, x, y, z], **nothing)
+        self.position, self.rotation = np.zeros(3), np.eye(3)
+
+    def joint(self, name: str, axis: np.ndarray, compliance: float | None = None, slides: bool = False) -> None:
+        """Joint of the current body; `compliance` None for one that is commanded or a gear, which has laws of its own."""
+        kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
+        self.body.add_joint(name=name, type=kind, axis=axis, armature=1.0)
+        if compliance is not None:
+            self.compliance[name] = compliance
+
+    def six_springs(self, name: str, compliances: Iterable[float]) -> None:
+        """Along and about x, y and z of the current body."""
+        names = [f"{name}_{kind}{axis}" for kind in ("", "r") for axis in "xyz"]
+        for number, compliance in enumerate(compliances):
+            self.joint(names[number], np.eye(3)[number % 3], compliance, slides=number < 3)
+
+    def weigh(self, mass: float, place: np.ndarray) -> None:
+        """Put a mass on the current body, in its frame; masses add up at their common centre."""
+        old = float(self.body.mass)
+        self.body.ipos = (old * np.array(self.body.ipos) + mass * place) / (old + mass)
+        self.body.mass = old + mass
+
+    def mark(self, name: str, position: np.ndarray, rotation: np.ndarray) -> None:
+        """A measuring point, in the frame of the current body."""
+        x, y, z, w = Rotation.from_matrix(rotation).as_quat()
+        self.body.add_site(name=name, pos=position, quat=[w, x, y, z])
+
+    def walk(self, number: int, stretch: Stretch, structure: Structure, elsewhere: str) -> None:
+        """From the near to the far end of a stretch; one measuring point may be put elsewhere."""
+        vector = stretch.vector_m + np.array(structure.wrong_vectors_m.get(number, _NOWHERE))
+        turn, tube = turned(structure.wrong_turns.get(number, _NOWHERE)), structure.tubes.get(number)
+        masses = [mass for mass in structure.masses if mass.stretch == number]
+        start, facing = self.position, self.rotation
+        if tube is None:
+            for mass in masses:
+                self.weigh(mass.mass_kg, start + facing @ (mass.along * vector + np.array(mass.aside_m)))
+            self.position = start + facing @ vector
+        else:
+            self.bend(f"link{number}_", vector, tube, structure.segments, masses)
+            facing = np.eye(3)
+        for point in stretch.points:
+            # What is wrong about a stretch is wrong at its far end.
+            if np.allclose(point.position_m, stretch.vector_m, atol=1e-12):
+                where, turns = self.position, facing @ point.rotation @ turn
+            elif tube is None:
+                where, turns = start + facing @ point.position_m, facing @ point.rotation
+            else:
+                raise InputError("structure", f"tubes[{number}]", f"[{point.name}] inside it", "points at the end of a link")
+            if point.name != elsewhere:
+                self.mark(point.name, where, turns)
+        self.rotation = facing @ stretch.rotation @ turn
+
+    def bend(self, name: str, vector: np.ndarray, tube: TaperedTube, count: int, masses: Iterable[Mass]) -> None:
+        """Rigid pieces with springs at the middle of each: the midpoint rule for the integral of M / EI along the link."""
+        along = vector / np.linalg.norm(vector)
+        first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        first /= np.linalg.norm(first)
+        across = (first, np.cross(along, first))
+        piece, step = float(np.linalg.norm(vector)) / count, vector / count
+        self.position = self.position + self.rotation @ (0.5 * step)
+        for segment in range(count):
+            start, width = f"{name}{segment}_", 1.0 - tube.taper * (segment + 0.5) / count
+            self.descend(f"{name}{segment}")
+            for which, axis in enumerate(across if np.isfinite(tube.shear_N) else ()):
+                self.joint(f"{start}shear{which}", axis, piece / (tube.shear_N * width), slides=True)
+            if np.isfinite(tube.axial_N):
+                self.joint(f"{start}axial", along, piece / (tube.axial_N * width), slides=True)
+            for which, axis in enumerate(across):
+                self.joint(f"{start}bend{which}", axis, piece / (tube.bending_Nm2 * width**3))
+            self.joint(f"{start}twist", along, piece / (tube.torsion_Nm2 * width**3))
+            for mass in masses:
+                # On the segment that holds its place; the body's origin is the middle of the segment.
+                if min(int(mass.along * count), count - 1) == segment:
+                    off = (mass.along - (segment + 0.5) / count) * vector
+                    self.weigh(mass.mass_kg, off + np.array(mass.aside_m))
+            self.position = step if segment < count - 1 else 0.5 * step
+
+
+def machine_of(arm: Arm, structure: Structure) -> Machine:
+    """Build the model of an arm."""
+    tree = _Tree(structure)
+    tree.descend("foot")
+    tree.six_springs("base", structure.base)
+    for number, stretch in enumerate(arm.stretches):
+        tree.walk(number, stretch, structure, arm.points[-1] if structure.flange else "")
+        if number < arm.joints:
+            tree.descend(f"arm{number + 1}")
+            axis = arm.axes[number]
+            tree.joint(f"drive{number + 1}", axis)
+            tree.joint(f"gear{number + 1}", axis)
+            across = [e for e in np.eye(3) if abs(e @ axis) < 0.5]
+            for which in range(2 if number + 1 in structure.loose else 0):
+                tree.joint(f"shift{number + 1}_{which}", across[which], 0.0, slides=True)
+            for which, compliance in enumerate(structure.tilt.get(number + 1, ())):
+                tree.joint(f"tilt{number + 1}_{which}", across[which], compliance)
+    if structure.flange:
+        tree.descend("flange")
+        tree.six_springs("flange", structure.flange)
+        tree.mark(arm.points[-1], np.zeros(3), np.eye(3))
+    if load := structure.payload:
+        tree.weigh(load.mass_kg, tree.position + tree.rotation @ np.array(load.aside_m))
+    if spring := structure.compensator:
+        # From the body before the shoulder's drive to the body behind it.
+        anchor = arm.stretches[1].vector_m + arm.stretches[1].rotation @ np.array(spring.anchor_m)
+        length, stiffness = [spring.free_length_m] * 2, [spring.stiffness_N_per_m, 0.0, 0.0]
+        tendon = tree.spec.add_tendon(name="compensator", stiffness=stiffness, springlength=length)
+        for body, name, place in (("arm1", "anchor", anchor), ("arm2", "crank", spring.crank_m)):
+            tree.spec.body(body).add_site(name=name, pos=place)
+            tendon.wrap_site(name)
+    return _indexed(arm, tree)
+
+
+def _indexed(arm: Arm, tree: _Tree) -> Machine:
+    model, numbers = tree.spec.compile(), range(1, arm.joints + 1)
+    place = {model.joint(j).name: int(model.jnt_qposadr[j]) for j in range(model.njnt)}
+    compliance = np.zeros(model.nq)
+    for name, value in tree.compliance.items():
+        compliance[place[name]] = value
+    # A body behind a drive is placed by the stretch before it.
+    behind_drive = np.array([model.body(number).name.startswith("arm") for number in range(model.nbody)], int)
+    within = behind_drive.cumsum()
+    return Machine(
+        model,
+        np.array([place[f"drive{j}"] for j in numbers]),
+        np.array([place[f"gear{j}"] for j in numbers]),
+        {name: place[name] for name in tree.compliance},
+        compliance,
+        np.array([model.site(name).id for name in arm.points]),
+        np.array([model.body(name).id for name in ("foot", *(f"arm{j}" for j in numbers))]),
+        within - behind_drive,
+        within[model.site_bodyid],
+    )
+
+
+@dataclass(frozen=True)
+class Loading:
+    """What acts on the arm in S states.
+
+    `drive` (S, n): angles at which the drives really stand, rad. `wrench` (S, 6): that the flange really feels, at its
+    deflected origin, base axes; N, N m. `growth` (S, n + 1): relative growth of all lengths of each stretch. `offsets` (S,): by
+    which structural coordinates are off beside what their springs do, rad or m.
+    """
+
+    drive: np.ndarray
+    wrench: np.ndarray
+    growth: np.ndarray
+    offsets: dict[int, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """Where an arm came to rest, in S states.
+
+    `coordinates` (S, coordinates): rad, m. `force` (S, coordinates): generalized force that each coordinate's spring transmits,
+    N m, N. `position`, `rotation` (S, points, 3), (S, points, 3, 3): of the measuring points, base frame, m.
+    """
+
+    coordinates: np.ndarray
+    force: np.ndarray
+    position: np.ndarray
+    rotation: np.ndarray
+    sweeps: int
+
+
+def equilibrium(
+    machine: Machine,
+    loading: Loading,
+    gear_deflection: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    structure_laws: Iterable[StructureLaw] = (),
+    start: np.ndarray | None = None,
+) -> Equilibrium:
+    """Where the arm comes to rest, by fixed-point iteration.
+
+    The forces depend on the deflections only through the geometry, by the share (force times arm) / stiffness, a thousandth or
+    so, so that each sweep gains about three digits. With linear springs it is the modified Newton method with their stiffness
+    as tangent. `gear_deflection`: ``gear_deflection(torque, unloaded)``, ndarray (S, n) each in N m, gives the deflections (S,
+    n) of the gears in rad; `unloaded` is the torque before the external wrench came on. `structure_laws` (str, callable): start
+    of the names of structural springs, and what they deflect by, beyond their compliance, under a force (S,). `start` (S, n):
+    deflections of the gears to begin with, rad, such as those of a robot that differs little. Raises `RuntimeError` where the
+    iteration does not settle to 1e-11 of the largest deflection.
+    """
+    gear = machine.gear
+    extra = [(index, law) for start, law in structure_laws for name, index in machine.springs.items() if name.startswith(start)]
+    coordinates = np.zeros((len(loading.drive), machine.model.nq))
+    coordinates[:, machine.drive] = loading.drive
+    unloaded = machine.forces(coordinates, loading.growth)[0][:, gear]
+    if start is not None:
+        coordinates[:, gear] = start
+    for sweep in range(1, _SWEEPS + 1):
+        force, position, rotation = machine.forces(coordinates, loading.growth, loading.wrench)
+        following = force * machine.compliance
+        following[:, machine.drive] = loading.drive
+        following[:, gear] = gear_deflection(force[:, gear], unloaded)
+        for index, law in extra:
+            following[:, index] += law(force[:, index])
+        for index, offset in loading.offsets.items():
+            following[:, index] += offset
+        change, size = np.abs(following - coordinates), np.abs(following)
+        change[:, machine.drive] = size[:, machine.drive] = 0.0
+        # The poses are those of `coordinates`; once the next would be the same they need no further sweep.
+        if change.max(initial=0.0) <= _TOLERANCE * max(size.max(initial=0.0), 1e-9):
+            return Equilibrium(coordinates, force, position, rotation, sweep)
+        coordinates = following
+    raise RuntimeError(f"no equilibrium after {_SWEEPS} sweeps: the last moved by {change.max():.3g}")

@@ -1,0 +1,329 @@
+"""The compiled arm and its equilibria against the analysis' own model, pinocchio, MuJoCo's inverse dynamics, closed forms."""
+
+from dataclasses import replace
+from itertools import cycle
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+from analysed_robots import ROBOTS, analysed
+from arms_at_rest import STATES, angles_and_wrenches, arm_of, at_rest, driven_to, forces_at
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from support import OTHER_CHAINS, robot_of
+
+from elastocal.errors import InputError
+from elastocal.mechanics.chain import stretches
+from elastocal.mechanics.elastostatics import generalized_forces as joint_torques
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.links import extended_chain, spring_compliance
+from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.robot import Link, Tube
+from elastocal_proof.plant.arm import arm_from_file
+from elastocal_proof.plant.machine import (
+    Compensator,
+    Loading,
+    Mass,
+    Structure,
+    TaperedTube,
+    equilibrium,
+    machine_of,
+)
+
+# One joint about y, its link forwards along x, and a measuring point at its end.
+LEVER = arm_of("Ry(q1) Tx(1.0) [A]", compliance_urad_per_Nm=[50.0])
+TWO = arm_of("Tz(0.4) Rz(q1) Tx(1) [A] Ry(q2) Tx(0.5) [B]")
+DOWN = np.array([0.0, 0.0, -9.80665])
+
+
+def everything(arm):
+    return Structure(
+        base=(1e-8, 1e-8, 5e-9, 5e-8, 5e-8, 1e-8),
+        flange=(1e-8, 2e-8, 1e-8, 2e-7, 1e-7, 3e-7),
+        tilt={1: (1e-7, 1e-7), arm.joints - 1: (2e-7, 2e-7)},
+        tubes={k: TaperedTube(2e7, 1.5e7, 2e9, 4e8, 0.2) for k in (2, 3) if k < arm.joints},
+        masses=(Mass(2, 300.0), Mass(min(3, arm.joints), 200.0, 0.4, (0.0, 0.0, 0.1))),
+        payload=Mass(arm.joints, 100.0, 1.0, (0.1, 0.0, 0.1)),
+        compensator=Compensator((-0.3, 0.0, -0.25), (0.2, 0.0, 0.05), 1.5e5, 0.3),
+    )
+
+
+def deflections(arm, angles, wrench, **more):
+    """Of each measuring point, m and rad, ndarray (points, S, 6)."""
+    machine, bent = at_rest(arm, angles, wrench, **more)
+    _, position, rotation = forces_at(machine, angles)
+    return np.array(
+        [
+            pose_differences(bent.position[:, p], bent.rotation[:, p], position[:, p], rotation[:, p])
+            for p in range(len(machine.sites))
+        ]
+    )
+
+
+def linear_deflections(chain, coordinates, wrench, compliance):
+    """J C J^T w of each measuring point, ndarray (points, S, 6)."""
+    turn = joint_torques(poses_and_jacobians(chain, coordinates, chain.end_effector)[2], wrench) @ compliance
+    return np.array([np.einsum("sij,sj->si", poses_and_jacobians(chain, coordinates, p)[2], turn) for p in chain.points])
+
+
+def assert_unloaded_poses_alike(arm, robot, angles):
+    _, position, rotation = forces_at(machine_of(arm, Structure()), angles)
+    for number, point in enumerate(robot.chain.points):
+        wanted = poses(robot.chain, angles, point)
+        np.testing.assert_allclose(position[:, number], wanted[0], atol=1e-12)
+        np.testing.assert_allclose(rotation[:, number], wanted[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("key", ["kuka", "fanuc", "abb", "ur10", "gp180", "iiwa14"])
+def test_poses_without_load_are_those_of_the_analysis(key):
+    arm = arm_from_file(ROBOTS / f"{key}.yaml")
+    assert_unloaded_poses_alike(arm, analysed(key), angles_and_wrenches(arm)[0])
+
+
+@pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
+def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_alike(name_of_chain):
+    text = OTHER_CHAINS[name_of_chain]
+    # Both have compliances 1 to n.
+    robot, arm = robot_of(text), arm_of(text)
+    angles, wrench = angles_and_wrenches(arm, force=10.0)
+    assert_unloaded_poses_alike(arm, robot, angles)
+    wanted = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
+    np.testing.assert_allclose(deflections(arm, angles, wrench), wanted, atol=2e-8)
+
+
+def test_a_tube_in_segments_bends_twists_and_stretches_as_the_catalogues_cantilever():
+    arm, robot = arm_from_file(ROBOTS / "kuka.yaml"), analysed("kuka")
+    tube = Tube(0.25, 0.02, 70e9, 26e9)
+    robot = replace(robot, links=tuple(Link(after, vector, tube) for after, vector in stretches(robot.chain)))
+    inner = tube.outer_diameter_m - 2 * tube.wall_m
+    second = np.pi * (tube.outer_diameter_m**4 - inner**4) / 64
+    area = np.pi * (tube.outer_diameter_m**2 - inner**2) / 4
+    mine = TaperedTube(70e9 * second, 2 * 26e9 * second, 70e9 * area)
+    long = {number: mine for number, stretch in enumerate(arm.stretches) if stretch.vector_m.any()}
+    angles, wrench = angles_and_wrenches(arm, force=10.0)
+    chain = extended_chain(robot)
+    coordinates = np.zeros((STATES, chain.coordinates))
+    coordinates[:, : arm.joints] = angles
+    wanted = linear_deflections(chain, coordinates, wrench, spring_compliance(robot))
+    worst = []
+    for segments in (2, 4, 8):
+        found = deflections(arm, angles, wrench, structure=Structure(tubes=long, segments=segments))
+        off = np.linalg.norm((found - wanted)[..., :3], axis=-1)
+        worst.append(np.sqrt((off**2).mean() / (np.linalg.norm(wanted[..., :3], axis=-1) ** 2).mean()))
+    # The midpoint rule misses l^3 / 12 n^2 EI of l^3 / 3 EI.
+    assert worst[2] < 5e-4
+    assert worst[0] / worst[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_weight_turns_the_joints_as_pinocchio_says(arm):
+    masses = (
+        Mass(1, 300.0, 0.4),
+        Mass(2, 250.0, 0.3, (0.05, 0.02, -0.04)),
+        Mass(2, 90.0, 0.9),
+        Mass(3, 150.0, 0.6, (0.0, 0.0, 0.1)),
+    )
+    load = Mass(arm.joints, 120.0, 1.0, (0.1, -0.05, 0.15))
+    gravity = (3.0, -2.0, -9.0)
+    angles, _ = angles_and_wrenches(arm)
+    found = forces_at(machine_of(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)), angles)[0]
+    model, parent = pin.Model(), 0
+    for number, axis in enumerate(arm.axes):
+        place = pin.SE3(arm.stretches[number].rotation, arm.stretches[number].vector_m)
+        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(axis), place, f"q{number}")
+        stretch = arm.stretches[number + 1]
+        weights = [(m.mass_kg, m.along * stretch.vector_m + m.aside_m) for m in masses if m.stretch == number + 1]
+        if number == arm.joints - 1:
+            weights.append((load.mass_kg, stretch.vector_m + stretch.rotation @ np.array(load.aside_m)))
+        for kilograms, centre in weights:
+            model.appendBodyToJoint(parent, pin.Inertia(kilograms, centre, np.eye(3)), pin.SE3.Identity())
+    model.gravity.linear = np.array(gravity)
+    data = model.createData()
+    wanted = -np.array([pin.computeGeneralizedGravity(model, data, row) for row in angles])
+    np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
+
+
+def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(arm):
+    """Each spring pulls back by what it has yielded over its compliance."""
+    angles, wrench = angles_and_wrenches(arm)
+    machine, rest = at_rest(arm, angles, wrench, structure=everything(arm))
+    model, data = machine.model, mujoco.MjData(machine.model)
+    compliance = machine.compliance.copy()
+    compliance[machine.gear] = arm.compliance
+    free, flange = np.setdiff1d(np.arange(model.nv), machine.drive), machine.sites[-1]
+    for row, push in zip(rest.coordinates[:20], wrench[:20], strict=True):
+        data.qpos[:], data.qvel[:], data.qacc[:] = row, 0.0, 0.0
+        mujoco.mj_inverse(model, data)
+        force = np.zeros(model.nv)
+        mujoco.mj_applyFT(model, data, push[:3], push[3:], data.site_xpos[flange], model.site_bodyid[flange], force)
+        left = (data.qfrc_inverse - force)[free] + (row / np.where(compliance > 0, compliance, 1.0))[free]
+        assert np.abs(left).max() < 1e-9 * np.abs(force).max()
+
+
+def test_forces_do_the_work_that_moving_each_coordinate_takes(fanuc_arm):
+    """Virtual work: of the load, the weights and the compensator together, by differences of their energies."""
+    structure = everything(fanuc_arm)
+    machine = machine_of(fanuc_arm, structure)
+    model, data = machine.model, mujoco.MjData(machine.model)
+    angles, push = np.random.default_rng(3).uniform(-1, 1, (1, 6)), np.array([[400.0, -700.0, 300.0, 0.0, 0.0, 0.0]])
+    coordinates = driven_to(machine, angles)
+    force = machine.forces(coordinates, np.zeros((1, 7)), push)[0][0]
+
+    def energy(row):
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        spring = np.linalg.norm(data.site("anchor").xpos - data.site("crank").xpos) - structure.compensator.free_length_m
+        weight = -model.body_mass @ data.xipos @ DOWN
+        return (
+            weight + 0.5 * structure.compensator.stiffness_N_per_m * spring**2 - data.site_xpos[machine.sites[-1]] @ push[0, :3]
+        )
+
+    step = 1e-5
+    wanted = [(energy(coordinates[0] - e) - energy(coordinates[0] + e)) / (2 * step) for e in step * np.eye(model.nq)]
+    np.testing.assert_allclose(force, wanted, atol=1e-3)
+
+
+def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
+    mass, angles = 200.0, np.array([[-1.0], [0.0], [0.7], [np.pi / 2]])
+    machine, found = at_rest(LEVER, angles, np.zeros((4, 6)), Structure(masses=(Mass(1, mass, 0.8),)))
+    moment = mass * 9.80665 * 0.8
+    # theta = C m g l cos(q + theta), to all orders; seven degrees at most.
+    wanted = [brentq(lambda t, q=q: t - 50e-6 * moment * np.cos(q + t), -1.0, 1.0, xtol=1e-15) for q in angles[:, 0]]
+    np.testing.assert_allclose(found.coordinates[:, machine.gear[0]], wanted, atol=1e-11)
+    np.testing.assert_allclose(found.position[:, 0, 2], -np.sin(angles[:, 0] + wanted), atol=1e-11)
+
+
+def test_a_structural_spring_yields_by_its_compliance_its_law_and_its_offset():
+    machine = machine_of(LEVER, Structure(base=(0.0, 0.0, 2e-8, 0.0, 0.0, 0.0)))
+    index, wrench = machine.springs["base_z"], np.array([[0.0, 0.0, 1000.0, 0.0, 0.0, 0.0], [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]])
+    loading = Loading(np.full((2, 1), np.pi / 2), wrench, np.zeros((2, 2)), {index: np.array([1e-5, 3e-5])})
+    laws = [("base_z", lambda force: 1e-11 * force**2), ("nothing", lambda force: force)]
+    found = equilibrium(machine, loading, lambda torque, unloaded: 0.0 * torque, laws)
+    np.testing.assert_allclose(found.coordinates[:, index], [2e-5 + 1e-5 + 1e-5, -1e-5 + 0.25e-5 + 3e-5], rtol=1e-9)
+
+
+def test_gears_know_the_torque_before_the_load_came_on():
+    seen, machine = [], machine_of(LEVER, Structure(masses=(Mass(1, 100.0, 1.0),)))
+
+    def law(torque, unloaded):
+        seen.append(unloaded.copy())
+        return 0.0 * torque
+
+    equilibrium(machine, Loading(np.zeros((1, 1)), np.array([[0, 0, -50.0, 0, 0, 0]]), np.zeros((1, 2))), law)
+    np.testing.assert_allclose(seen, np.full((len(seen), 1, 1), 100.0 * 9.80665), atol=1e-9)
+
+
+def test_an_arm_that_finds_no_rest_is_an_error_and_a_start_near_it_saves_sweeps():
+    signs, loading = cycle([0.01, -0.01]), Loading(np.zeros((1, 1)), np.zeros((1, 6)), np.zeros((1, 2)))
+    with pytest.raises(RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"):
+        equilibrium(machine_of(LEVER, Structure()), loading, lambda torque, _: 0 * torque + next(signs))
+    wrench = np.tile([0.0, 0.0, -900.0, 0.0, 0.0, 0.0], (1, 1))
+    machine, first = at_rest(LEVER, np.array([[0.9]]), wrench)
+    loading, start = Loading(np.array([[0.9]]), wrench, np.zeros((1, 2))), first.coordinates[:, machine.gear]
+    again = equilibrium(machine, loading, lambda torque, _: LEVER.compliance * torque, start=start)
+    np.testing.assert_allclose(again.coordinates, first.coordinates, atol=1e-12)
+    assert again.sweeps == 1 < first.sweeps
+
+
+def test_stretches_that_grow_move_targets_as_longer_links_do_and_the_model_keeps_its_own_lengths(arm):
+    angles, _ = angles_and_wrenches(arm)
+    each, machine = np.linspace(2e-4, -1e-4, arm.joints + 1), machine_of(arm, Structure())
+    # Only every second state has grown.
+    grown = np.outer(np.arange(STATES) % 2, each)
+    before = machine.model.body_pos.copy()
+    found = machine.forces(driven_to(machine, angles), grown)[1][:, -1]
+    np.testing.assert_array_equal(machine.model.body_pos, before)
+    longer = tuple(
+        replace(s, vector_m=s.vector_m * (1 + g), points=tuple(replace(p, position_m=p.position_m * (1 + g)) for p in s.points))
+        for s, g in zip(arm.stretches, each, strict=True)
+    )
+    models = [machine_of(one, Structure()) for one in (arm, replace(arm, stretches=longer))]
+    short, long = (forces_at(model, angles)[1][:, -1] for model in models)
+    np.testing.assert_allclose(found, np.where(np.arange(STATES)[:, None] % 2, long, short), atol=1e-12)
+
+
+def at(machine, **coordinates):
+    """MuJoCo's kinematics with some coordinates by their names, all others zero."""
+    data = mujoco.MjData(machine.model)
+    for name, value in coordinates.items():
+        data.qpos[machine.model.joint(name).qposadr[0]] = value
+    mujoco.mj_kinematics(machine.model, data)
+    return data
+
+
+def test_springs_have_their_axes_and_compliances_in_order_and_gears_turn_about_their_drives():
+    structure = Structure(base=(1e-8, 2e-8, 3e-8, 4e-8, 5e-8, 6e-8), tilt={2: (3e-7, 4e-7)}, loose=(2,))
+    machine = machine_of(TWO, structure)
+    wanted = {f"base_{kind}{axis}": ("xyz".index(axis), 1e-8) for kind in ("", "r") for axis in "xyz"}
+    wanted = {name: (axis, 1e-8 * number) for number, (name, (axis, _)) in enumerate(wanted.items(), 1)}
+    wanted |= {"tilt2_0": (0, 3e-7), "tilt2_1": (2, 4e-7), "shift2_0": (0, 0.0), "shift2_1": (2, 0.0)}
+    assert set(machine.springs) == set(wanted)
+    for name, (axis, compliance) in wanted.items():
+        index = machine.springs[name]
+        np.testing.assert_array_equal(machine.model.jnt_axis[index], np.eye(3)[axis])
+        assert machine.compliance[index] == pytest.approx(compliance)
+    both, one = at(machine, drive1=0.3, gear1=0.2, drive2=-1.0, gear2=0.1), at(machine, drive1=0.5, drive2=-0.9)
+    np.testing.assert_allclose(both.site_xpos, one.site_xpos, atol=1e-14)
+
+
+@pytest.mark.parametrize("flange", [(), (1e-9,) * 6])
+def test_a_load_counts_from_the_flange_and_turns_with_it(flange):
+    arm = arm_of("Tz(0.4) Rz(q1) Tx(1) Ry(q2) Tx(0.5) Rx(90deg) [B]")
+    machine = machine_of(arm, Structure(payload=Mass(2, 20.0, 1.0, (0.1, 0.2, 0.3)), flange=flange))
+    body = machine.model.body("flange" if flange else "arm2").id
+    # y of the flange is z of the link, and z its -y; the forearm points down: its x is -z of the base and its z is x.
+    wanted = [1.0 + 0.2, -0.3, 0.4 - 0.5 - 0.1]
+    np.testing.assert_allclose(at(machine, drive2=0.5 * np.pi).xipos[body], wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("segments", [1, 4])
+def test_a_mass_on_an_elastic_link_stands_where_it_does_on_a_rigid_one(segments):
+    masses = (Mass(1, 30.0, 0.0), Mass(1, 20.0, 0.55, (0.0, 0.1, 0.0)), Mass(1, 10.0, 1.0))
+    machine = machine_of(TWO, Structure(masses=masses, tubes={1: TaperedTube(1e6, 1e6)}, segments=segments))
+    data, weighs = at(machine, drive1=0.3), machine.model.body_mass
+    wanted = np.array([(20 * 0.55 + 10) / 60, 20 * 0.1 / 60, 0.0])
+    np.testing.assert_allclose(weighs @ data.xipos / 60.0, [0, 0, 0.4] + pin.exp3(np.array([0, 0, 0.3])) @ wanted, atol=1e-9)
+
+
+def test_a_tube_that_gets_thinner_yields_as_the_integrals_along_it():
+    tube, count = TaperedTube(2e6, 1e6, 3e7, 4e7, 0.3), 40
+    machine = machine_of(TWO, Structure(tubes={1: tube}, segments=count))
+
+    def total(kind, power=0):
+        middle = (np.arange(count) + 0.5) / count
+        springs = [machine.compliance[machine.springs[f"link1_{segment}_{kind}"]] for segment in range(count)]
+        return np.array(springs) @ (1.0 - middle) ** power
+
+    def integral(stiffness, thinning, power=0):
+        return quad(lambda x: (1.0 - x) ** power / (stiffness * (1.0 - 0.3 * x) ** thinning), 0.0, 1.0)[0]
+
+    # The tip under a force across, which bends by its lever squared; E I and G J go with the cube of the width, areas with it.
+    for which in (0, 1):
+        assert total(f"bend{which}", 2) == pytest.approx(integral(2e6, 3, 2), rel=1e-3)
+        assert total(f"shear{which}") == pytest.approx(integral(4e7, 1), rel=1e-3)
+    assert total("twist") == pytest.approx(integral(1e6, 3), rel=1e-3)
+    assert total("axial") == pytest.approx(integral(3e7, 1), rel=1e-3)
+
+
+@pytest.mark.parametrize("tubes", [{}, {1: TaperedTube(1e6, 1e6)}])
+def test_wrong_dimensions_are_at_the_far_end_of_their_stretch_and_carry_on(tubes):
+    structure = Structure(wrong_vectors_m={1: (0.0, 0.02, 0.0)}, wrong_turns={1: (0.0, 0.0, 0.1)}, tubes=tubes)
+    data, turn = at(machine_of(TWO, structure)), pin.exp3(np.array([0.0, 0.0, 0.1]))
+    np.testing.assert_allclose(data.site("A").xpos, [1.0, 0.02, 0.4], atol=1e-14)
+    np.testing.assert_allclose(data.site("A").xmat.reshape(3, 3), turn, atol=1e-14)
+    np.testing.assert_allclose(data.site("B").xpos, [1.0, 0.02, 0.4] + turn @ [0.5, 0.0, 0.0], atol=1e-14)
+
+
+def test_a_wrong_turn_is_about_the_axes_at_the_far_end_of_its_stretch():
+    arm = arm_of("Rz(q1) Tx(1) Rx(90deg) Ry(q2) Tx(0.5) [B]")
+    data = at(machine_of(arm, Structure(wrong_turns={1: (0.0, 0.0, 0.1)})))
+    wanted = pin.exp3(np.array([np.pi / 2, 0.0, 0.0])) @ pin.exp3(np.array([0.0, 0.0, 0.1]))
+    np.testing.assert_allclose(data.site("B").xpos, [1.0, 0.0, 0.0] + wanted @ [0.5, 0.0, 0.0], atol=1e-14)
+
+
+def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_inside_an_elastic_one():
+    arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
+    data = at(machine_of(arm, Structure(wrong_vectors_m={1: (0.0, 0.02, 0.0)}, wrong_turns={1: (0.0, 0.0, 0.1)})))
+    np.testing.assert_allclose(data.site("inner").xpos, [0.4, 0.0, 0.0], atol=1e-14)
+    with pytest.raises(InputError, match="inner"):
+        machine_of(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))

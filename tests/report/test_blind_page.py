@@ -1,0 +1,45 @@
+"""The page of targets has each quantity once with its robots and its limit."""
+
+import pandas as pd
+from made_blind_documents import PLAN, effect, frame, oracle, said, silence, truth, verdict
+
+from elastocal_proof.blind.summary import of_each_robot, summarize
+from elastocal_proof.report.blind_page import reached_words, targets_page
+
+
+def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_limit():
+    pairs = [truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot) for robot in ("m900ib700", "panda")]
+    both, best = verdict("several", effect("payload"), effect("joint_tilt", 2)), {"detected": True, "right": True}
+    entries = [
+        (pairs[0], both, oracle(), best),
+        (pairs[1], said("named", "payload"), oracle(), best),
+        (pairs[1], both, oracle()),
+    ]
+    cases = frame(*entries)
+    summary, alone = summarize(PLAN, cases, pd.DataFrame(), 1), of_each_robot(PLAN, cases, 1)
+    page = targets_page(PLAN, summary, {"The heavy one": alone["m900ib700"], "A soft one": alone["panda"]}, "full", 7)
+    assert page.startswith("# ") and "blind_pictures --config blind=full seed=7`" in page
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in page.splitlines() if line.startswith("| ")]
+    found = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:]}
+    # Of the quantities with a target those of single effects at 50 and 200 have no case, and so no row.
+    assert len(found) == len(rows) - 1 == int((summary.target != "").sum())
+    assert found["both of two effects, at 50 each"] == {
+        "quantity": "both of two effects, at 50 each",
+        "target": "at least 95 % of the limit",
+        "outcome": "missed",
+        "robots together": "66.7 % (9.4–99.2 %)",
+        "cases": "2 of 3",
+        "The heavy one": "100.0 %",
+        "A soft one": "50.0 %",
+        "limit, on a sample": "100.0 % (15.8–100.0 %), 2 of 2",
+        "found over limit, same sample": "50.0 % (0.0–100.0 %)",
+    }
+    alarms = found["false alarms, 3 kN"]
+    assert (alarms["outcome"], alarms["cases"], alarms["limit, on a sample"]) == ("no case", "0 of 0", "")
+
+
+def test_how_many_are_reached_says_on_which_robots():
+    fine = summarize(PLAN, frame(*[(truth(), silence(), oracle(1.0))] * 100), pd.DataFrame(), 1)
+    assert reached_words(fine).endswith("with a target reach it on the robots of the proof.")
+    tuned = summarize(PLAN, frame((truth(robot="kuka"), silence(), oracle(1.0))), pd.DataFrame(), 1)
+    assert "which proves nothing" in reached_words(tuned)
