@@ -69,7 +69,7 @@ rule study:
         rules.tabulate_assumptions.output,
         expand(
             "reports/tables/{table}.csv",
-            table=["ladder", "designs", "observability", "claims", "table4_studies", "joint_test"],
+            table=["ladder", "designs", "observability", "claims", "strategies_over_studies", "joint_test"],
         ),
         expand("reports/tables/{table}.csv", table=["costs", "break_even", "simulated_designs_few"]),
         expand("reports/tables/{table}.csv", table=["few_configurations", "measurement_kinds", "stiffness", "starts"]),

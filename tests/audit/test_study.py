@@ -28,8 +28,8 @@ def test_data_and_estimates_as_they_were_made_hold(run):
         (EXPERIMENTS, "data_set", lambda v: v - 1, "each data set and configuration once"),
         (IDEAL, "dz", lambda v: v + 1e-8, "deflection of hand, 20 rows"),
         (MEASURED, "rx", lambda v: v + 1e-8, "measured deflection of hand, data set 1"),
-        (IDENTIFIED, "c1", lambda v: 1.0001 * v, "compliances of data set 1, length 3"),
-        (IDENTIFIED, "c2", lambda v: np.nan, "compliances of data set 1, length 3"),
+        (IDENTIFIED, "compliance_1", lambda v: 1.0001 * v, "compliances of data set 1, length 3"),
+        (IDENTIFIED, "compliance_2", lambda v: np.nan, "compliances of data set 1, length 3"),
     ],
 )
 def test_an_altered_value_is_found(run, file, column, change, expected):

@@ -63,7 +63,7 @@ def test_a_file_that_cannot_be_read_is_a_finding_and_no_traceback(folder):
 
 GOOD = Finding("compliances", "numpy on pinocchio", 4, 1e-5, file="results/identified/kuka/200um/6DoF.parquet")
 BAD = Finding("column <dev>", "pinocchio", 2, 7.0, "found 1, expected 2", "data/simulated/kuka/ideal.parquet")
-BYTES = Finding("bytes as its job wrote them", "hashlib, SHA-256", 1, 0.0, file="reports/figures/fig3.pdf")
+BYTES = Finding("bytes as its job wrote them", "hashlib, SHA-256", 1, 0.0, file="reports/figures/figure3.pdf")
 
 
 def test_the_page_says_first_whether_all_holds_and_what_was_not_worked_out_again():

@@ -60,7 +60,7 @@ def made_run(folder):
     for name, table in tables.items():
         table.to_parquet(place / f"{name}.parquet")
     (folder / "results/identified/two/100um").mkdir(parents=True)
-    names = ["data_set", "length", "c1", "c2"]
+    names = ["data_set", "length", "compliance_1", "compliance_2"]
     pd.DataFrame(found, columns=names).to_parquet(folder / "results/identified/two/100um/hand.parquet")
     return Audited(folder, CONFIGURATION, {"two": ROBOT}, {"hand": STRATEGY}, 20)
 

@@ -57,7 +57,7 @@ def joined(blocks):
 
 def compliances(table, length):
     """(sets, 6) of one length."""
-    return np.column_stack([table[f"c{j}"] for j in range(1, 7)])[table["length"] == length]
+    return np.column_stack([table[f"compliance_{j}"] for j in range(1, 7)])[table["length"] == length]
 
 
 def judge(robot, at="end_effector"):

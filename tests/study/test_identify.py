@@ -63,7 +63,7 @@ def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_af
         experiments[name] = np.where(empty, 0.0, experiments[name])
     table = identified(kuka, strategies["6DoF"], [experiments], deflections_of(kuka, [experiments]), start=start)
     for joint in range(1, 7):
-        np.testing.assert_array_equal(np.isnan(table[f"c{joint}"]), empty)
+        np.testing.assert_array_equal(np.isnan(table[f"compliance_{joint}"]), empty)
 
 
 def test_design_table_names_the_right_set_length_and_joint_pair(kuka, strategies):

@@ -33,7 +33,7 @@ def test_columns_have_a_name_of_their_own_a_meaning_and_a_unit_but_for_shares_an
 
 def test_there_is_one_column_for_each_joint_and_one_covariance_for_each_pair():
     for joints in (3, 7):
-        assert {f"c{j + 1}" for j in range(joints)} <= {column.name for column in identified(joints).columns}
+        assert {f"compliance_{j + 1}" for j in range(joints)} <= {column.name for column in identified(joints).columns}
         pairs = covariance_columns(joints)
         assert {name for name, _, _ in pairs} <= {column.name for column in design(joints).columns}
         assert [(i, j) for _, i, j in pairs] == [(i, j) for i in range(joints) for j in range(i + 1)]

@@ -130,7 +130,7 @@ def found(kuka):
 def test_errors_are_those_of_the_strategy_that_measures_the_points_together(kuka, strategies, found, points, strategy):
     experiments = experiments_of(kuka, 40, 6)
     table = identified(kuka, strategies[strategy], experiments, deflections_of(kuka, experiments, 1e-5))
-    models = np.column_stack([table[f"c{j}"] for j in range(1, 7)])[table["length"] == 6]
+    models = np.column_stack([table[f"compliance_{j}"] for j in range(1, 7)])[table["length"] == 6]
     expected = (position_errors(judge(kuka), models) ** 2).mean(axis=1)
     np.testing.assert_allclose(found[points]["mean_square"][:, 5], expected, rtol=1e-6)
 

@@ -14,7 +14,7 @@ KEYS = [(name, "ascending") for name in ("point", "data_set", "configuration")]
 
 
 # All data, estimates and scores of a robot, and of what follows a table in two formats, and a figure.
-SOME = ("reports/tables/table4.tex", "reports/tables/table4.md", "reports/figures/fig4.pdf")
+SOME = ("reports/tables/table4.tex", "reports/tables/table4.md", "reports/figures/figure4.pdf")
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_every_figure_and_table_has_a_record_that_names_commit_configuration_and
     records = [json.loads(paper.path(name).read_text("utf-8")) for name in paper.files("results/records/**/*.json")]
     origins = {file: record["origin"] for record in records for file in record["outputs"]}
     made = paper.files("reports/figures/*", "reports/tables/*", "results/[!lt]*/**/*.parquet")
-    assert {"reports/tables/table4.csv", "reports/figures/fig4.png"} < set(made)
+    assert {"reports/tables/table4.csv", "reports/figures/figure4.png"} < set(made)
     assert set(made) <= set(origins)
     (origin,) = {tuple(origin.items()) for origin in origins.values()}
     assert dict(origin)["seed"] == 1 and len(dict(origin)["configuration_sha256"]) == 64

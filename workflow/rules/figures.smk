@@ -6,12 +6,16 @@ Needs results/ and reports/tables/. Writes reports/figures/*.pdf and *.png.
 TITLES = {name: STUDY.robots[name]["name"] for name in config["robots"]}
 REDUCED_TITLES = {name: TITLES[name] for name in REDUCED}
 # Figure 2 shows the first robot and has one more for each further one; Figure 3 shows the extended robot where there is one.
-SCHEME_ROBOTS = {"fig2": REDUCED[0], **{f"fig2_{name}": name for name in REDUCED[1:]}, "fig3": (EXTENDED or REDUCED)[-1]}
+SCHEME_ROBOTS = {
+    "figure2": REDUCED[0],
+    **{f"figure2_{name}": name for name in REDUCED[1:]},
+    "figure3": (EXTENDED or REDUCED)[-1],
+}
 # Figures 5a and 5c show the first robot, 5b and 5d the second, as in the paper.
 STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
 DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
 BEST_TWO = [name for name in (CLASSICAL, "3+6DoF-comb") if name in config["strategies"]]
-PAPER_FIGURES = [*SCHEME_ROBOTS, "fig4", *(f"fig5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS))]
+PAPER_FIGURES = [*SCHEME_ROBOTS, "figure4", *(f"figure5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS))]
 FIGURES = [
     *PAPER_FIGURES,
     "studies",
@@ -27,7 +31,7 @@ FIGURES = [
 # Each other figure: its function, file, caption, category, what it shows, tables, settings.
 DRAWN = {
     "draw_noise_impact": (
-        ("noise_impact", "fig4", "fig4", PAPER, "Figure 4: impact of noise"),
+        ("noise_impact", "figure4", "figure4", PAPER, "Figure 4: impact of noise"),
         {"metrics": cells("metrics", REDUCED, NOISE, CLASSICAL)},
         {"strategy": NAMES[CLASSICAL], "titles": REDUCED_TITLES},
     ),
@@ -76,11 +80,11 @@ DRAWN = {
 # Figures 5a and 5b, and 5c and 5d: their panels, function, caption, words, and the limit that they show.
 PANELS = {
     "draw_stiffness_errors": (
-        *(STIFFNESS_PANELS, "stiffness_errors", "fig5_stiffness", "stiffness errors of all strategies"),
+        *(STIFFNESS_PANELS, "stiffness_errors", "figure5_stiffness", "stiffness errors of all strategies"),
         {"limit_percent": config["tables"]["k_sigma_limit_percent"]},
     ),
     "draw_deviations": (
-        *(DEVIATION_PANELS, "deviations", "fig5_deviation", "deviation by all strategies"),
+        *(DEVIATION_PANELS, "deviations", "figure5_deviation", "deviation by all strategies"),
         {"limit_um": config["tables"]["deviation_limit_um"]},
     ),
 }
@@ -95,7 +99,7 @@ def draw_panel(panels, function, caption, words, limit):
         "metrics": lambda wildcards: cells("metrics", panels[wildcards.panel], TABLE_NOISE),
         "printed": f"{CONFIG}/paper/reference.csv",
     }
-    return (function, "fig5{panel}", caption, PAPER, f"Figure 5{{panel}}: {words}"), tables, settings
+    return (function, "figure5{panel}", caption, PAPER, f"Figure 5{{panel}}: {words}"), tables, settings
 
 
 DRAWN |= {name: draw_panel(*panel) for name, panel in PANELS.items()}
@@ -147,7 +151,7 @@ rule draw_scheme:
         scheme="|".join(SCHEME_ROBOTS),
     params:
         robot=lambda wildcards: STUDY.robots[SCHEME_ROBOTS[wildcards.scheme]],
-        scheme=lambda wildcards: "spring_scheme" if wildcards.scheme == "fig3" else "kinematic_scheme",
+        scheme=lambda wildcards: "spring_scheme" if wildcards.scheme == "figure3" else "kinematic_scheme",
     script:
         "../scripts/draw_scheme.py"
 

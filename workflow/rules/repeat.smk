@@ -75,7 +75,9 @@ STUDY_TABLES |= {
         "study_tables",
         {"studies": expand(rules.repeat_studies.output.repeated, interpretation=MEASURED.values(), robot=REDUCED)} | REFERENCE,
         {
-            "table": table_of("table4_studies", PAPER, "table4_studies", "Table 4 over studies, by what is measured"),
+            "table": table_of(
+                "strategies_over_studies", PAPER, "strategies_over_studies", "Table 4 over studies, by what is measured"
+            ),
             "joint": table_of("joint_test", PAPER),
         },
         {

@@ -75,7 +75,7 @@ def study_facts(
         name: frame[frame.robot.isin(titles)] if "robot" in frame and name not in linked else frame
         for name, frame in whole.items()
     }
-    judged, pairs = of["comparison"][of["comparison"].p_value.notna()], of["score_pairs"]
+    judged, pairs = of["comparison"][of["comparison"].p_holm.notna()], of["score_pairs"]
     of |= {
         "claims": of["claims"].assign(found=_found(of["claims"], names)),
         "outside": judged[judged.p_value < LEVEL],

@@ -139,10 +139,12 @@ def _two_best(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
 
 
 def _ratio_of_dev(evidence: Evidence) -> Finding:
-    kuka = evidence.robots[0]
-    ratio = evidence.scores(kuka, _PLAIN, _DEV) / evidence.scores(kuka, _COMB, _DEV)
-    p = _number(ratio, 1.86, 0.01)
-    return _one(f"dev of 6DoF over comb on {kuka}: {_spread(ratio)}", HOLDS if p > LEVEL else FAILS, p)
+    found = {robot: evidence.scores(robot, _PLAIN, _DEV) / evidence.scores(robot, _COMB, _DEV) for robot in evidence.robots}
+    text, p = _often(np.all([ratio >= 1.86 for ratio in found.values()], axis=0))
+    reached = [ratio.mean() >= 1.86 for ratio in found.values()]
+    ratios = _each(evidence, lambda robot: _spread(found[robot]))
+    verdict = HOLDS if all(reached) else PARTLY if any(reached) else FAILS
+    return _one(f"dev of 6DoF over comb: {ratios}; at least 1.86 on both {text}", verdict, p)
 
 
 def _small_noise(evidence: Evidence) -> Finding:
@@ -150,7 +152,8 @@ def _small_noise(evidence: Evidence) -> Finding:
         low = _expected_dev(evidence, robot, 0.0), _expected_dev(evidence, robot, 100.0)
         return f"{low[0]:.2f} to {low[1]:.1f} µm, {_expected_dev(evidence, robot, 200.0):.1f} µm at 200"
 
-    return _one(f"dev expected at 0 to 100 µm of noise: {_each(evidence, at)}; it goes with σ²", HOLDS)
+    words = "it goes with σ², so that small noise tends to zero and says of a strategy what large noise says"
+    return _one(f"dev expected at 0 to 100 µm of noise: {_each(evidence, at)}; {words}", PARTLY)
 
 
 def _large_noise(evidence: Evidence) -> Finding:
@@ -168,7 +171,10 @@ def _below_two(evidence: Evidence) -> Finding:
     lengths = [evidence.find_lengths(robot, _PLAIN, _DEV) for robot in evidence.robots]
     text, p = _often(np.all([each < 50 for each in lengths], axis=0))
     means = "; ".join(f"{robot} {np.median(each):.0f}" for robot, each in zip(evidence.robots, lengths, strict=True))
-    return _one(f"dev of 6DoF reaches 2 µm at {means} configurations (median), below 50 on both {text}", FAILS, p)
+    printed = evidence.tables["comparison"].query("strategy == @_PLAIN and quantity == 'n_dev_2_um'").paper
+    paper = " and ".join(f"{value:g}" for value in printed)
+    words = f"at {means} configurations (median; the paper's own Table 4: {paper}), below 50 on both {text}"
+    return _one(f"dev of 6DoF reaches 2 µm {words}", FAILS, p)
 
 
 def _repeatability(evidence: Evidence) -> Finding:

@@ -301,7 +301,7 @@ def evaluate_strategy(
         """Estimates with their weights, one pass for both views of them."""
         for block, counts in zip(identified_blocks, weight_blocks, strict=True):
             sets = data_sets(block)
-            compliance = np.stack([block[f"c{j + 1}"].reshape(len(sets), -1) for j in range(joints)], axis=-1)
+            compliance = np.stack([block[f"compliance_{j + 1}"].reshape(len(sets), -1) for j in range(joints)], axis=-1)
             sums.append(accuracy_sums(compliance[:, evaluated_rows], judge))
             yield compliance, to_weights(counts)
 
@@ -356,7 +356,7 @@ def identify(job: Job) -> None:
     counts = ["replicate", "count"]
     # Read again, so that any number of data sets is worked off in the same memory.
     tables = evaluate_strategy(
-        read_blocks(job.output.identified, identified(n), ["data_set", *(f"c{j + 1}" for j in range(n))]),
+        read_blocks(job.output.identified, identified(n), ["data_set", *(f"compliance_{j + 1}" for j in range(n))]),
         read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS),
         read_table(job.input.weights, WEIGHTS, counts, members=TESTS),
         judge_of(job, robot),

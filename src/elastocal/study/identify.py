@@ -51,7 +51,7 @@ def design(joints: int) -> TableSchema:
 def identified(joints: int) -> TableSchema:
     """What a strategy identified; one row for each data set and length."""
     compliances = [
-        real(f"c{j}", "rad/(N m)", f"identified compliance of joint {j}", missing=True) for j in range(1, joints + 1)
+        real(f"compliance_{j}", "rad/(N m)", f"identified compliance of joint {j}", missing=True) for j in range(1, joints + 1)
     ]
     return table("identified", SET, LENGTH, *compliances)
 
@@ -147,7 +147,7 @@ def identified_blocks(
             compliance = situation.solve_exactly(start, range(1, len(compliance) + 1))
         np.moveaxis(compliance, 1, -1)[undetermined(strategy, rows, triangles)] = np.nan
         columns = prefix_index_columns(data_sets(block), len(compliance))
-        yield columns | {f"c{j + 1}": compliance[:, j].T.ravel() for j in range(chain.coordinates)}
+        yield columns | {f"compliance_{j + 1}": compliance[:, j].T.ravel() for j in range(chain.coordinates)}
 
 
 def read_measured(job: Job, joints: int, points: Iterable[str]) -> Blocks:

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -32,10 +32,7 @@ from elastocal.study.jobs import MICRO, MILLI, Job, frames, read_reference, writ
 from elastocal.study.metrics import length_to_reach
 from elastocal.study.repeated import repeated
 from elastocal.study.simulation import INITIAL, find_statistics
-from elastocal.study.tables import deviation_ratio, read_replicates, share_compensated
-
-if TYPE_CHECKING:
-    pass
+from elastocal.study.tables import COMPLIANCE, deviation_ratio, read_replicates, share_compensated
 
 # A figure differs from the study where its p value, corrected for all figures, is below this.
 LEVEL = 0.05
@@ -76,12 +73,12 @@ class OurResults:
         if figure.table == "text":
             return self._of_text(quantity)
         if figure.table == "1":
-            return self.cell("table1", quantity, robot=robot)[0], 0.0, "R1: an input"
+            return self.cell("table1", COMPLIANCE.format(quantity[1:]), robot=robot)[0], 0.0, "R1: an input"
         if figure.table == "2":
             remark = "R11: the tube was chosen for it" if (robot, quantity) == FITTED else "R3"
             return *self.cell("table2", f"{quantity.removeprefix('deviation_')}_mm", robot=robot), remark
         if figure.table == "3":
-            return *self.cell("table3", quantity, robot=robot), "R7"
+            return *self.cell("table3", COMPLIANCE.format(quantity[1:]), robot=robot), "R7"
         column, key = _TABLE4.get(quantity, quantity), {"strategy": figure.strategy, "robot": robot}
         if "k_sigma" not in column:
             return *self.cell("table4", column, **key), "R8"
@@ -219,8 +216,9 @@ def comparison_table(
     """The printed figures judged by further studies.
 
     `beside`: by `beside_paper`. `studies`: as in `predict_scatter`. `initial`: the initial table of each robot. `length`: of
-    Table 3. Returns `beside` with studies_mean, studies_std, p_value and p_holm: of further studies for Tables 3 and 4, of
-    single data sets for Table 2; without a p value where the study was fitted to the figure.
+    Table 3. Returns `beside` with studies_mean, studies_std and p_value: of further studies for Tables 3 and 4, of single
+    data sets for Table 2; without a p value where the study was fitted to the figure. p_holm: corrected for the figures of
+    Tables 3 and 4, the one family of all tests; of Table 2 none.
     """
 
     def judged(figure: Any) -> tuple[float, float, float]:
@@ -238,7 +236,8 @@ def comparison_table(
 
     scattered = [judged(figure) for figure in beside.itertuples()]
     found = pd.DataFrame(scattered, beside.index, ["studies_mean", "studies_std", "p_value"], float)
-    return beside.join(found.assign(p_holm=holm(found.p_value.to_numpy())))
+    family = found.p_value.where(beside.table.isin(["3", "4"])).to_numpy()
+    return beside.join(found.assign(p_holm=holm(family)))
 
 
 def joint_table(studies: pd.DataFrame, reference: pd.DataFrame, length: int) -> pd.DataFrame:

@@ -25,10 +25,15 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
 
+# Compliance of a joint by its number, in tables that people read; in files it is ``compliance_{}``, rad/(N m).
+COMPLIANCE = "compliance_{}_urad_per_Nm"
+
+
 def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
     """Joint compliances that the study takes as true, µrad/(N m)."""
     found = {name: dict(enumerate((MICRO * robot.compliance).tolist(), 1)) for name, robot in robots.items()}
-    return pd.DataFrame([{"robot": name} | {f"c{j}": value for j, value in row.items()} for name, row in found.items()])
+    rows = [{"robot": name} | {COMPLIANCE.format(j): value for j, value in row.items()} for name, row in found.items()]
+    return pd.DataFrame(rows)
 
 
 def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray]) -> pd.DataFrame:
@@ -61,7 +66,8 @@ def table3(metrics: pd.DataFrame, robots: Iterable[str], strategy: str, noise_um
         row: dict[str, str | float] = {"robot": robot}
         # A robot with fewer joints than another one of the same frame has empty columns for those that it lacks.
         for j in range(1, int(cell.filter(regex=r"^compliance_\d+$").notna().sum()) + 1):
-            row |= {f"c{j}": MICRO * cell[f"compliance_{j}"], f"c{j}_std_error": MICRO * cell[f"compliance_{j}_std_error"]}
+            for end in ("", "_std_error"):
+                row[COMPLIANCE.format(j) + end] = MICRO * cell[f"compliance_{j}{end}"]
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -214,6 +220,7 @@ def column_head(name: str) -> str:
 
 
 _HEADS = (
+    (r"compliance_(\d+)_urad_per_Nm", "c{} (µrad/(N·m))"),
     (r"k_sigma_(\d+)(?:_percent)?", "k_Σ at {} (%)"),
     (r"n_k_sigma_([\d.]+)_percent", "n, k_Σ ≤ {} %"),
     (r"dev_(\d+)(?:_um)?", "dev at {} (µm)"),

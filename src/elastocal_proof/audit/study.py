@@ -125,7 +125,7 @@ def estimates(run: Audited, file: str, robot: str, strategy: str, noise_um: str 
             noisy = f"data/simulated/{robot}/{noise_um}um/measured.parquet"
             seen = np.concatenate([run.deflections(noisy, name)[data_set, :length, :rows].ravel() for name in points])
             allowed = ROUNDING * max(1.0, condition / _EXACT_UP_TO)
-            yield compare(f"compliances {words}", by, row.filter(regex=r"^c\d+$"), lost * gain @ seen, allowed)
+            yield compare(f"compliances {words}", by, row.filter(regex=r"^compliance_\d+$"), lost * gain @ seen, allowed)
         elif enough:
             spread = (gain @ gain.T)[np.tril_indices(arm.joints)]
             yield compare(f"covariance {words}", by, row.filter(like="cov_").to_numpy(float), spread, SINGLE)
