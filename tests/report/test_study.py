@@ -136,7 +136,11 @@ def test_the_page_has_the_rows_of_each_table_and_leaves_out_what_was_not_measure
 
     found = tables_of(EVERY)
     assert [len(rows) - 1 for rows in found.values()] == [
-        len(EVERY[name]) for name in ("claims", "table4", "reflectors", "reflectors", "break_even", "simulated")
+        len(EVERY[name])
+        for name in (
+            *("joint", "claims", "table4", "reflectors", "reflectors", "break_even", "simulated", "needed", "smallest"),
+            *("observability", "budget", "staged", "ladder", "tubes", "geometry", "weighting"),
+        )
     ]
     assert found["Claims of the paper"][1] == EVERY["claims"][0]
     assert found["Table 4, positions of three reflectors"][1] == [*EVERY["reflectors"][0][:2], *EVERY["reflectors"][0][6:]]
