@@ -139,7 +139,7 @@ def test_the_page_has_the_rows_of_each_table_and_leaves_out_what_was_not_measure
         len(EVERY[name])
         for name in (
             *("joint", "claims", "table4", "reflectors", "reflectors", "break_even", "simulated", "needed", "smallest"),
-            *("observability", "budget", "staged", "ladder", "tubes", "geometry", "weighting"),
+            *("observability", "budget", "second_targets", "staged", "ladder", "tubes", "geometry", "weighting"),
         )
     ]
     assert found["Claims of the paper"][1] == EVERY["claims"][0]
