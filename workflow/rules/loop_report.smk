@@ -87,11 +87,13 @@ rule pictures:
         loop=expand("reports/loop/kuka_extended_end_effector/figures/{figure}.png", figure=["arrows", "candidates"]),
         hero="reports/loop/kuka_extended_end_effector/figures/hero.png",
         measured="reports/loop/ur5_every_seventh/figures/before_after.png",
+        steps=expand("reports/loop/{campaign}/before_after.csv", campaign=config["loop"]["main"]),
         page=rules.write_study_page.output.page,
     output:
         figures=expand("docs/{figure}.png", figure=FIGURES),
         loop=expand("docs/loop_{figure}.png", figure=["arrows", "candidates"]),
         hero="docs/hero.png",
         measured="docs/measured_in_the_box.png",
+        steps=expand("docs/{campaign}.csv", campaign=config["loop"]["main"]),
     shell:
-        "(cp {input.figures} {input.hero} docs/; cp {input.measured} {output.measured}; for one in {input.loop}; do cp $one docs/loop_$(basename $one); done) 2> {log}"
+        "(cp {input.figures} {input.hero} docs/; cp {input.measured} {output.measured}; for one in {input.loop}; do cp $one docs/loop_$(basename $one); done; for one in {input.steps}; do cp $one docs/$(basename $(dirname $one)).csv; done) 2> {log}"
