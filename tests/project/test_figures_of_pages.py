@@ -1,9 +1,9 @@
 """Each figure of a page stands in the table that it is from, and a page has no figure without a source.
 
-`figures_of_pages.yaml` says where each is from: of a page and a source the words of the page, and in which table (by the heading
-above it), row and column their numbers stand, or in which sentence (no column). Sources are pages and CSV files that commands write
-into docs/ (`make pictures`, the blind proof, the league) or, of runs of hours, the table of the page itself. Figures that come
-from no table (settings, earlier runs) are listed under `without a table`, with what made them.
+`figures_of_pages.yaml` says where each is from: of a page and a source the words of the page, and in which table (by the
+heading above it), row and column their numbers stand, or in which sentence (no column). Sources are pages and CSV files that
+commands write into docs/ (`make pictures`, the blind proof, the league) or, of runs of hours, the table of the page itself.
+Figures that come from no table (settings, earlier runs) are listed under `without a table`, with what made them.
 """
 
 import re
