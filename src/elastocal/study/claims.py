@@ -140,10 +140,12 @@ def _two_best(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
 
 def _ratio_of_dev(evidence: Evidence) -> Finding:
     found = {robot: evidence.scores(robot, _PLAIN, _DEV) / evidence.scores(robot, _COMB, _DEV) for robot in evidence.robots}
-    text, p = _often(np.all([ratio >= 1.86 for ratio in found.values()], axis=0))
-    reached = [ratio.mean() >= 1.86 for ratio in found.values()]
+    reached = np.array([ratio >= 1.86 for ratio in found.values()])
+    both = reached.all(axis=0)
+    text, p = _often(both)
     ratios = _each(evidence, lambda robot: _spread(found[robot]))
-    verdict = HOLDS if all(reached) else PARTLY if any(reached) else FAILS
+    # The claim is a lower bound: it holds where nearly every study keeps to it.
+    verdict = HOLDS if both.mean() > 1 - LEVEL else PARTLY if reached.mean(axis=1).max() > 0.5 else FAILS
     return _one(f"dev of 6DoF over comb: {ratios}; at least 1.86 on both {text}", verdict, p)
 
 
