@@ -46,7 +46,7 @@ PRINTED = pd.DataFrame(
 )
 PER_DATASET = pd.DataFrame(
     [
-        {"robot": robot, "strategy": name, "ds": ds, "rms_um": 100.0 * n / ds, "rms_um_std_error": 3.0 * n}
+        {"robot": robot, "strategy": name, "length": ds, "rms_um": 100.0 * n / ds, "rms_um_std_error": 3.0 * n}
         | {"crlb_rms_um": 80.0 / ds, "mean_um": 90.0 * n / ds, "p95_um": 150.0 * n / ds, "efficiency": (0.8 / n) ** 2}
         for robot in TITLES
         for n, name in enumerate(ORDER, 1)

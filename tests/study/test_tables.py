@@ -33,7 +33,7 @@ def test_efficiency_is_the_squared_ratio_of_bound_and_error_and_is_empty_without
     assert table.crlb_rms_um.tolist() == pytest.approx([0.0, 40.0])
     assert np.isnan(table.efficiency[0]) and table.efficiency[1] == pytest.approx(0.25)
     assert table.efficiency_std_error[1] == pytest.approx(2 * 0.25 * 4 / 80)
-    assert {"ds", "relative_error_1_percent", "relative_error_1_percent_std_error"} <= set(table)
+    assert {"length", "relative_error_1_percent", "relative_error_1_percent_std_error"} <= set(table)
 
 
 @pytest.mark.parametrize(

@@ -133,6 +133,18 @@ wildcard_constraints:
     test="(/test)?",
 
 
+def draw_panel(panels, function, caption, words, limit):
+    def settings(wildcards):
+        robot = panels[wildcards.panel]
+        return {"title": TITLES[robot], "robot": robot, "order": list(NAMES.values())} | limit
+
+    tables = {
+        "metrics": lambda wildcards: cells("metrics", panels[wildcards.panel], TABLE_NOISE),
+        "printed": f"{CONFIG}/paper/reference.csv",
+    }
+    return (function, "figure5{panel}", caption, PAPER, f"Figure 5{{panel}}: {words}"), tables, settings
+
+
 def sources(step):
     """A script, or the one that calls a function of the packages, and the package modules that it runs.
 

@@ -141,7 +141,7 @@ def _two_best(evidence: Evidence, sigma: str) -> tuple[str, bool, float]:
 def _ratio_of_dev(evidence: Evidence) -> Finding:
     found = {robot: evidence.scores(robot, _PLAIN, _DEV) / evidence.scores(robot, _COMB, _DEV) for robot in evidence.robots}
     reached = np.array([ratio >= 1.86 for ratio in found.values()])
-    both = reached.all(axis=0)
+    both = np.asarray(reached.all(axis=0))
     text, p = _often(both)
     ratios = _each(evidence, lambda robot: _spread(found[robot]))
     # The claim is a lower bound: it holds where nearly every study keeps to it.

@@ -163,11 +163,11 @@ def per_dataset_table(
     `accuracy`: long. `bounds`: the bounds table of each robot. `points`: measuring points that each strategy, by its name,
     reads. The efficiency is (crlb_rms / rms)^2: at most one for an unbiased estimator, empty without noise.
     """
-    frame = accuracy.rename(columns={"length": "ds"}).copy()
-    limits = pd.concat([bound.assign(robot=robot) for robot, bound in bounds.items()]).rename(columns={"length": "ds"})
+    frame = accuracy.copy()
+    limits = pd.concat([bound.assign(robot=robot) for robot, bound in bounds.items()])
     frame["points"] = frame.strategy.map({strategy: "+".join(sorted(names)) for strategy, names in points.items()})
-    frame = frame.merge(limits, on=["robot", "points", "ds"], how="left", validate="many_to_one")
-    result = frame[["strategy", "robot", "noise_um", "ds"]].copy()
+    frame = frame.merge(limits, on=["robot", "points", "length"], how="left", validate="many_to_one")
+    result = frame[["strategy", "robot", "noise_um", "length"]].copy()
     for name in ("mean", "rms", "p95", "max"):
         result[f"{name}_um"] = MICRO * frame[name]
     result["crlb_rms_um"] = frame.rms_per_noise * frame.noise_um
