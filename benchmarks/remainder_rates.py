@@ -96,8 +96,8 @@ if __name__ == "__main__":
             used += found.chosen.regression is not None
             worse += off.mean() > off.std(ddof=1) / np.sqrt(len(off)) > 0.0
             errors.append([each.mean() for each in squares])
-        said = ", ".join(f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}" for level in LEVELS)
-        row = f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns; something remains, {said}"
+        rates = ", ".join(f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}" for level in LEVELS)
+        row = f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns; something remains, {rates}"
         if errors:
             physics, with_it, floor = (rms(column) for column in zip(*errors, strict=True))
             row += f"; used {used}, worse by more than a standard error {worse}; held-out RMS of physics {physics:.0f} µm, "

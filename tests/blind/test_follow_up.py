@@ -5,6 +5,7 @@ import pytest
 from made_folders import made_folder
 
 from elastocal.campaigns.reading import read_campaign
+from elastocal.diagnosis.new_states import Entries
 from elastocal.diagnosis.next_experiment import Proposal
 from elastocal_proof.blind import follow_up as module
 from elastocal_proof.blind.follow_up import followed_up, proposed
@@ -28,9 +29,8 @@ def made_proposal(joints, poses, ladder, draws):
     count = np.arange(poses, dtype=float)
     wrench = np.tile([0.0, 0.0, -500.0, 0.0, 0.0, 0.0], (poses, 1))
     angles = draws.uniform(-1, 1, (poses, joints))
-    return Proposal(
-        angles, wrench, None, np.zeros(poses, bool), ladder, ("6DoF",), count, count, 1.0, 9, ("a",), ("b",), (), ""
-    )
+    entries = Entries(angles, wrench, None, np.zeros(poses, bool))
+    return Proposal(("a",), nearest=("b",), entries=entries, shares=ladder, points=("6DoF",), separation=count, resolved=count)
 
 
 @pytest.fixture

@@ -132,15 +132,15 @@ class _Hypotheses:
         `information` (N, U, U): of N experiments. `truths`, `noise` (T, U): its products with the sensitivities, of variance G;
         on average over the noise where it is not given. Returns (N, T, M).
         """
-        told = information @ truths.T
-        squares = (told * truths.T).sum(axis=1)
+        expected = information @ truths.T
+        squares = (expected * truths.T).sum(axis=1)
         if noise is not None:
-            told, squares = told + noise.T, squares + 2.0 * (noise * truths).sum(axis=1)
+            expected, squares = expected + noise.T, squares + 2.0 * (noise * truths).sum(axis=1)
         found = np.empty((len(information), len(truths), len(self.models)))
         for number, model in enumerate(self.models):
             of_mean = information @ model.mean
-            left = squares - 2.0 * model.mean @ told + (of_mean @ model.mean)[:, None]
-            seen = told[:, model.columns] - of_mean[:, model.columns, None]
+            left = squares - 2.0 * model.mean @ expected + (of_mean @ model.mean)[:, None]
+            seen = expected[:, model.columns] - of_mean[:, model.columns, None]
             inner = information[:, model.columns[:, None], model.columns] + model.precision
             factor, inverse = np.linalg.cholesky(inner), np.linalg.inv(inner)
             left -= (seen * (inverse @ seen)).sum(axis=1)

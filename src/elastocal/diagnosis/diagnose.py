@@ -347,7 +347,7 @@ def _averages(declared: Fit, found: Evidence, best: Hypothesis | None) -> Averag
 def _compliances(declared: Fit, final: Fit, springs: Averaged, prior_share: float) -> dict[str, list[float]]:
     joints = final.model.sites.joints
     after, deviations = joint_compliances(final.model, final.estimate).copy(), np.zeros(joints)
-    told = np.zeros(joints, bool)
+    identified = np.zeros(joints, bool)
     if final.model.identifies_compliance:
         mine = final.places_of("joint_compliance")
         names = [("joint_compliance", final.parameters[index][1].name) for index in mine]
@@ -356,6 +356,6 @@ def _compliances(declared: Fit, final: Fit, springs: Averaged, prior_share: floa
         deviations = np.array([springs.std_error.get(name, error) for name, error in zip(names, alone, strict=True)])
         # With a prior of the size that such a spring reaches, of which that share would be left.
         plausible = np.array([final.parameters[index][1].plausible for index in mine])
-        told = ~final.held[mine] & (deviations**2 < prior_share * (deviations**2 + plausible**2))
+        identified = ~final.held[mine] & (deviations**2 < prior_share * (deviations**2 + plausible**2))
     found = {"before": joint_compliances(declared.model, declared.estimate), "after": after, "std_error": deviations}
-    return {name: (1e6 * values).tolist() for name, values in found.items()} | {"identifiable": told.tolist()}
+    return {name: (1e6 * values).tolist() for name, values in found.items()} | {"identifiable": identified.tolist()}

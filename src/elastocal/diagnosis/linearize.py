@@ -1,7 +1,7 @@
 """From a fit to the problem that is searched: columns of everything that its model might lack, whitened, and their products.
 
-One object for all that looks at them: the first look at gross errors takes its rows, alarm and search its statistics, a closer
-look at some shapes adds their columns, averages and proposals take its products.
+One object for all that looks at them: the initial screening of gross errors takes its rows, alarm and search its statistics, a
+closer look at some shapes adds their columns, averages and proposals take its products.
 """
 
 from __future__ import annotations

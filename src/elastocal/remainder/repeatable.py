@@ -3,8 +3,9 @@
 A posterior predictive check [1] whose discrepancy is how well ridge regressions on functions of the joint angles, fitted to the
 residuals of most configurations, predict those of the others. Residuals are no independent errors: the fit has taken out of
 them what its parameters can follow, and its priors have left in them what these hold back. So chance is errors of changing
-sign, one sign for each configuration (wild cluster bootstrap [2]), and parameters drawn from their priors, both carried through
-the same fit. Each configuration keeps its size of error and all that its measurements share; no noise need be known.
+sign, one sign for each configuration (the cluster bootstrap of residuals [2]), and parameters drawn from their priors, both
+carried through the same fit. Each configuration keeps its size of error and all that its measurements share; no noise need be
+known.
 
 [1] Gelman, A., Meng, X.-L. and Stern, H., Posterior predictive assessment of model fitness via realized discrepancies,
     Statistica Sinica 6, 1996.
