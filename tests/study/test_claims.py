@@ -113,7 +113,7 @@ def test_the_factor_of_comb_holds_where_both_robots_reach_it(dev, verdict, often
 
 def test_small_noise_is_no_more_than_in_part_nothing(table):
     assert claim(table, "0, 50 and 100").verdict == PARTLY
-    assert "the paper's own Table 4: 89 and 72" in claim(table, "6DoF reaches 2").ours
+    assert "the paper's Table 4: 89 and 72" in claim(table, "6DoF reaches 2").ours
 
 
 def test_fanuc_is_better_in_all_figures_only_where_it_is(table):

@@ -6,11 +6,8 @@ Needs results/ and reports/tables/. Writes reports/figures/*.pdf and *.png.
 TITLES = {name: STUDY.robots[name]["name"] for name in config["robots"]}
 REDUCED_TITLES = {name: TITLES[name] for name in REDUCED}
 # Figure 2 shows the first robot and has one more for each further one; Figure 3 shows the extended robot where there is one.
-SCHEME_ROBOTS = {
-    "figure2": REDUCED[0],
-    **{f"figure2_{name}": name for name in REDUCED[1:]},
-    "figure3": (EXTENDED or REDUCED)[-1],
-}
+SCHEME_ROBOTS = dict(zip(["figure2", *(f"figure2_{name}" for name in REDUCED[1:])], REDUCED, strict=True))
+SCHEME_ROBOTS |= {"figure3": (EXTENDED or REDUCED)[-1]}
 # Figures 5a and 5c show the first robot, 5b and 5d the second, as in the paper.
 STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
 DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))

@@ -75,9 +75,7 @@ STUDY_TABLES |= {
         "study_tables",
         {"studies": expand(rules.repeat_studies.output.repeated, interpretation=MEASURED.values(), robot=REDUCED)} | REFERENCE,
         {
-            "table": table_of(
-                "strategies_over_studies", PAPER, "strategies_over_studies", "Table 4 over studies, by what is measured"
-            ),
+            "table": table_of("strategies_over_studies", PAPER, "strategies_over_studies", "Table 4 over studies"),
             "joint": table_of("joint_test", PAPER),
         },
         {

@@ -144,7 +144,9 @@ def bias_and_accuracy(
             single = per_dataset[(per_dataset.robot == robot) & (per_dataset.strategy == strategy)]
             color = PALETTE[index]
             axis.fill_between(single.length, single.mean_um, single.p95_um, color=color, alpha=0.13, linewidth=0)
-            axis.plot(single.length, single.rms_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, RMS")
+            axis.plot(
+                single.length, single.rms_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, RMS"
+            )
             bound = {"color": "black", "marker": "_", "markersize": 7, "linestyle": "none", "zorder": 3 + index}
             axis.plot(single.length, single.crlb_rms_um, label=f"{strategy}: Cramér-Rao bound, RMS", **bound)
             label = f"{strategy}: dev of the paper"

@@ -216,9 +216,8 @@ def comparison_table(
     """The printed figures judged by further studies.
 
     `beside`: by `beside_paper`. `studies`: as in `predict_scatter`. `initial`: the initial table of each robot. `length`: of
-    Table 3. Returns `beside` with studies_mean, studies_std and p_value: of further studies for Tables 3 and 4, of single
-    data sets for Table 2; without a p value where the study was fitted to the figure. p_holm: corrected for the figures of
-    Tables 3 and 4, the one family of all tests; of Table 2 none.
+    Table 3. Returns `beside` with studies_mean, studies_std and p_value: of further studies for Tables 3 and 4 (p_holm corrects
+    for these), of single data sets for Table 2; without a p value where the study was fitted to the figure.
     """
 
     def judged(figure: Any) -> tuple[float, float, float]:
@@ -236,8 +235,7 @@ def comparison_table(
 
     scattered = [judged(figure) for figure in beside.itertuples()]
     found = pd.DataFrame(scattered, beside.index, ["studies_mean", "studies_std", "p_value"], float)
-    family = found.p_value.where(beside.table.isin(["3", "4"])).to_numpy()
-    return beside.join(found.assign(p_holm=holm(family)))
+    return beside.join(found.assign(p_holm=holm(found.p_value.where(beside.table.isin(["3", "4"])).to_numpy())))
 
 
 def joint_table(studies: pd.DataFrame, reference: pd.DataFrame, length: int) -> pd.DataFrame:

@@ -31,9 +31,10 @@ COMPLIANCE = "compliance_{}_urad_per_Nm"
 
 def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
     """Joint compliances that the study takes as true, µrad/(N m)."""
-    found = {name: dict(enumerate((MICRO * robot.compliance).tolist(), 1)) for name, robot in robots.items()}
-    rows = [{"robot": name} | {COMPLIANCE.format(j): value for j, value in row.items()} for name, row in found.items()]
-    return pd.DataFrame(rows)
+    found = {name: MICRO * robot.compliance for name, robot in robots.items()}
+    return pd.DataFrame(
+        [{"robot": name} | {COMPLIANCE.format(j): c for j, c in enumerate(row, 1)} for name, row in found.items()]
+    )
 
 
 def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray]) -> pd.DataFrame:
@@ -66,8 +67,7 @@ def table3(metrics: pd.DataFrame, robots: Iterable[str], strategy: str, noise_um
         row: dict[str, str | float] = {"robot": robot}
         # A robot with fewer joints than another one of the same frame has empty columns for those that it lacks.
         for j in range(1, int(cell.filter(regex=r"^compliance_\d+$").notna().sum()) + 1):
-            for end in ("", "_std_error"):
-                row[COMPLIANCE.format(j) + end] = MICRO * cell[f"compliance_{j}{end}"]
+            row |= {COMPLIANCE.format(j) + end: MICRO * cell[f"compliance_{j}{end}"] for end in ("", "_std_error")}
         rows.append(row)
     return pd.DataFrame(rows)
 
