@@ -37,6 +37,9 @@ def test_blank_rows_and_blanks_around_cells_are_passed_over_and_counted(cell):
         (2, "pose", "1.5", ["'1.5'", "integer"]),
         (2, "repeat", "3000000000", ["'3000000000'", "integer"]),
         (2, "q1", "1_0", ["'1_0'", "a number"]),
+        # One half in the digits of Arabic, and a pose in wide ones.
+        (2, "q1", "\u0660.\u0665", ["a number", "digits 0 to 9"]),
+        (2, "pose", "\uff10", ["a number", "digits 0 to 9"]),
     ],
 )
 def test_faulty_cell_is_refused_by_row_and_column(cell, row, column, entry, words):

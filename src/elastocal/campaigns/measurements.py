@@ -32,6 +32,8 @@ _LONGEST_LINE, _MOST_BYTES = 10_000, 1000 * MOST_MEASUREMENTS
 # Rows whose texts are in memory at a time; their numbers take a tenth of that.
 _ROWS_AT_A_TIME = 20_000
 _COMMENT = "#"
+# A file names no more.
+MOST_JOINTS = 99
 
 CSV, PARQUET = "measurements.csv", "measurements.parquet"
 # Columns of a sheet for people: a place to tick, which is not read, and joint angles as controllers show them, q1_deg or q1_mm,
@@ -85,6 +87,19 @@ def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFi
     if len(rows) == 0:
         raise InputError(path, "", "no row of data", "one row for each measurement of one target")
     return MeasurementFile(path, columns, rows, lines, joints, measured)
+
+
+def described_by(folder: Path) -> tuple[list[str], str]:
+    """Targets that the measurements of a folder are of, in their order, and whether each is a "position" or a "pose".
+
+    No targets where there is no measurement. Raises `InputError`: a file that is no table of measurements.
+    """
+    there = next((path for path in (folder / CSV, folder / PARQUET) if path.is_file()), None)
+    if there is None:
+        return [], "position"
+    columns = (_read_csv if there.name == CSV else _read_parquet)(there.as_posix(), MOST_JOINTS)[0]
+    names = dict.fromkeys(text for cell in columns.get("target", ()) if (text := str(cell).strip()))
+    return list(names), "pose" if {"rx", "ry", "rz"} <= columns.keys() else "position"
 
 
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
@@ -185,10 +200,14 @@ def _numbers(cells: Sequence[str]) -> np.ndarray | list[str]:
 
 
 def _read_numbers(cells: Sequence[Any] | np.ndarray) -> np.ndarray:
-    """ndarray of float (N,); a ValueError or TypeError where a cell is none. Python takes 1_0 for 10."""
-    if not isinstance(cells, np.ndarray) and any(isinstance(cell, str) and "_" in cell for cell in cells):
+    """ndarray of float (N,); a ValueError or TypeError where a cell is none, such as 1_0 or other scripts' digits."""
+    if not isinstance(cells, np.ndarray) and any(isinstance(cell, str) and not _is_plain(cell) for cell in cells):
         raise ValueError
     return np.array(cells, float)
+
+
+def _is_plain(cell: str) -> bool:
+    return "_" not in cell and (cell.isascii() or cell.strip().isascii())
 
 
 def _join(chunks: Sequence[Any]) -> Sequence[Any] | np.ndarray:
@@ -330,7 +349,7 @@ class MeasurementFile:
             values = _read_numbers(self.columns[name])
         except (ValueError, TypeError):
             index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
-            raise self._value_fault(index, name, "a number with a decimal point") from None
+            raise self._value_fault(index, name, "a number with a decimal point, in digits 0 to 9") from None
         # Not a number is no more than anything either.
         sound = np.abs(values) <= LARGEST_NUMBER
         if not sound.all():
