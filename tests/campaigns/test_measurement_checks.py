@@ -66,10 +66,15 @@ def test_a_clock_that_is_set_back_inside_of_a_pose_is_found_in_poses_of_any_orde
         cell.read()
 
 
-def test_rows_that_were_measured_anew_an_hour_later_stay(cell):
+def test_rows_measured_anew_an_hour_later_and_targets_one_after_the_other_stay(cell):
     time = 60.0 * np.arange(len(cell.table["pose"]))
     time[12] += 3550.0
     cell.table["time_s"] = time.tolist()
+    assert len(cell.read().measurements) == len(time)
+    pose = np.array(cell.table["pose"])
+    by_target = np.argsort([f"{target}{number:06}" for number, target in enumerate(cell.table["target"])])
+    cell.table["time_s"] = (3500.0 * pose / pose.max()).tolist()
+    cell.table = {name: [values[place] for place in by_target] for name, values in cell.table.items()}
     assert len(cell.read().measurements) == len(time)
 
 

@@ -147,9 +147,11 @@ def _check_times(measurements: Measurements, table: MeasurementFile) -> None:
         for of in (inside, np.ones_like(inside)):
             if (place := _set_back(np.diff(measurements.time_s[rows])[of])) is not None:
                 before, index = rows[:-1][of][place], int(rows[1:][of][place])
-                found = (
-                    f"{measurements.time_s[index]:.15g} after {measurements.time_s[before]:.15g} in row {table.rows[before]}"
-                )
+                if of is not inside and len(np.intersect1d(*np.split(pose_of[rows], [np.searchsorted(rows, index)]))) > 1:
+                    # One target after the other, each at the same poses.
+                    continue
+                early, late = measurements.time_s[[index, before]]
+                found = f"{early:.15g} after {late:.15g} in row {table.rows[before]}"
                 raise table.cell_fault(index, "time_s", found, "a clock that is not set back: add the hour or the day")
 
 
