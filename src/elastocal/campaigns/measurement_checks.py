@@ -147,7 +147,7 @@ def _check_times(measurements: Measurements, table: MeasurementFile) -> None:
         for of in (inside, np.ones_like(inside)):
             if (place := _set_back(np.diff(measurements.time_s[rows])[of])) is not None:
                 before, index = rows[:-1][of][place], int(rows[1:][of][place])
-                if of is not inside and len(np.intersect1d(*np.split(pose_of[rows], [np.searchsorted(rows, index)]))) > 1:
+                if of is not inside and len({*pose_of[rows[rows < index]]} & {*pose_of[rows[rows >= index]]}) > 1:
                     # One target after the other, each at the same poses.
                     continue
                 early, late = measurements.time_s[[index, before]]

@@ -249,6 +249,9 @@ class _Winner:
             if change.placement == "targets":
                 estimates = written.estimate, self.placement.estimate
                 detail, parameters = _target_fault(campaign.targets, *estimates, IMPLAUSIBLE_M, IMPLAUSIBLE_RAD)
+                # A target that sits a little off may as well be a last link of another length.
+                far = np.linalg.norm(self.placement.estimate.target_offset - written.estimate.target_offset, axis=1).max()
+                decisive = far > _NEAR_M or "turned" in detail
             if change.placement == "mounts":
                 detail, parameters = _mount_fault(campaign.targets, self.placement.estimate)
             alike = self.alike if len(self.tried.changes) == 1 else ()

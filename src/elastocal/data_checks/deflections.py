@@ -12,7 +12,7 @@ import numpy as np
 from scipy.constants import g, pound_force
 
 from elastocal.campaigns.groups import groups_of
-from elastocal.data_checks.placement import rms, robust_sigma, robustly_placed, spread
+from elastocal.data_checks.placement import free_columns, rms, robust_sigma, robustly_placed, spread
 from elastocal.fitting.identifiability import solve_normal
 from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base
@@ -329,14 +329,7 @@ def _off_geometry(
     position: np.ndarray,
 ) -> list[np.ndarray]:
     """Residual and parts less what frames, targets and joint offsets can explain of them."""
-    columns = [jacobian]
-    if campaign.frame == "tracker":
-        turns = np.stack([np.cross(axis, position) for axis in np.eye(3)], axis=-1)
-        rigid = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=-1)
-        columns += [rigid * (measurements.session == session)[:, None, None] for session in np.unique(measurements.session)]
-    for index, target in enumerate(campaign.targets):
-        if target.offset_m is None:
-            columns.append(rotation * (measurements.target == index)[:, None, None])
+    columns = [jacobian, *free_columns(campaign, measurements, rotation, position)]
     flat = np.concatenate(columns, axis=-1).reshape(residual.size, -1)
     left, sizes, _ = np.linalg.svd(flat, full_matrices=False)
     basis = left[:, sizes > 1e-9 * sizes[0]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from elastocal.data_checks.geometry import explained_by_geometry
 from elastocal.data_checks.placement import IMPLAUSIBLE_M, IMPLAUSIBLE_RAD, placed, rms, robustly_placed, spread, trimmed_rms
 from elastocal.data_checks.protocol import Fault, Value
 
@@ -29,6 +30,8 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
         turned = 0.0 if placement.turn is None else trimmed_rms(placement.turn)
         if away < _FARTHEST_M and turned < _FARTHEST_RAD:
             return []
+    if explained_by_geometry(campaign, some):
+        return []
     what = f"positions lie {away:.2g} m" if away >= _FARTHEST_M else f"orientations lie {turned:.2g} rad"
     detail = (
         f"{what} (RMS) from where the robot file puts them, and no other sense, unit, axis, frame or order of rows that was"

@@ -111,6 +111,24 @@ def spread(measurements: Measurements, poses: int = MANY_POSES) -> Measurements:
     return measurements.select(np.sort(np.concatenate(chosen)))
 
 
+def free_columns(
+    campaign: Campaign, measurements: Measurements, rotation: np.ndarray, position: np.ndarray
+) -> list[np.ndarray]:
+    """Sensitivities of positions to frames and targets that nobody knows, ndarrays (N, 3, .), base axes.
+
+    `rotation`, `position` (N, 3, 3), (N, 3): of the points on which the targets sit, and of the targets.
+    """
+    columns = []
+    if campaign.frame == "tracker":
+        turns = np.stack([np.cross(axis, position) for axis in np.eye(3)], axis=-1)
+        rigid = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=-1)
+        columns += [rigid * (measurements.session == session)[:, None, None] for session in np.unique(measurements.session)]
+    for index, target in enumerate(campaign.targets):
+        if target.offset_m is None:
+            columns.append(rotation * (measurements.target == index)[:, None, None])
+    return columns
+
+
 def rms(values: np.ndarray) -> float:
     """Root of the mean square, of an array of any shape."""
     return float(np.sqrt((values**2).mean()))

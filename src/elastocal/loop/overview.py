@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.application.scope import calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.catalogue import faults
+from elastocal.data_checks.controller import controller_warnings
 from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept
 from elastocal.diagnosis.linearize import linearized
@@ -87,7 +88,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     if not decisive:
         fitted = calibrate_on_case(case, declared.model, declared.estimate, declared.covariance, noise)
         facts["accuracy"] = campaign_accuracy(fitted, states).document()
-    suspicious = [*warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case, settings)]
+    suspicious = [*controller_warnings(campaign), *warnings, *warnings_of(left_out)]
+    suspicious += _suspicious(campaign, facts, case, settings)
     return facts | _testable(part) | {"suspicious": [*suspicious, *repeat_warnings(training, held_out)]}
 
 
