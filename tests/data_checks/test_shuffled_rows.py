@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made, with_other_compliances
 
+from elastocal.data_checks.catalogue import faults
 from elastocal.data_checks.shuffled_rows import find
 
 
@@ -46,7 +47,7 @@ def test_poses_whose_measurements_are_swapped_are_named(campaign):
 @pytest.mark.parametrize(("steps", "words"), [(1, "row further up"), (-1, "row further down")])
 def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
     source = np.roll(np.arange(len(campaign.measurements)), steps)
-    (fault,) = find(campaign, with_measured(campaign.measurements, source))
+    (fault,) = faults(campaign, with_measured(campaign.measurements, source))
     assert words in fault.detail
     assert fault.parameters[0].value == -steps
 

@@ -129,6 +129,14 @@ def free_columns(
     return columns
 
 
+def with_measured(measurements: Measurements, source: np.ndarray) -> Measurements:
+    """Measurements with the measured columns of other rows."""
+    turned = measurements.rotation_vector
+    return replace(
+        measurements, position=measurements.position[source], rotation_vector=None if turned is None else turned[source]
+    )
+
+
 def rms(values: np.ndarray) -> float:
     """Root of the mean square, of an array of any shape."""
     return float(np.sqrt((values**2).mean()))

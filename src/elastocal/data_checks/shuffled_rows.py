@@ -14,11 +14,9 @@ are matched to deflections as an assignment problem [2].
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
@@ -33,6 +31,7 @@ from elastocal.data_checks.placement import (
     robustly_placed,
     spread,
     trimmed_rms,
+    with_measured,
 )
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.observations import state_clusters
@@ -57,8 +56,6 @@ _FEWEST_IN_PLACE = 10
 _MATCHING_ROUNDS = 10
 # Orientations distinguish places as points at this distance from the target would, m.
 _ARM_M = 0.5
-# A shift concerns all rows: more than this share is absurdly far, and all but a few come right.
-_MANY, _CURED = 0.01, 0.9
 # A load is out of place where it misses the deflection by this share of it, and by so many times what others miss; back in
 # place within so many.
 _MISSED, _MISSED_MORE, _MISSED_LIKE_OTHERS = 0.5, 6.0, 3.0
@@ -80,48 +77,9 @@ def _of_positions(campaign: Campaign, measurements: Measurements) -> list[Fault]
     far = (as_written.distance > IMPLAUSIBLE_M).mean()
     if far * len(measurements) < _FEWEST_ROWS:
         return []
-    found = _shifted(campaign, measurements, as_written) if far > _MANY else []
-    if not found and trimmed_rms(some.distance) > IMPLAUSIBLE_M:
+    if trimmed_rms(some.distance) > IMPLAUSIBLE_M:
         return _all_matched(campaign, measurements, as_written)
-    return found or _matched(measurements, as_written, as_written, as_written)
-
-
-def _shifted(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Fault]:
-    """All rows fit once the measured columns are moved by one row."""
-    shifts = list(product(("row", "row of its target", "pose"), (1, -1)))
-    moved = [_moved(measurements, *shift) for shift in shifts]
-    plain = [trimmed_rms(placed(campaign, spread(part)).distance) for part in moved]
-    best = int(np.argmin(plain))
-    estimate = robustly_placed(campaign, spread(moved[best])).estimate
-    before, after = as_written.distance, placed_by(campaign, moved[best], estimate).distance
-    # Neighbouring rows may be near each other: those that are not tell.
-    cured = (after > IMPLAUSIBLE_M).mean() < (1 - _CURED) * (before > IMPLAUSIBLE_M).mean()
-    if not cured or trimmed_rms(after) > min(trimmed_rms(before), IMPLAUSIBLE_M) or rms(after) > rms(before) / FAR_BETTER:
-        return []
-    kind, steps = shifts[best]
-    detail = f"the measured columns fit one {kind} further {'down' if steps > 0 else 'up'}"
-    return [Fault(NAMES[0], (), detail, (Value("shift", float(steps), "–"),), (rms(before), rms(after)), (), True)]
-
-
-def _moved(measurements: Measurements, kind: str, steps: int) -> Measurements:
-    """Measurements with the measured columns so many rows of a kind further down; those that fall off an end are left out."""
-    of_target = [measurements.session, measurements.target]
-    alike = {
-        "row": [measurements.session],
-        "row of its target": of_target,
-        "pose": [*of_target, measurements.load, measurements.repeat],
-    }[kind]
-    order, source = np.argsort(measurements.row, kind="stable"), np.empty(len(measurements), int)
-    source[order] = pd.Series(order).groupby([column[order] for column in alike]).shift(steps, fill_value=-1)
-    return _with_measured(measurements, np.maximum(source, 0)).select(source >= 0)
-
-
-def _with_measured(measurements: Measurements, source: np.ndarray) -> Measurements:
-    """Measurements with the measured columns of other rows."""
-    turned = measurements.rotation_vector
-    return replace(
-        measurements, position=measurements.position[source], rotation_vector=None if turned is None else turned[source]
-    )
+    return _matched(measurements, as_written, as_written, as_written)
 
 
 def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Fault]:
@@ -140,7 +98,7 @@ def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Pla
         if before is not None and (source == before).all():
             break
         before = source
-        estimate = placed(campaign, spread(_with_measured(measurements, source))).estimate
+        estimate = placed(campaign, spread(with_measured(measurements, source))).estimate
     return _matched(measurements, as_written, beside, None)
 
 
