@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_campaigns import Plan, made, with_geometric_errors
 
-from elastocal.data_checks.catalogue import faults
 from elastocal.data_checks.implausible import find
+from elastocal.data_checks.protocol import faults
 
 
 @pytest.mark.parametrize("tracker", [True, False])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made, with_other_compliances
 
-from elastocal.data_checks.catalogue import faults
+from elastocal.data_checks import loads
+from elastocal.data_checks.protocol import faults
 from elastocal.data_checks.shuffled_rows import find
 
 
@@ -61,7 +62,7 @@ def test_loads_beside_the_deflections_of_others_are_named(campaign, share):
     for mine, other in zip(loaded[some], loaded[rng.permutation(some)], strict=True):
         theirs = measurements.wrench[(measurements.pose == other[0]) & (measurements.load == other[1])][0]
         wrench[(measurements.pose == mine[0]) & (measurements.load == mine[1])] = theirs
-    (fault,) = find(campaign, replace(measurements, wrench=wrench))
+    (fault,) = loads.find(campaign, replace(measurements, wrench=wrench))
     assert "load" in fault.detail
     assert fault.evidence[1] < fault.evidence[0] / 5
     assert 0.6 * share < fault.parameters[0].value <= share

@@ -9,13 +9,11 @@ each is tried, none is fitted.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import partial
-from itertools import combinations, permutations, product
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from elastocal.data_checks.placement import (
@@ -28,15 +26,16 @@ from elastocal.data_checks.placement import (
     robustly_placed,
     spread,
     trimmed_rms,
-    with_measured,
 )
 from elastocal.data_checks.protocol import Fault, Value
+from elastocal.data_checks.readings import IN_SESSION, POSES, hypotheses, measured_otherwise, shifts, with_unknown
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements, Target
     from elastocal.data_checks.placement import Placement
+    from elastocal.data_checks.readings import Change
     from elastocal.fitting.model import Estimate
 
 NAMES, FAMILY, AFTER = (
@@ -45,8 +44,6 @@ NAMES, FAMILY, AFTER = (
     ("constant_columns",),
 )
 
-# Poses enough to compare some two hundred hypotheses.
-_POSES = 40
 # What a correction leaves as it is may come out this much larger by chance.
 _NO_WORSE = 1.2
 # Hypotheses whose misfits differ by less than this share, or by less than a tracker could tell, fit alike.
@@ -57,43 +54,6 @@ _MOST_ALIKE = 5
 _NEAR_M, _NEAR_RAD = 0.05, 0.05
 # Faults that are mended one after the other.
 _ROUNDS = 3
-_IN_SESSION = " in session "
-# Metres for each unit that people write for metres.
-_LENGTHS = {
-    "millimetres": 1e-3,
-    "centimetres": 1e-2,
-    "decimetres": 0.1,
-    "inches": 0.0254,
-    "feet": 0.3048,
-    "tenths of what they should be": 10.0,
-    "hundredths of what they should be": 100.0,
-    "thousandths of what they should be": 1e3,
-}
-# What rotation vectors were multiplied by before they were written.
-_TURNS = {
-    0.5: "halves of what they should be",
-    2.0: "doubles of what they should be",
-    180 / np.pi: "degrees",
-    np.pi / 180: "radians converted twice",
-}
-# Angles that people write for a rotation vector, as letters of scipy: capital ones turn about the moved axes.
-_EULER = {"XYZ": "Euler angles about the moved x, y, z", "xyz": "angles about the fixed x, y, z (roll, pitch, yaw)"}
-
-
-@dataclass(frozen=True)
-class Change:
-    """One way in which the file may have to be read otherwise.
-
-    `name`: of the fault that it would be. `detail`: one sentence in plain words. `correct`: reads a campaign so. `joints`: from
-    1. `placement`: what it fits; its sentence and its numbers then come from the fit.
-    """
-
-    name: str
-    detail: str
-    correct: Callable[[Campaign], Campaign] = field(compare=False)
-    joints: tuple[int, ...] = ()
-    parameters: tuple[Value, ...] = ()
-    placement: str = ""
 
 
 @dataclass(frozen=True)
@@ -135,14 +95,19 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
 
     Returns each beside the alternatives that fit as well.
     """
-    few = replace(campaign, measurements=spread(measurements, _POSES))
-    found = _one_after_the_other(few, _shifts(measurements))
+    few = replace(campaign, measurements=spread(measurements, POSES))
+    found = _one_after_the_other(few, shifted := shifts(measurements))
+    loaded = measurements.select(measurements.load > 0)
+    if not found and len(loaded):
+        # Rows of one pose that stand a row off show it at the last load alone, where the next pose's stand.
+        stages = [[[(change,) for change in shifted]]]
+        found, _ = _mended(replace(campaign, measurements=spread(loaded, POSES)), stages)
     if found or campaign.measured == "position":
         return found
     if slight := _slightly_turned(few):
         return slight
     # Where orientations do not go with positions in any way, positions alone may still tell.
-    found = _one_after_the_other(_measured(replace(few, measured="position"), rotation_vector=None), [])
+    found = _one_after_the_other(measured_otherwise(replace(few, measured="position"), rotation_vector=None), [])
     return [replace(fault, detail=f"{fault.detail} (positions alone: orientations do not go with them)") for fault in found]
 
 
@@ -150,7 +115,7 @@ def _one_after_the_other(campaign: Campaign, first: Sequence[Change]) -> list[Fa
     """Faults that are mended one after the other; `first`: changes that are tried of the file as it stands alone."""
     found: list[Fault] = []
     for number in range(_ROUNDS):
-        new, campaign = _mended(campaign, () if number else first)
+        new, campaign = _mended(campaign, hypotheses(campaign, () if number else first))
         known = {(fault.name, fault.detail) for fault in found}
         new = [fault for fault in new if (fault.name, fault.detail) not in known]
         found += new
@@ -161,7 +126,7 @@ def _one_after_the_other(campaign: Campaign, first: Sequence[Change]) -> list[Fa
 
 def _slightly_turned(campaign: Campaign) -> list[Fault]:
     """A mount turned by as much as the zero of a joint may be off, but seldom is: for physics to tell, and a warning."""
-    freed = _with_unknown({"rotation": None}, campaign)
+    freed = with_unknown({"rotation": None}, campaign)
     written, fitted = (robustly_placed(each, campaign.measurements) for each in (campaign, freed))
     detail, parameters, _ = _target_fault(campaign.targets, written.estimate, fitted.estimate, np.inf, _NEAR_RAD)
     if not detail or written.turn is None or fitted.turn is None:
@@ -169,50 +134,14 @@ def _slightly_turned(campaign: Campaign) -> list[Fault]:
     return [Fault("wrong_target", (), detail, parameters, (rms(written.turn), rms(fitted.turn)), (), False, ())]
 
 
-def hypotheses(campaign: Campaign, first: Sequence[Change] = ()) -> Iterator[list[list[tuple[Change, ...]]]]:
-    """Everything that is tried, the simplest first, each stage where none before convinces.
-
-    Of a stage what is discrete comes before what is fitted, which is preferred only where it is far better.
-    """
-    oriented = campaign.measured == "pose"
-    single = [*_senses(campaign.robot.joints), *_lengths_of_positions(), *_lengths_of_targets(campaign)]
-    single += [*(_rotations() if oriented else []), *_axes(campaign.frame == "tracker" and not oriented, oriented), *first]
-    fitted = _placements(campaign)
-    yield [[(change,) for change in single], [(change,) for change in fitted]]
-    pairs: list[tuple[Change, ...]] = []
-    for change in fitted:
-        if change.placement == "frame":
-            elsewhere = replace(campaign, frame="tracker")
-            others = [*fitted, *next(hypotheses(elsewhere))[0], *(_axes(True, False) if oriented else [])]
-            alone = [other[0] if isinstance(other, tuple) else other for other in others]
-            pairs += [(change, other) for other in alone if other is not change]
-    yield [[*pairs, *combinations(_senses(campaign.robot.joints)[: campaign.robot.joints], 2)]]
-
-
-def _placements(campaign: Campaign) -> list[Change]:
-    """Changes that fit where the base or the targets are, as far as the campaign says that it knows them."""
-    found = []
-    if campaign.frame == "base":
-        found.append(Change("wrong_frame", "", lambda c: replace(c, frame="tracker"), placement="frame"))
-    unknown: list[dict[str, None]] = []
-    if campaign.measured == "pose" and any(target.rotation is not None for target in campaign.targets):
-        unknown.append({"rotation": None})
-    if any(target.offset_m is not None for target in campaign.targets):
-        unknown.append({"offset_m": None, "rotation": None})
-    found += [Change("wrong_target", "", partial(_with_unknown, parts), placement="targets") for parts in unknown]
-    if len(_mounts(campaign.measurements)) > len(np.unique(campaign.measurements.target)):
-        found.append(Change("mounted_anew", "", _with_a_mount_each_session, placement="mounts"))
-    return found
-
-
-def _mended(campaign: Campaign, first: Sequence[Change]) -> tuple[list[Fault], Campaign]:
+def _mended(campaign: Campaign, stages: Iterable[Sequence[Sequence[tuple[Change, ...]]]]) -> tuple[list[Fault], Campaign]:
     """Faults of the simplest hypothesis that mends the measurements, and the campaign as it is then read."""
     written = Reading((), campaign, robustly_placed(campaign, campaign.measurements))
     # All measurements but a few, or all: a joint may move in a few poses only.
     measures = [measure for measure in (trimmed_rms, rms) if written.misfit(measure).implausible]
     if not measures:
         return [], campaign
-    for stage in hypotheses(campaign, first):
+    for stage in stages:
         tried = [[_read(campaign, changes) for changes in part] for part in stage]
         for measure in measures:
             before, best = written.misfit(measure), None
@@ -293,164 +222,6 @@ def _faults(
     return found
 
 
-def _senses(joints: int) -> list[Change]:
-    """Joints counted the other way round, then those counted from their neighbours."""
-    unit, found = np.eye(joints), []
-    for j in range(joints):
-        detail = f"joint {j + 1} has the wrong sense: measurements fit with its sign turned"
-        found.append(Change("wrong_sign", detail, partial(_with_angles, np.diag(1.0 - 2.0 * unit[j])), (j + 1,)))
-    for j, (sign, word) in product(range(joints - 1), ((1.0, "added to"), (-1.0, "taken from"))):
-        detail = f"joint {j + 2} is counted from joint {j + 1}: measurements fit with the angle of joint {j + 1} {word} it"
-        matrix = unit + sign * np.outer(unit[j + 1], unit[j])
-        found.append(Change("wrong_sign", detail, partial(_with_angles, matrix), (j + 1, j + 2)))
-    return found
-
-
-def _shifts(measurements: Measurements) -> list[Change]:
-    """Measured columns that stand a row further up or down, of all measurements: those left have others beside them."""
-    of_target = [measurements.session, measurements.target]
-    alike = {
-        "row": [measurements.session],
-        "row of its target": of_target,
-        "pose": [*of_target, measurements.load, measurements.repeat],
-    }
-    found = []
-    for (kind, columns), steps in product(alike.items(), (1, -1)):
-        order, source = np.argsort(measurements.row, kind="stable"), np.empty(len(measurements), int)
-        source[order] = pd.Series(order).groupby([column[order] for column in columns]).shift(steps, fill_value=-1)
-        detail = f"the measured columns fit one {kind} further {'down' if steps > 0 else 'up'}"
-        moved = partial(_with_shifted, measurements, source)
-        found.append(Change("shuffled_rows", detail, moved, (), (Value("shift", float(steps), "–"),)))
-    return found
-
-
-def _lengths_of_positions() -> list[Change]:
-    found = []
-    for unit, metres in _LENGTHS.items():
-        detail = f"the positions look like {unit}: measurements fit {metres:g} times the written positions"
-        factor = Value("metres for each unit of position written", metres, "m")
-        found.append(Change("wrong_unit", detail, partial(_with_axes, metres * np.eye(3), None), (), (factor,)))
-    return found
-
-
-def _lengths_of_targets(campaign: Campaign) -> list[Change]:
-    """Of all targets, or of one where there are several."""
-    known = [target.name for target in campaign.targets if target.offset_m is not None and any(target.offset_m)]
-    groups = [known, *([name] for name in known if len(known) > 1)] if known else []
-    found = []
-    for names, (unit, metres) in product(groups, _LENGTHS.items()):
-        which = f"the offset of {names[0]} looks" if len(names) == 1 < len(known) else "the target offsets look"
-        which = "the target offset looks" if len(known) == 1 else which
-        detail = f"{which} like {unit}: measurements fit {metres:g} times what is written for {', '.join(names)}"
-        factor = Value("metres for each unit of target offset written", metres, "m")
-        found.append(Change("wrong_unit", detail, partial(_with_offsets, names, metres), (), (factor,)))
-    return found
-
-
-def _rotations() -> list[Change]:
-    detail = "the rotation vectors fit turned round, as if they took base axes into the target's"
-    found = [Change("wrong_sign", detail, partial(_with_rotations, np.negative))]
-    for factor, words in _TURNS.items():
-        detail = f"the rotation vectors look like {words}: measurements fit {1 / factor:.4g} times the written rotation vectors"
-        value = Value("radians for each unit of rotation vector written", 1 / factor, "rad")
-        divided = partial(_with_rotations, partial(np.multiply, 1 / factor))
-        found.append(Change("wrong_unit", detail, divided, (), (value,)))
-    for letters, words in _EULER.items():
-        detail = f"the columns of the rotation vector look like {words}, in rad"
-        read = partial(_with_rotations, lambda turned, order=letters: Rotation.from_euler(order, turned).as_rotvec())
-        found.append(Change("wrong_unit", detail, read))
-    return found
-
-
-def _axes(mirrored_only: bool, oriented: bool) -> list[Change]:
-    """Axes exchanged or turned round, those of the fewest changes first; rotation vectors as written, or exchanged as well."""
-    if mirrored_only:
-        detail = "the measurements are mirrored: two axes are exchanged, or one is turned round, or joints have the wrong sense"
-        return [Change("swapped_axes", detail, partial(_with_axes, np.diag([1.0, 1.0, -1.0]), None))]
-    ways = [
-        np.array(signs)[:, None] * np.eye(3)[list(order)]
-        for order in permutations(range(3))
-        for signs in product((1.0, -1.0), repeat=3)
-    ]
-    ways.sort(key=lambda matrix: np.abs(matrix - np.eye(3)).sum())
-    found = []
-    for matrix in ways[1:]:
-        detail = f"the axes are exchanged: measurements fit with {_axes_in_words(matrix)}"
-        found.append(Change("swapped_axes", detail, partial(_with_axes, matrix, None)))
-        handed = np.linalg.det(matrix)
-        for sign in sorted({1.0, handed}) if oriented else ():
-            words = f"{detail}, and their rotation vectors likewise{', turned round' if sign * handed > 0 > handed else ''}"
-            found.append(Change("swapped_axes", words, partial(_with_axes, matrix, sign * matrix)))
-    return found
-
-
-def _axes_in_words(matrix: np.ndarray) -> str:
-    """Such as ``x = -y, y = x``: what is to be read for the axes that change."""
-    written = [f"{'-' if row.min() < 0 else ''}{'xyz'[np.argmax(np.abs(row))]}" for row in matrix]
-    return ", ".join(f"{axis} = {read}" for axis, read in zip("xyz", written, strict=True) if axis != read)
-
-
-# Ways to read a campaign otherwise, by what comes before it.
-
-
-def _with_angles(matrix: np.ndarray, campaign: Campaign) -> Campaign:
-    # The sign of a column of the file, which counts from where the controller counts.
-    reported = campaign.robot.reported_angles(campaign.measurements.joint_angles)
-    return _measured(campaign, joint_angles=campaign.robot.model_angles(reported @ matrix.T))
-
-
-def _with_axes(matrix: np.ndarray, turning: np.ndarray | None, campaign: Campaign) -> Campaign:
-    """Positions by a matrix, and rotation vectors, which stay as they are without one of theirs."""
-    vectors = campaign.measurements.rotation_vector
-    vectors = vectors if turning is None or vectors is None else vectors @ turning.T
-    return _measured(campaign, position=campaign.measurements.position @ matrix.T, rotation_vector=vectors)
-
-
-def _with_shifted(measurements: Measurements, source: np.ndarray, campaign: Campaign) -> Campaign:
-    """Some of all measurements, each with the measured columns of the row at its `source`, left out where that is -1."""
-    moved = with_measured(measurements, np.maximum(source, 0)).select(source >= 0)
-    return replace(campaign, measurements=spread(moved, _POSES))
-
-
-def _with_rotations(function: Callable[[np.ndarray], np.ndarray], campaign: Campaign) -> Campaign:
-    vectors = campaign.measurements.rotation_vector
-    return _measured(campaign, rotation_vector=None if vectors is None else function(vectors))
-
-
-def _measured(campaign: Campaign, **columns: Any) -> Campaign:
-    return replace(campaign, measurements=replace(campaign.measurements, **columns))
-
-
-def _with_unknown(parts: Mapping[str, Any], campaign: Campaign) -> Campaign:
-    seen = set(campaign.measurements.target.tolist())
-    targets = [replace(t, **parts) if number in seen else t for number, t in enumerate(campaign.targets)]
-    return replace(campaign, targets=tuple(targets))
-
-
-def _with_offsets(names: Collection[str], factor: float, campaign: Campaign) -> Campaign:
-    targets = [
-        replace(target, offset_m=tuple(factor * value for value in target.offset_m))
-        if target.offset_m is not None and target.name in names
-        else target
-        for target in campaign.targets
-    ]
-    return replace(campaign, targets=tuple(targets))
-
-
-def _with_a_mount_each_session(campaign: Campaign) -> Campaign:
-    measurements, mounts = campaign.measurements, _mounts(campaign.measurements)
-    named = [(campaign.targets[target], session) for target, session in mounts]
-    targets = [replace(t, name=f"{t.name}{_IN_SESSION}{session}", offset_m=None, rotation=None) for t, session in named]
-    number = {mount: index for index, mount in enumerate(mounts)}
-    each = np.array([number[mount] for mount in zip(measurements.target, measurements.session, strict=True)])
-    return replace(_measured(campaign, target=each), targets=tuple(targets))
-
-
-def _mounts(measurements: Measurements) -> list[tuple[int, int]]:
-    """Targets and the sessions in which they are measured."""
-    return sorted(set(zip(measurements.target.tolist(), measurements.session.tolist(), strict=True)))
-
-
 def _frame_fault(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str, tuple[Value, ...], bool]:
     """Sentence and numbers of a base that stands elsewhere, and whether that is too far for physics."""
     parameters, away, turned = [], 0.0, 0.0
@@ -473,7 +244,7 @@ def _frame_fault(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str
 def _mount_fault(targets: Sequence[Target], estimate: Estimate) -> tuple[str, tuple[Value, ...]]:
     """Sentence and numbers of a target that was mounted anew: the two of its mounts that are farthest apart."""
     rotations = Rotation.from_matrix(estimate.target_rotation)
-    parted = [target.name.rpartition(_IN_SESSION) for target in targets]
+    parted = [target.name.rpartition(IN_SESSION) for target in targets]
     pairs = [(a, b) for a, b in combinations(range(len(targets)), 2) if parted[a][0] == parted[b][0]]
     turns = np.array([(rotations[a].inv() * rotations[b]).magnitude() for a, b in pairs])
     shifts = np.array([np.linalg.norm(estimate.target_offset[a] - estimate.target_offset[b]) for a, b in pairs])

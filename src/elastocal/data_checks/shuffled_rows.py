@@ -1,14 +1,12 @@
-"""Positions beside the angles, or loads beside the deflections, of other rows.
+"""Positions beside the angles of other rows.
 
 A row is out of place where it is absurdly far from the nominal robot as it stands, and where another place is not only better
 but clearly nearer than chance would have it: among many points some point is always near.
 
-Where most rows are out of place, they are matched by iterative closest points [1] from the principal axes of all points; loads
-are matched to deflections as an assignment problem [2].
+Where most rows are out of place, they are matched by iterative closest points [1] from the principal axes of all points.
 
 [1] Besl, P. J. and McKay, N. D., A method for registration of 3-D shapes, IEEE Transactions on Pattern Analysis and Machine
     Intelligence 14, 1992.
-[2] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
 """
 
 from __future__ import annotations
@@ -17,10 +15,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from elastocal.data_checks.deflections import state_deflections
 from elastocal.data_checks.placement import (
     FAR_BETTER,
     IMPLAUSIBLE_M,
@@ -38,11 +34,10 @@ from elastocal.fitting.observations import state_clusters
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
-    from elastocal.data_checks.deflections import StateDeflections
     from elastocal.data_checks.placement import Placement
     from elastocal.fitting.model import Estimate
 
-NAMES, FAMILY, AFTER = ("shuffled_rows",), "data", ("constant_columns", "alternatives", "loads")
+NAMES, FAMILY, AFTER = ("shuffled_rows",), "data", ("constant_columns", "alternatives")
 
 # A row is out of place beyond so many robust standard deviations of the others, and back in place within so many.
 _OUT_OF_PLACE, _IN_PLACE = 20.0, 5.0
@@ -56,21 +51,10 @@ _FEWEST_IN_PLACE = 10
 _MATCHING_ROUNDS = 10
 # Orientations distinguish places as points at this distance from the target would, m.
 _ARM_M = 0.5
-# A load is out of place where it misses the deflection by this share of it, and by so many times what others miss; back in
-# place within so many.
-_MISSED, _MISSED_MORE, _MISSED_LIKE_OTHERS = 0.5, 6.0, 3.0
-_MOST_STATES = 1500
-_ROUNDS_OF_COMPLIANCE = 4
-# A matching of loads is no chance if it leaves so much less than one of the deflections of other poses.
-_CHANCE_LOADS = 1.0 / 3.0
 
 
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
-    """Rows whose measured columns, or whose loads, belong to other rows."""
-    return [*_of_positions(campaign, measurements), *_of_loads(campaign, measurements)]
-
-
-def _of_positions(campaign: Campaign, measurements: Measurements) -> list[Fault]:
+    """Rows whose measured columns belong to other rows."""
     some = robustly_placed(campaign, spread(measurements))
     # One fit to some poses serves all: it only has to be good to a few centimetres.
     as_written = placed_by(campaign, measurements, some.estimate)
@@ -189,66 +173,3 @@ def _spacing(measurements: Measurements, predicted: np.ndarray, rows: np.ndarray
         other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
         spacing[members] = np.where(np.isfinite(other), other, 0.0)
     return spacing
-
-
-def _of_loads(campaign: Campaign, measurements: Measurements) -> list[Fault]:
-    states = state_deflections(campaign, measurements)
-    if states is None or not _FEWEST_IN_PLACE <= len(states.wrench) <= _MOST_STATES:
-        return []
-    every, nominal = np.arange(len(states.wrench)), campaign.robot.compliance
-    compliance = nominal if states.compliance_known else states.compliance(every, every, nominal)
-    for _ in range(_ROUNDS_OF_COMPLIANCE):
-        missed = np.diag(states.misfits(compliance))
-        out = missed > _MISSED * states.sizes()
-        if (~out).sum() < _FEWEST_IN_PLACE:
-            break
-        compliance = states.compliance(every[~out], every[~out], nominal)
-    if out.sum() < _FEWEST_ROWS:
-        return []
-    if (~out).sum() >= max(_FEWEST_IN_PLACE, len(out) / 2):
-        return _some_loads_matched(states, compliance, missed, out)
-    return _all_loads_matched(states, nominal)
-
-
-def _some_loads_matched(states: StateDeflections, compliance: np.ndarray, missed: np.ndarray, out: np.ndarray) -> list[Fault]:
-    """Most loads are in place and tell how well the others must fit where they belong."""
-    sigma = np.median(missed[~out])
-    if (out & (missed > _MISSED_MORE * sigma)).sum() < _FEWEST_ROWS:
-        return []
-    # By chance the load of another state may miss by little.
-    rows = np.flatnonzero(missed > _MISSED_LIKE_OTHERS * sigma)
-    cost = states.misfits(compliance)[np.ix_(rows, rows)]
-    there = linear_sum_assignment(cost**2)[1]
-    left = cost[np.arange(len(rows)), there]
-    back = left < _MISSED_LIKE_OTHERS * sigma
-    if back.mean() < _MOST:
-        return []
-    return _loads_fault(states, rows[back], rows[there[back]], missed[rows[back]], left[back])
-
-
-def _all_loads_matched(states: StateDeflections, nominal: np.ndarray) -> list[Fault]:
-    """Most loads are out of place; the matching must fit far better than one of deflections that these loads did not make."""
-    every, compliance = np.arange(len(states.wrench)), nominal
-    before = np.diag(states.misfits(nominal))
-    for _ in range(_ROUNDS_OF_COMPLIANCE):
-        cost = states.misfits(compliance)
-        there = linear_sum_assignment(cost**2)[1]
-        compliance = states.compliance(every, there, nominal)
-    left = cost[every, there]
-    strange = states.misfits(compliance, np.roll(states.seen, len(every) // 2, axis=0))
-    chance = strange[linear_sum_assignment(strange**2)]
-    if np.median(left) > _CHANCE_LOADS * np.median(chance):
-        return []
-    return _loads_fault(states, every, there, before, left)
-
-
-def _loads_fault(
-    states: StateDeflections, here: np.ndarray, there: np.ndarray, before: np.ndarray, left: np.ndarray
-) -> list[Fault]:
-    moved = here != there
-    if moved.sum() < _FEWEST_ROWS or rms(left[moved]) > rms(before[moved]) / FAR_BETTER:
-        return []
-    count, rows = int(moved.sum()), sorted(row for state in here[moved] for row in states.rows[state])
-    detail = f"{count} of {len(states.wrench)} loaded states fit with the load of another one of them"
-    share = Value("share of the loaded states", count / len(states.wrench), "–")
-    return [Fault(NAMES[0], (), detail, (share,), (rms(before[moved]), rms(left[moved])), tuple(rows), True)]
