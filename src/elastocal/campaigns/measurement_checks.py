@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.campaigns.campaign import Measurements, Target
-from elastocal.campaigns.column_bounds import FARTHEST_RAD
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.campaigns.joint_space import SAME_POSE_RAD
-from elastocal.campaigns.measurements import MeasurementFile
+from elastocal.campaigns.measurements import FARTHEST_RAD, MeasurementFile
 from elastocal.errors import InputError
 from elastocal.mechanics.robot import Robot
 

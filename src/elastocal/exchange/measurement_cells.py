@@ -7,8 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from elastocal.campaigns.column_bounds import BOUNDS, find_beyond
-from elastocal.campaigns.measurements import show_cell
+from elastocal.campaigns.measurements import BOUNDS, find_beyond, show_cell
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import ANGLE, FORCE, LENGTH, MOMENT, NONE, TEMPERATURE, TIME, UNITS, kind_of, unit_scale
 from elastocal.exchange.csv_dialect import TextTable

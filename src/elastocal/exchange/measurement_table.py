@@ -15,8 +15,16 @@ import pandas as pd
 import yaml
 from scipy.spatial import cKDTree
 
-from elastocal.campaigns.column_bounds import FARTHEST_RAD
-from elastocal.campaigns.measurements import MOST_JOINTS, SHOWN, SHOWN_TO, TICK, file_columns, sheet_columns, show_cell
+from elastocal.campaigns.measurements import (
+    FARTHEST_RAD,
+    MOST_JOINTS,
+    SHOWN,
+    SHOWN_TO,
+    TICK,
+    file_columns,
+    sheet_columns,
+    show_cell,
+)
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, text_fault
 from elastocal.exchange.column_names import (
