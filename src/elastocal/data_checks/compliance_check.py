@@ -53,18 +53,14 @@ def compliance_warnings(compliance: np.ndarray, std_error: np.ndarray, nominal: 
     most, word = (MOST_OFF_NOMINAL, "nominal") if known else (MOST_OFF_USUAL, "usual for such a robot")
     low, high = nominal / most, most * nominal
     beyond = np.maximum(low - compliance, compliance - high)
-    named = [
-        f"joint {joint + 1} {compliance[joint]:.3g} ± {std_error[joint]:.2g} ({_off(compliance[joint], nominal[joint], word)}"
-        f"{'' if beyond[joint] > _SURE * std_error[joint] else ', perhaps by chance'})"
-        for joint in np.flatnonzero((std_error > 0) & (beyond > 0))
-    ]
+    named = []
+    for j in np.flatnonzero((std_error > 0) & (beyond > 0)):
+        off = f"negative, {word} {nominal[j]:.3g}" if compliance[j] < 0 else f"{compliance[j] / nominal[j]:.2g} times {word}"
+        chance = "" if beyond[j] > _SURE * std_error[j] else ", perhaps by chance"
+        named.append(f"joint {j + 1} {compliance[j]:.3g} ± {std_error[j]:.2g} ({off}{chance})")
     if not named:
         return []
     return [
         f"joint compliances beyond what robots have, in µrad/(N·m): {', '.join(named)};"
         " check the sign and the unit of the loads, and whether something else yields too"
     ]
-
-
-def _off(value: float, nominal: float, word: str) -> str:
-    return f"negative, {word} {nominal:.3g}" if value < 0 else f"{value / nominal:.2g} times {word}"

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.data_checks.placement import placed, rms
-from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.data_checks.placement import at_targets, placed, rms
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign
@@ -33,12 +32,7 @@ def controller_warnings(campaign: Campaign) -> list[str]:
     placement = placed(campaign, measurements)
     reported = robot.reported_angles(measurements.joint_angles)
     step = max(_last_digit(reported), np.radians(_last_digit(np.degrees(reported))))
-    jacobian = np.zeros((len(measurements), 3, robot.joints))
-    for number, target in enumerate(campaign.targets):
-        mine = measurements.target == number
-        jacobian[mine] = poses_and_jacobians(robot.chain, measurements.joint_angles[mine], robot.chain.point(target.point))[2][
-            :, :3
-        ]
+    jacobian = at_targets(robot.chain, measurements.joint_angles, campaign, measurements, placement.estimate)[2]
     # A number is off by a uniform error of its last digit.
     shown = max(_last_digit(measurements.position), _DIGITS_OF_LENGTHS_M)
     rounding = np.sqrt(((step * jacobian) ** 2).sum(axis=(1, 2)) + 3 * shown**2)

@@ -14,6 +14,7 @@ import numpy as np
 from elastocal.data_checks.placement import (
     IMPLAUSIBLE_M,
     IMPLAUSIBLE_RAD,
+    at_targets,
     free_columns,
     placed,
     rms,
@@ -23,7 +24,6 @@ from elastocal.data_checks.placement import (
 )
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.mechanics.chain import with_inserted
-from elastocal.mechanics.kinematics import poses_and_jacobians
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -104,12 +104,8 @@ def _step(
     """Gauss-Newton step of the shifts and turns that are inserted into a chain, ndarray (6 L,), m and rad."""
     angles = measurements.joint_angles
     coordinates = np.concatenate([angles, np.tile(values, (len(angles), 1))], axis=1)
-    jacobian, rotation = np.empty((len(angles), 3, len(values))), np.empty((len(angles), 3, 3))
-    for number, target in enumerate(campaign.targets):
-        mine = measurements.target == number
-        point = replace(extended.point(target.point), offset_m=tuple(placement.estimate.target_offset[number]))
-        _, rotation[mine], whole = poses_and_jacobians(extended, coordinates[mine], point)
-        jacobian[mine] = whole[:, :3, angles.shape[1] :]
+    _, rotation, whole = at_targets(extended, coordinates, campaign, measurements, placement.estimate)
+    jacobian = whole[..., angles.shape[1] :]
     free = free_columns(campaign, measurements, rotation, placement.predicted)
     columns = np.concatenate([jacobian * wide, *free], axis=-1) / _LEFT_M
     left = (placement.measured - placement.predicted) / _LEFT_M

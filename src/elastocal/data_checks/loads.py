@@ -17,7 +17,7 @@ from scipy.constants import g, pound_force
 from scipy.optimize import linear_sum_assignment
 
 from elastocal.campaigns.groups import groups_of
-from elastocal.data_checks.placement import FAR_BETTER, free_columns, rms, robust_sigma, robustly_placed, spread
+from elastocal.data_checks.placement import FAR_BETTER, at_targets, free_columns, rms, robust_sigma, robustly_placed, spread
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.identifiability import solve_normal
 from elastocal.fitting.observations import single_observations, state_clusters
@@ -26,10 +26,7 @@ from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from elastocal.campaigns.campaign import Campaign, Measurements
-    from elastocal.fitting.model import Estimate
 
 NAMES, FAMILY, AFTER = ("wrong_sign", "wrong_unit", "shuffled_rows"), "data", ("constant_columns", "alternatives")
 
@@ -162,16 +159,15 @@ def deflections(campaign: Campaign, measurements: Measurements) -> Deflections |
     """
     if not measurements.wrench.any():
         return None
-    measurements = _some_poses(measurements)
+    pose = state_clusters(measurements)
+    chosen = np.unique(np.linspace(0, pose.max(), _MANY_POSES).round().astype(int))
+    measurements = measurements.select(np.isin(pose, chosen))
     # Frames and targets from the lowest loads: those of a wrong unit must not enter.
     estimate = robustly_placed(campaign, spread(measurements)).estimate
-    residual, jacobian, end, rotation, origin = _linearized(campaign, measurements, estimate)
-    at_rest = measurements.wrench.copy()
-    parts = []
-    for part in (slice(0, 3), slice(3, 6)):
-        wrench = np.zeros_like(at_rest)
-        wrench[:, part] = measurements.wrench[:, part]
-        parts.append(regressor(jacobian, generalized_forces(end, wrench)) * campaign.robot.compliance)
+    position, rotation, jacobian = at_targets(campaign.robot.chain, measurements.joint_angles, campaign, measurements, estimate)
+    residual, end = measured_in_base(estimate, single_observations(measurements))[0] - position, _end(campaign, measurements)
+    torques = [generalized_forces(end, measurements.wrench * (np.arange(6) // 3 == part)) for part in (0, 1)]
+    parts = [regressor(jacobian, each) * campaign.robot.compliance for each in torques]
     pose = state_clusters(measurements)
     count = int(pose.max()) + 1
     if count < _FEWEST_POSES:
@@ -180,7 +176,12 @@ def deflections(campaign: Campaign, measurements: Measurements) -> Deflections |
     centred = [_centred(values, group) for values in (residual[..., None], *parts)]
     whole = sum((part**2).sum() for part in parts)
     if sum((part**2).sum() for part in centred[1:]) <= _DIFFERING * whole:
-        centred = _off_geometry(campaign, measurements, residual, parts, jacobian, rotation, origin)
+        # Less what frames, targets and joint offsets can explain of them.
+        columns = [jacobian, *free_columns(campaign, measurements, rotation, position)]
+        left, sizes, _ = np.linalg.svd(np.concatenate(columns, axis=-1).reshape(residual.size, -1), full_matrices=False)
+        basis = left[:, sizes > 1e-9 * sizes[0]]
+        whole_columns = [part.reshape(residual.size, -1) for part in (residual, *parts)]
+        centred = [values - basis @ (basis.T @ values) for values in whole_columns]
     flat = [values.reshape(3 * len(measurements), -1) for values in centred]
     return Deflections(flat[0][:, 0], flat[1], flat[2], count)
 
@@ -285,7 +286,8 @@ def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDe
         return None
     measurements = measurements.select(compared)
     estimate = robustly_placed(campaign, spread(measurements)).estimate
-    residual, jacobian, end, _, _ = _linearized(campaign, measurements, estimate)
+    position, _, jacobian = at_targets(campaign.robot.chain, measurements.joint_angles, campaign, measurements, estimate)
+    residual, end = measured_in_base(estimate, single_observations(measurements))[0] - position, _end(campaign, measurements)
     keys = np.column_stack([measurements.session, measurements.pose, measurements.load])
     first, state = groups_of(keys)
     states, targets = keys[first], len(campaign.targets)
@@ -338,27 +340,10 @@ def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, n
     return step[well], kept
 
 
-def _some_poses(measurements: Measurements) -> Measurements:
-    pose = state_clusters(measurements)
-    chosen = np.unique(np.linspace(0, pose.max(), _MANY_POSES).round().astype(int))
-    return measurements.select(np.isin(pose, chosen))
-
-
-def _linearized(
-    campaign: Campaign, measurements: Measurements, estimate: Estimate
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Measured less predicted without load (N, 3), Jacobians of target and end, rotation of the target's point, positions."""
-    chain, angles = campaign.robot.chain, measurements.joint_angles
-    position, rotation = np.empty((len(measurements), 3)), np.empty((len(measurements), 3, 3))
-    jacobian = np.empty((len(measurements), 3, chain.coordinates))
-    for index, target in enumerate(campaign.targets):
-        mask = measurements.target == index
-        point = replace(chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
-        position[mask], rotation[mask], at_target = poses_and_jacobians(chain, angles[mask], point)
-        jacobian[mask] = at_target[:, :3]
-    end = poses_and_jacobians(chain, angles, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
-    measured, _ = measured_in_base(estimate, single_observations(measurements))
-    return measured - position, jacobian, end, rotation, position
+def _end(campaign: Campaign, measurements: Measurements) -> np.ndarray:
+    """Jacobian of the origin of the last measuring point, where wrenches are stated, ndarray (N, 6, n)."""
+    chain = campaign.robot.chain
+    return poses_and_jacobians(chain, measurements.joint_angles, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
 
 
 def _centred(values: np.ndarray, group: np.ndarray) -> np.ndarray:
@@ -366,24 +351,6 @@ def _centred(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     total = np.zeros((group.max() + 1, *values.shape[1:]))
     np.add.at(total, group, values)
     return values - (total / np.maximum(np.bincount(group), 1).reshape(-1, *[1] * (values.ndim - 1)))[group]
-
-
-def _off_geometry(
-    campaign: Campaign,
-    measurements: Measurements,
-    residual: np.ndarray,
-    parts: Sequence[np.ndarray],
-    jacobian: np.ndarray,
-    rotation: np.ndarray,
-    position: np.ndarray,
-) -> list[np.ndarray]:
-    """Residual and parts less what frames, targets and joint offsets can explain of them."""
-    columns = [jacobian, *free_columns(campaign, measurements, rotation, position)]
-    flat = np.concatenate(columns, axis=-1).reshape(residual.size, -1)
-    left, sizes, _ = np.linalg.svd(flat, full_matrices=False)
-    basis = left[:, sizes > 1e-9 * sizes[0]]
-    values = [part.reshape(residual.size, -1) for part in (residual, *parts)]
-    return [value - basis @ (basis.T @ value) for value in values]
 
 
 def _of_loads(campaign: Campaign, measurements: Measurements) -> list[Fault]:

@@ -16,12 +16,14 @@ from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states, single_observations
 from elastocal.fitting.prediction import measured_in_base
 from elastocal.fitting.registration import nominal_poses, registered_to
+from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.pose_differences import rotation_vectors
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
+    from elastocal.mechanics.chain import Chain
 
 # Poses enough to tell what concerns all measurements.
 MANY_POSES = 80
@@ -109,6 +111,20 @@ def spread(measurements: Measurements, poses: int = MANY_POSES) -> Measurements:
         first = order[np.unique(measurements.pose[order], return_index=True)[1]]
         chosen.append(first[np.unique(np.linspace(0, len(first) - 1, poses).round().astype(int))])
     return measurements.select(np.sort(np.concatenate(chosen)))
+
+
+def at_targets(
+    chain: Chain, coordinates: np.ndarray, campaign: Campaign, measurements: Measurements, estimate: Estimate
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where a chain has the target of each measurement: `position` (N, 3), `rotation` (N, 3, 3), `jacobian` (N, 3, C)."""
+    count = len(coordinates)
+    found = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty((count, 6, chain.coordinates))
+    for index, target in enumerate(campaign.targets):
+        mine = measurements.target == index
+        point = replace(chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
+        for part, values in zip(found, poses_and_jacobians(chain, coordinates[mine], point), strict=True):
+            part[mine] = values
+    return found[0], found[1], found[2][:, :3]
 
 
 def free_columns(

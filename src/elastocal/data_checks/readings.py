@@ -71,7 +71,7 @@ def hypotheses(campaign: Campaign, first: Sequence[Change] = ()) -> Iterator[lis
     Of a stage what is discrete comes before what is fitted, which is preferred only where it is far better.
     """
     oriented = campaign.measured == "pose"
-    single = [*_senses(campaign.robot.joints), *_lengths_of_positions(), *_lengths_of_targets(campaign)]
+    single = [*_senses(campaign.robot.joints), *_lengths(campaign)]
     single += [*(_rotations() if oriented else []), *_axes(campaign.frame == "tracker" and not oriented, oriented), *first]
     fitted = _placements(campaign)
     yield [[(change,) for change in single], [(change,) for change in fitted]]
@@ -131,20 +131,15 @@ def shifts(measurements: Measurements) -> list[Change]:
     return found
 
 
-def _lengths_of_positions() -> list[Change]:
+def _lengths(campaign: Campaign) -> list[Change]:
+    """Of positions, then of the offsets of all targets, or of one where there are several."""
     found = []
     for unit, metres in _LENGTHS.items():
         detail = f"the positions look like {unit}: measurements fit {metres:g} times the written positions"
         factor = Value("metres for each unit of position written", metres, "m")
         found.append(Change("wrong_unit", detail, partial(_with_axes, metres * np.eye(3), None), (), (factor,)))
-    return found
-
-
-def _lengths_of_targets(campaign: Campaign) -> list[Change]:
-    """Of all targets, or of one where there are several."""
     known = [target.name for target in campaign.targets if target.offset_m is not None and any(target.offset_m)]
     groups = [known, *([name] for name in known if len(known) > 1)] if known else []
-    found = []
     for names, (unit, metres) in product(groups, _LENGTHS.items()):
         which = f"the offset of {names[0]} looks" if len(names) == 1 < len(known) else "the target offsets look"
         which = "the target offset looks" if len(known) == 1 else which
