@@ -150,7 +150,7 @@ def _mended(campaign: Campaign, stages: Iterable[Sequence[Sequence[tuple[Change,
                 if winner and (best is None or winner[1].together < best[1].together / FAR_BETTER):
                     best = winner
             if best:
-                return _faults(written, before, *best), best[0].campaign
+                return _faults(written, before, best), best[0].campaign
     return [], campaign
 
 
@@ -198,15 +198,9 @@ def _evidence(written: Misfit, corrected: Misfit, reading: Reading) -> tuple[flo
     return None
 
 
-def _faults(
-    written: Reading,
-    before: Misfit,
-    reading: Reading,
-    after: Misfit,
-    evidence: tuple[float, float],
-    alike: tuple[str, ...],
-) -> list[Fault]:
+def _faults(written: Reading, before: Misfit, best: _Winner) -> list[Fault]:
     """One fault for each change."""
+    reading, after, evidence, alike = best
     found, targets, estimate = [], reading.campaign.targets, reading.placement.estimate
     poses = Value("poses compared", float(len(np.unique(reading.campaign.measurements.pose))), "–")
     for change in reading.changes:

@@ -260,10 +260,6 @@ class StateDeflections:
         total += square.reshape(len(square), -1) @ products.T
         return np.sqrt(np.maximum(total, 0.0) / self.targets[:, None])
 
-    def sizes(self) -> np.ndarray:
-        """RMS over the targets of the deflections of each state, ndarray (S,), m."""
-        return np.sqrt((self.seen**2).sum(axis=(1, 2)) / self.targets)
-
     def compliance(self, states: np.ndarray, loads: np.ndarray, nominal: np.ndarray) -> np.ndarray:
         """Compliances that fit the deflections of some states best under some loads, near the nominal ones.
 
@@ -359,9 +355,10 @@ def _of_loads(campaign: Campaign, measurements: Measurements) -> list[Fault]:
         return []
     every, nominal = np.arange(len(states.wrench)), campaign.robot.compliance
     compliance = nominal if states.compliance_known else states.compliance(every, every, nominal)
+    sizes = np.sqrt((states.seen**2).sum(axis=(1, 2)) / states.targets)
     for _ in range(_ROUNDS_OF_COMPLIANCE):
         missed = np.diag(states.misfits(compliance))
-        out = missed > _MISSED * states.sizes()
+        out = missed > _MISSED * sizes
         if (~out).sum() < _FEWEST_STATES:
             break
         compliance = states.compliance(every[~out], every[~out], nominal)

@@ -51,6 +51,8 @@ _FEWEST_IN_PLACE = 10
 _MATCHING_ROUNDS = 10
 # Orientations distinguish places as points at this distance from the target would, m.
 _ARM_M = 0.5
+# No robot nor tracker reaches so far.
+_SESSIONS_APART_M = 1e5
 
 
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
@@ -58,8 +60,7 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     some = robustly_placed(campaign, spread(measurements))
     # One fit to some poses serves all: it only has to be good to a few centimetres.
     as_written = placed_by(campaign, measurements, some.estimate)
-    far = (as_written.distance > IMPLAUSIBLE_M).mean()
-    if far * len(measurements) < _FEWEST_ROWS:
+    if (as_written.distance > IMPLAUSIBLE_M).sum() < _FEWEST_ROWS:
         return []
     if trimmed_rms(some.distance) > IMPLAUSIBLE_M:
         return _all_matched(campaign, measurements, as_written)
@@ -74,7 +75,8 @@ def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Pla
 
     def nearest(estimate: Estimate) -> tuple[Placement, np.ndarray, np.ndarray]:
         beside = placed_by(campaign, measurements, estimate)
-        return beside, *_gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))
+        predicted, measured = (_places(measurements, each, None) for each in (beside.predicted, beside.measured))
+        return beside, *cKDTree(measured).query(predicted)
 
     estimate, before = min(starts, key=lambda start: trimmed_rms(nearest(start)[1])), None
     for _ in range(_MATCHING_ROUNDS):
@@ -123,9 +125,11 @@ def _matched(measurements: Measurements, as_written: Placement, beside: Placemen
     rows = np.flatnonzero(out)
     if len(rows) < _FEWEST_ROWS:
         return []
-    predicted = _places(beside.predicted, beside.predicted_rotation)
-    left, source = _gaps(measurements, predicted, _places(beside.measured, beside.measured_rotation), rows)
-    back = (left < level) & (left < _NO_CHANCE * _spacing(measurements, predicted, rows)) & (source != rows)
+    predicted = _places(measurements, beside.predicted, beside.predicted_rotation)[rows]
+    measured = _places(measurements, beside.measured, beside.measured_rotation)[rows]
+    left, number = map(np.asarray, cKDTree(measured).query(predicted))
+    source = rows[number]
+    back = (left < level) & (left < _NO_CHANCE * _spacing(predicted)) & (source != rows)
     # Each measurement has one place: one that stands for many is no permutation.
     pose = state_clusters(measurements)
     taken = len(np.unique(pose[source[back]])), len(np.unique(pose[rows[back]]))
@@ -140,36 +144,19 @@ def _matched(measurements: Measurements, as_written: Placement, beside: Placemen
     return [Fault(NAMES[0], (), detail, (share,), (before, after), concerned, True)]
 
 
-def _places(position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
-    """Positions and, where they are measured, orientations as points whose distances are in m, ndarray (N, 3 or 12)."""
-    if rotation is None:
-        return position
-    # A small angle changes the nine entries, taken together, by the square root of two times itself.
-    return np.concatenate([position, _ARM_M / np.sqrt(2) * rotation.reshape(len(rotation), 9)], axis=1)
+def _places(measurements: Measurements, position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
+    """Positions and, where they are measured, orientations as points whose distances are in m, sessions far apart."""
+    parts = [position, _SESSIONS_APART_M * measurements.session[:, None]]
+    if rotation is not None:
+        # A small angle changes the nine entries, taken together, by the square root of two times itself.
+        parts.append(_ARM_M / np.sqrt(2) * rotation.reshape(len(rotation), 9))
+    return np.concatenate(parts, axis=1)
 
 
-def _gaps(
-    measurements: Measurements, predicted: np.ndarray, measured: np.ndarray, rows: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """For each of some rows the distance to the nearest measured place among them, and the row of that place."""
-    left, source = np.empty(len(rows)), np.empty(len(rows), int)
-    for session in np.unique(measurements.session[rows]):
-        members = np.flatnonzero(measurements.session[rows] == session)
-        tree = cKDTree(measured[rows[members]])
-        left[members], number = tree.query(predicted[rows[members]])
-        source[members] = rows[members[number]]
-    return left, source
-
-
-def _spacing(measurements: Measurements, predicted: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """For each of some rows how far the next place is among those predicted for them."""
-    spacing = np.zeros(len(rows))
-    for session in np.unique(measurements.session[rows]):
-        members = np.flatnonzero(measurements.session[rows] == session)
-        points = predicted[rows[members]]
-        # One of each place.
-        places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
-        near = np.reshape(cKDTree(places).query(points, k=min(4, len(places)))[0], (len(points), -1))
-        other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
-        spacing[members] = np.where(np.isfinite(other), other, 0.0)
-    return spacing
+def _spacing(points: np.ndarray) -> np.ndarray:
+    """How far from each of some points (N, .) the next place of its session is, 0 where there is none, ndarray (N,), m."""
+    # One of each place.
+    places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
+    near = np.reshape(cKDTree(places).query(points, k=min(4, len(places)))[0], (len(points), -1))
+    other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
+    return np.where(other < _SESSIONS_APART_M / 2, other, 0.0)

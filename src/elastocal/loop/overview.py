@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.application.scope import calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.columns import columns_of
-from elastocal.data_checks.controller import controller_warnings
 from elastocal.data_checks.protocol import faults
+from elastocal.data_checks.warnings import controller_warnings
 from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept
 from elastocal.diagnosis.linearize import linearized
