@@ -78,10 +78,9 @@ def _explained_by_geometry(campaign: Campaign, measurements: Measurements) -> bo
     extended, wide = with_inserted(chain, inserted), np.tile(_WIDE, len(inserted))
     values = np.zeros(len(wide))
     for _ in range(_ROUNDS):
+        constants = dict(enumerate(values.tolist(), chain.coordinates))
         fixed = [
-            t
-            if t.coordinate is None or t.coordinate < chain.coordinates
-            else replace(t, constant=values[t.coordinate - chain.coordinates], coordinate=None)
+            replace(t, constant=constants[t.coordinate], coordinate=None) if t.coordinate in constants else t
             for t in extended.transforms
         ]
         arm = replace(extended, transforms=tuple(fixed), coordinates=chain.coordinates)

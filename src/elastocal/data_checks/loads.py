@@ -88,16 +88,10 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
 
     The first only where compliances are known: no size of a deflection is to be expected else.
     """
-    return _of_units(campaign, measurements) or _of_loads(campaign, measurements)
-
-
-def _of_units(campaign: Campaign, measurements: Measurements) -> list[Fault]:
-    if not campaign.robot.compliance_known:
-        return []
-    deflected = deflections(campaign, measurements)
+    deflected = deflections(campaign, measurements) if campaign.robot.compliance_known else None
     found = unit_of_loads(deflected) if deflected else None
     if found is None:
-        return []
+        return _of_loads(campaign, measurements)
     evidence, faults = (found.rms_as_written, found.rms_corrected), []
     slope = Value("deflection over the one expected", found.slope, "–")
     if found.sign < 0:

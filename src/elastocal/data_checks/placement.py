@@ -200,10 +200,8 @@ class _Nominal:
 
     def placed(self, kept: np.ndarray | None = None) -> Placement:
         """All of them, in frames and targets that are fitted to all, or to those kept, ndarray of bool (N,)."""
-        if kept is None:
-            return self.placed_by(registered_to(self.model, self.observations, self.position, self.rotation))
-        some = select_states(self.observations, kept)
-        return self.placed_by(registered_to(self.model, some, self.position[kept], self.rotation[kept]))
+        some, at = (self.observations, slice(None)) if kept is None else (select_states(self.observations, kept), kept)
+        return self.placed_by(registered_to(self.model, some, self.position[at], self.rotation[at]))
 
     def placed_by(self, estimate: Estimate) -> Placement:
         target = self.observations.target

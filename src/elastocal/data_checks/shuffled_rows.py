@@ -114,9 +114,8 @@ def _main_axes(points: np.ndarray) -> np.ndarray:
 
 def _matched(measurements: Measurements, as_written: Placement, beside: Placement, rest: Placement | None) -> list[Fault]:
     """The fault that some rows fit in the places of each other; `rest` says how well rows fit that are in place."""
-    distance = beside.distance
+    distance, level = beside.distance, IMPLAUSIBLE_M
     out = distance > IMPLAUSIBLE_M
-    level = IMPLAUSIBLE_M
     if rest is not None and (~out).sum() >= _FEWEST_IN_PLACE:
         sigma = robust_sigma(distance[~out], 3)
         out &= distance > _OUT_OF_PLACE * sigma
