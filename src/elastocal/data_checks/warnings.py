@@ -31,7 +31,7 @@ _SURE = 2.0
 # Nobody writes more digits than this; lengths of a robot file have no more than micrometres.
 _MOST_DIGITS, _DIGITS_OF_LENGTHS_M = 9, 1e-6
 # By so much rounding may be exceeded by chance; where it is itself as large as this, it cannot be told from a good robot.
-_BY_CHANCE, _TOO_COARSE_M = 1.5, 5e-5
+_BY_CHANCE, _TOO_COARSE_M = 1.3, 1e-4
 _FEWEST_POSES = 6
 
 
