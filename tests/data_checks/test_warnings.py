@@ -34,7 +34,7 @@ def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(fa
     assert "no measurements" in sentence and "own kinematics" in sentence
 
 
-@pytest.mark.parametrize("noise", [1e-5, 6e-5])
+@pytest.mark.parametrize("noise", [3e-6, 1e-5, 6e-5])
 def test_measured_positions_are_measured(fanuc, noise):
     campaign = worked_out(fanuc, True, 12, 12)
     position = campaign.measurements.position + noise * np.random.default_rng(1).standard_normal((56, 3))
