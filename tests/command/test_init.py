@@ -30,6 +30,11 @@ def test_targets_are_those_of_the_measurements_that_lie_there(elastocal, refusal
     assert result.exit_code == 0 and "fill in" not in result.output
     document, _ = read_descriptions(tmp_path, tmp_path)
     assert (document["measured"], document["targets"]) == ("pose", {"TCP": {"point": "tip", "offset_m": "unknown"}})
+    # The other way round: what is imported beside a campaign is compared with it.
+    assert "! campaign.yaml" not in elastocal("import", "csv", tmp_path / "t.csv", *words, "--force").output
+    (tmp_path / "t.csv").write_text((tmp_path / "t.csv").read_text().replace("TCP", "SMR"))
+    again = elastocal("import", "csv", tmp_path / "t.csv", *words, "--force")
+    assert again.exit_code == 0 and "has no target SMR" in again.output
     (tmp_path / "campaign.yaml").unlink()
     (tmp_path / "measurements.csv").write_text("mine")
     assert "unknown column 'mine'" in refusal("init", tmp_path)

@@ -15,8 +15,7 @@ def init(
 ) -> None:
     """Begin a campaign: a folder with files to fill in.
 
-    campaign.yaml explains every key, and has the targets of the measurements that lie there; else measurements.csv is a header
-    alone. No file that exists is replaced.
+    campaign.yaml explains every key, and has the targets of measurements that lie there. No file that exists is replaced.
     """
     from rich.console import Console
 
