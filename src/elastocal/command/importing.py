@@ -67,7 +67,7 @@ def dh(
     modified: Annotated[bool, Option("--modified", help="Craig's notation: alpha and a come before the joint.")] = False,
     angles: Annotated[Literal["deg", "rad"] | None, Option(help="Unit of columns of angles that state none.")] = None,
     lengths: Annotated[Literal["m", "mm"] | None, Option(help="Unit of columns of lengths that state none.")] = None,
-    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of a CSV table; a comma has to be stated.")] = None,
+    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of a CSV table. Default: found out.")] = None,
     ignore: Annotated[list[str] | None, Option(help="Column to leave out; as often as needed.")] = None,
     name: Annotated[str | None, Option(help="Maker and model. Default: the name of the file.")] = None,
     mass_std: _MassStd = DH_MASS_STD,
