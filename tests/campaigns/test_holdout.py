@@ -1,5 +1,7 @@
 """Poses that are held out: a split never parts a pose, depends on nothing but its seed, and leaves enough on both sides."""
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 from made_cells import DOCUMENT, POSES, Cell
 from support import refused
 
-from elastocal.campaigns.holdout import split
+from elastocal.campaigns.holdout import is_file_in, split
 
 
 def poses_of(measurements):
@@ -150,3 +152,39 @@ def test_thirty_poses_of_one_configuration_are_refused(cell):
         cell.table[name] = [cell.table[name][0]] * len(cell.table[name])
     with refused(cell.source, "holdout", "1 configuration to fit and 0 held out", "at least 5 to fit"):
         cell.read()
+
+
+@pytest.fixture
+def places(tmp_path):
+    for name in ("cell/deep", "elsewhere", "linked"):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / "a").write_text("x")
+    (tmp_path / "cell/out").symlink_to(tmp_path / "elsewhere/a")
+    (tmp_path / "cell/inside").symlink_to("deep/a")
+    (tmp_path / "cell/loop").symlink_to("loop")
+    (tmp_path / "alias").symlink_to("cell")
+    os.mkfifo(tmp_path / "cell/pipe")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("path", "inside"),
+    [
+        ("cell/deep/a", True),
+        ("cell/inside", True),
+        ("alias/deep/a", True),
+        ("cell/../cell/deep/a", True),
+        ("cell/out", False),
+        ("cell/../elsewhere/a", False),
+        ("elsewhere/a", False),
+        ("cell/none", False),
+        ("cell/loop", False),
+        ("cell/pipe", False),
+        ("cell/deep", False),
+        ("cell/" + "x" * 5000, False),
+        ("cell/\0", False),
+    ],
+)
+def test_a_file_is_where_its_links_lead(places, path, inside):
+    assert is_file_in(places / path, places / "cell") is inside
+    assert is_file_in(places / path, places / "linked", places / "alias") is inside

@@ -56,6 +56,15 @@ def test_a_pose_repeats_another_where_no_joint_stands_elsewhere_than_one_pose_ma
     assert not find_repeated(fitted, np.diag(fitted[:6])[None] * np.ones((1, 6))).any()
 
 
+def test_a_hundred_thousand_poses_of_one_configuration_take_seconds():
+    import time
+
+    angles = np.tile(np.random.default_rng(4).uniform(-2, 2, (2, 6)), (50_000, 1))
+    begun = time.process_time()
+    assert configurations(angles, np.arange(len(angles))).tolist() == [0, 1] * 50_000
+    assert time.process_time() - begun < 10.0
+
+
 def test_repeats_of_a_pose_are_one_configuration_in_the_order_of_the_poses():
     rng = np.random.default_rng(5)
     apart = rng.uniform(-2, 2, (12, 6))

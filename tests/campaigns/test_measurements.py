@@ -9,7 +9,7 @@ import pytest
 from made_cells import assert_same
 from support import refused
 
-from elastocal.campaigns.measurements import CSV, read_measurements
+from elastocal.campaigns.measurements import BOUNDS, CSV, file_columns, read_measurements
 from elastocal.campaigns.reading import read_campaign
 
 
@@ -37,6 +37,9 @@ def test_blank_rows_and_blanks_around_cells_are_passed_over_and_counted(cell):
         (2, "pose", "1.5", ["'1.5'", "integer"]),
         (2, "repeat", "3000000000", ["'3000000000'", "integer"]),
         (2, "q1", "1_0", ["'1_0'", "a number"]),
+        # One half in the digits of Arabic, and a pose in wide ones.
+        (2, "q1", "\u0660.\u0665", ["a number", "digits 0 to 9"]),
+        (2, "pose", "\uff10", ["a number", "digits 0 to 9"]),
     ],
 )
 def test_faulty_cell_is_refused_by_row_and_column(cell, row, column, entry, words):
@@ -199,4 +202,23 @@ def test_a_sheet_may_be_ticked_and_have_degrees_that_agree(cell):
     cell.table["q2_deg"][4] += 1.0
     cell.write()
     with refused(cell.measurements, "row 5, column q2_deg (line 6)", "which is q2"):
+        cell.read()
+
+
+IMPOSSIBLE = {
+    **{"fx": [2e6, -1e9], "my": [1e8], "x": [1e9], "time_s": [1.6e11, -1e12], "u95_m": [0.0, -1e-5, 6e-12, 1e-300, 60.0, 0.2]},
+    "temperature_c": [-500.0, -273.2, 293.15, 1e6],
+}
+
+
+def test_bounds_are_of_columns_that_a_file_may_have():
+    assert set(BOUNDS) <= set(file_columns(6))
+    assert all(bound.least < bound.largest for bound in BOUNDS.values())
+
+
+@pytest.mark.parametrize(("column", "entry"), [(column, entry) for column, found in IMPOSSIBLE.items() for entry in found])
+def test_what_physics_does_not_allow_is_refused_by_row_and_column(cell, column, entry):
+    cell.table["u95_m"] = [1e-4] * len(cell.table["pose"])
+    cell.spoil(14, column, entry)
+    with refused(cell.measurements, f"row 14, column {column} (line 15)", BOUNDS[column].allowed):
         cell.read()

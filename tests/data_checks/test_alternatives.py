@@ -179,6 +179,15 @@ def test_a_target_that_sits_elsewhere_is_named_with_its_place(fanuc):
     assert told["T6DoF offset y"] == pytest.approx(-0.1, abs=1e-3)
 
 
+@pytest.mark.parametrize(("error_m", "decisive"), [(0.025, False), (0.06, True)])
+def test_a_last_link_that_is_a_little_longer_than_its_file_stops_nothing(fanuc, error_m, decisive):
+    last = replace(fanuc.chain.transforms[-1], constant=fanuc.chain.transforms[-1].constant + error_m)
+    longer = replace(fanuc, chain=replace(fanuc.chain, transforms=(*fanuc.chain.transforms[:-1], last)))
+    campaign = made(fanuc, 1, Plan(poses=14, oriented=False), longer)
+    (fault,) = find(campaign, campaign.measurements.select(campaign.measurements.target == 3))
+    assert (fault.name, fault.decisive) == ("wrong_target", decisive)
+
+
 @pytest.mark.parametrize("shift", [0.0, 0.004, 0.03])
 def test_a_base_that_stands_a_little_off_stops_nothing(fanuc, shift):
     campaign = made(fanuc, 1, Plan(poses=14))

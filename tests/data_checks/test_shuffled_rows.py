@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made, with_other_compliances
 
+from elastocal.data_checks import loads
+from elastocal.data_checks.protocol import faults
 from elastocal.data_checks.shuffled_rows import find
 
 
@@ -46,7 +48,7 @@ def test_poses_whose_measurements_are_swapped_are_named(campaign):
 @pytest.mark.parametrize(("steps", "words"), [(1, "row further up"), (-1, "row further down")])
 def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
     source = np.roll(np.arange(len(campaign.measurements)), steps)
-    (fault,) = find(campaign, with_measured(campaign.measurements, source))
+    (fault,) = faults(campaign, with_measured(campaign.measurements, source))
     assert words in fault.detail
     assert fault.parameters[0].value == -steps
 
@@ -60,7 +62,7 @@ def test_loads_beside_the_deflections_of_others_are_named(campaign, share):
     for mine, other in zip(loaded[some], loaded[rng.permutation(some)], strict=True):
         theirs = measurements.wrench[(measurements.pose == other[0]) & (measurements.load == other[1])][0]
         wrench[(measurements.pose == mine[0]) & (measurements.load == mine[1])] = theirs
-    (fault,) = find(campaign, replace(measurements, wrench=wrench))
+    (fault,) = loads.find(campaign, replace(measurements, wrench=wrench))
     assert "load" in fault.detail
     assert fault.evidence[1] < fault.evidence[0] / 5
     assert 0.6 * share < fault.parameters[0].value <= share

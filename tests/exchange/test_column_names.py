@@ -84,6 +84,8 @@ SIX = "1,2,3,4,5,6"
         [f"q[{joint}] [deg]" for joint in range(6)],
         [f"actual_q_{joint}" for joint in range(6)],
         [f"rax_{joint}" for joint in range(1, 7)],
+        [f"field.position{joint}" for joint in range(6)],
+        [f"field.name.position{joint}" for joint in range(6)],
         [f"/joint_states/A{joint}/position" for joint in range(1, 7)],
         [f"/joint_states/position.J{joint}" for joint in range(1, 7)],
     ],

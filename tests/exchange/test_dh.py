@@ -197,11 +197,14 @@ def test_a_fault_names_its_line_and_column(tmp_path, fault):
         robot_from_dh(path, options=PLAIN)
 
 
-def test_commas_are_decimal_marks_only_where_an_option_says_so(tmp_path):
+def test_commas_are_decimal_marks_where_they_can_be_nothing_else_or_an_option_says_so(tmp_path):
     path = table(tmp_path, "theta_offset_deg;d_mm;a_mm;alpha_deg\n0;162,5;0;90\n-1,5;0;-1425,25;0\n")
-    with refused(path, "", "commas", "--decimal comma"):
+    (first, second), _ = read_dh_table(path, PLAIN)
+    assert read_dh_table(table(tmp_path, "d;a;alpha_deg\n1,250;1,500;90,125\n"), PLAIN)[0][0].d == pytest.approx(1.25)
+    text = "theta_offset_deg;d_m;a_m;alpha_deg\n0;1,250;0;90\n"
+    with refused(table(tmp_path, text), "line 2", "'1,250'", "--decimal comma"):
         read_dh_table(path, PLAIN)
-    (first, second), _ = read_dh_table(path, DhOptions(decimal="comma"))
+    assert read_dh_table(path, DhOptions(decimal="comma"))[0][0].d == 1.25
     assert (first.d, second.a, second.theta) == pytest.approx((0.1625, -1.42525, math.radians(-1.5)))
     for cell in ("1,425", "1.425,5", "1 425"):
         with refused(table(tmp_path, f"d;a;alpha\n{cell};0;90\n"), "line 2", repr(cell)):

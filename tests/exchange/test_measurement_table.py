@@ -74,7 +74,16 @@ def test_the_options_found_out_give_the_same_again(tmp_path):
         np.testing.assert_array_equal(again.table[name], values)
 
 
-@pytest.mark.parametrize("empty", [",,", "nan,NaN,1", "1,-,-", "N/A,n/a,NA"])
+def test_three_digits_behind_the_comma_of_an_angle_in_degrees_are_no_thousand(tmp_path):
+    text = "q1;x;y;z\n12,345;1,250;1,500;1,750\n"
+    found = table(tmp_path, text)
+    assert (found.options.decimal, found.table["x"].tolist()) == ("comma", [0.00125])
+    for units in ({"angles": "mrad", "lengths": "mm"}, {"q1": "mm", "lengths": "mm"}):
+        with refused(tmp_path / "t.csv", "line 2", "'12,345'", "--decimal comma"):
+            table(tmp_path, text, replace(PLAIN, units=units))
+
+
+@pytest.mark.parametrize("empty", [",,", "nan,NaN,1", "1,-,–", "N/A,n/a,NA", "#N/A,1,2", "-nan(ind),null,None"])
 def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path, empty):
     text = f"q1,x,y,z\n1,1,2,3\n2,{empty}\n3,1,2,3\n"
     with refused((tmp_path / "t.csv").as_posix(), "line 3", "--skip-empty" if empty == ",," else "a number such as"):

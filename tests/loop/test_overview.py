@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from small_data import service_arm_folder
 
 from elastocal.loop.overview import overview
+from elastocal.mechanics.kinematics import poses
 
 
 def overview_of(folder):
@@ -110,3 +111,15 @@ def test_a_fitted_mount_is_listed_and_a_known_one_is_not(kuka, tmp_path):
             np.testing.assert_allclose(found["mounts"][0]["rotation_rad"], turn.as_rotvec(), atol=5e-3)
         if rotation is None:
             assert any("rotation: unknown" in fault["sentence"] for fault in found["faults"])
+
+
+def test_positions_that_a_controller_worked_out_are_said_to_be_no_measurements(kuka, tmp_path):
+    table = made_table(kuka, "o")
+    chain, at = kuka.chain, kuka.model_angles(np.column_stack([table[f"q{joint}"] for joint in range(1, 7)]))
+    for point in chain.points:
+        mine = table["target"] == point.name
+        if mine.any():
+            for axis, values in zip("xyz", poses(chain, at[mine], point)[0].T, strict=True):
+                table[axis][mine] = values.round(6)
+    (first, *_) = overview_of(made_folder(tmp_path / "made", kuka, table=table))["suspicious"]
+    assert "no measurements" in first

@@ -51,12 +51,9 @@ def test_verdict_has_every_key_of_the_contract(diagnosed):
     assert {"noise_floor_rms_m", "reduction_ci95", "reduction_std_error", "poses", "outside_range"} <= set(heldout)
     assert set(heldout["before"]) == set(heldout["after"]) == {"mean_m", "rms_m", "p95_m", "max_m"}
     assert heldout["after"]["rms_m"] < min(heldout["before"]["rms_m"], verdict["uncorrected_m"])
-    assert {name: len(values) for name, values in compliance.items()} == {
-        "before": 6,
-        "after": 6,
-        "std_error": 6,
-        "identifiable": 6,
-    }
+    assert {name: len(values) for name, values in compliance.items()} == dict.fromkeys(
+        ("before", "after", "std_error", "identifiable"), 6
+    )
     told = {"probabilities", "misfit", "untestable", "held", "candidates_tested", "next_experiment", "accuracy"}
     assert told <= set(verdict) and verdict["converged"] == {"declared": True, "final": True}
     assert settings["alarm_level"]["value"] == 0.02 and settings["alarm_level"]["reason"]

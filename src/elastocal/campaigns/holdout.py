@@ -1,4 +1,4 @@
-"""Which poses of a campaign are fitted and which are held out to test the fit."""
+"""Which poses of a campaign are fitted and which are held out to test the fit; where the campaign that tests may lie."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,7 +9,6 @@ import numpy as np
 from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
-from elastocal.campaigns.places import is_file_in
 from elastocal.counting import counted
 from elastocal.errors import InputError
 
@@ -122,3 +121,20 @@ def _chosen_poses(
             raise InputError(source, "holdout.blocks", str(holdout["blocks"]), f"at most as many as configurations, {count}")
         return blocks_of_poses(measurements.joint_angles, index, holdout["blocks"]) == draws.integers(holdout["blocks"])
     return np.isin(configuration, draws.permutation(count)[: round(holdout["fraction"] * count)])
+
+
+def is_file(path: str | Path) -> bool:
+    """Whether a path is that of a regular file; False too for what no path can be."""
+    try:
+        return Path(path).is_file()
+    except (OSError, ValueError):
+        # A name that is too long, or with a null character.
+        return False
+
+
+def is_file_in(path: str | Path, *folders: str | Path) -> bool:
+    """Whether a path is that of a regular file in or below one of some folders.
+
+    `path`, `*folders`: links are followed, on both sides.
+    """
+    return is_file(path) and any(Path(path).resolve().is_relative_to(Path(folder).resolve()) for folder in folders)

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.campaigns.groups import groups_of
+
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
@@ -64,7 +66,10 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     controller's servo error can differ: the leader algorithm (Hartigan, Clustering Algorithms, 1975). Poses along a path, each
     near the next, are several configurations.
     """
-    mean = _means(joint_angles, pose)
+    # Poses with the very same angles lead or follow together: a tree of a hundred thousand equal points takes minutes.
+    first, same = groups_of(means := _means(joint_angles, pose))
+    order = np.argsort(first)
+    mean = means[first[order]]
     tree = _tree(mean)
     # What is farther from all others is not asked for its neighbours, and the neighbours of all are never held at once.
     beyond = np.nextafter(SAME_POSE_RAD, 1.0)
@@ -78,7 +83,7 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
                 near = np.array(tree.query_ball_point(mean[leader], SAME_POSE_RAD, p=np.inf))
                 found[near[found[near] < 0]] = count
             count += 1
-    return found
+    return found[np.argsort(order)][same]
 
 
 def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> np.ndarray:

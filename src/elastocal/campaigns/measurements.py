@@ -6,6 +6,7 @@ import csv
 import math
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any, TextIO
@@ -14,7 +15,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from elastocal.campaigns.column_bounds import BOUNDS, find_beyond
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, steering
 from elastocal.io.atomic_writes import atomic_write
@@ -32,6 +32,8 @@ _LONGEST_LINE, _MOST_BYTES = 10_000, 1000 * MOST_MEASUREMENTS
 # Rows whose texts are in memory at a time; their numbers take a tenth of that.
 _ROWS_AT_A_TIME = 20_000
 _COMMENT = "#"
+# A file names no more.
+MOST_JOINTS = 99
 
 CSV, PARQUET = "measurements.csv", "measurements.parquet"
 # Columns of a sheet for people: a place to tick, which is not read, and joint angles as controllers show them, q1_deg or q1_mm,
@@ -39,6 +41,46 @@ CSV, PARQUET = "measurements.csv", "measurements.parquet"
 TICK = "done"
 SHOWN = {"deg": math.radians(1.0), "mm": 1e-3}
 SHOWN_TO = 2e-3
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Least and largest value of a column, in its unit, and the reason in words that follow "x to y"."""
+
+    least: float
+    largest: float
+    reason: str
+
+    @property
+    def allowed(self) -> str:
+        """What an error says."""
+        return f"{self.least:g} to {self.largest:g} {self.reason}"
+
+
+# A turn and a half, of a rotation vector; nor does a joint of a serial arm report more, unless its limits say so.
+FARTHEST_RAD = 3.0 * np.pi
+# Generous: whatever lies beyond is in another unit, or no reading of an instrument beside a robot.
+_FORCE = Bound(-1e6, 1e6, "N, the weight of a hundred tonnes")
+_MOMENT = Bound(-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")
+_PLACE = Bound(-2e7, 2e7, "m, half the circumference of the Earth")
+BOUNDS: Mapping[str, Bound] = {
+    **dict.fromkeys(("fx", "fy", "fz"), _FORCE),
+    **dict.fromkeys(("mx", "my", "mz"), _MOMENT),
+    **dict.fromkeys("xyz", _PLACE),
+    "time_s": Bound(-1e11, 1e11, "s, three thousand years either way: not milliseconds of a calendar"),
+    "temperature_c": Bound(-200.0, 200.0, "°C, in which arms work, not kelvin"),
+    "u95_m": Bound(1e-8, 0.1, "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by"),
+}
+
+
+def find_beyond(name: str, values: np.ndarray) -> int | None:
+    """First of the values of a column (N,) that physics does not allow; None where it allows all of them."""
+    bound = BOUNDS.get(name)
+    if bound is None:
+        return None
+    # Not a number is no more than anything either.
+    wrong = ~((values >= bound.least) & (values <= bound.largest))
+    return int(np.argmax(wrong)) if wrong.any() else None
 
 
 def file_columns(joints: int) -> dict[str, Column]:
@@ -85,6 +127,19 @@ def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFi
     if len(rows) == 0:
         raise InputError(path, "", "no row of data", "one row for each measurement of one target")
     return MeasurementFile(path, columns, rows, lines, joints, measured)
+
+
+def described_by(folder: Path) -> tuple[list[str], str]:
+    """Targets that the measurements of a folder are of, in their order, and whether each is a "position" or a "pose".
+
+    No targets where there is no measurement. Raises `InputError`: a file that is no table of measurements.
+    """
+    there = next((path for path in (folder / CSV, folder / PARQUET) if path.is_file()), None)
+    if there is None:
+        return [], "position"
+    columns = (_read_csv if there.name == CSV else _read_parquet)(there.as_posix(), MOST_JOINTS)[0]
+    names = dict.fromkeys(text for cell in columns.get("target", ()) if (text := str(cell).strip()))
+    return list(names), "pose" if {"rx", "ry", "rz"} <= columns.keys() else "position"
 
 
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
@@ -185,10 +240,14 @@ def _numbers(cells: Sequence[str]) -> np.ndarray | list[str]:
 
 
 def _read_numbers(cells: Sequence[Any] | np.ndarray) -> np.ndarray:
-    """ndarray of float (N,); a ValueError or TypeError where a cell is none. Python takes 1_0 for 10."""
-    if not isinstance(cells, np.ndarray) and any(isinstance(cell, str) and "_" in cell for cell in cells):
+    """ndarray of float (N,); a ValueError or TypeError where a cell is none, such as 1_0 or other scripts' digits."""
+    if not isinstance(cells, np.ndarray) and any(isinstance(cell, str) and not _is_plain(cell) for cell in cells):
         raise ValueError
     return np.array(cells, float)
+
+
+def _is_plain(cell: str) -> bool:
+    return "_" not in cell and (cell.isascii() or cell.strip().isascii())
 
 
 def _join(chunks: Sequence[Any]) -> Sequence[Any] | np.ndarray:
@@ -330,7 +389,7 @@ class MeasurementFile:
             values = _read_numbers(self.columns[name])
         except (ValueError, TypeError):
             index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
-            raise self._value_fault(index, name, "a number with a decimal point") from None
+            raise self._value_fault(index, name, "a number with a decimal point, in digits 0 to 9") from None
         # Not a number is no more than anything either.
         sound = np.abs(values) <= LARGEST_NUMBER
         if not sound.all():

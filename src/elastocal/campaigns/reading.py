@@ -21,10 +21,17 @@ from elastocal.campaigns.campaign import (
     assemble_campaign,
     targets_from,
 )
-from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, holdout_from, measured_poses, other_folder
+from elastocal.campaigns.holdout import (
+    FEWEST_HELD_OUT_POSES,
+    held_out_mask,
+    holdout_from,
+    is_file,
+    is_file_in,
+    measured_poses,
+    other_folder,
+)
 from elastocal.campaigns.measurement_checks import check_angles, check_measurements
 from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, read_measurements, show_cell
-from elastocal.campaigns.places import is_file, is_file_in
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.io.documents import check_document, read_document
@@ -36,23 +43,9 @@ from elastocal.mechanics.robot_file import robot_from_document
 def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collection[str] | None = None) -> Campaign:
     """Read a campaign and check it as a whole.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Holds ``campaign.yaml`` and the measurements.
-    robots_folder : str or Path
-        Holds the robots that a campaign may name.
-    effects : iterable of str, optional
-        Names that ``declared`` may have; not checked without.
-
-    Returns
-    -------
-    Campaign
-
-    Raises
-    ------
-    InputError
-        The first fault found: file, row and column or key, what stands there and what may.
+    `folder`: holds ``campaign.yaml`` and the measurements. `robots_folder`: holds the robots that a campaign may name.
+    `effects`: names that ``declared`` may have; not checked without. Raises `InputError`: the first fault found: file, row and
+    column or key, what stands there and what may.
     """
     folder = Path(folder)
     source = (folder / DOCUMENT).as_posix()
@@ -110,21 +103,7 @@ def _tables(folder: Path) -> list[Path]:
 
 
 def read_robot(path: str | Path) -> Robot:
-    """Read a robot file.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Robot
-
-    Raises
-    ------
-    InputError
-        As in `robot_from_document`, and a document that its schema refuses.
-    """
+    """Read a robot file; an `InputError` is as in `robot_from_document`, or names what the schema refuses."""
     source = Path(path).as_posix()
     document = read_document(source)
     check_document(document, "robot", source)

@@ -1,7 +1,7 @@
 """A campaign's folder to begin with: every key explained, by the descriptions of the schemas that check it."""
 
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from elastocal.campaigns.measurements import file_columns
@@ -18,17 +18,17 @@ _ROBOT: dict[str, Any] = {
 }
 
 
-def campaign_template(name: str, robot: Robot) -> str:
+def campaign_template(name: str, robot: Robot, targets: Sequence[str] = (), measured: str = "position") -> str:
     """Text of a campaign.yaml to fill in.
 
-    `robot`: whose file is robot.yaml beside it.
+    `robot`: whose file is robot.yaml beside it. `targets`, `measured`: as the measurements have them that lie there.
     """
     document = {
         "campaign": name,
         "robot": "robot.yaml",
-        "measured": "position",
+        "measured": measured,
         "frame": "tracker",
-        "targets": {"reflector": {"point": robot.chain.end_effector.name, "offset_m": "unknown"}},
+        "targets": {t: {"point": robot.chain.end_effector.name, "offset_m": "unknown"} for t in targets or ("reflector",)},
         "compliance": "nominal" if robot.compliance_known else "identify",
         "declared": ["joint_offset", "link_geometry"],
         "holdout": {"fraction": 0.3, "seed": 1},

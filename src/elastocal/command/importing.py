@@ -67,7 +67,7 @@ def dh(
     modified: Annotated[bool, Option("--modified", help="Craig's notation: alpha and a come before the joint.")] = False,
     angles: Annotated[Literal["deg", "rad"] | None, Option(help="Unit of columns of angles that state none.")] = None,
     lengths: Annotated[Literal["m", "mm"] | None, Option(help="Unit of columns of lengths that state none.")] = None,
-    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of a CSV table; a comma has to be stated.")] = None,
+    decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of a CSV table. Default: found out.")] = None,
     ignore: Annotated[list[str] | None, Option(help="Column to leave out; as often as needed.")] = None,
     name: Annotated[str | None, Option(help="Maker and model. Default: the name of the file.")] = None,
     mass_std: _MassStd = DH_MASS_STD,
@@ -177,11 +177,16 @@ def csv(
         targets=markers or (earlier.targets if not target else None),
         **{name: value for name, value in stated.items() if value},
     )
-    found = read_measurement_table(file, chosen, _robot(robot, folder))
+    arm, known = _described(robot, folder)
+    found = read_measurement_table(file, chosen, arm)
     with write_together(folder, (CSV, IMPORT)) as partial:
         write_measurements(partial / CSV, found.table, found.joints)
         write_text(partial / IMPORT, import_options_text(found.options, file))
     lines = [*_summary(found), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"]
+    if known and (new := {*found.table["target"].tolist()} - known):
+        lines.append(
+            f"! campaign.yaml there has no target {', '.join(sorted(new))}: name it there, or in place of one of its own"
+        )
     typer.echo("\n".join(map(printable, lines)))
 
 
@@ -193,14 +198,16 @@ def _write(result: Imported, output: Path) -> None:
     typer.echo("\n".join(map(printable, [*summary(result), f"written: {output.as_posix()}"])))
 
 
-def _robot(path: Path | None, folder: Path) -> Robot | None:
-    """The robot of the file, or of the campaign that the folder holds already."""
+def _described(path: Path | None, folder: Path) -> tuple[Robot | None, set[str]]:
+    """The robot of the file, or of the campaign that the folder holds already, and the targets of this campaign."""
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.reading import read_descriptions, read_robot
 
-    if path is None and (folder / DOCUMENT).is_file():
-        path = read_descriptions(folder, pipeline() / "config" / "robots")[1]
-    return None if path is None else read_robot(path)
+    targets: set[str] = set()
+    if (folder / DOCUMENT).is_file():
+        document, there = read_descriptions(folder, pipeline() / "config" / "robots")
+        path, targets = path or there, {*document["targets"]}
+    return None if path is None else read_robot(path), targets
 
 
 def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:

@@ -15,12 +15,12 @@ def init(
 ) -> None:
     """Begin a campaign: a folder with files to fill in.
 
-    campaign.yaml explains every key; measurements.csv has its header alone. No file that exists is replaced.
+    campaign.yaml explains every key, and has the targets of measurements that lie there. No file that exists is replaced.
     """
     from rich.console import Console
 
     from elastocal.campaigns.campaign import DOCUMENT
-    from elastocal.campaigns.measurements import CSV, PARQUET
+    from elastocal.campaigns.measurements import CSV, PARQUET, described_by
     from elastocal.campaigns.reading import read_robot
     from elastocal.campaigns.template import campaign_template, robot_template, sheet_template
     from elastocal.io.atomic_writes import check_places, write_text, write_together
@@ -37,6 +37,7 @@ def init(
     source = place if place.exists() else robot
     arm = None if source is None else read_robot(source)
     there = [name for name in (place.name, CSV, PARQUET) if (folder / name).exists()]
+    targets, measured = described_by(folder)
     written = [name for name in (place.name, CSV, DOCUMENT) if name not in there and (name != CSV or PARQUET not in there)]
     with write_together(folder, written) as partial:
         if place.name in written:
@@ -44,8 +45,9 @@ def init(
         arm = arm or read_robot(partial / place.name)
         if CSV in written:
             write_text(partial / CSV, sheet_template(arm.joints))
-        write_text(partial / DOCUMENT, campaign_template(folder.resolve().name, arm))
+        write_text(partial / DOCUMENT, campaign_template(folder.resolve().name, arm, targets, measured))
     template = ["! robot.yaml is a template: enter your robot's chain and lengths, or use `elastocal import urdf` or `dh`"]
     answer = f"{folder.as_posix()}: {', '.join(written)}"
-    following = f"fill in measurements.csv, then elastocal check {folder.as_posix()}"
+    first = "check campaign.yaml for the frame and where targets sit" if targets else "fill in measurements.csv"
+    following = f"{first}, then elastocal check {folder.as_posix()}"
     print_answer(True, answer, template if source is None else [], following, Console())

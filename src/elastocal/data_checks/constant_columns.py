@@ -35,20 +35,19 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
         # Standard deviations along the main axes, the smallest first: a plane seen in its own axes has one constant column.
         needed = _extents(predicted[members])
         still = np.ptp(measured, axis=0) < _SAME_M
-        count = Value("poses", float(poses), "–")
-        who = campaign.targets[some.target[members[0]]].name
+        who, kinds = campaign.targets[some.target[members[0]]].name, []
         if still.any() and needed[still.sum() - 1] > IMPLAUSIBLE_M:
             axes = ", ".join(np.array(list("xyz"))[still])
             verb = "are" if still.sum() > 1 else "is"
             where = "zero" if not measured[:, still].any() else "the same"
             detail = f"{axes} of {who} {verb} {where} in all {poses} poses, though by its joint angles the robot moved"
-            found.append(Fault(NAMES[0], (), detail, (count,), (float(needed[-1]), 0.0), (), True))
+            kinds.append((detail, needed[-1]))
         moved = _extents(measured)[-1]
         if np.ptp(angles, axis=0).max() < _SAME_RAD and moved > IMPLAUSIBLE_M:
-            detail = (
-                f"the joint angles are the same in all {poses} poses, though the measurements of {who} lie {moved:.2g} m apart"
-            )
-            found.append(Fault(NAMES[0], (), detail, (count,), (float(moved), 0.0), (), True))
+            same = f"the joint angles are the same in all {poses} poses"
+            kinds.append((f"{same}, though the measurements of {who} lie {moved:.2g} m apart", moved))
+        count = (Value("poses", float(poses), "–"),)
+        found += [Fault(NAMES[0], (), detail, count, (float(size), 0.0), (), True) for detail, size in kinds]
     # One of each kind speaks for all targets.
     return list({fault.detail.split(" of ")[0]: fault for fault in reversed(found)}.values())
 

@@ -16,12 +16,14 @@ from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states, single_observations
 from elastocal.fitting.prediction import measured_in_base
 from elastocal.fitting.registration import nominal_poses, registered_to
+from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.pose_differences import rotation_vectors
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
+    from elastocal.mechanics.chain import Chain
 
 # Poses enough to tell what concerns all measurements.
 MANY_POSES = 80
@@ -111,6 +113,46 @@ def spread(measurements: Measurements, poses: int = MANY_POSES) -> Measurements:
     return measurements.select(np.sort(np.concatenate(chosen)))
 
 
+def at_targets(
+    chain: Chain, coordinates: np.ndarray, campaign: Campaign, measurements: Measurements, estimate: Estimate
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where a chain has the target of each measurement: `position` (N, 3), `rotation` (N, 3, 3), `jacobian` (N, 3, C)."""
+    count = len(coordinates)
+    found = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty((count, 6, chain.coordinates))
+    for index, target in enumerate(campaign.targets):
+        mine = measurements.target == index
+        point = replace(chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
+        for part, values in zip(found, poses_and_jacobians(chain, coordinates[mine], point), strict=True):
+            part[mine] = values
+    return found[0], found[1], found[2][:, :3]
+
+
+def free_columns(
+    campaign: Campaign, measurements: Measurements, rotation: np.ndarray, position: np.ndarray
+) -> list[np.ndarray]:
+    """Sensitivities of positions to frames and targets that nobody knows, ndarrays (N, 3, .), base axes.
+
+    `rotation`, `position` (N, 3, 3), (N, 3): of the points on which the targets sit, and of the targets.
+    """
+    columns = []
+    if campaign.frame == "tracker":
+        turns = np.stack([np.cross(axis, position) for axis in np.eye(3)], axis=-1)
+        rigid = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=-1)
+        columns += [rigid * (measurements.session == session)[:, None, None] for session in np.unique(measurements.session)]
+    for index, target in enumerate(campaign.targets):
+        if target.offset_m is None:
+            columns.append(rotation * (measurements.target == index)[:, None, None])
+    return columns
+
+
+def with_measured(measurements: Measurements, source: np.ndarray) -> Measurements:
+    """Measurements with the measured columns of other rows."""
+    turned = measurements.rotation_vector
+    return replace(
+        measurements, position=measurements.position[source], rotation_vector=None if turned is None else turned[source]
+    )
+
+
 def rms(values: np.ndarray) -> float:
     """Root of the mean square, of an array of any shape."""
     return float(np.sqrt((values**2).mean()))
@@ -158,10 +200,8 @@ class _Nominal:
 
     def placed(self, kept: np.ndarray | None = None) -> Placement:
         """All of them, in frames and targets that are fitted to all, or to those kept, ndarray of bool (N,)."""
-        if kept is None:
-            return self.placed_by(registered_to(self.model, self.observations, self.position, self.rotation))
-        some = select_states(self.observations, kept)
-        return self.placed_by(registered_to(self.model, some, self.position[kept], self.rotation[kept]))
+        some, at = (self.observations, slice(None)) if kept is None else (select_states(self.observations, kept), kept)
+        return self.placed_by(registered_to(self.model, some, self.position[at], self.rotation[at]))
 
     def placed_by(self, estimate: Estimate) -> Placement:
         target = self.observations.target

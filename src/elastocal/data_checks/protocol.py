@@ -13,10 +13,17 @@ trace that was right, a miss only leaves it to what comes after.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
+
+import elastocal.data_checks
+from elastocal.io.modules import modules_with
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from types import ModuleType
+
+    from elastocal.campaigns.campaign import Campaign, Measurements
 
 # Family of faults of the data among the effects of a verdict.
 OF_DATA = "data"
@@ -58,3 +65,30 @@ class Fault:
 def data_at_fault(verdict: Mapping[str, Any]) -> bool:
     """Whether the document of a diagnosis or verdict finds a fault of the data, after which it says nothing of the robot."""
     return any(effect["family"] == OF_DATA for effect in verdict["effects"])
+
+
+@cache
+def fault_modules() -> dict[str, ModuleType]:
+    """Modules that look for faults by their own names, each behind those that it comes after."""
+    waiting = modules_with("NAMES", elastocal.data_checks)
+    ordered: dict[str, ModuleType] = {}
+    while waiting:
+        ready = [name for name, module in waiting.items() if not set(module.AFTER) & set(waiting)]
+        if not ready:
+            raise ValueError(f"faults that come after each other: {', '.join(waiting)}")
+        ordered |= {name: waiting.pop(name) for name in ready}
+    return ordered
+
+
+def faults(campaign: Campaign, measurements: Measurements) -> tuple[Fault, ...]:
+    """Every fault that some measurements show; none is looked for where another one makes that meaningless: see `protocol`."""
+    found: list[Fault] = []
+    decisive: set[str] = set()
+    for name, module in fault_modules().items():
+        if decisive & set(module.AFTER):
+            continue
+        new = module.find(campaign, measurements)
+        found += new
+        if any(fault.decisive for fault in new):
+            decisive.add(name)
+    return tuple(found)

@@ -1,28 +1,22 @@
-"""Positions beside the angles, or loads beside the deflections, of other rows.
+"""Positions beside the angles of other rows.
 
 A row is out of place where it is absurdly far from the nominal robot as it stands, and where another place is not only better
 but clearly nearer than chance would have it: among many points some point is always near.
 
-Where most rows are out of place, they are matched by iterative closest points [1] from the principal axes of all points; loads
-are matched to deflections as an assignment problem [2].
+Where most rows are out of place, they are matched by iterative closest points [1] from the principal axes of all points.
 
 [1] Besl, P. J. and McKay, N. D., A method for registration of 3-D shapes, IEEE Transactions on Pattern Analysis and Machine
     Intelligence 14, 1992.
-[2] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from elastocal.data_checks.deflections import state_deflections
 from elastocal.data_checks.placement import (
     FAR_BETTER,
     IMPLAUSIBLE_M,
@@ -33,17 +27,17 @@ from elastocal.data_checks.placement import (
     robustly_placed,
     spread,
     trimmed_rms,
+    with_measured,
 )
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.observations import state_clusters
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
-    from elastocal.data_checks.deflections import StateDeflections
     from elastocal.data_checks.placement import Placement
     from elastocal.fitting.model import Estimate
 
-NAMES, FAMILY, AFTER = ("shuffled_rows",), "data", ("constant_columns", "alternatives", "loads")
+NAMES, FAMILY, AFTER = ("shuffled_rows",), "data", ("constant_columns", "alternatives")
 
 # A row is out of place beyond so many robust standard deviations of the others, and back in place within so many.
 _OUT_OF_PLACE, _IN_PLACE = 20.0, 5.0
@@ -57,71 +51,20 @@ _FEWEST_IN_PLACE = 10
 _MATCHING_ROUNDS = 10
 # Orientations distinguish places as points at this distance from the target would, m.
 _ARM_M = 0.5
-# A shift concerns all rows: more than this share is absurdly far, and all but a few come right.
-_MANY, _CURED = 0.01, 0.9
-# A load is out of place where it misses the deflection by this share of it, and by so many times what others miss; back in
-# place within so many.
-_MISSED, _MISSED_MORE, _MISSED_LIKE_OTHERS = 0.5, 6.0, 3.0
-_MOST_STATES = 1500
-_ROUNDS_OF_COMPLIANCE = 4
-# A matching of loads is no chance if it leaves so much less than one of the deflections of other poses.
-_CHANCE_LOADS = 1.0 / 3.0
+# No robot nor tracker reaches so far.
+_SESSIONS_APART_M = 1e5
 
 
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
-    """Rows whose measured columns, or whose loads, belong to other rows."""
-    return [*_of_positions(campaign, measurements), *_of_loads(campaign, measurements)]
-
-
-def _of_positions(campaign: Campaign, measurements: Measurements) -> list[Fault]:
+    """Rows whose measured columns belong to other rows."""
     some = robustly_placed(campaign, spread(measurements))
     # One fit to some poses serves all: it only has to be good to a few centimetres.
     as_written = placed_by(campaign, measurements, some.estimate)
-    far = (as_written.distance > IMPLAUSIBLE_M).mean()
-    if far * len(measurements) < _FEWEST_ROWS:
+    if (as_written.distance > IMPLAUSIBLE_M).sum() < _FEWEST_ROWS:
         return []
-    found = _shifted(campaign, measurements, as_written) if far > _MANY else []
-    if not found and trimmed_rms(some.distance) > IMPLAUSIBLE_M:
+    if trimmed_rms(some.distance) > IMPLAUSIBLE_M:
         return _all_matched(campaign, measurements, as_written)
-    return found or _matched(measurements, as_written, as_written, as_written)
-
-
-def _shifted(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Fault]:
-    """All rows fit once the measured columns are moved by one row."""
-    shifts = list(product(("row", "row of its target", "pose"), (1, -1)))
-    moved = [_moved(measurements, *shift) for shift in shifts]
-    plain = [trimmed_rms(placed(campaign, spread(part)).distance) for part in moved]
-    best = int(np.argmin(plain))
-    estimate = robustly_placed(campaign, spread(moved[best])).estimate
-    before, after = as_written.distance, placed_by(campaign, moved[best], estimate).distance
-    # Neighbouring rows may be near each other: those that are not tell.
-    cured = (after > IMPLAUSIBLE_M).mean() < (1 - _CURED) * (before > IMPLAUSIBLE_M).mean()
-    if not cured or trimmed_rms(after) > min(trimmed_rms(before), IMPLAUSIBLE_M) or rms(after) > rms(before) / FAR_BETTER:
-        return []
-    kind, steps = shifts[best]
-    detail = f"the measured columns fit one {kind} further {'down' if steps > 0 else 'up'}"
-    return [Fault(NAMES[0], (), detail, (Value("shift", float(steps), "–"),), (rms(before), rms(after)), (), True)]
-
-
-def _moved(measurements: Measurements, kind: str, steps: int) -> Measurements:
-    """Measurements with the measured columns so many rows of a kind further down; those that fall off an end are left out."""
-    of_target = [measurements.session, measurements.target]
-    alike = {
-        "row": [measurements.session],
-        "row of its target": of_target,
-        "pose": [*of_target, measurements.load, measurements.repeat],
-    }[kind]
-    order, source = np.argsort(measurements.row, kind="stable"), np.empty(len(measurements), int)
-    source[order] = pd.Series(order).groupby([column[order] for column in alike]).shift(steps, fill_value=-1)
-    return _with_measured(measurements, np.maximum(source, 0)).select(source >= 0)
-
-
-def _with_measured(measurements: Measurements, source: np.ndarray) -> Measurements:
-    """Measurements with the measured columns of other rows."""
-    turned = measurements.rotation_vector
-    return replace(
-        measurements, position=measurements.position[source], rotation_vector=None if turned is None else turned[source]
-    )
+    return _matched(measurements, as_written, as_written, as_written)
 
 
 def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Fault]:
@@ -132,7 +75,8 @@ def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Pla
 
     def nearest(estimate: Estimate) -> tuple[Placement, np.ndarray, np.ndarray]:
         beside = placed_by(campaign, measurements, estimate)
-        return beside, *_gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))
+        predicted, measured = (_places(measurements, each, None) for each in (beside.predicted, beside.measured))
+        return beside, *cKDTree(measured).query(predicted)
 
     estimate, before = min(starts, key=lambda start: trimmed_rms(nearest(start)[1])), None
     for _ in range(_MATCHING_ROUNDS):
@@ -140,7 +84,7 @@ def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Pla
         if before is not None and (source == before).all():
             break
         before = source
-        estimate = placed(campaign, spread(_with_measured(measurements, source))).estimate
+        estimate = placed(campaign, spread(with_measured(measurements, source))).estimate
     return _matched(measurements, as_written, beside, None)
 
 
@@ -170,9 +114,8 @@ def _main_axes(points: np.ndarray) -> np.ndarray:
 
 def _matched(measurements: Measurements, as_written: Placement, beside: Placement, rest: Placement | None) -> list[Fault]:
     """The fault that some rows fit in the places of each other; `rest` says how well rows fit that are in place."""
-    distance = beside.distance
+    distance, level = beside.distance, IMPLAUSIBLE_M
     out = distance > IMPLAUSIBLE_M
-    level = IMPLAUSIBLE_M
     if rest is not None and (~out).sum() >= _FEWEST_IN_PLACE:
         sigma = robust_sigma(distance[~out], 3)
         out &= distance > _OUT_OF_PLACE * sigma
@@ -181,9 +124,11 @@ def _matched(measurements: Measurements, as_written: Placement, beside: Placemen
     rows = np.flatnonzero(out)
     if len(rows) < _FEWEST_ROWS:
         return []
-    predicted = _places(beside.predicted, beside.predicted_rotation)
-    left, source = _gaps(measurements, predicted, _places(beside.measured, beside.measured_rotation), rows)
-    back = (left < level) & (left < _NO_CHANCE * _spacing(measurements, predicted, rows)) & (source != rows)
+    predicted = _places(measurements, beside.predicted, beside.predicted_rotation)[rows]
+    measured = _places(measurements, beside.measured, beside.measured_rotation)[rows]
+    left, number = map(np.asarray, cKDTree(measured).query(predicted))
+    source = rows[number]
+    back = (left < level) & (left < _NO_CHANCE * _spacing(predicted)) & (source != rows)
     # Each measurement has one place: one that stands for many is no permutation.
     pose = state_clusters(measurements)
     taken = len(np.unique(pose[source[back]])), len(np.unique(pose[rows[back]]))
@@ -198,99 +143,19 @@ def _matched(measurements: Measurements, as_written: Placement, beside: Placemen
     return [Fault(NAMES[0], (), detail, (share,), (before, after), concerned, True)]
 
 
-def _places(position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
-    """Positions and, where they are measured, orientations as points whose distances are in m, ndarray (N, 3 or 12)."""
-    if rotation is None:
-        return position
-    # A small angle changes the nine entries, taken together, by the square root of two times itself.
-    return np.concatenate([position, _ARM_M / np.sqrt(2) * rotation.reshape(len(rotation), 9)], axis=1)
+def _places(measurements: Measurements, position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
+    """Positions and, where they are measured, orientations as points whose distances are in m, sessions far apart."""
+    parts = [position, _SESSIONS_APART_M * measurements.session[:, None]]
+    if rotation is not None:
+        # A small angle changes the nine entries, taken together, by the square root of two times itself.
+        parts.append(_ARM_M / np.sqrt(2) * rotation.reshape(len(rotation), 9))
+    return np.concatenate(parts, axis=1)
 
 
-def _gaps(
-    measurements: Measurements, predicted: np.ndarray, measured: np.ndarray, rows: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """For each of some rows the distance to the nearest measured place among them, and the row of that place."""
-    left, source = np.empty(len(rows)), np.empty(len(rows), int)
-    for session in np.unique(measurements.session[rows]):
-        members = np.flatnonzero(measurements.session[rows] == session)
-        tree = cKDTree(measured[rows[members]])
-        left[members], number = tree.query(predicted[rows[members]])
-        source[members] = rows[members[number]]
-    return left, source
-
-
-def _spacing(measurements: Measurements, predicted: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """For each of some rows how far the next place is among those predicted for them."""
-    spacing = np.zeros(len(rows))
-    for session in np.unique(measurements.session[rows]):
-        members = np.flatnonzero(measurements.session[rows] == session)
-        points = predicted[rows[members]]
-        # One of each place.
-        places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
-        near = np.reshape(cKDTree(places).query(points, k=min(4, len(places)))[0], (len(points), -1))
-        other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
-        spacing[members] = np.where(np.isfinite(other), other, 0.0)
-    return spacing
-
-
-def _of_loads(campaign: Campaign, measurements: Measurements) -> list[Fault]:
-    states = state_deflections(campaign, measurements)
-    if states is None or not _FEWEST_IN_PLACE <= len(states.wrench) <= _MOST_STATES:
-        return []
-    every, nominal = np.arange(len(states.wrench)), campaign.robot.compliance
-    compliance = nominal if states.compliance_known else states.compliance(every, every, nominal)
-    for _ in range(_ROUNDS_OF_COMPLIANCE):
-        missed = np.diag(states.misfits(compliance))
-        out = missed > _MISSED * states.sizes()
-        if (~out).sum() < _FEWEST_IN_PLACE:
-            break
-        compliance = states.compliance(every[~out], every[~out], nominal)
-    if out.sum() < _FEWEST_ROWS:
-        return []
-    if (~out).sum() >= max(_FEWEST_IN_PLACE, len(out) / 2):
-        return _some_loads_matched(states, compliance, missed, out)
-    return _all_loads_matched(states, nominal)
-
-
-def _some_loads_matched(states: StateDeflections, compliance: np.ndarray, missed: np.ndarray, out: np.ndarray) -> list[Fault]:
-    """Most loads are in place and tell how well the others must fit where they belong."""
-    sigma = np.median(missed[~out])
-    if (out & (missed > _MISSED_MORE * sigma)).sum() < _FEWEST_ROWS:
-        return []
-    # By chance the load of another state may miss by little.
-    rows = np.flatnonzero(missed > _MISSED_LIKE_OTHERS * sigma)
-    cost = states.misfits(compliance)[np.ix_(rows, rows)]
-    there = linear_sum_assignment(cost**2)[1]
-    left = cost[np.arange(len(rows)), there]
-    back = left < _MISSED_LIKE_OTHERS * sigma
-    if back.mean() < _MOST:
-        return []
-    return _loads_fault(states, rows[back], rows[there[back]], missed[rows[back]], left[back])
-
-
-def _all_loads_matched(states: StateDeflections, nominal: np.ndarray) -> list[Fault]:
-    """Most loads are out of place; the matching must fit far better than one of deflections that these loads did not make."""
-    every, compliance = np.arange(len(states.wrench)), nominal
-    before = np.diag(states.misfits(nominal))
-    for _ in range(_ROUNDS_OF_COMPLIANCE):
-        cost = states.misfits(compliance)
-        there = linear_sum_assignment(cost**2)[1]
-        compliance = states.compliance(every, there, nominal)
-    left = cost[every, there]
-    strange = states.misfits(compliance, np.roll(states.seen, len(every) // 2, axis=0))
-    chance = strange[linear_sum_assignment(strange**2)]
-    if np.median(left) > _CHANCE_LOADS * np.median(chance):
-        return []
-    return _loads_fault(states, every, there, before, left)
-
-
-def _loads_fault(
-    states: StateDeflections, here: np.ndarray, there: np.ndarray, before: np.ndarray, left: np.ndarray
-) -> list[Fault]:
-    moved = here != there
-    if moved.sum() < _FEWEST_ROWS or rms(left[moved]) > rms(before[moved]) / FAR_BETTER:
-        return []
-    count, rows = int(moved.sum()), sorted(row for state in here[moved] for row in states.rows[state])
-    detail = f"{count} of {len(states.wrench)} loaded states fit with the load of another one of them"
-    share = Value("share of the loaded states", count / len(states.wrench), "–")
-    return [Fault(NAMES[0], (), detail, (share,), (rms(before[moved]), rms(left[moved])), tuple(rows), True)]
+def _spacing(points: np.ndarray) -> np.ndarray:
+    """How far from each of some points (N, .) the next place of its session is, 0 where there is none, ndarray (N,), m."""
+    # One of each place.
+    places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
+    near = np.reshape(cKDTree(places).query(points, k=min(4, len(places)))[0], (len(points), -1))
+    other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
+    return np.where(other < _SESSIONS_APART_M / 2, other, 0.0)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.counting import counted
-from elastocal.data_checks.catalogue import faults
-from elastocal.data_checks.compliance_check import fitted_compliance_warnings
+from elastocal.data_checks.protocol import faults
+from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained

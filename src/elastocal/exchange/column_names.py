@@ -70,6 +70,8 @@ _KNOWN = {other: name for name, others in _ALSO.items() for other in (name.repla
 _KNOWN |= {name: name for name in (*EULER, *MATRIX, *HOMOGENEOUS)}
 # Last but one names of topics that hold angles by their number.
 _ANGLES = ("position", "positions", "jointstates", "joints", "jointpositions")
+# Three positions by their number may be x, y and z.
+_FEWEST_POSITIONS = 4
 _COUNTED = re.compile(r"(.*?)(name|position)s?[\s_.]?[\[(]?\s*([0-9]{1,2})\s*[\])]?", re.ASCII | re.IGNORECASE)
 
 # What a marker has of its own; all else of a row is of the robot.
@@ -306,6 +308,15 @@ def _find_counted_joints(text: TextTable, headers: Sequence[str], mapped: set[st
         matches = (_JOINT.fullmatch(name) for name in _names_in(split_unit(header)[0]))
         if match := next(filter(None, matches), None):
             families.setdefault(match[1], {}).setdefault(int(match[2]), header)
+    notes = []
+    if not families:
+        # Of a message of joint states without the names beside.
+        counted = {header: match for header in text.columns if (match := _COUNTED.fullmatch(split_unit(header)[0]))}
+        members = {int(match[3]): header for header, match in counted.items() if match[2].lower() == "position"}
+        alone = len(members) == len(counted) and {*members.values()} <= {*headers}
+        if len(members) >= _FEWEST_POSITIONS and alone:
+            families = {"position": members}
+            notes = [f"{members[min(members)]!r} … taken for joints in the arm's order, as no columns name them"]
     # What options name needs no question, unless they name a part of what is counted from 0.
     families = {
         name: members if 0 in members and not mapped >= {*members.values()} else free
@@ -333,8 +344,8 @@ def _find_counted_joints(text: TextTable, headers: Sequence[str], mapped: set[st
                 allowed = f"--column q1={headers[0]!r} …, each joint's"
                 raise InputError(text.path, "header", f"{', '.join(headers)}, counted from 0", allowed)
             note = f"joints counted from 0: q1 is {headers[0]!r}, q{len(headers)} is {headers[-1]!r}"
-            return {header: f"q{number + 1}" for number, header in members.items()}, [note]
-    return {}, []
+            return {header: f"q{number + 1}" for number, header in members.items()}, [note, *notes]
+    return ({header: f"q{number}" for number, header in families["position"].items()} if notes else {}), notes
 
 
 def _have_unit_length(text: TextTable, headers: Sequence[str]) -> bool:

@@ -77,6 +77,7 @@ def read_text_table(
     wanted: str = _WANTED,
     units_in: Callable[[Sequence[str]], Sequence[str] | None] = lambda cells: None,
     names: Sequence[str] = (),
+    is_small: Callable[[str], bool] = lambda name: False,
 ) -> TextTable:
     """Read a table, finding out what is not stated of its dialect.
 
@@ -85,8 +86,9 @@ def read_text_table(
     `is_header`: of the cells of a line, whether they name the columns; the first such line does where no line is stated, else
     one behind a comment mark. `wanted`: what a header has, for messages. `ignored`: names of columns that are left out whatever
     they hold. `units_in`: the units of a row of cells that is nothing but units, such as one under the header. `names`: of all
-    columns of a table without a header. Raises `InputError`: a file that cannot be read or has no header, a row of another
-    length, or numbers that may be read in two ways.
+    columns of a table without a header. `is_small`: by the name of a column, whether none of its numbers is a thousand or more,
+    as angles in rad: 1,234 has a decimal comma there. Raises `InputError`: a file that cannot be read or has no header, a row
+    of another length, or numbers that may be read in two ways.
     """
     source = Path(path).as_posix()
     lines, encoding = _read_lines(path, stated.encoding)
@@ -130,7 +132,7 @@ def read_text_table(
         elif name not in ignored:
             columns[name] = each
     numbers = [number for number, _ in rows]
-    decimal, comma = stated.decimal or _find_decimal(columns, numbers, separator, source), _DECIMAL["comma"]
+    decimal, comma = stated.decimal or _find_decimal(columns, numbers, separator, source, is_small), _DECIMAL["comma"]
     if decimal == "comma":
         columns = {
             name: tuple(cell.replace(",", ".") if comma.fullmatch(cell) else cell for cell in cells)
@@ -256,16 +258,18 @@ def _split_cells(line: str, separator: str, source: str = "", number: int = 0) -
     return [cell.strip() for cell in row]
 
 
-def _find_decimal(columns: dict[str, tuple[str, ...]], lines: Sequence[int], separator: str, source: str) -> str:
+def _find_decimal(
+    columns: dict[str, tuple[str, ...]], lines: Sequence[int], separator: str, source: str, is_small: Callable[[str], bool]
+) -> str:
     """The decimal mark that all numbers have; refused are numbers that may be read in two ways."""
     seen: dict[str, tuple[int, str]] = {}
-    sure = False
+    sure, small = False, [is_small(name) for name in columns]
     for number, row in zip(lines, zip(*columns.values(), strict=True), strict=True):
-        for cell in row:
+        for cell, below in zip(row, small, strict=True):
             name = "comma" if "," in cell else "point" if "." in cell and "point" not in seen else ""
             if name and _DECIMAL[name].fullmatch(cell):
                 seen.setdefault(name, (number, cell))
-                sure |= name == "comma" and not _EITHER.fullmatch(cell)
+                sure |= name == "comma" and (below or not _EITHER.fullmatch(cell))
         if len(seen) == 2:
             (one, left), (other, right) = seen["point"], seen["comma"]
             allowed = "one decimal mark, and none between thousands; --decimal point or comma says which"

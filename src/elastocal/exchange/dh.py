@@ -114,8 +114,8 @@ class DhRow:
 class DhOptions:
     """How a table is read.
 
-    `angles`, `lengths`: units of columns that do not say; asked for where they are None. `decimal`: of CSV; commas are asked
-    for where it is not stated. `ignore`: columns that are left out.
+    `angles`, `lengths`: units of columns that do not say; asked for where they are None. `decimal`: of CSV; found out where
+    it is None. `ignore`: columns that are left out.
     """
 
     angles: str | None = None
@@ -204,10 +204,9 @@ def read_dh_table(path: str | Path, options: DhOptions = _AS_STATED) -> tuple[li
         options.ignore,
         wanted,
         read_units,
+        is_small=lambda name: split_unit(name)[0] in ("theta", "theta_offset", "alpha"),
     )
     dialect = text.dialect
-    if dialect.decimal == "comma" and options.decimal is None:
-        raise InputError(source, "", "numbers with commas", "--decimal comma where the comma is the decimal mark, else points")
     meanings: dict[str, _Meaning] = {}
     for column in text.columns:
         meaning = _find_meaning(column, text.units.get(column, ""), options, source)

@@ -3,11 +3,11 @@
 import re
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import product
 
 import numpy as np
 
-from elastocal.campaigns.column_bounds import BOUNDS, find_beyond
-from elastocal.campaigns.measurements import show_cell
+from elastocal.campaigns.measurements import BOUNDS, find_beyond, show_cell
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import ANGLE, FORCE, LENGTH, MOMENT, NONE, TEMPERATURE, TIME, UNITS, kind_of, unit_scale
 from elastocal.exchange.csv_dialect import TextTable
@@ -21,14 +21,16 @@ _COVARIATES = ("time_s", "temperature_c", "u95_m")
 _LARGEST_TIME = 1e19
 # Without a unit, seconds since 1970 of the years 1990 to 2100 cannot be seconds, minutes or hours of a campaign in these.
 _EPOCH_S = 6.3e8, 4.1e9
-_CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
-_DATES = ("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M")
+_HOURS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
+# Dates of points and of slashes: who writes 05/04/2023 has to say which is the month.
+_DATES, _ORDERS = ("%d.%m.%Y ", "%d.%m.%y "), {"day-first": "%d/%m/%Y ", "month-first": "%m/%d/%Y "}
+_SLASHES = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-]\d{4}\s.*", re.ASCII)
 # To Python a time without a date is of this day.
 _MIDNIGHT = datetime(1900, 1, 1, tzinfo=UTC)
 # Of a pose, load, repeat or session; as in measurements.csv.
 _LARGEST_ORDINAL = 2**31 - 1
 # What programs write where nothing was measured.
-_EMPTY = re.compile(r"|[+-]?nan|-+|n/?a", re.IGNORECASE)
+_EMPTY = re.compile(r"|[+-]?nan(\(\w+\))?|[-–—]+|#?n/?a|n\.a\.|null|none", re.IGNORECASE)
 
 
 def rows_with_position(text: TextTable, columns: Mapping[str, str], position: Sequence[str], skip_empty: bool) -> np.ndarray:
@@ -102,9 +104,9 @@ class CellReader:
         numbers = [plain_number(cell, _LARGEST_TIME) for cell in cells]
         if None not in numbers:
             return self._bounded(name, np.array(numbers, float) * UNITS[TIME][self.units[name]])
-        values = _clock_times(cells)
+        values = _clock_times(cells, self.units[name])
         if values is None:
-            allowed = "numbers, times as 10:20:33 or dates as 2023-05-04 10:20:33 (05/04/2023 may be two days)"
+            allowed = "numbers, times as 10:20:33 or dates as 2023-05-04 10:20:33, 04.05.2023 10:20 or 05/04/2023 10:20"
             raise self.fault(numbers.index(None), name, allowed)
         return values
 
@@ -143,11 +145,13 @@ def covariates_of(
             continue
         header, numbers = read.columns[name], [plain_number(cell, _LARGEST_TIME) for cell in read.cells(name)]
         is_time, text = name == "time_s", None in numbers
+        order = _order_of_dates(read, given.get(name)) if is_time and text else None
         try:
-            unit = stated.get(name) or given.get(name)
+            unit = order or stated.get(name) or given.get(name)
             if is_time and unit is None and (unit := _unit_of_epoch(numbers)):
                 notes.append(f"{header!r} taken for {unit} since 1970")
-            read.units |= find_units(read.text, read.columns, [name], stated, {**given, **({name: unit} if unit else {})})
+            named = {**given, **({name: unit} if unit else {})}
+            read.units |= {name: order} if order else find_units(read.text, read.columns, [name], stated, named)
             found[name] = read.times(name) if is_time else read.numbers(name)
             if unit is None and not text:
                 notes.append(f"{header!r} in {read.units[name]}, as nothing states a unit")
@@ -170,20 +174,39 @@ def _unit_of_epoch(numbers: Sequence[float | None]) -> str | None:
     )
 
 
-def _clock_times(cells: Sequence[str]) -> np.ndarray | None:
-    """Seconds of times or dates, all written in one way, ndarray (N,), on over midnight; None where they are none."""
+def _order_of_dates(read: CellReader, stated: str | None) -> str | None:
+    """Whether day or month is first in dates such as 11/27/2026, one of `_ORDERS`; None where a cell is none of these.
+
+    Raises `InputError`: dates that may be read either way, and nothing states which.
+    """
+    parts = [_SLASHES.fullmatch(cell) for cell in read.cells("time_s")]
+    if not all(parts) or stated in _ORDERS:
+        return stated if all(parts) else None
+    first, second = np.array([(int(part[1]), int(part[2])) for part in parts if part]).max(axis=0)
+    if first <= 12 and second <= 12:
+        allowed = f"dates of one meaning: --unit time_s={' or '.join(_ORDERS)} says it, or --ignore {read.columns['time_s']!r}"
+        raise read.fault(0, "time_s", allowed)
+    return "month-first" if first <= 12 else "day-first"
+
+
+def _clock_times(cells: Sequence[str], order: str) -> np.ndarray | None:
+    """Seconds of times or dates, all written in one way, ndarray (N,), on over midnight; None where they are none.
+
+    `order`: of dates with slashes, one of `_ORDERS`, if it is one of them.
+    """
     try:
         dates = [datetime.fromisoformat(cell.replace("/", "-")) for cell in cells if "-" in cell or "/" in cell]
         if len(dates) == len(cells) and len({date.tzinfo is None for date in dates}) == 1:
             return np.array([(date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp() for date in dates])
     except ValueError:
-        return None
-    for written in (*_CLOCKS, *_DATES):
+        pass
+    plain = [cell.replace("-", "/").replace(", ", " ").replace(",", ".") for cell in cells]
+    for day, hour in product(("", *_DATES, _ORDERS.get(order, _DATES[0])), _HOURS):
         try:
-            times = [datetime.strptime(cell, written).replace(tzinfo=UTC) for cell in cells]
+            times = [datetime.strptime(cell, day + hour).replace(tzinfo=UTC) for cell in plain]
         except ValueError:
             continue
-        if written in _DATES:
+        if day:
             return np.array([time.timestamp() for time in times])
         seconds = np.array([(time - _MIDNIGHT).total_seconds() for time in times])
         return seconds + 86400.0 * np.concatenate([[0], np.cumsum(np.diff(seconds) < -43200.0)])

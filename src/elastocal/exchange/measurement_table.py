@@ -15,8 +15,16 @@ import pandas as pd
 import yaml
 from scipy.spatial import cKDTree
 
-from elastocal.campaigns.column_bounds import FARTHEST_RAD
-from elastocal.campaigns.measurements import SHOWN, SHOWN_TO, TICK, file_columns, sheet_columns, show_cell
+from elastocal.campaigns.measurements import (
+    FARTHEST_RAD,
+    MOST_JOINTS,
+    SHOWN,
+    SHOWN_TO,
+    TICK,
+    file_columns,
+    sheet_columns,
+    show_cell,
+)
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, text_fault
 from elastocal.exchange.column_names import (
@@ -53,8 +61,6 @@ from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
 IMPORT = "import.yaml"
-# A table names no more.
-_MOST_JOINTS = 99
 # Angles that a controller reports twice at one standstill agree to better; poses of a plan lie degrees apart.
 SAME_POSE = 1e-3
 # Rows of one pose whose joints stand farther apart (rad or m) are not of one pose: a label says something else.
@@ -107,10 +113,10 @@ def _sheet_options(text: TextTable, options: ImportOptions) -> ImportOptions:
     ``q1_deg`` is not ``q1``: one of them was edited.
     """
     headers = {header for header in text.columns if header}
-    beside = headers & sheet_columns(_MOST_JOINTS) - {TICK}
+    beside = headers & sheet_columns(MOST_JOINTS) - {TICK}
     names = {header.partition("_")[0]: header for header in beside}
     needed = {TICK, "pose", "load", "repeat", "target", *POSITION, *names}
-    if not (names and needed <= headers and headers - beside - {TICK} <= {*file_columns(_MOST_JOINTS)}):
+    if not (names and needed <= headers and headers - beside - {TICK} <= {*file_columns(MOST_JOINTS)}):
         return options
     units = {}
     for name, header in names.items():
@@ -165,7 +171,16 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
         only_lengths = any(name and find_joints([name]) for name in names) and lengths_in(cells)
         return has_position(names) or bool(markers_in(cells) or only_lengths)
 
-    text = read_text_table(path, is_header, options, options.ignore or (), units_in=read_units, names=options.names or ())
+    def is_small(header: str) -> bool:
+        """Whether it is of angles in degrees or radians: no joint turns a thousand."""
+        name, unit = recognize_column(header)
+        unit = unit or (options.units or {}).get("angles")
+        shifts = robot is not None and any(robot.chain.prismatic)
+        return bool(name and find_joints([name])) and unit in ("deg", "°", "rad") and not shifts
+
+    text = read_text_table(
+        path, is_header, options, options.ignore or (), units_in=read_units, names=options.names or (), is_small=is_small
+    )
     options = _sheet_options(text, options)
     mapped, notes = dict(options.columns or {}), [f"units in the row under the header: {len(text.units)}"] if text.units else []
     if targets := choose_markers(text, options.target, options.targets, mapped):

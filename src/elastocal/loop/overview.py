@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.application.accuracy import calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.columns import columns_of
-from elastocal.data_checks.catalogue import faults
+from elastocal.data_checks.protocol import faults
+from elastocal.data_checks.warnings import controller_warnings
 from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept
 from elastocal.diagnosis.linearize import linearized
@@ -102,7 +103,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
             " no compliance and no accuracy are stated before the diagnosis",
         ]
     wrong = [each["sentence"] for each in facts["misplaced"]]
-    suspicious = [*wrong, *warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case, settings)]
+    suspicious = [*wrong, *controller_warnings(campaign), *warnings, *warnings_of(left_out)]
+    suspicious += _suspicious(campaign, facts, case, settings)
     return facts | _testable(part) | {"suspicious": [*suspicious, *repeat_warnings(training, held_out)]}
 
 

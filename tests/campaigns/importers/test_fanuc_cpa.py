@@ -10,7 +10,7 @@ from elastocal.campaigns.reading import read_campaign
 
 def test_cpa_source_becomes_a_campaign_of_the_controllers_angles(cpa, config_folder, tmp_path):
     path, angles, positions = cpa
-    fanuc_cpa.write_campaign(path, tmp_path / "campaign")
+    fanuc_cpa.write_campaign(path, tmp_path / "campaign", "fanuc_cpa")
     campaign = read_campaign(tmp_path / "campaign", config_folder / "robots")
     assert [target.name for target in campaign.targets] == list("DEF")
     assert campaign.noise == fanuc_cpa.NOISE

@@ -7,8 +7,8 @@ from elastocal.campaigns.reading import read_campaign
 
 
 def test_robot_files_of_the_sources_are_one_robot(fanuc, config_folder, tmp_path, static, cpa):
-    fanuc_static.write_campaign(static[0], tmp_path / "a")
-    fanuc_cpa.write_campaign(cpa[0], tmp_path / "b")
+    fanuc_static.write_campaign(static[0], tmp_path / "a", "fanuc_static")
+    fanuc_cpa.write_campaign(cpa[0], tmp_path / "b", "fanuc_cpa")
     fanuc_joint.write_campaign(static[0], cpa[0], tmp_path / "c", config_folder / "robots")
     robots = [read_campaign(tmp_path / name, config_folder / "robots").robot for name in "abc"]
     for robot in robots:

@@ -12,7 +12,7 @@ from elastocal.campaigns.reading import read_campaign
 
 def test_static_source_becomes_a_campaign_with_repeats(static, config_folder, tmp_path):
     path, angles, positions = static
-    fanuc_static.write_campaign(path, tmp_path / "campaign")
+    fanuc_static.write_campaign(path, tmp_path / "campaign", "fanuc_static")
     campaign = read_campaign(tmp_path / "campaign", config_folder / "robots")
     assert (campaign.name, campaign.measured, campaign.frame) == ("fanuc_static", "position", "tracker")
     assert [(target.name, target.point, target.offset_m) for target in campaign.targets] == [(n, "6DoF", None) for n in "ABC"]
@@ -37,5 +37,5 @@ def test_mat_file_of_other_variables_is_refused(static, tmp_path, changes, key, 
     path = tmp_path / "other.mat"
     scipy.io.savemat(path, {name: value for name, value in contents.items() if value is not None})
     with refused(path, key, *words):
-        fanuc_static.write_campaign(path, tmp_path / "campaign")
+        fanuc_static.write_campaign(path, tmp_path / "campaign", "fanuc_static")
     assert not (tmp_path / "campaign").exists()

@@ -28,7 +28,8 @@ def test_each_pose_counts_once_and_those_that_nobody_saw_not_at_all(tmp_path, co
     values = rows()
     values[values[:, 0] == 4, 19:] = np.nan
     path = write_mat(tmp_path / "some.mat", values)
-    angles, position = motoman.read(path)
+    angles, positions = motoman.read(path)
+    position = positions[motoman.TARGET]
     assert len(angles) == POSES - 1
     first = values[np.unique(values[:, 0], return_index=True)[1]]
     first = first[first[:, 0] != 4]

@@ -1,12 +1,10 @@
 """FANUC R-2000iC/165F, one joint moved at a time (RABKKK/LaserTrackerPoseData4KinIdent): a text file as a campaign."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.importers.reflectors import write_reflectors
+from elastocal.campaigns.importers.reflectors import campaign_writer
 from elastocal.campaigns.public_data import LARGEST_BYTES, PublicFile
 from elastocal.counting import counted
 from elastocal.errors import InputError
@@ -52,11 +50,4 @@ def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     return np.radians(values[:, _ANGLES]), {name: 1e-3 * values[:, 3 * i : 3 * i + 3] for i, name in enumerate(TARGETS)}
 
 
-def write_campaign(
-    path: str | Path, folder: str | Path, name: str = "fanuc_cpa", holdout: Mapping[str, Any] | None = None
-) -> None:
-    """Write the text file as a campaign's folder.
-
-    `path`: ``N1N2N3Jval.csv``. `holdout`: as in ``campaign.yaml``. Raises `InputError`: as in `read`.
-    """
-    write_reflectors(folder, name, ROBOT, *read(path), holdout, NOISE)
+write_campaign = campaign_writer(read, ROBOTS, NOISE)

@@ -1,13 +1,11 @@
 """FANUC R-2000iC/165F, 24 configurations with 10 repeats (Sarrasor/RoboticManipulators): a MAT file as a campaign."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.importers.mat_files import read_mat
-from elastocal.campaigns.importers.reflectors import write_reflectors
+from elastocal.campaigns.importers.reflectors import campaign_writer
 from elastocal.campaigns.public_data import PublicFile
 from elastocal.errors import InputError
 
@@ -40,11 +38,4 @@ def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     return found["q"], {target: found[f"m{target}"] for target in TARGETS}
 
 
-def write_campaign(
-    path: str | Path, folder: str | Path, name: str = "fanuc_static", holdout: Mapping[str, Any] | None = None
-) -> None:
-    """Write the MAT file as a campaign's folder.
-
-    `path`: ``calibration_dataset.mat``. `holdout`: as in ``campaign.yaml``. Raises `InputError`: as in `read`.
-    """
-    write_reflectors(folder, name, ROBOT, *read(path), holdout)
+write_campaign = campaign_writer(read, ROBOTS)

@@ -4,15 +4,13 @@ Measured with a GTS3800 laser tracker for P. Jacobi's master's thesis (Tsinghua 
 position of the reflector, which the nominal chain and a tool along its last axis reproduce to 12 um, and a difference from it.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.importers.csv_columns import read_columns, table
-from elastocal.campaigns.importers.reflectors import write_reflectors
+from elastocal.campaigns.importers.reflectors import campaign_writer
 from elastocal.campaigns.public_data import PublicFile
 from elastocal.errors import InputError
 
@@ -39,19 +37,18 @@ FILES["jacobi_ur5_every_seventh"] = replace(
     excerpt=True,
 )
 TARGET = "SMR"
-# Robots of the source by their number of joints.
-_ROBOT_OF_JOINTS = {6: "ur5", 7: "wam"}
-ROBOTS = tuple(_ROBOT_OF_JOINTS.values())
+# Of six and of seven joints.
+ROBOTS, _JOINTS = ("ur5", "wam"), (6, 7)
 # The tracker's maker: 15 um + 6 um/m; its distance is not stated. The least that a measurement scatters: what the joints add
 # is the error common to a pose, which is estimated.
 NOISE = {"position_m": 1.5e-5}
 _COMMANDED, _DIFFERENCE = ("x_t", "y_t", "z_t"), ("x_dif", "y_dif", "z_dif")
 
 
-def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
+def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Measurements of one file.
 
-    Returns `joint_angles` (N, n): as commanded, rad; `position` (N, 3): m, in the frame in which the tracker was set to the
+    Returns `joint_angles` (N, n): as commanded, rad; `positions` (N, 3): m, in the frame in which the tracker was set to the
     robot's base. The source does not state the sign of the difference; with this one the sums have six decimals of a
     millimetre, as the tracker gives them, with the other one fifteen. Raises `InputError`: no file, a column that is missing,
     something that is no number, another number of joints.
@@ -60,18 +57,11 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     cells = read_columns(path, ",", (*_COMMANDED, *_DIFFERENCE), kind)
     joints = sum(name.startswith("joint_") for name in cells)
     names = [f"joint_{number + 1}" for number in range(joints)]
-    if joints not in _ROBOT_OF_JOINTS or not set(names) <= set(cells):
+    if joints not in _JOINTS or not set(names) <= set(cells):
         found = ", ".join(name for name in cells if name.startswith("joint_")) or "no column joint_1"
-        raise InputError(path, "header", found, f"joint_1 to joint_{' or joint_'.join(map(str, _ROBOT_OF_JOINTS))}")
+        raise InputError(path, "header", found, f"joint_1 to joint_{' or joint_'.join(map(str, _JOINTS))}")
     angles, commanded, difference = (table(path, cells, columns) for columns in (names, _COMMANDED, _DIFFERENCE))
-    return np.radians(angles), 1e-3 * (commanded + difference)
+    return np.radians(angles), {TARGET: 1e-3 * (commanded + difference)}
 
 
-def write_campaign(path: str | Path, folder: str | Path, name: str, holdout: Mapping[str, Any] | None = None) -> None:
-    """Write one file as a campaign's folder.
-
-    `path`: ``3D_..._uncalibrated_grid_cleaned.csv`` or ``..._random_cleaned.csv``. `holdout`: as in ``campaign.yaml``. Raises
-    `InputError`: as in `read`.
-    """
-    angles, position = read(path)
-    write_reflectors(folder, name, _ROBOT_OF_JOINTS[angles.shape[1]], angles, {TARGET: position}, holdout, NOISE)
+write_campaign = campaign_writer(read, ROBOTS, NOISE)

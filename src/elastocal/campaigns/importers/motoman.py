@@ -3,16 +3,13 @@
 A file holds a row for each camera image that was taken of a pose; rows of one pose repeat its joint angles and its reflector.
 """
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.importers.mat_files import read_mat
-from elastocal.campaigns.importers.reflectors import reflector_table, unloaded_document
+from elastocal.campaigns.importers.reflectors import campaign_writer
 from elastocal.campaigns.public_data import PublicFile
-from elastocal.campaigns.writing import write_campaign as write_folder
 from elastocal.errors import InputError
 
 _SOURCE = "ctu-vras/multirobot-calibration", "a20f0454732bc36f1d980ff08c3d30536b8b1b19"
@@ -43,12 +40,12 @@ _WITH_A_WRONG_POSE, _WRONG_POSE = 587, 12
 _STILL_RAD = 1e-3
 
 
-def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
+def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Measurements of one file.
 
-    Returns `joint_angles` (P, 6): of the right arm, rad; `position` (P, 3): m, tracker frame. Poses whose reflector the tracker
-    did not see are left out, and so is the one that the source's own reader leaves out. Raises `InputError`: no MAT file,
-    another shape, or a turntable that turns.
+    Returns `joint_angles` (P, 6): of the right arm, rad; `positions` (P, 3): m, tracker frame. Poses whose reflector the
+    tracker did not see are left out, and so is the one that the source's own reader leaves out. Raises `InputError`: no MAT
+    file, another shape, or a turntable that turns.
     """
     found = read_mat(path, [_NAME])
     rows = np.asarray(found.get(_NAME, np.zeros(0)))
@@ -63,16 +60,7 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     turned = np.abs(rows[:, _TURNTABLE]).max()
     if turned > _STILL_RAD:
         raise InputError(path, f"{_NAME} column {_TURNTABLE + 1}", f"a turntable at {turned:g} rad", "one that stands at 0")
-    return rows[:, _ANGLES], rows[:, _POSITION]
+    return rows[:, _ANGLES], {TARGET: rows[:, _POSITION]}
 
 
-def write_campaign(path: str | Path, folder: str | Path, name: str, holdout: Mapping[str, Any] | None = None) -> None:
-    """Write one file as a campaign's folder; no pose repeats another.
-
-    `path`: ``updated_leica_dataset.mat`` or ``leica_right_hand_6x6x6_dataset.mat``. `holdout`: as in ``campaign.yaml``. Raises
-    `InputError`: as in `read`.
-    """
-    angles, position = read(path)
-    poses = np.arange(len(angles))
-    table = reflector_table(poses, 0 * poses, angles, {TARGET: position})
-    write_folder(folder, unloaded_document(name, ROBOT, "position", [TARGET], holdout, NOISE), table, angles.shape[1])
+write_campaign = campaign_writer(read, ROBOTS, NOISE)

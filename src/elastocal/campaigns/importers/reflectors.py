@@ -1,6 +1,6 @@
 """Public campaigns: targets on an unloaded flange, measured by a tracker in a frame that nobody knows."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,8 @@ from elastocal.campaigns.writing import write_campaign
 
 # What such data can be fitted with at all before any physics is looked for.
 _DECLARED = ("joint_offset", "link_geometry")
+_SIX = 6
+_Reflectors = tuple[np.ndarray, Mapping[str, np.ndarray]]
 
 
 def unloaded_document(
@@ -76,6 +78,22 @@ def write_reflectors(
     table, joints = reflector_table(*pose_and_repeat(joint_angles), joint_angles, positions), joint_angles.shape[1]
     document = unloaded_document(name, robot, "position", positions, holdout, noise, f"{joints}DoF")
     write_campaign(folder, document, table, joints)
+
+
+def campaign_writer(read: Callable[[Any], _Reflectors], robots: Sequence[str], noise: Mapping[str, float] | None = None) -> Any:
+    """``write_campaign`` of an importer whose files hold one session of reflectors each.
+
+    `read`: of a file, joint angles (N, n), rad, and positions (N, 3), m, by reflector. `robots`: the robot of the files, or
+    those of six and of seven joints.
+    """
+
+    def write(path: str | Path, folder: str | Path, name: str, holdout: Mapping[str, Any] | None = None) -> None:
+        """Write one file of the source as a campaign's folder; `holdout` as in ``campaign.yaml``; raises as ``read`` does."""
+        angles, positions = read(path)
+        robot = robots[-1] if angles.shape[1] > _SIX else robots[0]
+        write_reflectors(folder, name, robot, angles, positions, holdout, noise)
+
+    return write
 
 
 def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
