@@ -66,6 +66,10 @@ def test_the_first_character_that_would_steer_is_found(text, character):
         (OSError(errno.ENOMEM, "Cannot allocate memory"), "memory: found none left"),
         (ImportError("x.so: failed to map segment from shared object"), "memory: found none left"),
         (ImportError("No module named 'x'"), "Python: found No module named 'x'; allowed: an environment"),
+        (
+            PermissionError(13, "Permission denied", "a/go.csv.0123456789abcdef.partial/go.csv"),
+            "a/go.csv: found Permission denied",
+        ),
     ],
 )
 def test_a_fault_of_the_machine_is_one_line_with_what_would_help(error, words):

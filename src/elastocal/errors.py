@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import re
 import unicodedata
 from typing import TYPE_CHECKING
 
@@ -72,6 +73,7 @@ def text_fault(text: str) -> tuple[str, str] | None:
     return None
 
 
+_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial\b.*")
 # What the loader of libraries says of it.
 _NO_MEMORY = ("failed to map segment", "annot allocate memory")
 _SPACE = "a place with space where this user may write"
@@ -93,7 +95,8 @@ def fault_of_machine(error: OSError | MemoryError | ImportError, place: str = "d
     if isinstance(error, ImportError):
         return InputError("Python", "", str(error), "an environment with every package of this version")
     found, allowed = reason_of(error), _REMEDIES.get(error.errno or 0, "a disk that can be read and written")
-    return InputError(str(error.filename or place), "", found, allowed)
+    # What was asked for, not the name beside it under which it is written.
+    return InputError(_PARTIAL.sub("", str(error.filename or place)), "", found, allowed)
 
 
 def reason_of(error: OSError) -> str:

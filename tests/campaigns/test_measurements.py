@@ -9,6 +9,7 @@ import pytest
 from made_cells import assert_same
 from support import refused
 
+from elastocal.campaigns import measurements as module
 from elastocal.campaigns.measurements import BOUNDS, CSV, file_columns, read_measurements
 from elastocal.campaigns.reading import read_campaign
 
@@ -222,3 +223,18 @@ def test_what_physics_does_not_allow_is_refused_by_row_and_column(cell, column, 
     cell.spoil(14, column, entry)
     with refused(cell.measurements, f"row 14, column {column} (line 15)", BOUNDS[column].allowed):
         cell.read()
+
+
+def test_what_a_small_file_of_parquet_would_grow_to_is_refused_before_it_is_read(cell, monkeypatch):
+    monkeypatch.setattr(pq, "read_table", None)
+    cell.write("parquet")
+    path, table = cell.folder / "measurements.parquet", pa.table(cell.table)
+    empty = np.zeros(len(table), np.int32)
+    lists = pa.ListArray.from_arrays(np.append(empty, np.int32(1000)), pa.array(np.zeros(1000, np.int8)))
+    pq.write_table(table.set_column(table.column_names.index("x"), "x", lists), path)
+    with refused(path.as_posix(), "column x", "list"):
+        read_campaign(cell.folder, cell.robots)
+    monkeypatch.setattr(module, "_MOST_ROW_GROUPS", 7)
+    pq.write_table(table, path, row_group_size=10)
+    with refused(path.as_posix(), "", "8 row groups", "at most 7"):
+        read_campaign(cell.folder, cell.robots)

@@ -72,6 +72,8 @@ def test_what_an_option_or_another_number_says_is_read(tmp_path, text, dialect, 
 )
 def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch, limit, largest, words):
     monkeypatch.setattr(csv_dialect, limit, largest)
+    # Before any line is looked at.
+    monkeypatch.setattr(csv_dialect, "steering", None)
     with refused(tmp_path / "table.txt", "", words):
         read(tmp_path, "x;y\n" + "1;2\n" * 200)
 

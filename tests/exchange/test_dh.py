@@ -247,8 +247,8 @@ def test_a_unit_that_nothing_states_is_asked_for(tmp_path, text, name, option):
     ],
 )
 def test_units_stand_behind_names_in_brackets_or_in_a_row_of_their_own(tmp_path, head):
-    (row,), notes = read_dh_table(table(tmp_path, f"{head}\n{ROW}\n"))
-    assert (row.d, row.a, row.alpha) == pytest.approx((1e-4, 2e-4, 90.0))
+    (row,), notes = read_dh_table(table(tmp_path, f"{head}\n{ROW.replace('90', '1.5')}\n"))
+    assert (row.d, row.a, row.alpha) == pytest.approx((1e-4, 2e-4, 1.5))
     assert "d in mm" in notes[0] and "alpha in rad" in notes[0]
 
 
@@ -320,3 +320,9 @@ def test_what_is_no_kinematics_is_refused(tmp_path, document, key, words):
 def test_no_notation_of_tables_goes_with_it(tmp_path):
     with refused("--modified", "", "kinematics"):
         robot_from_dh(kinematics(tmp_path, ORIGINS), modified=True)
+
+
+def test_degrees_where_radians_are_stated_are_refused_with_the_way_to_say_so(tmp_path):
+    (tmp_path / "arm.csv").write_text("theta_offset,d,a,alpha\n0,0.162,0,1.5708\n0,0,-0.4,-90\n", encoding="utf-8")
+    with refused(tmp_path / "arm.csv", "line 3, alpha", "'-90'", "--angles deg"):
+        robot_from_dh(tmp_path / "arm.csv", options=DhOptions("rad", "m"))

@@ -220,6 +220,10 @@ def test_more_than_a_urdf_can_have_is_refused_at_once(tmp_path, monkeypatch):
     joints = [joint(f"j{number}", f"l{number}", f"l{number + 1}") for number in range(2001)]
     with refused(tmp_path / "made.urdf", "", "2002 times <link>", "at most 2000"):
         read_urdf(file_of(tmp_path, robot(*links, *joints)))
+    with refused(tmp_path / "made.urdf", "line 3", "more than 50 elements in each other"):
+        read_urdf(file_of(tmp_path, robot("<a>" * 50 + "</a>" * 50)))
+    with refused(tmp_path / "made.urdf", "line 3", "more than 200000 elements"):
+        read_urdf(file_of(tmp_path, robot("<a/>" * 200_000)))
     monkeypatch.setattr(urdf, "LARGEST_BYTES", 1000)
     with refused(tmp_path / "made.urdf", "", "more than 1000 bytes"):
         read_urdf(file_of(tmp_path, robot(*SOUND) + " " * 1000))

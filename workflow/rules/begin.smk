@@ -1,10 +1,14 @@
 """Before all else: the configuration is a document that can be read, which Snakemake's own reader would not say in one line."""
 
+import logging
 import sys
 from pathlib import Path
 
 from elastocal.errors import InputError
 from elastocal.io.documents import read_document
+
+# On a full disk the log of the run cannot be written: its traceback would stand before the line that says so.
+logging.raiseExceptions = False
 
 # In a checkout by its name alone, in an installed package with its folder.
 FILE = Path(workflow.basedir, "config.yaml")

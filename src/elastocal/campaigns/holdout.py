@@ -15,6 +15,7 @@ from elastocal.errors import InputError
 _HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
 # Below these a fit or a test says nothing.
 FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
+_NOWHERE_RAD = 1e9
 
 
 def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
@@ -24,7 +25,7 @@ def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
     campaign is the test, all measurements are training and `held_out` is empty: see `reading.held_out_campaign`. Raises
     `InputError`: too few poses, or poses that are not there.
     """
-    held_out = held_out_mask(campaign.holdout, campaign.measurements, campaign.name)
+    held_out = held_out_mask(campaign.holdout, campaign.measurements, campaign.robot.reported_offset, campaign.name)
     return campaign.measurements.select(~held_out), campaign.measurements.select(held_out)
 
 
@@ -59,14 +60,24 @@ def other_folder(named: str, folder: Path, source: str) -> Path:
     return other
 
 
-def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, source: str) -> np.ndarray:
+def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, reported_zero: np.ndarray, source: str) -> np.ndarray:
     """Which measurements are held out, ndarray of bool (N,).
 
     Where poses are drawn it is by configuration, with all poses that share its joint angles: a repeat of what was fitted tests
-    nothing. `InputError`, which names ``source``: too few configurations, or poses that are not there.
+    nothing. Rows of zeros, which were lost, change no draw; ``reported_zero`` (n,) is where the model's joints then stand, rad.
+    `InputError`, which names ``source``: too few configurations, or poses that are not there.
     """
     pairs, index = measured_poses(measurements)
-    configuration = configurations(measurements.joint_angles, index)
+    told = (measurements.joint_angles != reported_zero).any(axis=1) | measurements.position.any(axis=1)
+    nothing = np.bincount(index, told) == 0
+    if nothing.any() and np.median(np.bincount(index)) > 1 and {"fraction", "blocks"} & {*holdout}:
+        # Of several rows a pose one was lost: others tell of its pose, and a draw that counted it would part all poses anew.
+        mask, known = np.ones(len(measurements), bool), ~nothing[index]
+        mask[known] = held_out_mask(holdout, measurements.select(known), reported_zero, source)
+        return mask
+    # A pose that was lost is a configuration of its own, and none that stands at zero.
+    angles = np.where(nothing[index, None], _NOWHERE_RAD + index[:, None], measurements.joint_angles)
+    configuration = configurations(angles, index)
     chosen = np.zeros(len(pairs), bool)
     if "campaign" not in holdout:
         chosen = _chosen_poses(holdout, measurements, pairs, configuration, index, source)

@@ -29,6 +29,7 @@ Columns = dict[str, Sequence[Any] | np.ndarray]
 MOST_MEASUREMENTS = 2_000_000
 # Forty columns of twenty digits are 1,000 characters.
 _LONGEST_LINE, _MOST_BYTES = 10_000, 1000 * MOST_MEASUREMENTS
+_MOST_ROW_GROUPS = 2_000
 # Rows whose texts are in memory at a time; their numbers take a tenth of that.
 _ROWS_AT_A_TIME = 20_000
 _COMMENT = "#"
@@ -261,9 +262,15 @@ def _read_parquet(path: str, joints: int) -> tuple[Columns, np.ndarray, None]:
     try:
         # pyarrow's own complaint of a column that is there twice is a list of all columns.
         with pq.ParquetFile(path) as file:
-            names, count = file.schema_arrow.names, file.metadata.num_rows
+            fields, count, groups = file.schema_arrow, file.metadata.num_rows, file.metadata.num_row_groups
+        names = fields.names
         _check_header(path, names)
         check_column_names(names, joints, path)
+        # A kilobyte may hold a list of a billion numbers; each row group takes memory of its own beside its rows.
+        if nested := next((field for field in fields if pa.types.is_nested(field.type)), None):
+            raise InputError(path, f"column {nested.name}", f"type {nested.type}", "numbers, or text")
+        if groups > _MOST_ROW_GROUPS:
+            raise InputError(path, "", f"{groups} row groups", f"at most {_MOST_ROW_GROUPS}")
         if count > MOST_MEASUREMENTS:
             raise _refuse_length(path, f"{count}")
         # As dictionaries texts take the memory that they take in the file.

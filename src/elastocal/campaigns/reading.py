@@ -62,7 +62,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     check_measurements(measurements, table, robot, targets, source)
     _check_compliance(document, robot, robot_path, measurements, source)
     _check_noise(document, measurements, robot.joints, source)
-    held_out_mask(holdout, measurements, source)
+    held_out_mask(holdout, measurements, robot.reported_offset, source)
     place = {"table": Path(table.path).name, "header_line": table.header_line}
     return assemble_campaign(document | {"holdout": holdout} | place, robot, measurements, source)
 

@@ -154,15 +154,16 @@ def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]
     """Lines as editors count them; control characters and marks that turn the order of letters are refused."""
     content = read_bytes(path, LARGEST_BYTES, "a table with a line for each measurement")
     text, encoding = _decode(content, path, encoding)
+    count = text.count("\n") + text.count("\r") - text.count("\r\n") + (text[-1:] not in ("\n", "\r"))
+    if count > MOST_LINES:
+        allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
+        raise InputError(path, "", counted(count, "line"), allowed)
     lines = re.split(r"\r\n|\n|\r", text)
     for number, line in enumerate(lines, 1):
         if character := steering(line.replace("\t", " ")):
             allowed = "printable characters, in UTF-8, or in UTF-16 with a byte order mark"
             raise InputError(path, f"line {number}", f"the character {character!a}", allowed)
     lines = lines[:-1] if lines[-1] == "" else lines
-    if len(lines) > MOST_LINES:
-        allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
-        raise InputError(path, "", counted(len(lines), "line"), allowed)
     return lines, encoding
 
 

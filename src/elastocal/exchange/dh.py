@@ -287,12 +287,12 @@ def _row(where: str, text: Mapping[str, str], meanings: Mapping[str, _Meaning], 
         column, meaning = column_of[name], meanings[column_of[name]]
         turns = name in _ANGLES or (name in _LIMITS and kind != "P")
         if name not in _PLAIN and not (meaning.angle if turns else meaning.length):
-            found = f"a limit without a unit of {'angles' if turns else 'lengths'}"
-            raise InputError(source, f"{where}, {column}", found, _OPTIONS[turns])
-        value = _number(text[name], turns and meaning.angle == "rad")
-        largest = MOST_TURNS * (2.0 * math.pi if meaning.angle == "rad" else 360.0) if turns else LARGEST_NUMBER
-        if value is None or abs(value) > largest:
-            allowed = f"a number, {MOST_TURNS} turns at most" if turns else A_NUMBER
+            raise InputError(source, f"{where}, {column}", "a limit without a unit", _OPTIONS[turns])
+        rad = meaning.angle == "rad"
+        value = _number(text[name], turns and rad)
+        most = 2 if rad and name in _ANGLES else MOST_TURNS  # 90 is in degrees, whatever is stated.
+        if value is None or abs(value) > (most * (2.0 * math.pi if rad else 360.0) if turns else LARGEST_NUMBER):
+            allowed = f"a number, {most} turns at most{'; degrees are --angles deg' * (most == 2)}" if turns else A_NUMBER
             raise InputError(source, f"{where}, {column}", repr(text[name]), allowed)
         if name in _PLAIN:
             if not value > 0:

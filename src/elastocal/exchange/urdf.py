@@ -43,6 +43,8 @@ from elastocal.mechanics.usual_values import UNLIMITED_DEG
 
 # The longest public descriptions, of humanoids with hands, have less than a megabyte.
 LARGEST_BYTES = 20_000_000
+# Elements, and how deep in each other: each takes memory many times its size in the file.
+_MOST_ELEMENTS, _DEEPEST = 200_000, 50
 # Whole cells with grippers and cameras have some hundred links; each is followed to the root.
 _MOST_PARTS = 2000
 _MOVING = {"revolute": "R", "continuous": "R", "prismatic": "T"}
@@ -243,13 +245,26 @@ def _end(joint: Element, tag: str, attribute: str = "link") -> str:
 
 def _root_of(data: bytes, source: str) -> Element:
     """The root of the tree, its names without namespaces."""
-    parser = expat.ParserCreate()
+    parser, count, depth = expat.ParserCreate(), 0, 0
+
+    def begin(*_: object) -> None:
+        nonlocal count, depth
+        count, depth = count + 1, depth + 1
+        if count > _MOST_ELEMENTS or depth > _DEEPEST:
+            found = (
+                f"more than {_DEEPEST} elements in each other" if depth > _DEEPEST else f"more than {_MOST_ELEMENTS} elements"
+            )
+            raise InputError(source, f"line {parser.CurrentLineNumber}", found, "a URDF, which needs fewer")
+
+    def end(*_: object) -> None:
+        nonlocal depth
+        depth -= 1
 
     def refuse(*_: object) -> None:
         allowed = "a URDF without a document type, for entities of one could be endless or other files"
         raise InputError(source, f"line {parser.CurrentLineNumber}", "<!DOCTYPE", allowed)
 
-    parser.StartDoctypeDeclHandler = refuse
+    parser.StartDoctypeDeclHandler, parser.StartElementHandler, parser.EndElementHandler = refuse, begin, end
     try:
         parser.Parse(data, True)
         root = ElementTree.fromstring(data)
