@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
+    from elastocal.remainder.repeatable import Repeatable
 
 ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
 UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
@@ -211,6 +212,14 @@ def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]
             for joint in np.flatnonzero(compliance < -settings.negative_compliance * deviation)
         ]
     return found
+
+
+def remainder_sentences(left: Repeatable | None) -> list[str]:
+    """A sentence where what a model leaves is a function of the joints, so that no verdict covers it."""
+    if left is None or not left.remains:
+        return []
+    size, error = 1e6 * left.rms_m, 1e6 * left.rms_std_error_m
+    return [f"{size:.0f} ± {error:.0f} µm RMS of what is left are a function of the joint angles and have no name"]
 
 
 def scatter_warnings(left: Noise, measured: Noise, least: float) -> list[str]:
