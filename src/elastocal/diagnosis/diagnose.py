@@ -30,6 +30,7 @@ from elastocal.diagnosis.verdict import (
     pose_error_warnings,
     remainder_sentences,
     scatter_warnings,
+    with_related,
 )
 from elastocal.effects.catalogue import effects
 from elastocal.fitting.case import noise_facts
@@ -154,6 +155,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     lost: list[str] = []
     if found:
+        doubted = findings.oversized(final, found.conclusion.best.named)
+        found = replace(found, conclusion=with_related(found.conclusion, doubted))
         if not found.adopted:
             named = found.conclusion.best.named
             steps[-1] = replace(steps[-1], fitted=_with_noise_left(case, declared, found) if named else final)

@@ -12,7 +12,7 @@ the machine: what the smooth error adds to a mechanism counts as the mechanism i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +22,7 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.fitting.displacement import joint_compliances
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.search import Model, Posterior, Problem
@@ -112,6 +112,16 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
     alternatives = {name: () if named else _instead_of(name, best, stated) for name in best.named}
     probability = best.probability if named else sum(h.probability for h in stated)
     return Conclusion(NAMED if named else kind, hypotheses, best, alternatives, mechanisms, probability)
+
+
+def with_related(conclusion: Conclusion, doubted: Collection[str]) -> Conclusion:
+    """The same where something related may act instead of some mechanisms, none of which is then stated alone."""
+    alternatives = {
+        name: (*others, OTHER) if name in doubted and OTHER not in others else others
+        for name, others in conclusion.alternatives.items()
+    }
+    alone = conclusion.verdict == NAMED and doubted
+    return replace(conclusion, verdict=CLASS if alone else conclusion.verdict, alternatives=alternatives)
 
 
 def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tuple[bool, Sequence[Hypothesis]]:
