@@ -226,11 +226,12 @@ def _explained(
 
     At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. With it
     the fit of the model found to what the search looks at. What an error common to the measurements of a pose takes beyond
-    what robots repeat to must be chance: where it is a function of the joints no more of it is thought of.
+    what robots repeat to must be chance: where it is a function of the joints no more of it is thought of. And where what is
+    left is one, the search goes on about each model that is new.
     """
     candidates, searched = list(part.case.candidates.values()), part.searched
     about = declared = part.declared
-    before = None
+    before, settled = None, True
     if start:
         found_before, before = start
         about = fit(found_before.model, searched, found_before.noise, found_before.estimate, True, ON_THE_WAY)
@@ -257,12 +258,16 @@ def _explained(
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
         if not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit):
-            if noise.pose_rad <= settings.pose_repeatability_rad or not _remains(about, searched, seed):
+            # About a model that is new the problem is another one, and what is a function of the joints is no error of poses.
+            new = named not in (before, ()) or model.pose_error_rad > settings.pose_repeatability_rad
+            if not new or not _remains(about, searched, seed):
                 break
             most_pose_error_rad = settings.pose_repeatability_rad
         before = named
+    else:
+        settled = False
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
-    return Evidence(problem, found, alarm, conclusion, adopted), about
+    return Evidence(problem, found, alarm, conclusion, adopted, settled), about
 
 
 def _remains(fitted: Fit, observations: Observations, seed: int) -> bool:
@@ -319,6 +324,9 @@ def _document(
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
         remarks += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)
+        if not found.settled:
+            often = f"linearised {settings.linearizations} times"
+            remarks.append(f"the problem was {often}, and each time another model was found: more may be missing")
         misfit = _misfit(found)
         kept = found.posterior.models[conclusion.best.model] if found.adopted else found.posterior.nothing
         numbers = found.linearized.products.freedom

@@ -44,7 +44,7 @@ _SCALED = ("value", "std_error", "prior_std")
 class Evidence:
     """What the last linearisation of a diagnosis says; None of it where the data are at fault.
 
-    `adopted`: whether the effects found enter the model.
+    `adopted`: whether the effects found enter the model. `settled`: whether a further linearisation would find the same.
     """
 
     linearized: Linearized
@@ -52,6 +52,7 @@ class Evidence:
     alarm: Alarm
     conclusion: Conclusion
     adopted: bool
+    settled: bool
 
 
 def location_words(mechanism: str, location: Sequence[int | str]) -> str:
