@@ -89,6 +89,19 @@ def test_an_error_that_all_measurements_of_a_pose_share_is_noise_of_the_model_an
     assert found.document["noise"]["pose_rad"] == found.final.noise.pose_rad
 
 
+@pytest.mark.slow
+def test_what_is_a_function_of_the_joints_is_no_error_of_poses_and_no_declared_model_covers_it(kuka, config_folder, tmp_path):
+    """A deviation of joint 2 by two others at once: without candidates all measurements of a pose seem to err together."""
+    table = made_table(kuka, "made", plan=replace(PLAN, poses=150, ladder=(0,), repeats=1, repeated_poses=0))
+    table |= {"q2": table["q2"] + 3e-4 * np.sin(table["q1"]) * np.cos(table["q3"])}
+    case, _ = cases_in(made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots")
+    found = diagnose(replace(case, candidates={}), Settings(), 1)
+    assert found.document["repeatable"]["remains"] and found.document["verdict"] == "unexplained"
+    assert found.final.noise.pose_rad == pytest.approx(Settings().pose_repeatability_rad, rel=0.3)
+    assert "function of the joint angles" in found.document["contradictions"][0]
+    assert not any("err together" in line for line in found.document["warnings"])
+
+
 @pytest.fixture(scope="module")
 def case(cases):
     return cases[0]

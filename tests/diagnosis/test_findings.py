@@ -8,7 +8,7 @@ from planted import planted
 
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.diagnosis.averaging import Averaged
-from elastocal.diagnosis.findings import fault_entry, implausible, location_words, parameter_entries, sag_entries
+from elastocal.diagnosis.findings import fault_entry, implausible, location_words, oversized, parameter_entries, sag_entries
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.fitting.prediction import predict
 
@@ -139,6 +139,8 @@ def test_a_size_beyond_what_such_an_effect_reaches_is_named(found):
     for sign in (1, -1):
         (warning,) = implausible(with_value(fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible), entries)
         assert warning.startswith("joint_offset@3: offset is") and "3 times what such an effect reaches" in warning
+        large = with_value(fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible)
+        assert oversized(large, {"joint_offset", "payload"}) == {"joint_offset"} and not oversized(large, {"payload"})
     assert implausible(with_value(fitted, "joint_offset@3", 3.1 * plausible, 0.1 * plausible), entries) == []
 
 

@@ -20,12 +20,15 @@ from elastocal.diagnosis.verdict import (
     NOT_TESTABLE,
     SEVERAL,
     UNEXPLAINED,
+    Conclusion,
+    Hypothesis,
     concluded,
     contradictions,
     hypotheses_of,
     location_probabilities,
     pose_error_warnings,
     scatter_warnings,
+    with_related,
 )
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.noise import Noise
@@ -177,6 +180,17 @@ def test_hypotheses_gather_locations_laws_and_sum_to_one():
 @pytest.fixture(scope="module")
 def fitted(kuka):
     return planted(kuka, {}, seed=6, poses=8).declared
+
+
+def test_a_mechanism_whose_size_is_wrong_is_stated_with_something_related():
+    best = Hypothesis(("joint_offset",), 0.99, 0)
+    sure = Conclusion("named", (best,), best, {"joint_offset": ()}, {"joint_offset": 0.99}, 0.99)
+    doubted = with_related(sure, {"joint_offset"})
+    assert (doubted.verdict, doubted.alternatives) == ("class", {"joint_offset": (OTHER,)})
+    assert with_related(doubted, {"joint_offset"}) == doubted and with_related(sure, set()) == sure
+    both = replace(sure, verdict="several", alternatives={"joint_offset": (), "payload": ()})
+    found = with_related(both, {"payload"})
+    assert (found.verdict, found.alternatives) == ("several", {"joint_offset": (), "payload": (OTHER,)})
 
 
 def with_noise(fitted, **changes):

@@ -89,7 +89,8 @@ def probabilities(sets=None, alarm_p_value=0.002):
         for name in where:
             mechanisms[name] = mechanisms.get(name, 0.0) + value
     nothing = sum(value for where, value in sets if not where)
-    return {"nothing": nothing, "alarm_p_value": alarm_p_value, "mechanisms": mechanisms, "sets": listed}
+    facts = {"nothing": nothing, "stated": sets[0][1], "alarm_p_value": alarm_p_value}
+    return facts | {"mechanisms": mechanisms, "sets": listed}
 
 
 def step_rows(effects=("lost_motion",), largest_m=3e-4):

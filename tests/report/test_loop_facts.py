@@ -25,6 +25,7 @@ from elastocal.effects.catalogue import effects
 from elastocal.figures.residuals import before_after
 from elastocal.figures.style import save
 from elastocal.report.loop_facts import (
+    AND_MORE,
     AT_FAULT,
     campaign_sentences,
     cause_rows,
@@ -36,10 +37,10 @@ from elastocal.report.loop_facts import (
 
 WORDS = {
     "adequate": "none of 30 candidate causes is needed",
-    "named": "lacks one mechanism: lost motion (backlash) of joint 3.",
+    "named": "lacks one mechanism: lost motion (backlash) of joint 3 (94 %).",
     "named, location uncertain": "Its location is less certain: joint 3 (80 %) and joint 5 (20 %).",
-    "class": "most probably lost motion (backlash) of joint 3. Instead of lost motion (backlash) it may be bearing tilt or "
-    "elastic bending and torsion: these measurements do not distinguish them.",
+    "class": "most probably lost motion (backlash) of joint 3 (94 %). Instead of lost motion (backlash) it may be bearing tilt "
+    "or elastic bending and torsion: these measurements do not distinguish them.",
     "class with a related mechanism": "Instead of lost motion (backlash) it may be a related mechanism",
     "several": "lacks 2 mechanisms: lost motion (backlash) of joint 3 (94 %; 0.085 mm) and weight of an undeclared payload "
     "(94 %; 0.085 mm)",
@@ -57,6 +58,23 @@ def test_facts_are_json_and_the_verdict_is_said_in_plain_words(campaign):
     # No sentence has a hole, a double blank or what a template leaves behind.
     assert not re.search(r"  | [.,;:] |\{|None|Undefined|\.\.\"", " ".join(facts["sentences"] + facts["now"]))
     assert "{{" not in said and "{%" not in said
+
+
+@pytest.mark.parametrize(
+    ("campaign", "said"),
+    [
+        ("named", "lacks lost motion (backlash) of joint 3 (94 %), and more than that."),
+        ("class", "lacks at least one mechanism, most probably"),
+        ("several", "lacks at least 2 mechanisms"),
+    ],
+)
+def test_what_is_left_and_is_a_function_of_the_joints_is_said_beside_what_was_found(campaign, said):
+    for remains in (True, False):
+        left = {"p_value": 0.003 if remains else 0.2, "remains": remains, "rms_m": 8.3e-5, "rms_std_error_m": 5.8e-6}
+        facts = facts_of(CAMPAIGNS[campaign] | {"repeatable": left})
+        words = plainly(" ".join(facts["sentences"]))
+        stated = "83.0 µm ± 5.80 µm RMS of what is left are a function of the joint angles and have no name."
+        assert (said in words, stated in words, facts["verdict"].endswith(AND_MORE)) == (remains, remains, remains)
 
 
 def test_what_to_do_follows_from_the_verdict_and_from_the_gain():

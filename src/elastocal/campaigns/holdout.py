@@ -68,8 +68,8 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, report
     `InputError`, which names ``source``: too few configurations, or poses that are not there.
     """
     pairs, index = measured_poses(measurements)
-    told = (measurements.joint_angles != reported_zero).any(axis=1) | measurements.position.any(axis=1)
-    nothing = np.bincount(index, told) == 0
+    measured = (measurements.joint_angles != reported_zero).any(axis=1) | measurements.position.any(axis=1)
+    nothing = np.bincount(index, measured) == 0
     if nothing.any() and np.median(np.bincount(index)) > 1 and {"fraction", "blocks"} & {*holdout}:
         # Of several rows a pose one was lost: others tell of its pose, and a draw that counted it would part all poses anew.
         mask, known = np.ones(len(measurements), bool), ~nothing[index]

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.data_checks.hypotheses import IN_SESSION, POSES, hypotheses, measured_otherwise, shifts, with_unknown
 from elastocal.data_checks.placement import (
     FAR_BETTER,
     IMPLAUSIBLE_M,
@@ -28,14 +29,13 @@ from elastocal.data_checks.placement import (
     trimmed_rms,
 )
 from elastocal.data_checks.protocol import Fault, Value
-from elastocal.data_checks.readings import IN_SESSION, POSES, hypotheses, measured_otherwise, shifts, with_unknown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements, Target
+    from elastocal.data_checks.hypotheses import Change
     from elastocal.data_checks.placement import Placement
-    from elastocal.data_checks.readings import Change
     from elastocal.fitting.model import Estimate
 
 NAMES, FAMILY, AFTER = (
@@ -164,7 +164,7 @@ _Winner = tuple[Reading, Misfit, tuple[float, float], tuple[str, ...]]
 
 
 def _best(tried: Sequence[Reading], before: Misfit, measure: Callable[[np.ndarray], float]) -> _Winner | None:
-    """The first of the readings that fit best, if it convinces: what it leaves, the evidence, and what fits alike."""
+    """The first of the hypotheses that fit best, if it convinces: what it leaves, the evidence, and what fits alike."""
     misfits = [one.misfit(measure) for one in tried]
     together = np.array([misfit.together for misfit in misfits])
     positions, orientations = np.array([(misfit.position_m, misfit.orientation_rad) for misfit in misfits]).T

@@ -30,7 +30,7 @@ _RIGID = (
 _SURE = 2.0
 # Nobody writes more digits than this; lengths of a robot file have no more than micrometres.
 _MOST_DIGITS, _DIGITS_OF_LENGTHS_M = 9, 1e-6
-# By so much rounding may be exceeded by chance; where it is itself as large as this, it cannot be told from a good robot.
+# By so much rounding may be exceeded by chance; where it is itself as large as this, it says nothing of the robot.
 _BY_CHANCE, _TOO_COARSE_M = 1.3, 1e-4
 _FEWEST_POSES = 6
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,12 +22,15 @@ from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import (
     ADEQUATE,
     NAMED,
+    NOT_TESTABLE,
     SEVERAL,
     UNEXPLAINED,
     concluded,
     contradictions,
     pose_error_warnings,
+    remainder_sentences,
     scatter_warnings,
+    with_related,
 )
 from elastocal.effects.catalogue import effects
 from elastocal.fitting.case import noise_facts
@@ -36,6 +39,7 @@ from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.observations import sample_of
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
+from elastocal.remainder.repeatable import repeatable_part
 from elastocal.validation.left_out import certain_loss, left_out_squares
 
 if TYPE_CHECKING:
@@ -119,11 +123,11 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         # Where all measurements mean something else, no single row is wrong.
         part = fitted_to(case, np.ones(len(case.campaign.measurements), bool), settings)
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
-    found, about, near = None, part.declared, None
+    found, about, near, most_pose_error_rad = None, part.declared, None, np.inf
     errors = Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
-        found, about = _explained(part, settings, seed, tell, near)
+        found, about = _explained(part, settings, seed, tell, near, most_pose_error_rad)
         errors = gross_errors(about, part.noise, case.campaign.measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
@@ -143,7 +147,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
         near = (about, found.conclusion.best.named) if relinearized else None
         # Its statistics make room for those of the next search.
-        found = None
+        found, most_pose_error_rad = None, found.linearized.most_pose_error_rad
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared_to_all()
     final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True) if found else declared
@@ -151,6 +155,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     lost: list[str] = []
     if found:
+        doubted = findings.oversized(final, found.conclusion.best.named)
+        found = replace(found, conclusion=with_related(found.conclusion, doubted))
         if not found.adopted:
             named = found.conclusion.best.named
             steps[-1] = replace(steps[-1], fitted=_with_noise_left(case, declared, found) if named else final)
@@ -161,15 +167,23 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         elif lost and lost[0]:
             kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
             steps.append(Step("frames and targets, kept", "kept", kept))
-    adequate = found is not None and found.conclusion.verdict == ADEQUATE
-    contradicting = contradictions(final, noise, settings) if adequate else []
+    kept = steps[-1].fitted
+    repeatable, contradicting = repeatable_part(kept, case.observations, seed) if found else None, []
+    remaining = remainder_sentences(repeatable)
+    if found and found.conclusion.verdict == ADEQUATE:
+        contradicting = remaining or contradictions(final, noise, settings)
+    elif found and found.conclusion.verdict == NOT_TESTABLE:
+        contradicting = remaining
     if found and contradicting:
         found = replace(found, conclusion=replace(found.conclusion, verdict=UNEXPLAINED))
     warnings = [*contradicting, *part.warnings, *filter(None, lost)]
+    if found and not remaining:
+        warnings += pose_error_warnings(kept.noise, found.linearized.pose_std_error_rad)
     document = _document(case, noise, steps, final, found, known, settings, warnings)
     left_out = entries_of(errors, whole, held_out=False)
     warnings = [*document["warnings"], *warnings_of(left_out)]
     document |= {"contradictions": contradicting, "gross_errors": left_out, "warnings": warnings}
+    document["repeatable"] = repeatable and asdict(repeatable)
     return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
 
 
@@ -206,20 +220,23 @@ def _explained(
     seed: int,
     tell: Callable[[str], None],
     start: tuple[Fit, tuple[str, ...]] | None,
+    most_pose_error_rad: float,
 ) -> tuple[Evidence, Fit]:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
 
     At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. With it
-    the fit of the model found to what the search looks at.
+    the fit of the model found to what the search looks at. What an error common to the measurements of a pose takes beyond
+    what robots repeat to must be chance: where it is a function of the joints no more of it is thought of. And where what is
+    left is one, the search goes on about each model that is new.
     """
     candidates, searched = list(part.case.candidates.values()), part.searched
     about = declared = part.declared
-    before = None
+    before, settled = None, True
     if start:
         found_before, before = start
         about = fit(found_before.model, searched, found_before.noise, found_before.estimate, True, ON_THE_WAY)
     for round_number in range(1 if start else 0, settings.linearizations):
-        problem = linearized(about, searched, candidates, settings)
+        problem, near = linearized(about, searched, candidates, settings, most_pose_error_rad), about if before else None
         nothing, alone = initial_screening(problem.problem)
         draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
         alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
@@ -237,18 +254,26 @@ def _explained(
         leading = " with ".join(words) or "nothing is missing"
         tell(f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}")
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
+        about = fit_with_sizes(declared, searched, noise, selected(problem, model), near, settled=ON_THE_WAY)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
-        if named or off:
-            chosen, near = selected(problem, model), about if before else None
-            about = fit_with_sizes(declared, searched, noise, chosen, near, settled=ON_THE_WAY)
         if not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit):
-            break
+            # About a model that is new the problem is another one, and what is a function of the joints is no error of poses.
+            new = named not in (before, ()) or model.pose_error_rad > settings.pose_repeatability_rad
+            if not new or not _remains(about, searched, seed):
+                break
+            most_pose_error_rad = settings.pose_repeatability_rad
         before = named
-    if not named:
-        about = fit(declared.model, searched, noise, declared.estimate, True, ON_THE_WAY)
+    else:
+        settled = False
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
-    return Evidence(problem, found, alarm, conclusion, adopted), about
+    return Evidence(problem, found, alarm, conclusion, adopted, settled), about
+
+
+def _remains(fitted: Fit, observations: Observations, seed: int) -> bool:
+    """Whether what a model leaves is a function of the joints."""
+    found = repeatable_part(fitted, observations, seed)
+    return found is not None and found.remains
 
 
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:
@@ -299,11 +324,13 @@ def _document(
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
         remarks += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)
+        if not found.settled:
+            often = f"linearised {settings.linearizations} times"
+            remarks.append(f"the problem was {often}, and each time another model was found: more may be missing")
         misfit = _misfit(found)
         kept = found.posterior.models[conclusion.best.model] if found.adopted else found.posterior.nothing
         numbers = found.linearized.products.freedom
         other_m = float(np.sqrt(3.0 * other_predictions(problem, found.posterior, kept) / numbers)) * noise.position_m
-        remarks += pose_error_warnings(final.noise, found.linearized.pose_std_error_rad)
     remarks += fitted_compliance_warnings(final) + scatter_warnings(final.noise, noise, settings.relinearize_noise)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:

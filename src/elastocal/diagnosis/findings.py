@@ -18,7 +18,7 @@ from elastocal.effects.sizes import lever_m
 from elastocal.fitting.linearization import effect_columns
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.alarm import Alarm
@@ -44,7 +44,7 @@ _SCALED = ("value", "std_error", "prior_std")
 class Evidence:
     """What the last linearisation of a diagnosis says; None of it where the data are at fault.
 
-    `adopted`: whether the effects found enter the model.
+    `adopted`: whether the effects found enter the model. `settled`: whether a further linearisation would find the same.
     """
 
     linearized: Linearized
@@ -52,6 +52,7 @@ class Evidence:
     alarm: Alarm
     conclusion: Conclusion
     adopted: bool
+    settled: bool
 
 
 def location_words(mechanism: str, location: Sequence[int | str]) -> str:
@@ -215,6 +216,20 @@ def fault_entry(fault: Fault) -> dict[str, Any]:
     }
 
 
+def oversized(final: Fit, names: Collection[str]) -> set[str]:
+    """Which of some effects have a parameter beyond what such an effect reaches: size or name is wrong."""
+    found = set()
+    for effect in [effect for effect in final.model.effects if effect.effect in names]:
+        errors = np.sqrt(np.diag(final.covariance))[final.places_of(effect.key)]
+        known = zip(final.values_of(effect.key)[0], errors, effect.parameters, strict=False)
+        found |= {effect.effect for entry in known if _too_large(*entry)}
+    return found
+
+
+def _too_large(value: float, std_error: float, parameter: Parameter) -> bool:
+    return bool(abs(value) > _IMPLAUSIBLE * parameter.plausible + _SURE * std_error)
+
+
 def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: float | None = None) -> list[str]:
     """Warnings of found parameters that nature does not allow, however many effects were found.
 
@@ -231,7 +246,7 @@ def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: floa
             if parameter.sign * value < -_SURE * error:
                 needed = "positive" if parameter.sign > 0 else "negative"
                 found.append(f"{key}: {parameter.name} is {size}, and by its physics {needed}")
-            if abs(value) > _IMPLAUSIBLE * parameter.plausible + _SURE * error:
+            if _too_large(value, error, parameter):
                 found.append(f"{key}: {parameter.name} is {size}, more than {_IMPLAUSIBLE:g} times what such an effect reaches")
             carried = parameter.carried and final.model.identifies_compliance
             if rated_kg is not None and carried and value - _SURE * error > rated_kg:

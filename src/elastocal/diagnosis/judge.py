@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,6 @@ from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan, remainder_facts
-from elastocal.remainder.repeatable import repeatable_part
 from elastocal.validation.fitted_range import outside_poses, repeat_warnings
 from elastocal.validation.held_out import (
     METRICS,
@@ -91,7 +90,6 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     pairs = [(last, row) for last, row in pairwise(rows) if row["kind"] == "effect"]
     gains = {row["step"].removeprefix("with "): float(1 - row["heldout_rms_m"] / last["heldout_rms_m"]) for last, row in pairs}
     found, campaign, remainder = diagnosis.document, case.campaign, None
-    repeatable = None if data_at_fault(found) else repeatable_part(diagnosis.final, case.observations, seed)
     if campaign.remainder != NO_REMAINDER and not data_at_fault(found):
         # Poses held out at random have neighbours among those fitted; others have none, nor may those that set the intervals.
         plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
@@ -101,8 +99,6 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
         "effects": [entry | {"heldout_gain": gains.get(entry["name"])} for entry in found["effects"]],
         "heldout": heldout,
         "remainder": remainder,
-        # Whether what the final model leaves of the training poses is a function of the joints; none with too few of them.
-        "repeatable": repeatable and asdict(repeatable),
         "gross_errors": [*found["gross_errors"], *left_out],
         "warnings": [*found["warnings"], *warnings_of(left_out), *warnings],
     }

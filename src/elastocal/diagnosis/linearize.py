@@ -64,7 +64,7 @@ class Linearized:
     `about`: of the declared model, or with effects found already, about which the problem is then linear. `around`: of the
     states looked at. `tried`: candidates that can be tested at all, each with values of its shape. `lacking`: why not others.
     `candidates`: keys of all: parameters of the fit that they own are coefficients of units here. `against`: laws
-    of the competitor.
+    of the competitor. `most_pose_error_rad`: largest error common to the measurements of a pose that is thought of.
     """
 
     about: Fit
@@ -75,6 +75,7 @@ class Linearized:
     lacking: dict[str, str]
     candidates: frozenset[str]
     against: list[other.Law]
+    most_pose_error_rad: float
 
     def with_shapes(self, closer: dict[str, list[Shapes]]) -> Linearized:
         """The same with other values of the shapes of some candidates, by their keys, such as of a closer look."""
@@ -164,7 +165,8 @@ class Linearized:
     @property
     def pose_errors_rad(self) -> np.ndarray:
         """Sizes of the pose error that are thought of, zero first."""
-        return self.pose_std_error_rad * np.array(self.settings.pose_steps)
+        sizes = self.pose_std_error_rad * np.array(self.settings.pose_steps)
+        return np.unique(np.minimum(sizes, self.most_pose_error_rad))
 
     @cached_property
     def problem(self) -> Problem:
@@ -188,7 +190,13 @@ class Linearized:
         return self.lacking | dict.fromkeys(sorted(small), "too small to be seen at any size that such an effect has")
 
 
-def linearized(fitted: Fit, observations: Observations, candidates: Sequence[Candidate], settings: Settings) -> Linearized:
+def linearized(
+    fitted: Fit,
+    observations: Observations,
+    candidates: Sequence[Candidate],
+    settings: Settings,
+    most_pose_error_rad: float = np.inf,
+) -> Linearized:
     """Gather what the measurements say of a fit to them and of all candidates."""
     around = fitted.conditions_of(observations.states)
     there = fitted.model.offered(observations.states)
@@ -196,7 +204,7 @@ def linearized(fitted: Fit, observations: Observations, candidates: Sequence[Can
     tried = {c.key: (c, shapes_tried(c, fitted)) for c in candidates if not why[c.key]}
     against = other.laws_of(around, settings.other_features)
     missing = {key: reason for key, reason in why.items() if reason}
-    return Linearized(fitted, observations, settings, around, tried, missing, frozenset(why), against)
+    return Linearized(fitted, observations, settings, around, tried, missing, frozenset(why), against, most_pose_error_rad)
 
 
 def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Settings) -> np.ndarray:

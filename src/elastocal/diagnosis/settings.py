@@ -48,6 +48,11 @@ class Settings:
         "grid of the error common to the measurements of a pose, in standard errors of a joint angle from one pose",
     )
     pose_error_probability: float = _setting(0.5, "prior probability that the measurements of a pose have an error in common")
+    pose_repeatability_rad: float = _setting(
+        5e-5,
+        "error of a joint common to the measurements of a pose that chance makes: robots repeat a pose to 20 to 50 µrad (ISO"
+        " 9283); more is thought of where what is left is no function of the joints, and what repeats show is noise already",
+    )
     harmonic_decay: float = _setting(0.3, "amplitudes of gear harmonics fall with the order to this power (measured UR10)")
     other_features: int = _setting(
         16, "principal components of the random functions of each law at each joint; few inputs need no more"
@@ -107,7 +112,7 @@ class Settings:
         4, "times that a model is searched for at most, each without the rows that the one before does not explain"
     )
     linearizations: int = _setting(
-        2, "times that the problem is linearised at most, each about the model found before; a third moves no verdict"
+        5, "times that the problem is linearised at most, each about the model found before; met, it is warned of"
     )
     relinearize_above: float = _setting(
         100.0,

@@ -12,7 +12,7 @@ the machine: what the smooth error adds to a mechanism counts as the mechanism i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,13 +22,14 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.fitting.displacement import joint_compliances
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.search import Model, Posterior, Problem
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
+    from elastocal.remainder.repeatable import Repeatable
 
 ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
 UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
@@ -111,6 +112,16 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
     alternatives = {name: () if named else _instead_of(name, best, stated) for name in best.named}
     probability = best.probability if named else sum(h.probability for h in stated)
     return Conclusion(NAMED if named else kind, hypotheses, best, alternatives, mechanisms, probability)
+
+
+def with_related(conclusion: Conclusion, doubted: Collection[str]) -> Conclusion:
+    """The same where something related may act instead of some mechanisms, none of which is then stated alone."""
+    alternatives = {
+        name: (*others, OTHER) if name in doubted and OTHER not in others else others
+        for name, others in conclusion.alternatives.items()
+    }
+    alone = conclusion.verdict == NAMED and doubted
+    return replace(conclusion, verdict=CLASS if alone else conclusion.verdict, alternatives=alternatives)
 
 
 def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tuple[bool, Sequence[Hypothesis]]:
@@ -211,6 +222,14 @@ def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]
             for joint in np.flatnonzero(compliance < -settings.negative_compliance * deviation)
         ]
     return found
+
+
+def remainder_sentences(left: Repeatable | None) -> list[str]:
+    """A sentence where what a model leaves is a function of the joints, so that no verdict covers it."""
+    if left is None or not left.remains:
+        return []
+    size, error = 1e6 * left.rms_m, 1e6 * left.rms_std_error_m
+    return [f"{size:.0f} ± {error:.0f} µm RMS of what is left are a function of the joint angles and have no name"]
 
 
 def scatter_warnings(left: Noise, measured: Noise, least: float) -> list[str]:

@@ -34,6 +34,8 @@ TITLES = {
     "not_testable": "these measurements can test no mechanism",
 }
 AT_FAULT = "the data are at fault"
+# Where what is left is a function of the joints.
+AND_MORE = "; more is missing that has no name"
 # Sections of the template that are lists; the others are one paragraph.
 _LISTS = ("sentences", "now", "warnings", "headline", "accuracy", "noise", "settings", "method")
 # Causes and locations below this are not shown; from `_SURE` on a location is stated without its alternatives, a cause is real.
@@ -71,7 +73,11 @@ def campaign_sentences(
         "version": __version__,
     }
     return sentences(
-        "campaign.txt", say.FILTERS, verdict={"next_experiment": None, **verdict}, descriptions=descriptions, **facts
+        "campaign.txt",
+        say.FILTERS,
+        verdict={"next_experiment": None, "repeatable": None, **verdict},
+        descriptions=descriptions,
+        **facts,
     )
 
 
@@ -95,12 +101,14 @@ def loop_facts(
     # Probabilities are then those from before the measurements.
     searched = {entry["name"] for effect in verdict["effects"] for entry in effect["parameters"] if entry.get("shape")}
     held = [*(name for name in verdict["held"] if name not in searched), *tables.left_to_priors(parameters)]
+    repeatable = verdict.get("repeatable")
+    more = AND_MORE if repeatable and repeatable["remains"] and verdict["effects"] else ""
     return {
         **{name: lines if name in _LISTS else " ".join(lines) for name, lines in stated.items()},
         "method": dict(stated["method"]),
         "campaign": verdict["campaign"],
         "robot": descriptions["robot"]["name"],
-        "verdict": AT_FAULT if faulty else TITLES[verdict["verdict"]],
+        "verdict": AT_FAULT if faulty else TITLES[verdict["verdict"]] + more,
         "faulty": faulty,
         "headline": dict(stated["headline"]) or None,
         "causes": [] if verdict["verdict"] == "not_testable" else cause_rows(verdict),

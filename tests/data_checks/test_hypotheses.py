@@ -7,7 +7,7 @@ import pytest
 from made_campaigns import Plan, made
 
 from elastocal.data_checks.alternatives import find
-from elastocal.data_checks.readings import hypotheses, shifts
+from elastocal.data_checks.hypotheses import hypotheses, shifts
 
 
 def test_what_is_simple_comes_first_and_no_change_is_there_twice(fanuc):
