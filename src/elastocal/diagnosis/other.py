@@ -3,13 +3,13 @@
 A displacement is a random function of a few inputs, an approximate Gaussian process: the principal components over the states
 of a campaign (Karhunen-Loeve) of a sum of random Fourier features [1] with normal coefficients. Such a discrepancy [2] should
 leave to the model what the model explains [3]: what is constant of it, or at a joint straight in its angle, is taken off, for a
-zero offset, a compliance and a transmission ratio have names. What comes with time or by the place of the end keeps its
-constant part: a zero that slips has slipped at once. A function of everything at once would fit nothing better than chance
-does, so that each law has the inputs of one cause, as terms of an additive Gaussian process have [4]: a joint's own angle,
-torque and approach; the angles of the joints beside it; time and temperature; the load on the base along each of its axes; the
-place of the end. At a joint each acts in proportion to the load or without it: what yields turns nothing that is not loaded,
-and one law for both would be charged for what it does not do. Alone it means that the residual is *unexplained*; beside a
-mechanism, that a *related* one acts. It names nothing and is not used to predict.
+zero offset, a compliance and a transmission ratio have names. What comes with time begins at nothing, as a zero that slips
+does; what goes by the place of the end keeps its constant part. A function of everything at once would fit nothing better than
+chance does, so that each law has the inputs of one cause, as terms of an additive Gaussian process have [4]: a joint's own
+angle, torque and approach; the angles of the joints beside it; time and temperature; the load on the base along each of its
+axes; the place of the end. At a joint each acts in proportion to the load or without it: what yields turns nothing that is not
+loaded, and one law for both would be charged for what it does not do. Alone it means that the residual is *unexplained*; beside
+a mechanism, that a *related* one acts. It names nothing and is not used to predict.
 
 [1] Rahimi, A. and Recht, B., Random features for large-scale kernel machines, Advances in Neural Information Processing Systems
     20, 2007.
@@ -154,10 +154,12 @@ def _principal(
     frequency, phase = _fourier(known.shape[1], draws)
     size = np.sqrt(2.0 * variance / _DRAWN) if known.shape[1] else 0.0
     random = size * np.cos(known @ frequency + phase)
-    named = inputs.cause not in (TIME, PLACE)
-    straight = named and bool(location) and not loaded
+    straight = inputs.cause in (OWN, NEIGHBOURS) and not loaded
     angle = campaign.joint_angles[:, inputs.coordinate if straight else 0]
-    mean, center, squares = named * random.mean(axis=0), angle.mean(), ((angle - angle.mean()) ** 2).sum()
+    # Of what is taken off: the first in time, or all.
+    first = np.argmin(known[:, -1]) if inputs.cause == TIME else slice(None)
+    mean = np.zeros(_DRAWN) if inputs.cause == PLACE else random[first].reshape(-1, _DRAWN).mean(axis=0)
+    center, squares = angle.mean(), ((angle - angle.mean()) ** 2).sum()
     slope = (angle - center) @ random / squares if straight and squares > _ROUNDING else np.zeros_like(mean)
     largest = max(np.abs(_load(campaign, location)).max(initial=0.0), _ROUNDING)
 
