@@ -53,7 +53,8 @@ def catalogue():
 def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(catalogue):
     tried = [(c, (value,)) for c in catalogue for shape in c.shapes for value in shape.values(3)]
     tried += [(c, ()) for c in catalogue if not c.shapes]
-    laws = [Law((1,), OWN, 1.0, (), 40), Law((1,), NEIGHBOURS, 1.0, (), 40), Law((), f"{FORCE} shift", 1.0, (), 24)]
+    at_joints = [Law((joint,), cause, 1.0, (), 40) for joint, cause in ((1, OWN), (1, NEIGHBOURS), (2, OWN))]
+    laws = [at_joints[0], at_joints[1], Law((), f"{FORCE} shift", 1.0, (), 24), at_joints[2]]
     units = units_of(tried, laws, SETTINGS)
     columns = np.concatenate([unit.columns for unit in units])
     np.testing.assert_array_equal(np.sort(columns), np.arange(len(columns)))
@@ -61,9 +62,11 @@ def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(cat
     assert [(unit.law, len(unit.columns)) for unit in against] == [(law, law.features) for law in laws]
     assert not any(unit.law for unit in units if unit.candidate)
     # Laws and shapes at one location share its probability; laws of the competitor have places of their own.
-    for place in {unit.place for unit in units}:
+    for place in {unit.place for unit in units if unit.candidate}:
         assert np.exp([unit.log_prior for unit in units if unit.place == place]).sum() == pytest.approx(1.0), place
     assert len({unit.place for unit in against}) == len(laws)
+    # Their kinds are equally likely, however many locations each has.
+    assert np.exp([unit.log_prior for unit in against]) == pytest.approx(len(laws) / 3 / np.array([2, 1, 1, 2]))
     assert len({unit.key for unit in units}) == len(units)
 
 

@@ -137,7 +137,7 @@ PARAMETERS = {
     **dict.fromkeys(("compensator_torque@2", "compensator_stiffness@2"), WAVES),
     "transmission_ratio@1": "per_q1",
     "transmission_ratio@4": "per_q4 per_q3",
-    "transmission_order@1[order 1-2]": "cos_kq sin_kq",
+    "transmission_order@1[order 1-2]": "cos_kq sin_kq cos_2kq sin_2kq",
     "motor_eccentricity@1": "cos_1_motor sin_1_motor cos_2_motor sin_2_motor",
     "link_elasticity@1": "bending_1_over_EI torsion_1_over_GJ",
     # Across the axis of the joint.

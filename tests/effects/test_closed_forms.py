@@ -312,7 +312,7 @@ CLOSED_FORMS = {
     "transmission_harmonic": of_the_joint(lambda arm, law, name: wave(name, joint_angle(arm, law))),
     "transmission_ratio": of_the_joint(lambda arm, law, name: arm.states.joint_angles[:, int(name.removeprefix("per_q")) - 1]),
     "transmission_order": of_the_joint(
-        lambda arm, law, name, order: {"c": np.cos, "s": np.sin}[name[0]](order * joint_angle(arm, law))
+        lambda arm, law, name, order: {"c": np.cos, "s": np.sin}[name[0]]((1 + ("2" in name)) * order * joint_angle(arm, law))
     ),
     "motor_eccentricity": of_the_joint(motor_eccentricity),
     "bearing_runout": bearing_runout,

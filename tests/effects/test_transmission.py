@@ -47,13 +47,13 @@ def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
     around = conditions_on(fanuc, states)
     made = displacements(bands[1], around, 2.7)
     angle = states.joint_angles[:, 2]
-    np.testing.assert_allclose(made[:, :, 2], [np.cos(2.7 * angle), np.sin(2.7 * angle)], rtol=1e-13)
+    np.testing.assert_allclose(made[:, :, 2], [wave(k * angle) for k in (2.7, 5.4) for wave in (np.cos, np.sin)], rtol=1e-13)
 
 
 def test_order_between_integers_is_fitted_where_it_is(fanuc):
     candidate = candidate_on(fanuc, "transmission_order@3[order 2-3]")
     model = made_model(fanuc, (Target("A", "6DoF", (0.1, 0, 0)),), fitted_frames=False, effects=(candidate,))
-    true = replace(made_estimate(model), coefficients=(np.array([2e-4, -3e-4]),), shapes=(np.array([2.68]),))
+    true = replace(made_estimate(model), coefficients=(np.array([2e-4, -3e-4, 1e-4, 5e-5]),), shapes=(np.array([2.68]),))
     seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=5, span=2.5)), np.random.default_rng(6))
     found = fit(model, seen, NOISE, made_estimate(model, size=0.0))
     assert found.converged

@@ -137,10 +137,13 @@ def units_of(tested: Sequence[tuple[Candidate, Sequence[float]]], laws: Sequence
             Unit(candidate.effect, candidate.location, candidate, values, columns, sizes, signs, log_share, largest=largest)
         )
         start += len(columns)
+    kinds = Counter((bool(law.location), law.name) for law in laws)
     for law in laws:
         count = law.features
+        # Kinds of laws are equally likely, and of each its locations.
+        log_share = float(np.log(len(laws) / len(kinds) / kinds[bool(law.location), law.name]))
         whole = np.arange(start, start + count), np.ones(count), np.zeros(count, int)
-        units.append(Unit(OTHER, law.location, None, (), *whole, law=law, largest=len(settings.scales) - 1))
+        units.append(Unit(OTHER, law.location, None, (), *whole, log_share, law=law, largest=len(settings.scales) - 1))
         start += count
     require_unique([unit.key for unit in units])
     return tuple(units)

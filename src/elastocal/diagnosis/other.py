@@ -3,12 +3,13 @@
 A displacement is a random function of a few inputs, an approximate Gaussian process: the principal components over the states
 of a campaign (Karhunen-Loeve) of a sum of random Fourier features [1] with normal coefficients. Such a discrepancy [2] should
 leave to the model what the model explains [3]: what is constant of it, or at a joint straight in its angle, is taken off, for a
-zero offset, a frame that is fitted and a transmission ratio have names. A function of everything at once would fit nothing
-better than chance does, so that each law has the inputs of one cause, as terms of an additive Gaussian process have [4]: a
-joint's own angle, torque and approach; the angles of the joints beside it; time and temperature; the load on the base along
-each of its axes; the place of the end. Half of the features are multiplied by the load, so that they vanish without it. Alone
-it means that the residual is *unexplained*; beside a mechanism, that a *related* one acts. It names nothing and is not used to
-predict.
+zero offset, a compliance and a transmission ratio have names. What comes with time begins at nothing, as a zero that slips
+does; what goes by the place of the end keeps its constant part. A function of everything at once would fit nothing better than
+chance does, so that each law has the inputs of one cause, as terms of an additive Gaussian process have [4]: a joint's own
+angle, torque and approach; the angles of the joints beside it; time and temperature; the load on the base along each of its
+axes; the place of the end. At a joint each acts in proportion to the load or without it: what yields turns nothing that is not
+loaded, and one law for both would be charged for what it does not do. Alone it means that the residual is *unexplained*; beside
+a mechanism, that a *related* one acts. It names nothing and is not used to predict.
 
 [1] Rahimi, A. and Recht, B., Random features for large-scale kernel machines, Advances in Neural Information Processing Systems
     20, 2007.
@@ -40,7 +41,7 @@ JOINT_RAD, BASE_M, BASE_RAD = 2e-4, 1e-4, 1e-4
 # Length scales of the features in units of the inputs, which are of size one: from smooth to as many waves as poses can show.
 _LENGTH_SCALES = (0.7, 3.0)
 OWN, NEIGHBOURS, TIME, FORCE, PLACE = "own", "neighbours", "time", "force", "place"
-SHIFT, TURN = "shift", "turn"
+SHIFT, TURN, UNDER_LOAD = "shift", "turn", " under load"
 # Of so many random features the principal components are taken, at a joint as many as the settings say.
 _DRAWN, _BASE_FEATURES = 64, 6
 # Inputs that differ by less, in SI units or of their largest value, differ by rounding.
@@ -75,22 +76,34 @@ def laws_of(campaign: Conditions, features: int) -> list[Law]:
     `features`: at a joint.
     """
     sites = campaign.sites
-    at_the_base = ((SHIFT, BASE_M, sites.base[:3]), (TURN, BASE_RAD, sites.base[3:]))
-    places = [
-        *(((j + 1,), cause, cause, JOINT_RAD, [j], features) for j in range(sites.joints) for cause in (OWN, NEIGHBOURS, TIME)),
+    whole = [(f" {SHIFT}", BASE_M, list(sites.base[:3])), (f" {TURN}", BASE_RAD, list(sites.base[3:]))]
+    # What bends the ray to a target shifts it one way, wherever a frame that is placed wrongly would shift it every way.
+    along = [(f" {SHIFT} {axis}", BASE_M, [at]) for axis, at in zip("xyz", sites.base[:3], strict=True)]
+    half = _BASE_FEATURES // 2
+    places: list[tuple[tuple[int, ...], str, str, float, list[int], dict[bool, int]]] = [
         *(
-            ((), cause, f"{cause} {motion}", size, coordinates, _BASE_FEATURES)
-            for cause in (FORCE, TIME, PLACE)
-            for motion, size, coordinates in at_the_base
+            ((j + 1,), cause, words, JOINT_RAD, [j], {loaded: features})
+            for j in range(sites.joints)
+            for cause in (OWN, NEIGHBOURS, TIME)
+            for loaded, words in ((False, ""), (True, UNDER_LOAD))
+            if not loaded or np.abs(campaign.total[:, j]).max(initial=0.0) > _ROUNDING
         ),
+        *(((), FORCE, *motion, {False: half, True: half}) for motion in whole),
+        *(((), TIME, *motion, {False: _BASE_FEATURES}) for motion in whole),
+        *(((), PLACE, *motion, {False: _BASE_FEATURES}) for motion in (*along, whole[1])),
     ]
     found = []
-    for location, cause, name, size, coordinates, count in places:
+    for location, cause, words, size, coordinates, counts in places:
         inputs = [_Inputs(campaign, cause, coordinate) for coordinate in coordinates]
         if any(each.differ.any() for each in inputs):
-            draws = stream(_SEED, f"other {cause}", "random Fourier features", location[0] if location else 0)
-            parts = tuple((each.coordinate, _principal(campaign, each, location, count, draws)) for each in inputs)
-            found.append(Law(location, name, size, parts, count * len(parts)))
+            name = f"{cause}{words}"
+            draws = stream(_SEED, f"other {name}", "random Fourier features", location[0] if location else 0)
+            parts = tuple(
+                (each.coordinate, _principal(campaign, each, location, draws, loaded, count, 1.0 / len(counts)))
+                for each in inputs
+                for loaded, count in counts.items()
+            )
+            found.append(Law(location, name, size, parts, sum(counts.values()) * len(inputs)))
     return found
 
 
@@ -127,36 +140,38 @@ class _Inputs:
 
 
 def _principal(
-    campaign: Conditions, inputs: _Inputs, location: tuple[int, ...], count: int, draws: np.random.Generator
+    campaign: Conditions,
+    inputs: _Inputs,
+    location: tuple[int, ...],
+    draws: np.random.Generator,
+    loaded: bool,
+    count: int,
+    variance: float,
 ) -> _Waves:
-    """So many principal components (S, count) of random functions of the inputs, half of them of those that go with the load.
-
-    Each half has a variance of about one half. What is constant over the campaign is taken off, and at a joint what goes
-    straight with its angle: a zero offset, a frame that is fitted and a transmission ratio have names in the catalogue.
-    """
+    """So many principal components (S, count) of random functions of the inputs of such a variance, in proportion to the load
+    or without it, less what has a name in the catalogue."""
     known = inputs.of(campaign)
-    frequencies, phases = zip(*(_fourier(known.shape[1], draws) for _ in range(2)), strict=True)
-    frequency, phase = np.concatenate(frequencies, axis=1), np.concatenate(phases)
-    size = np.sqrt(1.0 / _DRAWN) if known.shape[1] else 0.0
+    frequency, phase = _fourier(known.shape[1], draws)
+    size = np.sqrt(2.0 * variance / _DRAWN) if known.shape[1] else 0.0
     random = size * np.cos(known @ frequency + phase)
-    straight = bool(location) and inputs.cause != TIME
+    straight = inputs.cause in (OWN, NEIGHBOURS) and not loaded
     angle = campaign.joint_angles[:, inputs.coordinate if straight else 0]
-    mean, center, squares = random.mean(axis=0), angle.mean(), ((angle - angle.mean()) ** 2).sum()
+    # Of what is taken off: the first in time, or all.
+    first = np.argmin(known[:, -1]) if inputs.cause == TIME else slice(None)
+    mean = np.zeros(_DRAWN) if inputs.cause == PLACE else random[first].reshape(-1, _DRAWN).mean(axis=0)
+    center, squares = angle.mean(), ((angle - angle.mean()) ** 2).sum()
     slope = (angle - center) @ random / squares if straight and squares > _ROUNDING else np.zeros_like(mean)
-    largest = np.abs(_load(campaign, location)).max(initial=0.0)
+    largest = max(np.abs(_load(campaign, location)).max(initial=0.0), _ROUNDING)
 
     def waves(around: Conditions) -> np.ndarray:
         found = size * np.cos(inputs.of(around) @ frequency + phase) - mean
         if straight:
             found -= np.outer(around.joint_angles[:, inputs.coordinate] - center, slope)
-        if largest > _ROUNDING:
-            found[:, _DRAWN:] *= (_load(around, location) / largest)[:, None]
-        return found
+        return found * (_load(around, location) / largest)[:, None] if loaded else found
 
-    seen, axes, free = waves(campaign), np.zeros((2 * _DRAWN, count)), count - count // 2
-    for drawn, kept in ((slice(_DRAWN), slice(free)), (slice(_DRAWN, None), slice(free, None))):
-        _, vectors = np.linalg.eigh(seen[:, drawn].T @ seen[:, drawn])
-        axes[drawn, kept] = vectors[:, ::-1][:, : axes[drawn, kept].shape[1]]
+    seen = waves(campaign)
+    _, vectors = np.linalg.eigh(seen.T @ seen)
+    axes = vectors[:, ::-1][:, :count]
     return lambda around: waves(around) @ axes
 
 

@@ -55,7 +55,7 @@ class Settings:
     )
     harmonic_decay: float = _setting(0.3, "amplitudes of gear harmonics fall with the order to this power (measured UR10)")
     other_features: int = _setting(
-        16, "principal components of the random functions of each law at each joint; few inputs need no more"
+        8, "principal components of the random functions of each law at each joint; few inputs need no more"
     )
     missed_loss: float = _setting(
         5.0,

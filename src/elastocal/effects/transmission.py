@@ -71,8 +71,9 @@ def transmission_harmonic(own: Effect, sites: Sites, joint: int, low: int, high:
 def transmission_order(own: Effect, sites: Sites, joint: int, above: int) -> Candidates:
     """Transmission error of an order that is no integer: parts of a gear that do not come round with the joint.
 
-    theta_i = a cos(k q_i) + b sin(k q_i), with theta_i, a, b and the joint angle q_i in rad and k between two integers:
-    planets, cranks and cages turn by ratios of numbers of teeth [1]. Integers themselves are those of `transmission_harmonic`.
+    theta_i = sum_m a_m cos(m k q_i) + b_m sin(m k q_i), m = 1, 2, with theta_i, a_m, b_m and the joint angle q_i in rad and k
+    between two integers: planets, cranks and cages turn by ratios of numbers of teeth [1], and what is out of round errs twice
+    in their turn as well, wherever twice k lies. Integers k are those of `transmission_harmonic`.
     Over the part of a turn that a joint uses, orders nearer than half a wave over that part are nearly one function, so that
     the middle between two integers is where a search has to try; and less than a whole wave in a turn would be nearly any
     smooth function.
@@ -80,12 +81,12 @@ def transmission_order(own: Effect, sites: Sites, joint: int, above: int) -> Can
     [1] H. W. Müller, Epicyclic Drive Trains, Wayne State University Press, 1982.
     """
     shape = Shape("order", "1", above + 0.5, above + _MARGIN, above + 1 - _MARGIN, tried=1)
-    waves = own.parameters("amplitude", ("cos_kq", "sin_kq"), "rad", sites)
-    parameters = [replace(wave, order=above + 1) for wave in waves]
+    waves = own.parameters("amplitude", ("cos_kq", "sin_kq", "cos_2kq", "sin_2kq"), "rad", sites)
+    parameters = [replace(wave, order=(above + 1) * (1 + number // 2)) for number, wave in enumerate(waves)]
 
     def law(around: Conditions, order: float) -> Displacements:
         angle = order * around.joint_angles[:, joint]
-        return [{joint: np.cos(angle)}, {joint: np.sin(angle)}]
+        return [{joint: wave(times * angle)} for times in (1, 2) for wave in WAVES.values()]
 
     band, angles = f"order {above}-{above + 1}", _SAMPLES_PER_PERIOD * (above + 1)
     at = (joint + 1,)
