@@ -44,7 +44,7 @@ def export(
     from rich.console import Console
 
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
-    from elastocal.application.calibrated import OperatingConditions
+    from elastocal.application.calibrated import OperatingConditions, regressed
     from elastocal.application.forward_model import find_left_out_m, fold_effects, sidecar
     from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
@@ -77,14 +77,21 @@ def export(
             lines += _drop_in(drop_in, partial / URDF, calibrated.robot, robot, found.case.observations.states.joint_angles)
         write_json(partial / SIDECAR, document)
         lines += _denavit_hartenberg(calibrated.robot, robot, partial, output)
+    states = found.case.observations.states
+    at = calibrated.robot.reported_angles(states.joint_angles)
+    under = OperatingConditions(states.wrench, None, states.time_s, states.temperature_c)
     if document["effects"]:
-        states = found.case.observations.states
-        angles = calibrated.robot.reported_angles(states.joint_angles)
-        off = find_left_out_m(calibrated, angles, OperatingConditions(states.wrench, None, states.time_s, states.temperature_c))
         names = ", ".join(entry["key"] for entry in document["effects"])
-        largest, rms = 1e3 * off.max(), 1e3 * np.sqrt((off**2).mean())
-        lines.insert(0, f"! only {SIDECAR} holds {names}: up to {largest:.3f} mm at the measured poses ({rms:.3f} mm RMS)")
+        lines.insert(0, f"! only {SIDECAR} holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
+    if calibrated.remainder is not None:
+        words, lost = found.verdict["remainder"]["words"], np.linalg.norm(regressed(calibrated, at, under), axis=1)
+        lines.insert(0, f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}")
     print_answer(True, f"{found.name}: calibrated robot in {output}", lines, "", console)
+
+
+def _sizes(off: np.ndarray) -> str:
+    """How far something moves the end effector (N,), m, in words."""
+    return f"up to {1e3 * off.max():.3f} mm at the measured poses ({1e3 * float((off**2).mean()) ** 0.5:.3f} mm RMS)"
 
 
 def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, angles: np.ndarray) -> list[str]:
