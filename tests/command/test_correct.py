@@ -73,7 +73,7 @@ def test_the_regression_corrects_what_physics_does_not_have(elastocal, regressed
         assert good.mean() > 0.9
         there = targets.loc[good, [f"q{j}" for j in range(1, 7)]].to_numpy()
         errors[flags] = missed(robot, found.calibrated.scope, position[good], there)
-        assert targets["predicted_error_after_m"].mean() < 3.0 * errors[flags] < 6.0 * targets["predicted_bound_m"].mean()
+        assert errors[flags] < targets["predicted_bound_m"].mean()
     assert errors[()] < 0.5 * errors["--physics-only",]
 
 

@@ -47,6 +47,9 @@ def test_a_regression_that_no_file_can_hold_is_said_with_its_size(elastocal, reg
     told = " ".join(result.stderr.split())
     lost = re.search(r"no file holds the Gaussian process .*?up to (\S+) mm at the measured poses \((\S+) mm RMS", told)
     assert lost and 0.1 < float(lost[2]) < float(lost[1]) < 1.0
+    verdict = json.loads((regressed_checkout / "reports/loop/smooth/verdict.json").read_text())
+    stated = json.loads((tmp_path / "out" / "effects.json").read_text())["accuracy"]
+    assert stated["rms_m"] == pytest.approx(verdict["physics"]["accuracy"]["rms_m"], rel=1e-3)
 
 
 def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(

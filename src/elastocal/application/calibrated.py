@@ -21,7 +21,7 @@ from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.kinematics import poses
-from elastocal.remainder.corrected import inputs_of
+from elastocal.remainder.corrected import beyond_regressed, inputs_of
 from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
 
 if TYPE_CHECKING:
@@ -195,8 +195,8 @@ def regression_acts(calibrated: CalibratedRobot, reported_angles: np.ndarray, op
     """At which commands (N, n) a regression on the remainder is added, ndarray of bool (N,)."""
     if calibrated.remainder is None:
         return np.zeros(len(reported_angles), bool)
-    wrench = None if operating.wrench is None else np.broadcast_to(operating.wrench, (len(reported_angles), 6))
-    return ~np.logical_or(*beyond_fitted(calibrated, reported_angles, wrench))
+    states = states_of(calibrated, reported_angles, operating)
+    return ~beyond_regressed(calibrated.states, states.joint_angles, states.wrench)
 
 
 def inputs_at(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> Inputs:

@@ -35,7 +35,8 @@ def export(
 ) -> None:
     """Write the calibrated robot: robot file, URDF, DH, effects.
 
-    URDF and DH parameters hold the geometry; effects.json holds springs and effects as well.
+    URDF and DH parameters hold the geometry; effects.json holds springs and effects as well. None holds the regression on the
+    remainder: what is lost with it is said, and the accuracy stated is without.
     """
     from datetime import date as calendar
 
@@ -55,7 +56,9 @@ def export(
     check_places(*(output / name for name in _NAMES))
     if urdf is not None and (output / URDF).resolve() == urdf.resolve():
         raise InputError(urdf, "", "the file that would be replaced", "a URDF outside of --output")
-    found = diagnosed_campaign(folder, accept_environment)
+    whole = diagnosed_campaign(folder, accept_environment)
+    # No file has the regression: what stands in them is of a robot without.
+    found = whole if whole.calibrated.remainder is None else diagnosed_campaign(folder, accept_environment, physics_only=True)
     calibrated = found.calibrated
     robot = fold_effects(calibrated).robot
     drop_in = None if urdf is None else write_calibrated_origins(urdf, calibrated.robot, robot)
@@ -83,8 +86,8 @@ def export(
     if document["effects"]:
         names = ", ".join(entry["key"] for entry in document["effects"])
         lines.insert(0, f"! only {SIDECAR} holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
-    if calibrated.remainder is not None:
-        words, lost = found.verdict["remainder"]["words"], np.linalg.norm(regressed(calibrated, at, under), axis=1)
+    if found is not whole:
+        words, lost = whole.verdict["remainder"]["words"], np.linalg.norm(regressed(whole.calibrated, at, under), axis=1)
         lines.insert(0, f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}")
     print_answer(True, f"{found.name}: calibrated robot in {output}", lines, "", console)
 
