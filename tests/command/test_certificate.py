@@ -73,7 +73,7 @@ def test_the_robot_is_judged_as_it_is_corrected(elastocal, regressed_checkout, m
     assert (delivered["conformity"]["decision"], physics["conformity"]["decision"]) == ("pass", "undecided")
     assert [document["held_out"][-1]["model"] for document in documents.values()] == ["delivered", "corrected"]
     assert delivered["held_out"][-1]["rms_m"] == verdict["heldout"]["delivered"]["rms_m"]
-    assert 0.0 < delivered["workspace"][0]["share_regressed"] < 1.0 and physics["workspace"][0]["share_regressed"] == 0.0
+    assert delivered["workspace"][0]["share_regressed"] > 0.5 and physics["workspace"][0]["share_regressed"] == 0.0
     left = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded", "left by the regression")
     squares = sum(line["rms_m"] ** 2 for line in delivered["budget"] if line["name"] in left)
     assert squares == pytest.approx(delivered["accuracy"]["rms_m"] ** 2, rel=1e-9)

@@ -58,8 +58,9 @@ def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(regres
         again = campaign_accuracy(found.calibrated)
         assert again.rms_m == pytest.approx(found.verdict["accuracy"]["rms_m"], rel=1e-3)
         assert again.form_m == pytest.approx(found.verdict["accuracy"]["form_m"], rel=1e-6)
-    # What it is predicted to miss is what it missed: a standard error of a fifth, by 45 poses of which three lie outside.
-    assert stated["accuracy"]["rms_m"] == pytest.approx(np.sqrt(heldout["delivered"]["rms_m"] ** 2 - 3 * NOISE_M**2), rel=0.4)
+    # What it is predicted to miss is by folds with fewer poses, and no less than what it missed.
+    missed = np.sqrt(heldout["delivered"]["rms_m"] ** 2 - 3 * NOISE_M**2)
+    assert missed < stated["accuracy"]["rms_m"] < 3.0 * missed < stated["physics"]["accuracy"]["rms_m"]
 
 
 def test_it_says_what_code_data_and_environment_made_it(checkout):
