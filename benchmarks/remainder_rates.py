@@ -24,7 +24,6 @@ from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.whole import cases_in
 from elastocal.remainder.corrected import Plan, corrected, inputs_of
 from elastocal.remainder.repeatable import repeatable_part
-from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
 
@@ -57,7 +56,7 @@ def exact_cases(poses: int) -> tuple[Case, Case]:
 def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarray]:
     """A case with errors, and what no model could predict of it, (M, 3), m. `part`: of one robot, that of the seed."""
     fitted, robot = fit_declared(case.model, case.observations, NOISE), np.random.default_rng(seed)
-    inputs = inputs_of(fitted.model, fitted.estimate, case.observations, elsewhere=True)
+    inputs = inputs_of(fitted.model, fitted.estimate, case.observations)
     offsets, joints, moved = robot.normal(0.0, OFFSET_RAD, 6), robot.choice(5, 2, replace=False), robot.choice([1, 2])
     waves = np.sin(inputs.joint_angles[:, joints] + robot.uniform(0.0, 2.0 * np.pi, 2))
     deviation = 2.0 * size * waves.prod(axis=1)[:, None] * inputs.jacobian[:, :, moved]
@@ -89,8 +88,7 @@ if __name__ == "__main__":
             if asked.check:
                 continue
             alone = position_residuals(*placed(fitted, case, held_out), held_out.observations)
-            plan, beyond = Plan("auto", blocks=False, within_range=True, seed=seed), outside_poses(fitted, case, held_out)
-            found = corrected(plan, fitted, case, held_out, beyond)
+            found = corrected(Plan("auto", blocks=False, within_range=True, seed=seed), fitted, case, held_out)
             squares = [(off**2).sum(axis=1) for off in (alone, found.residual, chance)]
             off = squares[1] - squares[0]
             used += found.chosen.regression is not None

@@ -114,3 +114,15 @@ def made_checkout(tmp_path_factory):
 def checkout(made_checkout, tmp_path_factory):
     """A copy, to be changed by the tests of a file."""
     return shutil.copytree(made_checkout, tmp_path_factory.mktemp("checkout") / "top", symlinks=True)
+
+
+@pytest.fixture(scope="session")
+def regressed_checkout(tmp_path_factory):
+    """A checkout with the diagnosed campaign ``smooth`` in it, of a robot that errs by what only a regression has."""
+    from certified import certified_checkout
+    from made_remainders import smoothly_wrong_folder
+
+    top = tmp_path_factory.mktemp("regressed")
+    changes = {"poses": 150, "frame": "tracker", "remainder": "gaussian_process"}
+    certified_checkout(top, "smooth", made=lambda *words: smoothly_wrong_folder(*words, **changes))
+    return top

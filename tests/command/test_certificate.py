@@ -58,6 +58,28 @@ def test_bad_options_end_in_one_line_and_write_nothing(in_checkout, refusal, tmp
     assert not (tmp_path / "out").exists()
 
 
+def test_the_robot_is_judged_as_it_is_corrected(elastocal, regressed_checkout, monkeypatch, tmp_path):
+    """What physics leaves fails where the regression on it passes, and the map says where it acts."""
+    monkeypatch.chdir(regressed_checkout)
+    verdict = json.loads(Path("reports/loop/smooth/verdict.json").read_text())
+    ends = verdict["accuracy"]["rms_bound_m"], verdict["physics"]["accuracy"]["rms_m"]
+    assert ends[0] < ends[1]
+    documents = {}
+    for flags in ((), ("--physics-only",)):
+        output = tmp_path / f"out{len(flags)}"
+        elastocal("certificate", "smooth", "--tolerance", f"{1e3 * sum(ends) / 2:.4f}mm", "--output", output, *flags)
+        documents[flags] = json.loads((output / "certificate.json").read_text())
+    delivered, physics = documents.values()
+    assert (delivered["conformity"]["decision"], physics["conformity"]["decision"]) == ("pass", "undecided")
+    assert [document["held_out"][-1]["model"] for document in documents.values()] == ["delivered", "corrected"]
+    assert delivered["held_out"][-1]["rms_m"] == verdict["heldout"]["delivered"]["rms_m"]
+    assert delivered["workspace"][0]["share_regressed"] > 0.5 and physics["workspace"][0]["share_regressed"] == 0.0
+    left = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded", "left by the regression")
+    squares = sum(line["rms_m"] ** 2 for line in delivered["budget"] if line["name"] in left)
+    assert squares == pytest.approx(delivered["accuracy"]["rms_m"] ** 2, rel=1e-9)
+    assert any(line["name"] == "regression" and line["rms_m"] > 1e-4 for line in delivered["budget"])
+
+
 def test_data_at_fault_get_no_certificate(refusal, checkout, tmp_path, monkeypatch):
     shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(tmp_path / "top")

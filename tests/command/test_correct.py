@@ -1,6 +1,7 @@
 """Wanted poses in, joint targets out; nothing is written where a pose cannot be reached."""
 
 import re
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -8,9 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
+from made_remainders import smooth
 from scipy.spatial.transform import Rotation
 
 from elastocal.application.calibrated import forward, nominal_forward
+from elastocal.application.frames import root_mean_square, subtract_placement
 from elastocal.exchange.target_path import read_corrected_targets
 from elastocal.loop.calibrated_files import load_diagnosed
 
@@ -39,6 +42,42 @@ def output(tmp_path):
 @pytest.fixture
 def words(in_checkout, path, output):
     return "correct", in_checkout / "made", path, "--output", output
+
+
+def missed(robot, scope, wanted, commands):
+    """RMS error in m of a robot that errs by `smooth`, after the best placement of its base."""
+    position, rotation = nominal_forward(robot, commands)
+    off = (wanted - position - smooth(robot.model_angles(commands)))[..., None]
+    off = subtract_placement(scope, position, rotation, np.concatenate([off, 0 * off], axis=1))
+    return root_mean_square(off[:, :3, 0])
+
+
+def test_the_regression_corrects_what_physics_does_not_have(elastocal, regressed_checkout, monkeypatch, tmp_path):
+    """At poses between those of the campaign: how close the robot then comes to them, by what it really errs by."""
+    monkeypatch.chdir(regressed_checkout)
+    found = load_diagnosed("smooth", ROBOTS, regressed_checkout)
+    robot, states = found.calibrated.robot, found.case.observations.states
+    commands = robot.reported_angles(0.5 * (states.joint_angles[1:] + states.joint_angles[:-1]))
+    position, rotation = nominal_forward(robot, commands)
+    names = ["x", "y", "z", "rx", "ry", "rz", *(f"q{joint}" for joint in range(1, 7))]
+    wanted = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec(), commands])
+    pd.DataFrame(wanted, columns=names).to_csv(tmp_path / "path.csv", index=False)
+    errors = {}
+    for flags in ((), ("--physics-only",)):
+        output = tmp_path / f"targets{len(flags)}.csv"
+        result = elastocal(
+            "correct", "smooth", tmp_path / "path.csv", "--output", output, "--partial", "--allow-large-steps", *flags
+        )
+        assert ("Gaussian process" in result.stderr) == (not flags)
+        targets = pd.read_csv(output)
+        good = (targets["status"] == "ok").to_numpy()
+        assert good.mean() > 0.9
+        there = targets.loc[good, [f"q{j}" for j in range(1, 7)]].to_numpy()
+        errors[flags] = missed(robot, found.calibrated.scope, position[good], there)
+        corrected = found.calibrated if not flags else replace(found.calibrated, remainder=None)
+        np.testing.assert_allclose(forward(corrected, there)[0], position[good], atol=1e-8)
+        assert errors[flags] < targets["predicted_bound_m"].mean()
+    assert errors[()] < 0.5 * errors["--physics-only",]
 
 
 def moved_away(path, rows):

@@ -41,6 +41,17 @@ def test_robot_file_urdf_and_sidecar_hold_what_was_found(in_checkout, elastocal,
     assert document["effects"] == [] and document["date"] == "2026-11-23" and len(document["joint_compliance"]) == 6
 
 
+def test_a_regression_that_no_file_can_hold_is_said_with_its_size(elastocal, regressed_checkout, monkeypatch, tmp_path):
+    monkeypatch.chdir(regressed_checkout)
+    result = elastocal("export", "smooth", "--output", tmp_path / "out")
+    told = " ".join(result.stderr.split())
+    lost = re.search(r"no file holds the Gaussian process .*?up to (\S+) mm at the measured poses \((\S+) mm RMS", told)
+    assert lost and 0.1 < float(lost[2]) < float(lost[1]) < 1.0
+    verdict = json.loads((regressed_checkout / "reports/loop/smooth/verdict.json").read_text())
+    stated = json.loads((tmp_path / "out" / "effects.json").read_text())["accuracy"]
+    assert stated["rms_m"] == pytest.approx(verdict["physics"]["accuracy"]["rms_m"], rel=1e-3)
+
+
 def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(
     in_checkout, elastocal, refusal, tmp_path
 ):

@@ -18,7 +18,13 @@ def errors(seed, count=2000):
     corrected = rng.uniform(1e-5, 3e-5, count)
     position = rng.uniform([-2, -2, 0], [2, 2, 2], (count, 3))
     return WorkspaceErrors(
-        np.zeros((count, 6)), position, rng.uniform(1e-3, 2e-3, count), corrected, 2 * corrected, position[:, 2] > 1.5
+        np.zeros((count, 6)),
+        position,
+        rng.uniform(1e-3, 2e-3, count),
+        corrected,
+        2 * corrected,
+        position[:, 2] > 1.5,
+        np.zeros(count, bool),
     )
 
 
@@ -29,6 +35,14 @@ def test_each_load_has_a_row_and_what_lies_outside_is_hatched():
     hatched = [patch for patch in figure.axes[0].patches if patch.get_hatch()]
     assert hatched and min(patch.get_y() for patch in hatched) > 1.3
     assert_nothing_cut_off(figure)
+
+
+def test_where_a_regression_corrects_has_dots():
+    made = errors(1)
+    figure = workspace_map([replace(made, regressed=made.position[:, 2] < 1.0)], [0.0], 2e-4)
+    dotted = [[patch for patch in axis.patches if patch.get_hatch() == "...."] for axis in figure.axes[:2]]
+    assert not dotted[0] and dotted[1] and max(patch.get_y() for patch in dotted[1]) < 1.0
+    assert any("regression" in entry for entry in legend_entries(figure))
 
 
 def test_before_and_after_are_one_quantity_on_one_scale_with_the_tolerance_as_a_contour():

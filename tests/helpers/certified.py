@@ -24,8 +24,8 @@ REPORT = "report.html"
 _PLAN = replace(PLAN, poses=27)
 
 
-def certified_checkout(top, name="made", offset=3e-4):
-    """A checkout with a campaign that was diagnosed and judged.
+def certified_checkout(top, name="made", offset=3e-4, made=None):
+    """A checkout with a campaign that was diagnosed and judged; `made` makes its folder.
 
     Returns folder of the campaign, in `top`.
     """
@@ -36,7 +36,10 @@ def certified_checkout(top, name="made", offset=3e-4):
         (top / ENGINE).parent.mkdir()
         (top / ENGINE).write_text("'''Made it.'''\n", encoding="utf-8")
     robot = analysed("kuka")
-    folder = made_folder(top / name, robot, name, table=made_table(robot, name, plan=_PLAN, offset_of_joint_3=offset))
+    if made is None:
+        folder = made_folder(top / name, robot, name, table=made_table(robot, name, plan=_PLAN, offset_of_joint_3=offset))
+    else:
+        folder = made(top / name, robot, name)
     out = run_loop(folder, ROBOTS, top / "results" / "loop" / name, ANALYSIS)
     shutil.move(out / "descriptions.json", out / "campaign.json")
     reports = top / "reports" / "loop" / name

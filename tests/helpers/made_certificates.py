@@ -38,6 +38,7 @@ def made_document(decision="pass", repeats=True, measured=False, **conformity):
         "verdict": "named",
         "effects": ["lost_motion"],
         "errors": [["predicted over the poses", "1.500 mm", "0.120 mm"]],
+        "regression": "",
         "held_out": [step("uncorrected", 1.5e-3), step("declared", 3e-4), step("corrected", 1.2e-4, True)],
         "noise_floor_rms_m": 1e-4,
         "joint_ranges": [{"low": -85.0, "high": 60.4, "unit": "deg"}, {"low": 0.0, "high": 1.5, "unit": "m"}],
@@ -83,7 +84,14 @@ def made_document(decision="pass", repeats=True, measured=False, **conformity):
         "budget_states": 100,
         "tracker_rms_m": 1.5e-4,
         "workspace": [
-            {"force_N": force, "uncorrected": quantiles, "bound": quantiles, "bound_inside": inside, "share_outside": 0.3}
+            {
+                "force_N": force,
+                "uncorrected": quantiles,
+                "bound": quantiles,
+                "bound_inside": inside,
+                "share_outside": 0.3,
+                "share_regressed": 0.2,
+            }
             for force, inside in ((0.0, quantiles), (100.0, None))
         ],
     }

@@ -10,8 +10,10 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS
 from certified import ENGINE
+from made_remainders import NOISE_M
 from support import refused
 
+from elastocal.application.accuracy import campaign_accuracy
 from elastocal.application.calibrated import calibrate_by_fit
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
@@ -43,6 +45,22 @@ def test_the_robot_is_that_of_the_final_fit(checkout):
     assert found.calibrated.scope.frame == ("robot" if found.case.model.fitted_frames else "base")
     assert found.verdict["campaign"] == found.name == "made"
     assert found.calibrated.scope.form_m == found.verdict["accuracy"]["form_m"]
+
+
+def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(regressed_checkout):
+    words = regressed_checkout / "smooth", ROBOTS, regressed_checkout
+    whole, physics = (load_diagnosed(*words, physics_only) for physics_only in (False, True))
+    stated, heldout = whole.verdict, whole.verdict["heldout"]
+    assert heldout["delivered"]["rms_m"] < 0.6 * heldout["after"]["rms_m"]
+    assert physics.calibrated.remainder is None and physics.verdict["heldout"]["delivered"] == heldout["after"]
+    assert physics.verdict["accuracy"] == stated["physics"]["accuracy"] != stated["accuracy"]
+    for found in (whole, physics):
+        again = campaign_accuracy(found.calibrated)
+        assert again.rms_m == pytest.approx(found.verdict["accuracy"]["rms_m"], rel=1e-3)
+        assert again.form_m == pytest.approx(found.verdict["accuracy"]["form_m"], rel=1e-6)
+    # What it is predicted to miss is by folds with fewer poses, and no less than what it missed.
+    missed = np.sqrt(heldout["delivered"]["rms_m"] ** 2 - 3 * NOISE_M**2)
+    assert missed < stated["accuracy"]["rms_m"] < 3.0 * missed < stated["physics"]["accuracy"]["rms_m"]
 
 
 def test_it_says_what_code_data_and_environment_made_it(checkout):

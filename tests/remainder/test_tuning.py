@@ -8,7 +8,7 @@ from made_remainders import made_inputs
 
 from elastocal.remainder import extra_trees, gaussian_process, ridge_harmonics
 from elastocal.remainder.protocol import Folds, Prediction
-from elastocal.remainder.tuning import NORMAL_WIDTH, calibrated, gain_of, tuned
+from elastocal.remainder.tuning import NORMAL_WIDTH, gain_of, shrunk, spread_of, tuned
 
 
 def folds(inputs, residual, count=5):
@@ -86,8 +86,12 @@ def test_a_gain_is_shrunk_and_its_test_allows_for_folds_that_share_their_poses()
 
 
 def boasting(factor):
-    """A predictor of zero that states a multiple of the noise, which grows with the first angle."""
-    return lambda there: Prediction(np.zeros((len(there), 3)), factor * spread(there))
+    """A regression that predicts zero and states a multiple of the noise, which grows with the first angle."""
+
+    def fitted(inputs, residual, settings, seed):
+        yield lambda there: Prediction(np.zeros((len(there), 3)), lambda: factor * spread(there))
+
+    return SimpleNamespace(fitted=fitted)
 
 
 def spread(there):
@@ -98,10 +102,21 @@ def spread(there):
 def test_intervals_hold_95_percent_and_keep_their_shape(factor):
     inputs, _ = made_inputs(600, seed=1)
     off = np.random.default_rng(2).normal(size=(600, 3)) * spread(inputs)
-    honest = calibrated(boasting(factor), np.abs(off / (factor * spread(inputs))).ravel(), 1.0)
+    found = spread_of(np.abs(off), factor * spread(inputs))
+    assert found.typical == pytest.approx(np.sqrt((off**2).mean()) / found.otherwise_m)
+    honest = shrunk(boasting(factor), {}, 1.0, found, inputs, off, 1)
     there, _ = made_inputs(2000, seed=3)
     found = honest(there)
     # 1,800 scores and 6,000 coordinates: standard errors of 0.5 and 0.3 %.
     inside = np.abs(np.random.default_rng(4).normal(size=(2000, 3)) * spread(there)) < NORMAL_WIDTH * found.std
     assert 0.935 < inside.mean() < 0.965
     np.testing.assert_allclose(found.std / spread(there), (found.std / spread(there))[0, 0])
+
+
+def test_a_regression_that_states_no_deviations_has_those_of_poses_left_out():
+    inputs, residual = made_inputs(90, seed=1)
+    found = chosen_of([extra_trees], inputs, residual)
+    there, truth = made_inputs(2000, seed=3)
+    prediction = found.predictor(there)
+    assert found.spread.times is None and np.ptp(prediction.std) == 0.0
+    assert (np.abs(truth - prediction.mean) < NORMAL_WIDTH * prediction.std).mean() > 0.9

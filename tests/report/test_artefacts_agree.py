@@ -65,10 +65,13 @@ def assert_agree(folder):
     faulty = verdict["probabilities"] is None
     for name, text in (texts | {"the terminal": terminal}).items():
         errors = verdict["heldout"]
-        before, after = (errors[stage]["rms_m"] for stage in ("uncalibrated", "after"))
-        stated = [] if faulty else re.findall(r"([\d.]+) ?→ ?([\d.]+) mm(?: ?\(noise ([\d.]+)\))?", text)
+        regressed = errors["delivered"] != errors["after"]
+        stages = ("uncalibrated", *(["after"] if regressed else []), "delivered")
+        figures = " ?→ ?".join([r"([\d.]+)"] * len(stages))
+        stated = [] if faulty else re.findall(rf"{figures} mm(?: ?\(noise ([\d.]+)\))?", text)
         assert faulty or len(stated) == 1, name
-        for value, expected in zip(stated[0] if stated else (), (before, after, errors["noise_floor_rms_m"]), strict=False):
+        wanted = [*(errors[stage]["rms_m"] for stage in stages), errors["noise_floor_rms_m"]]
+        for value, expected in zip(stated[0] if stated else (), wanted, strict=False):
             assert (not value and not expected) or close(value, 1e3 * expected), name
     for name, text in texts.items():
         for effect in [] if faulty else verdict["effects"]:

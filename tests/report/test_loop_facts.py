@@ -98,6 +98,10 @@ def test_the_headline_has_the_robot_as_it_was_and_as_it_is_and_its_caption_what_
     said = campaign_sentences(CAMPAIGNS["named"])
     assert said["headline_line"] == ["0.171 → 0.084 mm (noise 0.050), RMS position error on 10 validation poses"]
     assert "The declared model, fitted, leaves 0.120 mm." in said["headline_caption"][0] and len(said["cost"]) == 1
+    regressed = verdict_document("named", [effect_entry()], remainder=remainder_facts())
+    assert campaign_sentences(regressed)["headline_line"] == [
+        "0.171 → 0.084 → 0.060 mm (noise 0.050), RMS position error on 10 validation poses: before, by physics, as delivered"
+    ]
     assert "noise" not in campaign_sentences(CAMPAIGNS["noise not known"])["headline_line"][0]
     assert campaign_sentences(CAMPAIGNS["fault of the data"])["headline_line"] == []
 
@@ -215,7 +219,7 @@ def test_what_a_regression_adds_is_said_with_shares_intervals_and_where_it_corre
     assert "RMS error of 60.0 µm (95 %: 50.0 µm to 72.0 µm) instead of 84.0 µm: a change of the error by −31 to +5 %" in words
     assert "the effects explain 51.0 % and the regression 24.0 %; 25.0 % is left" in words
     assert "± 100 µm within the range of the fitted poses, ± 400 µm outside (median of a coordinate), hold 95 %" in words
-    assert "At the 3 poses outside the range of the fitted ones it corrects nothing" in words
+    assert "At the 3 poses beyond the fitted joints or loads it corrects nothing" in words
     assert "outside" not in said(remainder_facts()) and said(None) == ""
     none = said(remainder_facts() | {"regression": ""})
     assert none.startswith("What the final model leaves shows no pattern") and none.endswith("none is used.")

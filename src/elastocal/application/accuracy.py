@@ -4,7 +4,8 @@ The error at a pose is the real robot less the commanded model, in a frame (`fra
 uncertainty of the parameters leaves; the repeatability of the joints and the error that each new pose has of its own; what the
 form of the model leaves open, by what other models of the diagnosis predict, or held-out poses where these show more; and all
 of what the fit ascribes to effects that no command contains, such as a step of the set-up, for nothing shows that they leave
-the robot alone. Nothing of the tracker's noise is in it.
+the robot alone. Where a regression on the remainder acts, the first two are no smaller than poses left out of it say, and what
+is open of the form is in them unless held-out poses show more. Nothing of the tracker's noise is in it.
 """
 
 from __future__ import annotations
@@ -17,13 +18,16 @@ from scipy.special import gammaincinv
 
 from elastocal.application.calibrated import (
     OperatingConditions,
+    Remainder,
     calibrate_by_model,
     forward,
+    inputs_at,
     move_to_end_effector,
     moves_robot,
     nominal_forward,
     observations_of,
     pose_sensitivities,
+    regression_acts,
     square_root,
 )
 from elastocal.application.frames import BASE, FRAMES, ROBOT, Scope, find_absorbed, free_parts, placement
@@ -33,18 +37,17 @@ from elastocal.fitting.noise import hidden_repeatability
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.pose_differences import pose_differences
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import States
+    from elastocal.remainder.protocol import Predictor
+    from elastocal.remainder.tuning import Spread
 
 PREDICTED, MEASURED = "predicted", "measured"
 REGION = "the poses and loads that were fitted"
@@ -69,8 +72,9 @@ class Accuracy:
     the worst of them; with one-sided confidence below `rms_bound_m`, `worst_bound_m`, None where nothing says so. `noise`: what
     became of the tracker's noise. `region`: which poses these are. `offset_removed`, `left_out`, `contradicted`: as in
     `frames.Scope`. `left_out_m`, `form_m`, `repeated_m`: of `rms_m`, by what is left out, by what the form of the model leaves
-    open, by the repeatability of the joints and the error that each pose has of its own. `fitted`: whether anything of the
-    robot was; without, no error of 0 is one.
+    open, by the repeatability of the joints and the error that each pose has of its own; `regression_m`: by what a regression
+    on the remainder leaves beyond parameters and repeatability. `fitted`: whether anything of the robot was; without, no error
+    of 0 is one.
     """
 
     frame: str
@@ -88,6 +92,7 @@ class Accuracy:
     form_m: float = 0.0
     contradicted: bool = False
     repeated_m: float = 0.0
+    regression_m: float = 0.0
     confidence: float = CONFIDENCE
     fitted: bool = True
 
@@ -106,13 +111,15 @@ class Prediction:
     """Predicted errors at N poses.
 
     `parameters_m`, `repeated_m` (N,): root mean square by the uncertainty of the parameters, and by what each approach and each
-    pose has of its own. `std_rad` (N,): of orientation, by both. `error_m` (N,): by both, by the form of the model and by what
-    is not commanded. `bound_m` (N,): below which each error is with `CONFIDENCE`. `rms_m`, `worst_m` (draws,): over the poses,
-    of robots that the fit leaves possible.
+    pose has of its own. `regression_m`, `form_m` (N,): by what a regression leaves beyond both, and by the form of the model.
+    `std_rad` (N,): of orientation. `error_m` (N,): by all of these and by what is not commanded. `bound_m` (N,): below which
+    each error is with `CONFIDENCE`. `rms_m`, `worst_m` (draws,): over the poses, of robots that the fit leaves possible.
     """
 
     parameters_m: np.ndarray
     repeated_m: np.ndarray
+    regression_m: np.ndarray
+    form_m: np.ndarray
     std_rad: np.ndarray
     error_m: np.ndarray
     bound_m: np.ndarray
@@ -122,7 +129,7 @@ class Prediction:
 
     def accuracy(self, region: str) -> Accuracy:
         """The statement over these poses, named in words."""
-        names = ("frame", "offset_removed", "left_out", "left_out_m", "form_m", "contradicted")
+        names = ("frame", "offset_removed", "left_out", "left_out_m", "contradicted")
         return Accuracy(
             kind=PREDICTED,
             rms_m=_rms(self.error_m),
@@ -133,6 +140,8 @@ class Prediction:
             poses=len(self.error_m),
             region=region,
             repeated_m=_rms(self.repeated_m),
+            regression_m=_rms(self.regression_m),
+            form_m=_rms(self.form_m),
             fitted=bool(self.parameters_m.any()),
             **{name: getattr(self.scope, name) for name in names},
         )
@@ -152,7 +161,8 @@ def predict_errors(
     freedom = scope.repeated_freedom
     size = np.sqrt(stream.gamma(0.5 * freedom, 2.0 / freedom, draws)) if freedom else np.ones(draws)
     total, worst = np.zeros(draws), np.zeros(draws)
-    parts = []
+    acts, stated = _by_regression(calibrated, reported_angles, operating)
+    parts, more = [], np.zeros_like(stated)
     for start in range(0, len(reported_angles), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
         angles, under = reported_angles[part], operating.part(part)
@@ -160,27 +170,49 @@ def predict_errors(
         moved = (pose_sensitivities(calibrated, angles, under) - columns @ scope.absorbed) @ root
         apart = jacobians(robot.chain, robot.model_angles(angles), robot.chain.end_effector) * repeated
         parts.append([each @ each.transpose(0, 2, 1) for each in (moved, apart)])
+        known = np.trace((parts[-1][0] + parts[-1][1])[:, :3, :3], axis1=1, axis2=2)
+        more[:, part] = np.maximum(stated[:, part] - known, 0.0)
         off = moved[:, :3] @ drawn + apart[:, :3] @ (size * stream.standard_normal((len(angles), apart.shape[2], draws)))
+        if acts[part].any():
+            off += np.sqrt(more[0, part] / 3.0)[:, None, None] * stream.standard_normal(off.shape)
         squares = (off**2).sum(axis=1)
         total += squares.sum(axis=0)
         worst = np.maximum(worst, squares.max(axis=0))
     covariances = [np.concatenate(each) for each in zip(*parts, strict=True)]
     ours, own = (np.diagonal(covariance, axis1=1, axis2=2) for covariance in covariances)
-    left_out, form = scope.left_out_m**2, scope.form_m**2
+    left_out, form = scope.left_out_m**2, np.where(acts & (not scope.contradicted), 0.0, scope.form_m**2)
+    alike = (more[1] + form) / 3.0
     # An error of form is one law over all poses: what is open is how large it is.
-    unknown = form * stream.standard_normal(draws) ** 2
+    unknown = form.mean() * stream.standard_normal(draws) ** 2
     return Prediction(
         parameters_m=np.sqrt(ours[:, :3].sum(axis=1)),
         repeated_m=np.sqrt(own[:, :3].sum(axis=1)),
+        regression_m=np.sqrt(more[0]),
+        form_m=np.sqrt(form),
         std_rad=np.sqrt((ours + own)[:, 3:].sum(axis=1)),
-        error_m=np.sqrt((ours + own)[:, :3].sum(axis=1) + left_out + form),
+        error_m=np.sqrt((ours + own)[:, :3].sum(axis=1) + more[0] + left_out + form),
         bound_m=np.sqrt(
-            quantile_of_length((covariances[0] + covariances[1])[:, :3, :3] + form / 3.0 * np.eye(3)) ** 2 + left_out
+            quantile_of_length((covariances[0] + covariances[1])[:, :3, :3] + alike[:, None, None] * np.eye(3)) ** 2 + left_out
         ),
         rms_m=np.sqrt(total / len(reported_angles) + left_out + unknown),
         worst_m=np.sqrt(worst + scope.left_out_worst_m**2 + _WORST_OF_FORM * unknown),
         scope=scope,
     )
+
+
+def _by_regression(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where a regression acts, (N,), and the squared error that it leaves there without the tracker's noise, (2, N), m²: on the
+    average, and for intervals."""
+    acts = regression_acts(calibrated, reported_angles, operating)
+    found, more = np.zeros((2, len(acts))), calibrated.remainder
+    if more is not None:
+        std = more.predictor(inputs_at(calibrated, reported_angles[acts], operating.part(acts))).std
+        assert std is not None, "every regression that was chosen has intervals"
+        for number, times in enumerate((more.typical, 1.0)):
+            found[number, acts] = np.maximum((times**2 * std**2 - more.sensor_m**2).sum(axis=1), 0.0)
+    return acts, found
 
 
 def _under(scope: Scope, operating: OperatingConditions) -> Scope:
@@ -218,18 +250,37 @@ def before_m(calibrated: CalibratedRobot, position: np.ndarray, rotation: np.nda
     return np.linalg.norm((off - placement(scope, position, rotation) @ scope.absorbed_before)[:, :3], axis=1)
 
 
-def calibrate_on_case(case: Case, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
+def calibrate_on_case(
+    case: Case, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise, remainder: Remainder | None = None
+) -> CalibratedRobot:
     """A calibrated robot from a model that was fitted to a case, as `calibrate_by_model`, that knows what its errors mean.
 
+    `remainder`: of `regression_on`.
     Where the sensor hides how well each joint repeats, all are taken to repeat alike, by what the repeats leave possible.
     """
     robot, states, freedom = case.campaign.robot, case.observations.states, 0.0
     if noise.source == "repeats" and not noise.joint_rad.any():
         alike, freedom = hidden_repeatability(model, estimate, case.campaign.measurements)
         noise = replace(noise, joint_rad=np.full(robot.joints, alike))
-    found = replace(calibrate_by_model(robot, model, estimate, covariance, noise), fitted=states)
+    found = replace(calibrate_by_model(robot, model, estimate, covariance, noise), fitted=states, remainder=remainder)
     scope = scope_of(found, model, estimate, covariance, states)
     return replace(found, scope=replace(scope, repeated_freedom=freedom))
+
+
+def regression_on(
+    case: Case, estimate: Estimate, predictor: Predictor | None, spread: Spread | None, noise_m: float
+) -> Remainder | None:
+    """A regression on what a model leaves of a case, for the end effector; none where no target was on it.
+
+    `noise_m`: of the tracker, as the campaign knows it: where the model leaves something, the fit takes it for noise.
+    """
+    end = case.campaign.robot.chain.end_effector
+    mine = [number for number, target in enumerate(case.campaign.targets) if target.point == end.name]
+    if predictor is None or spread is None or not mine:
+        return None
+    place = min(estimate.target_offset[mine], key=lambda offset: float(np.linalg.norm(offset - end.offset_m)))
+    sensor = noise_m * float(np.sqrt((1.0 / case.observations.states.repeats).mean()))
+    return Remainder(predictor, place, sensor, spread.typical)
 
 
 def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> Scope:
@@ -301,25 +352,27 @@ def set_form(calibrated: CalibratedRobot, form_m: float, contradicted: bool = Fa
     return replace(calibrated, scope=replace(calibrated.scope, form_m=form_m, contradicted=contradicted))
 
 
-def judge_by_held_out(calibrated: CalibratedRobot, final: Fit, case: Case, held_out: Case) -> CalibratedRobot:
+def judge_by_held_out(calibrated: CalibratedRobot, held_out: Case, residual: np.ndarray, noise_m: float) -> CalibratedRobot:
     """A calibrated robot whose predicted errors are as large as its held-out poses say, where these contradict them.
+
+    `residual` (M, 3): what it leaves of them, m. `noise_m`: of the tracker in a coordinate.
 
     By the mean square over targets at the end effector: it must be larger than those of robots and of noise that are drawn as
     predicted. What it is more counts as error of the model's form. Nothing changes where the noise is not known.
     """
-    end = case.campaign.robot.chain.end_effector.name
+    end = calibrated.robot.chain.end_effector.name
     seen, states = held_out.observations, held_out.observations.states
     mine = np.array([target.point == end for target in held_out.campaign.targets])[seen.target]
-    if final.noise.source == "residual" or not mine.any():
+    if calibrated.noise.source == "residual" or not mine.any():
         return calibrated
     state = seen.state[mine]
     found = predict_errors(calibrated, calibrated.robot.reported_angles(states.joint_angles), conditions_in(calibrated, states))
-    sensor = final.noise.position_m**2 / states.repeats[state]
-    noise = sensor @ np.random.default_rng(_SEED).chisquare(3, (len(state), len(found.rms_m))) / len(state)
-    square = float((position_residuals(*placed(final, case, held_out), seen)[mine] ** 2).sum(axis=1).mean())
-    if (found.rms_m**2 + noise < square).mean() <= CONFIDENCE:
+    sensor = noise_m**2 / states.repeats[state]
+    drawn = sensor @ np.random.default_rng(_SEED).chisquare(3, (len(state), len(found.rms_m))) / len(state)
+    square = float((residual[mine] ** 2).sum(axis=1).mean())
+    if (found.rms_m**2 + drawn < square).mean() <= CONFIDENCE:
         return calibrated
-    known = (found.error_m[state] ** 2).mean() - calibrated.scope.form_m**2
+    known = (found.error_m[state] ** 2 - found.form_m[state] ** 2).mean()
     return set_form(calibrated, float(np.sqrt(square - 3.0 * sensor.mean() - known)), contradicted=True)
 
 

@@ -1,9 +1,9 @@
 """The robot as corrected: the final model of a diagnosis without what belongs to one campaign's set-up and its instruments.
 
 All that uses it (`accuracy`, `compensation`, `certificate`, `forward_model`) asks the same of it: where it comes to rest
-(`come_to_rest`, `forward`), how surely (`pose_sensitivities` with its covariance, noise and scope), and where it was fitted
-(`beyond_fitted`). Poses are those of the end effector's measuring point in the robot's base frame: that of the chain, which the
-fit placed under the tracker. How far tool and work frame are known is another matter, and in no figure here.
+(`come_to_rest` and `regressed`, `forward`), how surely (`pose_sensitivities` with its covariance, noise and scope), and where
+it was fitted (`beyond_fitted`). Poses are those of the end effector's measuring point in the robot's base frame: that of the
+chain, which the fit placed under the tracker. How far tool and work frame are known is another matter, and in no figure here.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.kinematics import poses
+from elastocal.remainder.corrected import beyond_regressed, inputs_of
 from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
 
 if TYPE_CHECKING:
@@ -30,11 +31,26 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
+    from elastocal.remainder.protocol import Inputs, Predictor
 
 # States at a time: what a walk along all sites makes of them stays in the processor's cache.
 _AT_ONCE = 1024
 # °C, at which dimensions are stated (ISO 1).
 _REFERENCE_C = 20.0
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """A regression on what the model leaves, added to it where joints and loads were fitted.
+
+    `place` (3,): of the target in the end effector's measuring point for which it was fitted, m. `sensor_m`: deviation of the
+    tracker's noise in a coordinate of what it was fitted to, which its intervals contain. `typical`: as of `tuning.Spread`.
+    """
+
+    predictor: Predictor
+    place: np.ndarray
+    sensor_m: float
+    typical: float
 
 
 @dataclass(frozen=True)
@@ -46,6 +62,7 @@ class CalibratedRobot:
     frame is the robot's base. `covariance` (P, P): of the parameters of the effects (linear, then shapes, effect by effect),
     marginal over frames, targets and all effects that are left out; zero where held. `noise`: of the campaign, with the
     repeatability of the joints. `scope`: what its errors mean. `fitted`: the campaign's states; None where they are not known.
+    `remainder`: None where physics alone corrects.
     """
 
     robot: Robot
@@ -55,6 +72,7 @@ class CalibratedRobot:
     noise: Noise
     scope: Scope
     fitted: States | None = None
+    remainder: Remainder | None = None
 
     @property
     def states(self) -> States:
@@ -160,13 +178,40 @@ def forward(
     position, rotation = np.empty((len(reported_angles), 3)), np.empty((len(reported_angles), 3, 3))
     for part in parts(len(reported_angles)):
         _, position[part], rotation[part] = come_to_rest(calibrated, reported_angles[part], operating.part(part))
-    return position, rotation
+    return position + regressed(calibrated, reported_angles, operating), rotation
+
+
+def regressed(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
+    """Displacement of the end effector by the regression on the remainder, ndarray (N, 3), m, base axes; 0 where none acts."""
+    found = np.zeros((len(reported_angles), 3))
+    if calibrated.remainder is not None:
+        acts = regression_acts(calibrated, reported_angles, operating)
+        asked = inputs_at(calibrated, reported_angles[acts], operating.part(acts))
+        found[acts] = calibrated.remainder.predictor(asked).mean
+    return found
+
+
+def regression_acts(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
+    """At which commands (N, n) a regression on the remainder is added, ndarray of bool (N,)."""
+    if calibrated.remainder is None:
+        return np.zeros(len(reported_angles), bool)
+    states = states_of(calibrated, reported_angles, operating)
+    return ~beyond_regressed(calibrated.states, states.joint_angles, states.wrench)
+
+
+def inputs_at(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> Inputs:
+    """What a regression on the remainder is asked of some commands (N, n)."""
+    assert calibrated.remainder is not None
+    seen = observations_of(states_of(calibrated, reported_angles, operating))
+    found = inputs_of(calibrated.model, calibrated.estimate, seen)
+    place = np.broadcast_to(calibrated.remainder.place, (len(found), 3))
+    return replace(found, others=np.hstack([found.others[:, :-3], place]))
 
 
 def come_to_rest(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions, near: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the robot yields to: coordinates (N, C) of its sites, and position and rotation as by `forward`.
+    """Where the robot yields to by its model: coordinates (N, C) of its sites, and position and rotation as by `forward`.
 
     `near` (N, C): coordinates at which the loads are taken, of states that differ little. Without, loads act where the robot
     has yielded to them, by the fixed-point iteration of `displacement.conditions`.

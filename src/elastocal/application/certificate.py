@@ -16,6 +16,7 @@ from elastocal.application.calibrated import (
     forward,
     nominal_forward,
     pose_sensitivities,
+    regression_acts,
     square_root,
     without,
 )
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 _SPRINGS = "joint_compliance"
 TOTAL, UNCERTAINTY, REPEATABILITY = "uncorrected", "uncertainty of the parameters", "repeatability"
 FORM, NOT_COMMANDED = "form of the model", "not commanded"
+REGRESSION, LEFT_BY_REGRESSION = "regression", "left by the regression"
 # Ends of 95 % intervals.
 _ENDS = (0.025, 0.975)
 # ISO 9283 takes three standard deviations beyond the mean, and asks (section 7.2.1) for so many poses, approached so often.
@@ -121,7 +123,7 @@ class WorkspaceErrors:
 
     `joint_angles` (N, n): as the controller reports them, rad. `position` (N, 3): m, base axes. `uncorrected_m` (N,): as
     `accuracy.before_m`. `corrected_m`, `bound_m` (N,): of the corrected robot, as `accuracy.Prediction`. `outside` (N,): beyond
-    the range of the fitted poses.
+    the range of the fitted poses. `regressed` (N,): whether a regression on the remainder is added.
     """
 
     joint_angles: np.ndarray
@@ -130,6 +132,7 @@ class WorkspaceErrors:
     corrected_m: np.ndarray
     bound_m: np.ndarray
     outside: np.ndarray
+    regressed: np.ndarray
 
 
 def draw_angles(calibrated: CalibratedRobot, count: int, stream: np.random.Generator) -> np.ndarray:
@@ -145,15 +148,16 @@ def workspace_errors(calibrated: CalibratedRobot, reported_angles: np.ndarray, w
     off = pose_differences(*nominal_forward(calibrated.robot, reported_angles), position, rotation)
     before, after = before_m(calibrated, position, rotation, off), predict_errors(calibrated, reported_angles, operating, 0)
     outside = beyond_fitted(calibrated, reported_angles)[0]
-    return WorkspaceErrors(reported_angles, position, before, after.error_m, after.bound_m, outside)
+    acts = regression_acts(calibrated, reported_angles, operating)
+    return WorkspaceErrors(reported_angles, position, before, after.error_m, after.bound_m, outside, acts)
 
 
 @dataclass(frozen=True)
 class Share:
     """A line of the budget.
 
-    `name`: an effect by its name in the catalogue, ``joint_compliance``, or `TOTAL`, `UNCERTAINTY`, `REPEATABILITY`, `FORM` or
-    `NOT_COMMANDED`. `low_m`, `high_m`: 95 % interval by the covariance of the parameters; None where the line has none.
+    `name`: an effect by its name in the catalogue, ``joint_compliance``, or one of the constants above: `TOTAL` to
+    `LEFT_BY_REGRESSION`. `low_m`, `high_m`: 95 % interval by the covariance of the parameters; None where the line has none.
     """
 
     name: str
@@ -206,15 +210,17 @@ def error_budget(
         TOTAL: before_m(calibrated, *pose, off),
         UNCERTAINTY: rest.parameters_m,
         REPEATABILITY: rest.repeated_m,
-        FORM: np.full(1, rest.scope.form_m),
+        LEFT_BY_REGRESSION: rest.regression_m,
+        FORM: rest.form_m,
         NOT_COMMANDED: np.full(1, rest.scope.left_out_m),
     }
     total, *ends = (Share(name, float(np.sqrt((length**2).mean()))) for name, length in lengths.items())
-    return [total, *shares, *(end for end in ends if end.rms_m or end.name not in (FORM, NOT_COMMANDED))]
+    return [total, *shares, *(end for end in ends if end.rms_m or end.name in (UNCERTAINTY, REPEATABILITY))]
 
 
 def effect_costs(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> dict[str, float]:
-    """RMS error in m over some states if one effect alone were left out of the correction, by effect; compliances last.
+    """RMS error in m over some states if one effect alone were left out of the correction, by effect; compliances come after
+    effects, and a regression on the remainder last.
 
     In the frame of the robot's scope: what a new placement of its base takes up is no error there.
 
@@ -222,9 +228,11 @@ def effect_costs(calibrated: CalibratedRobot, reported_angles: np.ndarray, opera
     """
     pose, costs = forward(calibrated, reported_angles, operating), {}
     names = [effect.effect for effect in calibrated.model.effects]
-    for name in dict.fromkeys([*names, _SPRINGS]):
+    for name in dict.fromkeys([*names, _SPRINGS, *([REGRESSION] if calibrated.remainder else [])]):
         other = without(calibrated, {number for number, each in enumerate(names) if each == name})
-        if name not in names:
+        if name == REGRESSION:
+            other = replace(calibrated, remainder=None)
+        elif name not in names:
             # Compliances as declared are no effect of the model.
             other = replace(other, model=replace(other.model, nominal_compliance=0.0 * other.model.nominal_compliance))
         apart = pose_differences(*pose, *forward(other, reported_angles, operating))[..., None]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import come_to_rest, parts
+from elastocal.application.calibrated import come_to_rest, parts, regressed
 from elastocal.application.inverse_kinematics import SOLVED_M, allowed_steps, along_path, find_beyond_limits, reach_m, refine
 from elastocal.exchange.target_path import OK
 from elastocal.mechanics.kinematics import jacobians
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 
 OUTSIDE_LIMITS, UNREACHABLE, SINGULAR = "outside limits", "unreachable", "singular"
 OTHER_POSTURE = "not in the stated posture"
-# Newton's steps: each leaves a five-hundredth, and more near singular postures.
-_STEPS = 8
+# Newton's steps: each leaves a five-hundredth, and more near singular postures. What a regression adds is taken anew after the
+# first so many of them: each leaves a thousandth of it, and what has jumps would keep others from settling.
+_STEPS, _REGRESSED = 8, 2
 # What may be left of a corrected target: far below any robot's repeatability.
 _CORRECTED_M = 1e-9
 # A correction turns joints by milliradians. Where one must turn by this much (rad, or m) the robot stands so near a singular
@@ -135,14 +136,15 @@ def _find_chunk_targets(
     reached = left <= SOLVED_M
     scale = np.repeat([1.0, reach_m(robot)], 3)
     uncorrected = robot.reported_angles(nominal)
-    coordinates, *pose = come_to_rest(calibrated, uncorrected, operating)
-    before = pose_differences(position, rotation, *pose)
+    coordinates, at, turned = come_to_rest(calibrated, uncorrected, operating)
+    added = regressed(calibrated, uncorrected, operating)
+    before = pose_differences(position, rotation, at + added, turned)
     inverse = np.linalg.pinv(jacobians(robot.chain, nominal, robot.chain.end_effector))
     angles, off = nominal.copy(), before.copy()
     singular = np.zeros(len(angles), bool)
     # Rows that need another step: near singular postures more than elsewhere.
     moving = np.flatnonzero(reached)
-    for _ in range(_STEPS):
+    for number in range(_STEPS):
         step = (inverse[moving] @ off[moving, :, None])[..., 0]
         far = np.abs(angles[moving] + step - nominal[moving]).max(axis=1) > _LARGEST_CORRECTION
         singular[moving[far]] = True
@@ -150,8 +152,11 @@ def _find_chunk_targets(
         angles[moving] += step
         coordinates[moving, :joints] += step
         commands = robot.reported_angles(angles[moving])
-        coordinates[moving], *pose = come_to_rest(calibrated, commands, operating.part(moving), coordinates[moving])
-        off[moving] = pose_differences(position[moving], rotation[moving], *pose)
+        under = operating.part(moving)
+        coordinates[moving], at, turned = come_to_rest(calibrated, commands, under, coordinates[moving])
+        if number < _REGRESSED:
+            added[moving] = regressed(calibrated, commands, under)
+        off[moving] = pose_differences(position[moving], rotation[moving], at + added[moving], turned)
         moving = moving[np.linalg.norm(off[moving] * scale, axis=1) > _CORRECTED_M]
         if not len(moving):
             break

@@ -2,7 +2,8 @@
 
 A robot file can say offsets and ratios of the joints, in what the controller's angles mean, q = M r + o; errors of a link, as
 six elementary transforms at its far end in the order in which the fit moved it there; compliances and masses. What it cannot
-say, such as a gear's harmonics, stands in a sidecar with all that the forward model takes.
+say, such as a gear's harmonics, stands in a sidecar with all that the forward model takes; a regression on the remainder
+stands in neither.
 """
 
 from __future__ import annotations

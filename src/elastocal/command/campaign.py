@@ -17,9 +17,12 @@ if TYPE_CHECKING:
 AcceptEnvironment = Annotated[
     bool, Option("--accept-environment", help="Use results of other library versions, with a warning.")
 ]
+PhysicsOnly = Annotated[
+    bool, Option("--physics-only", help="Leave out the regression on what the model leaves: correct by named effects alone.")
+]
 
 
-def diagnosed_campaign(folder: Path, accept_environment: bool = False) -> Diagnosed:
+def diagnosed_campaign(folder: Path, accept_environment: bool = False, physics_only: bool = False) -> Diagnosed:
     """A campaign with what its diagnosis found, from the results of the pipeline, and what held-out poses said of its errors.
 
     An InputError refuses what `load_diagnosed` does, and results of another environment unless that is accepted: then a warning
@@ -28,7 +31,7 @@ def diagnosed_campaign(folder: Path, accept_environment: bool = False) -> Diagno
     from elastocal.io.origin import environment
     from elastocal.loop.calibrated_files import load_diagnosed
 
-    found = load_diagnosed(folder, pipeline() / "config" / "robots", workplace())
+    found = load_diagnosed(folder, pipeline() / "config" / "robots", workplace(), physics_only)
     was, now = found.origin["environment"], environment(pipeline())
     other = [name for name in sorted(was | now) if was.get(name) != now.get(name)]
     if other:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer import Argument, Option
 
-from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
+from elastocal.command.campaign import AcceptEnvironment, PhysicsOnly, diagnosed_campaign
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import iso_date, print_answer, printed
 from elastocal.command.quantities import LARGEST_SEED, length_m
@@ -40,6 +40,7 @@ def certificate(
     date: Annotated[str | None, Option(help="Date of the certificate, such as 2026-11-20. Default: today.")] = None,
     output: Annotated[Path | None, Option(help="Folder for both files. Default: the campaign's reports.")] = None,
     seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1,
+    physics_only: PhysicsOnly = False,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Certify a robot against a tolerance: pass, fail or undecided.
@@ -70,7 +71,7 @@ def certificate(
     number = campaign.get("serial_number", "") if serial is None else printed("--serial", serial)
     stated = {"measured_on": campaign.get("measured_on", "")} | campaign.get("certificate", {})
     day = calendar.today().isoformat() if date is None else iso_date("--date", date)
-    found = diagnosed_campaign(folder, accept_environment)
+    found = diagnosed_campaign(folder, accept_environment, physics_only)
     place = output or workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=output or workplace() / "reports")
     after = None if measured is None else measured_errors(measured, robots, found)

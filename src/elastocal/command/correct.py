@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
+from elastocal.command.campaign import AcceptEnvironment, PhysicsOnly, diagnosed_campaign
 from elastocal.command.printed import print_answer, print_lines
 from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
@@ -51,12 +51,14 @@ def correct(
         bool,
         Option("--allow-large-steps", help="Accept joints that turn by more than 5 times what the path turns, and 10 degrees."),
     ] = False,
+    physics_only: PhysicsOnly = False,
     partial: Annotated[bool, Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.
 
-    Loads, weight and every effect found are compensated, and each target states by how much the robot will miss it. Posture and
+    Loads, weight and every effect found are compensated, and where joints and loads were fitted what a regression predicts of
+    the rest, if the diagnosis chose one. Each target states by how much the robot will miss it. Posture and
     turns of the joints are those that move the robot least; where q1..qn state them they are kept. A joint that swings from
     target to target, or a stated posture that does not reach its target, is refused with its line.
     Predicted errors are stated as `elastocal certificate` states them: in the frame of the declared base, or, where the base is
@@ -69,7 +71,7 @@ def correct(
     from rich.progress import Progress
 
     from elastocal.application.accuracy import accuracy_sentence, before_m, campaign_accuracy, predict_errors
-    from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted
+    from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted, regressed
     from elastocal.application.compensation import find_joint_targets
     from elastocal.diagnosis.misplaced import point_sentence
     from elastocal.exchange.controllers.protocol import axes_of, check_name, targets_of
@@ -86,7 +88,7 @@ def correct(
     check_places(table, program)
     if not output.parent.is_dir():
         raise InputError(output, "", "no such folder", "a file in a folder that is there")
-    campaign = diagnosed_campaign(folder, accept_environment)
+    campaign = diagnosed_campaign(folder, accept_environment, physics_only)
     calibrated = campaign.calibrated
     prismatic = calibrated.robot.chain.prismatic
     named = axes_of(controller, prismatic, axes) if controller else ()
@@ -140,6 +142,12 @@ def correct(
     lines = [*error_lines(campaign.verdict, *stated), *lines]
     if good.any():
         lines += [accuracy_sentence(campaign_accuracy(calibrated)), point_sentence(campaign.case.campaign)]
+    if calibrated.remainder is not None:
+        added = np.linalg.norm(regressed(calibrated, found.joint_angles[good], operating.part(good)), axis=1)
+        size = f"{1e3 * np.sqrt((added[added > 0.0] ** 2).mean()):.3f} mm RMS" if added.any() else "nothing"
+        words = campaign.verdict["remainder"]["words"]
+        acts = f"{grouped((added > 0.0).sum())} of {counted(len(added), 'target')}"
+        lines.append(f"a {words} on what the model leaves corrects {acts} by {size}; --physics-only leaves it out")
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
         lines.append(f"{program.name} goes to {share}: {controller.WORDS}, {called}")
@@ -232,7 +240,7 @@ def _joint_targets(
         "predicted_error_before_m": before,
         "predicted_error_after_m": errors.error_m,
         "predicted_bound_m": np.where([each.startswith(NO_BOUND) for each in status], np.nan, errors.bound_m),
-        "predicted_std_m": np.hypot(errors.parameters_m, errors.repeated_m),
+        "predicted_std_m": np.sqrt(errors.parameters_m**2 + errors.repeated_m**2 + errors.regression_m**2),
         "predicted_rotation_before_rad": np.linalg.norm(found.error_before[:, 3:], axis=1),
         "predicted_rotation_std_rad": errors.std_rad,
         "repeatability_m": errors.repeated_m,

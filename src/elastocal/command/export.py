@@ -35,7 +35,8 @@ def export(
 ) -> None:
     """Write the calibrated robot: robot file, URDF, DH, effects.
 
-    URDF and DH parameters hold the geometry; effects.json holds springs and effects as well.
+    URDF and DH parameters hold the geometry; effects.json holds springs and effects as well. None holds the regression on the
+    remainder: what is lost with it is said, and the accuracy stated is without.
     """
     from datetime import date as calendar
 
@@ -44,7 +45,7 @@ def export(
     from rich.console import Console
 
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
-    from elastocal.application.calibrated import OperatingConditions
+    from elastocal.application.calibrated import OperatingConditions, regressed
     from elastocal.application.forward_model import find_left_out_m, fold_effects, sidecar
     from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
@@ -55,7 +56,9 @@ def export(
     check_places(*(output / name for name in _NAMES))
     if urdf is not None and (output / URDF).resolve() == urdf.resolve():
         raise InputError(urdf, "", "the file that would be replaced", "a URDF outside of --output")
-    found = diagnosed_campaign(folder, accept_environment)
+    whole = diagnosed_campaign(folder, accept_environment)
+    # No file has the regression: what stands in them is of a robot without.
+    found = whole if whole.calibrated.remainder is None else diagnosed_campaign(folder, accept_environment, physics_only=True)
     calibrated = found.calibrated
     robot = fold_effects(calibrated).robot
     drop_in = None if urdf is None else write_calibrated_origins(urdf, calibrated.robot, robot)
@@ -77,14 +80,21 @@ def export(
             lines += _drop_in(drop_in, partial / URDF, calibrated.robot, robot, found.case.observations.states.joint_angles)
         write_json(partial / SIDECAR, document)
         lines += _denavit_hartenberg(calibrated.robot, robot, partial, output)
+    states = found.case.observations.states
+    at = calibrated.robot.reported_angles(states.joint_angles)
+    under = OperatingConditions(states.wrench, None, states.time_s, states.temperature_c)
     if document["effects"]:
-        states = found.case.observations.states
-        angles = calibrated.robot.reported_angles(states.joint_angles)
-        off = find_left_out_m(calibrated, angles, OperatingConditions(states.wrench, None, states.time_s, states.temperature_c))
         names = ", ".join(entry["key"] for entry in document["effects"])
-        largest, rms = 1e3 * off.max(), 1e3 * np.sqrt((off**2).mean())
-        lines.insert(0, f"! only {SIDECAR} holds {names}: up to {largest:.3f} mm at the measured poses ({rms:.3f} mm RMS)")
+        lines.insert(0, f"! only {SIDECAR} holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
+    if found is not whole:
+        words, lost = whole.verdict["remainder"]["words"], np.linalg.norm(regressed(whole.calibrated, at, under), axis=1)
+        lines.insert(0, f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}")
     print_answer(True, f"{found.name}: calibrated robot in {output}", lines, "", console)
+
+
+def _sizes(off: np.ndarray) -> str:
+    """How far something moves the end effector (N,), m, in words."""
+    return f"up to {1e3 * off.max():.3f} mm at the measured poses ({1e3 * float((off**2).mean()) ** 0.5:.3f} mm RMS)"
 
 
 def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, angles: np.ndarray) -> list[str]:

@@ -19,7 +19,7 @@ from elastocal.fitting.displacement import conditions
 from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
-from elastocal.remainder.corrected import Plan, remainder_facts
+from elastocal.remainder.corrected import Plan, corrected, remainder_facts
 from elastocal.validation.fitted_range import outside_poses, repeat_warnings
 from elastocal.validation.held_out import (
     METRICS,
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.diagnose import Diagnosis, Step
     from elastocal.fitting.case import Case
     from elastocal.fitting.model import Estimate, Model
+    from elastocal.remainder.corrected import Corrected
     from elastocal.validation.held_out import Errors
 
 _REPLICATES = 1000
@@ -55,7 +56,8 @@ class Verdict:
     """A diagnosis with what held-out poses say of it.
 
     `document`: contents of verdict.json. `rows`: of before_after.csv. `held_out`: what was held out, without its gross errors.
-    `left_out`: these. `outside` (P,) of bool: poses held out that lie outside the range of the fitted ones.
+    `left_out`: these. `outside` (P,) of bool: poses held out that lie outside the range of the fitted ones. `delivered`: what
+    the final model and a regression leave of the held-out poses; None where there is none.
     """
 
     document: dict[str, Any]
@@ -63,6 +65,7 @@ class Verdict:
     held_out: Case
     left_out: Measurements
     outside: np.ndarray
+    delivered: Corrected | None
 
 
 def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
@@ -89,12 +92,11 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     # By what share each step lowers the held-out RMS.
     pairs = [(last, row) for last, row in pairwise(rows) if row["kind"] == "effect"]
     gains = {row["step"].removeprefix("with "): float(1 - row["heldout_rms_m"] / last["heldout_rms_m"]) for last, row in pairs}
-    found, campaign, remainder = diagnosis.document, case.campaign, None
-    if campaign.remainder != NO_REMAINDER and not data_at_fault(found):
-        # Poses held out at random have neighbours among those fitted; others have none, nor may those that set the intervals.
-        plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
-        draws = stream(seed, campaign.name, "remainder", 0)
-        remainder = remainder_facts(plan, diagnosis.declared, diagnosis.final, case, part, outside, draws)
+    found, remainder, delivered = diagnosis.document, None, as_delivered(diagnosis, part, seed)
+    if delivered is not None:
+        draws = stream(seed, case.campaign.name, "remainder", 0)
+        remainder = remainder_facts(delivered, diagnosis.declared, diagnosis.final, case, part, draws)
+    heldout["delivered"] = remainder["errors"] if remainder else heldout["after"]
     document = found | {
         "effects": [entry | {"heldout_gain": gains.get(entry["name"])} for entry in found["effects"]],
         "heldout": heldout,
@@ -102,7 +104,17 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
         "gross_errors": [*found["gross_errors"], *left_out],
         "warnings": [*found["warnings"], *warnings_of(left_out), *warnings],
     }
-    return Verdict(document, rows, part, held_out.campaign.measurements.select(errors.gross), outside)
+    return Verdict(document, rows, part, held_out.campaign.measurements.select(errors.gross), outside, delivered)
+
+
+def as_delivered(diagnosis: Diagnosis, held_out: Case, seed: int) -> Corrected | None:
+    """The final model with the regression that a campaign asks for, on held-out poses without gross errors; None for none."""
+    campaign = diagnosis.case.campaign
+    if campaign.remainder == NO_REMAINDER or data_at_fault(diagnosis.document):
+        return None
+    # Poses held out at random have neighbours among those fitted; others have none, nor may those that set the intervals.
+    plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
+    return corrected(plan, diagnosis.final, diagnosis.case, held_out)
 
 
 def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case, np.ndarray]:

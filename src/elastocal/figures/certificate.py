@@ -19,7 +19,7 @@ _FEWEST = 3
 # Light to dark: the larger error is the darker one, in grey too.
 _COLOURS = "viridis_r"
 # What is left however well the robot is corrected.
-_REST = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded")
+_REST = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded", "left by the regression")
 TRACKER = "tracker"
 _KINDS = {
     "uncorrected": ("#b9b9b9", "without any correction"),
@@ -45,6 +45,9 @@ def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], to
             image = _panel(axis, errors, found, scale, tolerance_m)
             axis.set_title(f"{title}, {load}")
         row[0].set_ylabel("height above the base (m)")
+        if errors.regressed.any():
+            acts, edges = _grid(errors, errors.regressed.astype(float))
+            _mark(row[1], edges, acts > 0.0, "....", "#000000aa")
     for axis in axes[-1]:
         axis.set_xlabel("distance from the base's vertical axis (m)")
     bar = figure.colorbar(image, ax=axes.ravel().tolist(), label="predicted RMS position error (mm)")
@@ -54,6 +57,9 @@ def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], to
         Line2D([], [], color="black", lw=1.6, label=f"tolerance {MILLI * tolerance_m:g} mm"),
         Patch(facecolor="none", edgecolor="#555555", hatch="////", lw=0.0, label="mostly beyond the range of the fitted poses"),
     ]
+    if any(errors.regressed.any() for errors in maps):
+        words = "some poses corrected by the regression too"
+        handles.append(Patch(facecolor="none", edgecolor="#555555", hatch="....", lw=0.0, label=words))
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 
@@ -75,14 +81,18 @@ def _panel(axis: Axes, errors: WorkspaceErrors, found: np.ndarray, scale: LogNor
     middles = [(ends[1:] + ends[:-1]) / 2 for ends in edges]
     if np.nanmin(found) < tolerance_m < np.nanmax(found):
         axis.contour(*middles, found.T, levels=[tolerance_m], colors="black", linewidths=1.6)
-    beyond = np.isfinite(found) & (outside > 0.5)
-    size = edges[0][1] - edges[0][0], edges[1][1] - edges[1][0]
-    for across, up in np.argwhere(beyond):
-        corner = edges[0][across], edges[1][up]
-        axis.add_patch(Rectangle(corner, *size, fill=False, hatch="////", lw=0.0, edgecolor="#ffffffaa"))
+    _mark(axis, edges, np.isfinite(found) & (outside > 0.5), "////", "#ffffffaa")
     axis.set_aspect("equal")
     axis.grid(visible=False)
     return image
+
+
+def _mark(axis: Axes, edges: list[np.ndarray], cells: np.ndarray, hatch: str, color: str) -> None:
+    """Hatch some cells (bins, bins) of a map."""
+    size = edges[0][1] - edges[0][0], edges[1][1] - edges[1][0]
+    for across, up in np.argwhere(cells):
+        corner = edges[0][across], edges[1][up]
+        axis.add_patch(Rectangle(corner, *size, fill=False, hatch=hatch, lw=0.0, edgecolor=color))
 
 
 @styled

@@ -42,6 +42,7 @@ _DRAWS, _REPLICATES = 2000, 2000
 _LIBRARIES = ("elastocal", "numpy", "scipy")
 USE = "the poses and loads of its use"
 _MODELS = {"frames": "uncorrected", "declared": "declared", "effect": "corrected"}
+_METRICS = ("mean_m", "rms_m", "p95_m", "max_m")
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,8 @@ def certificate(
         "verdict": found.verdict["verdict"],
         "effects": [effect["name"] for effect in found.verdict["effects"]],
         "errors": error_rows(found.verdict, *([] if use is None else [(accuracy, uncorrected)])),
-        "held_out": [_step(row) for _, row in found.errors.iterrows()],
+        "held_out": [*(_step(row) for _, row in found.errors.iterrows()), *_delivered(found.verdict)],
+        "regression": (found.verdict["remainder"] or {}).get("words", ""),
         "noise_floor_rms_m": found.verdict["heldout"]["noise_floor_rms_m"],
         "accuracy": (accuracy if measured is None else measured.accuracy).document(),
         "predicted": accuracy.document(),
@@ -158,10 +160,20 @@ def _step(row: pd.Series) -> dict[str, Any]:
     def number(name: str) -> float | None:
         return float(row[name]) if np.isfinite(row[name]) else None
 
-    names = [f"heldout_{metric}{end}" for metric in ("mean_m", "rms_m", "p95_m", "max_m") for end in ("", "_low", "_high")]
+    names = [f"heldout_{metric}{end}" for metric in _METRICS for end in ("", "_low", "_high")]
     return {"model": _MODELS[row["kind"]], "step": row["step"]} | {
         name.removeprefix("heldout_"): number(name) for name in names
     }
+
+
+def _delivered(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The same of the final model with a regression, where there is one."""
+    more = verdict["remainder"]
+    if not more or not more["regression"]:
+        return []
+    ends = dict.fromkeys(f"{name}_{end}" for name in _METRICS for end in ("low", "high"))
+    low, high = more["rms_ci95_m"]
+    return [{"model": "delivered", "step": more["words"]} | more["errors"] | ends | {"rms_m_low": low, "rms_m_high": high}]
 
 
 def _worst_pose(robot: Robot, reported_angles: np.ndarray, error_m: np.ndarray) -> dict[str, Any]:
@@ -186,4 +198,5 @@ def _summary(force_N: float, errors: WorkspaceErrors) -> dict[str, Any]:
         "bound": quantiles(errors.bound_m),
         "bound_inside": quantiles(errors.bound_m[inside]) if inside.any() else None,
         "share_outside": float(errors.outside.mean()),
+        "share_regressed": float(errors.regressed.mean()),
     }

@@ -29,7 +29,7 @@ def error_rows(verdict: Mapping[str, Any], *others: tuple[Accuracy, float]) -> l
     heldout = verdict["heldout"]
     stated = [(accuracy_from(verdict["accuracy"]), verdict["uncorrected_m"]), *others]
     return [
-        [_MEASURED, millimetres(heldout["uncalibrated"]["rms_m"]), millimetres(heldout["after"]["rms_m"])],
+        [_MEASURED, millimetres(heldout["uncalibrated"]["rms_m"]), millimetres(heldout["delivered"]["rms_m"])],
         *(
             [f"{each.kind} over {each.region}, {FRAMES[each.frame]}", millimetres(before), millimetres(each.rms_m)]
             for each, before in stated

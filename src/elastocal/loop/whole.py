@@ -14,6 +14,7 @@ from elastocal.application.accuracy import (
     campaign_accuracy,
     campaign_poses,
     judge_by_held_out,
+    regression_on,
     set_form,
 )
 from elastocal.application.calibrated import forward, nominal_forward
@@ -32,13 +33,16 @@ from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import STEPS, residuals
 from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.validation.held_out import position_residuals
+from elastocal.validation.placing import placed
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.diagnosis.judge import Verdict
+    from elastocal.remainder.corrected import Corrected
 
 
 def judge_campaign(job: Any) -> None:
@@ -80,12 +84,25 @@ def diagnosed(folder: str | Path, robots_folder: str | Path, seed: int, settings
     return judged(diagnose(training, settings or Settings(), seed), held_out, seed).document
 
 
-def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
-    """The robot that a diagnosis found, with all that is known of its errors: held-out rows without gross ones judge it."""
+def calibrated_by(
+    diagnosis: Diagnosis, held_out: Case, delivered: Corrected | None, physics_only: bool = False
+) -> CalibratedRobot:
+    """The robot that a diagnosis found, with all that is known of its errors: held-out rows without gross ones judge it.
+
+    `delivered`: of `judge.as_delivered`. `physics_only`: corrected without its regression; where there is one, what the final
+    model leaves is known to be no noise.
+    """
     case, final = diagnosis.case, diagnosis.final
-    found = calibrate_on_case(case, final.model, final.estimate, final.covariance, final.noise)
+    residual = position_residuals(*placed(final, case, held_out), held_out.observations)
+    noise_m, more = final.noise.position_m, None
+    if delivered is not None and delivered.chosen.regression:
+        noise_m = diagnosis.document["noise"]["position_m"]
+        if not physics_only:
+            residual = delivered.residual
+            more = regression_on(case, final.estimate, delivered.chosen.predictor, delivered.chosen.spread, noise_m)
+    found = calibrate_on_case(case, final.model, final.estimate, final.covariance, final.noise, more)
     found = set_form(found, diagnosis.document["other_models_m"] or 0.0)
-    return judge_by_held_out(found, final, case, held_out)
+    return judge_by_held_out(found, held_out, residual, noise_m)
 
 
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
@@ -94,24 +111,27 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     ``accuracy`` and ``uncorrected_m``, the RMS error without a correction at the same poses, are predicted; ``cost_m`` of an
     effect is the RMS error over the campaign's poses and loads if it alone were left out of the correction. All are None where
     the data are at fault, the cost also of an effect that is not in the final model or moves no robot. ``misplaced``: what was
-    declared wrongly, see there.
+    declared wrongly, see there. ``physics``: accuracy and ``uncorrected_m`` of a robot that is corrected without the regression
+    on the remainder; None where there is none.
     """
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
-    accuracy, uncorrected, costs = None, None, dict[str, float]()
-    wrong: list[dict[str, Any]] = []
+    stated: dict[str, Any] = {"accuracy": None, "uncorrected_m": None, "physics": None}
+    costs, wrong = dict[str, float](), list[dict[str, Any]]()
     if not data_at_fault(verdict.document):
-        found = calibrated_by(diagnosis, verdict.held_out)
-        accuracy = campaign_accuracy(found).document()
-        uncorrected = _uncorrected_m(found, *campaign_poses(found))
-        costs = effect_costs(found, *campaign_poses(found))
+        found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
+        stated |= _accuracy(found)
+        if found.remainder is not None:
+            stated["physics"] = _accuracy(calibrated_by(diagnosis, verdict.held_out, verdict.delivered, physics_only=True))
+        costs = effect_costs(replace(found, remainder=None), *campaign_poses(found))
         wrong = misplaced(diagnosis.final, case.campaign)
     effects = [effect | {"cost_m": costs.get(effect["name"])} for effect in verdict.document["effects"]]
-    stated = {"accuracy": accuracy, "uncorrected_m": uncorrected, "effects": effects, "misplaced": wrong}
-    return replace(verdict, document=verdict.document | stated)
+    return replace(verdict, document=verdict.document | stated | {"effects": effects, "misplaced": wrong})
 
 
-def _uncorrected_m(found: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> float:
-    """RMS error of the uncorrected robot at some commands, in the frame of its accuracy."""
-    position, rotation = forward(found, reported_angles, operating)
-    off = pose_differences(*nominal_forward(found.robot, reported_angles), position, rotation)
-    return float(np.sqrt((before_m(found, position, rotation, off) ** 2).mean()))
+def _accuracy(found: CalibratedRobot) -> dict[str, Any]:
+    """Predicted accuracy of a corrected robot, and in the same frame the RMS error of the uncorrected one at the same poses."""
+    angles, operating = campaign_poses(found)
+    position, rotation = forward(found, angles, operating)
+    off = pose_differences(*nominal_forward(found.robot, angles), position, rotation)
+    uncorrected = float(np.sqrt((before_m(found, position, rotation, off) ** 2).mean()))
+    return {"accuracy": campaign_accuracy(found).document(), "uncorrected_m": uncorrected}

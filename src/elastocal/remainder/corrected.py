@@ -17,23 +17,28 @@ from elastocal.fitting.prediction import target_points
 from elastocal.io.modules import modules_with
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.remainder.protocol import Folds, Inputs
-from elastocal.remainder.tuning import CONFIDENCE, NORMAL_WIDTH, tuned
+from elastocal.remainder.tuning import CONFIDENCE, NORMAL_WIDTH, Spread, shrunk, tuned
+from elastocal.validation.fitted_range import beyond_campaign
 from elastocal.validation.held_out import Errors, intervals, position_errors, position_residuals, summary
 from elastocal.validation.left_out import refits
 from elastocal.validation.placing import placed, same_campaign
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from typing import Any
 
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.fitting.observations import Observations
-    from elastocal.remainder.protocol import Regression
+    from elastocal.fitting.observations import Observations, States
+    from elastocal.remainder.protocol import Predictor, Regression
     from elastocal.remainder.tuning import Tuned
 
 # A regression is chosen by so many observations at most; the quantile that scales its intervals they fix to two per cent.
 _FOLDS, _MOST_TO_CHOOSE, _REPLICATES = 5, 2_000, 1000
+# Share of a joint's fitted range beside it within which a regression is added too: no pose has neighbours that near, and of
+# poses drawn like 200 fitted ones some 3 % would go without for standing a hundredth beyond.
+_BESIDE = 0.05
 
 
 @cache
@@ -47,8 +52,8 @@ class Plan:
     """How a remainder is to be regressed.
 
     `regression`: its name; `BEST_REMAINDER` for that which left-out poses choose. `blocks`: whether folds are blocks of joint
-    space, as for poses far from those fitted; else they are random. `within_range`: whether nothing is corrected outside the
-    range of the poses fitted.
+    space, as for poses far from those fitted; else they are random. `within_range`: whether nothing is corrected beyond the
+    joint angles and loads that were fitted.
     """
 
     regression: str
@@ -62,7 +67,7 @@ class Corrected:
     """What a model and a regression leave of poses that they have not seen; arrays of M.
 
     `residual` (M, 3): measured less predicted positions, m, base axes. `std` (M, 3): standard deviation stated for them, m;
-    None where the regression states none. `outside` (M,) of bool: whether the pose lies outside the range of those fitted.
+    None where there is no regression. `outside` (M,) of bool: beyond the joint angles or loads that were fitted.
     `chosen`: regression and setting, and what they gain on left-out training poses; none of them where nothing is corrected.
     """
 
@@ -72,20 +77,20 @@ class Corrected:
     chosen: Tuned
 
 
-def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case, beyond: np.ndarray) -> Corrected:
+def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
     """Predict held-out poses by a model and a regression on what it leaves of the training poses.
 
     Whether there is one, its setting, size and intervals come from cross-validation of the training poses, with the model
     fitted anew without each fold. Poses of another campaign have their frames and targets fitted to what both leave of them.
 
-    `fitted`: to the training poses. `case`: of the training poses. `beyond` (P,) of bool: held-out poses outside the range of
-    those fitted, as of `fitted_range.outside_poses`.
+    `fitted`: to the training poses. `case`: of the training poses.
     """
-    there, elsewhere = held_out.observations, not same_campaign(case, held_out)
-    (model, estimate), found = placed(fitted, case, held_out), chosen(plan, fitted, case.observations, elsewhere)
-    prediction, outside = found.predictor(inputs_of(model, estimate, there, elsewhere)), beyond[there.cluster]
+    there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
+    found = chosen(plan, fitted, case.observations)
+    prediction = found.predictor(inputs_of(model, estimate, there))
+    outside = beyond_regressed(case.observations.states, there.states.joint_angles, there.states.wrench)[there.state]
     mean = np.where(outside[:, None] & plan.within_range, 0.0, prediction.mean)
-    if elsewhere:
+    if not same_campaign(case, held_out):
         session = np.searchsorted(estimate.sessions, there.states.session[there.state])
         moved = there.position - (estimate.frame_rotation[session] @ mean[..., None])[..., 0]
         known = replace(fitted, model=model, estimate=estimate)
@@ -93,18 +98,31 @@ def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case, beyond: np.nd
     return Corrected(position_residuals(model, estimate, there) - mean, prediction.std, outside, found)
 
 
-def chosen(plan: Plan, fitted: Fit, seen: Observations, elsewhere: bool) -> Tuned:
-    """The regression on what a model leaves of the observations that it was fitted to, or none.
+def beyond_regressed(fitted: States, joint_angles: np.ndarray, wrench: np.ndarray | None) -> np.ndarray:
+    """Where no regression is added, ndarray of bool (N,): beyond the loads that were fitted, and joint angles with a margin.
 
-    `elsewhere`: as of `inputs_of`.
+    `joint_angles` (N, n): of the chain, rad. `wrench` (N, 6): N, N m; None for none.
     """
+    low, high = fitted.joint_angles.min(axis=0), fitted.joint_angles.max(axis=0)
+    middle = 0.5 * (low + high)
+    return beyond_campaign(fitted, middle + (joint_angles - middle) / (1.0 + 2.0 * _BESIDE), wrench)
+
+
+def chosen(plan: Plan, fitted: Fit, seen: Observations) -> Tuned:
+    """The regression on what a model leaves of the observations that it was fitted to, or none."""
     among = [each for name, each in regressions().items() if plan.regression in (name, BEST_REMAINDER)]
-    folds = _folds(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE), elsewhere)
-    inputs = inputs_of(fitted.model, fitted.estimate, seen, elsewhere)
+    folds = _folds(plan, fitted, sample_of(seen, _MOST_TO_CHOOSE))
+    inputs = inputs_of(fitted.model, fitted.estimate, seen)
     return tuned(among, folds, inputs, fitted.residual[:, :3], plan.seed)
 
 
-def _folds(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Folds:
+def fitted_again(facts: Mapping[str, Any], model: Model, estimate: Estimate, seen: Observations) -> Predictor:
+    """The regression that `remainder_facts` tells of, fitted to the same observations."""
+    found = regressions()[facts["regression"]], facts["setting"], facts["left_out"]["factor"], Spread(**facts["spread"])
+    return shrunk(*found, inputs_of(model, estimate, seen), position_residuals(model, estimate, seen), facts["seed"])
+
+
+def _folds(plan: Plan, fitted: Fit, observations: Observations) -> Folds:
     """Training poses in folds, the model fitted anew without each."""
     states, model = observations.states, fitted.model
     pose = state_clusters(states)
@@ -119,47 +137,37 @@ def _folds(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool)
         mine = refit.within[observations.state]
         residual[number, ~mine] = position_residuals(model, refit.estimate, refit.rest)
         residual[number, mine] = position_residuals(model, refit.there, refit.left_out)
-    each, inputs = observations.cluster, inputs_of(model, fitted.estimate, observations, elsewhere)
+    each, inputs = observations.cluster, inputs_of(model, fitted.estimate, observations)
     return Folds(inputs, configuration[each], fold[each], position_residuals(model, fitted.estimate, observations), residual)
 
 
-def inputs_of(model: Model, estimate: Estimate, observations: Observations, elsewhere: bool) -> Inputs:
-    """Inputs of a regression, from the nominal chain and the places of the targets.
-
-    `estimate`: says where the targets sit. `elsewhere`: whether observations of another campaign are to be predicted: time then
-    carries nothing over. Returns without time or temperature where they were not recorded.
-    """
+def inputs_of(model: Model, estimate: Estimate, observations: Observations) -> Inputs:
+    """Inputs of a regression, from the nominal chain and the places of the targets; `estimate` says where these sit."""
     states, chain = observations.states, model.sites.chain
     coordinates = chain.at(states.joint_angles)
     jacobian = np.empty((len(observations), 3, chain.coordinates))
     for number, point in enumerate(target_points(model, estimate)):
         mask = observations.target == number
         jacobian[mask] = poses_and_jacobians(chain, coordinates[observations.state[mask]], point)[2][:, :3]
-    recorded = () if elsewhere else (states.time_s, states.temperature_c)
-    others = [states.wrench, *(values[:, None] for values in recorded if values is not None)]
-    return Inputs(
-        states.joint_angles[observations.state],
-        np.hstack([np.hstack(others)[observations.state], estimate.target_offset[observations.target]]),
-        jacobian,
-    )
+    others = np.hstack([states.wrench[observations.state], estimate.target_offset[observations.target]])
+    return Inputs(states.joint_angles[observations.state], others, jacobian)
 
 
 def remainder_facts(
-    plan: Plan, declared: Fit, final: Fit, case: Case, held_out: Case, beyond: np.ndarray, draws: np.random.Generator
+    found: Corrected, declared: Fit, final: Fit, case: Case, held_out: Case, draws: np.random.Generator
 ) -> dict[str, Any]:
     """Held-out errors with a regression on what the final model leaves, beside those without.
 
-    `declared`, `final`: to the training poses. `case`: of the training poses. `beyond`: as in `corrected`. `draws`: of the
-    bootstrap over poses. Returns ``regression``, empty where none is used, and its ``words``; ``left_out``, the `Gain` on
+    `declared`, `final`: to the training poses. `case`: of the training poses. `draws`: of the bootstrap over poses. Returns
+    ``regression``, empty where none is used, its ``words``, ``setting``, ``spread`` and ``seed``; ``left_out``, the `Gain` on
     training poses by which it is used or not, with the ``level`` of that test; ``errors``, the summary of `held_out.summary`
     with it; ``rms_ci95_m``; of the squared error that the declared model leaves the shares that effects
     (``physics``) and the regression (``regression_share``) explain and that is ``left``; ``reduction_ci95`` of the RMS by the
     regression alone; ``covered``, the share of coordinates inside the stated 95 % intervals, and ``half_width_m``, half of
-    their median width within and outside the range; ``outside``, poses outside the range of those fitted, at which nothing is
-    corrected.
+    their median width within and outside the range; ``outside``, poses beyond the joint angles or loads that were fitted, at
+    which nothing is corrected.
     """
     before, after = (position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (declared, final))
-    found = corrected(plan, final, case, held_out, beyond)
     with_it = Errors(np.linalg.norm(found.residual, axis=1), before.cluster)
     limits, reductions = intervals([after, with_it], _REPLICATES, draws)
     squares = [float((errors.distance**2).mean()) for errors in (before, after, with_it)]
@@ -172,6 +180,9 @@ def remainder_facts(
     return {
         "regression": regression.NAME if regression else "",
         "words": regression.WORDS if regression else "",
+        "seed": found.chosen.seed,
+        "setting": found.chosen.setting and dict(found.chosen.setting),
+        "spread": found.chosen.spread and asdict(found.chosen.spread),
         "left_out": None if gain is None else asdict(gain) | {"level": found.chosen.level},
         "errors": {name: float(value) for name, value in summary(with_it.distance).items()},
         "rms_ci95_m": [float(end) for end in limits[1]["rms_m"]],

@@ -81,17 +81,22 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
         gram += known @ known.T
         right += known @ standard[first : first + _AT_ONCE]
     factor = lapack.dpotrf(gram, lower=1)[0]
-    along = lapack.dpotrs(factor, right, lower=1)[0]
+    weights = variance * lapack.dtrtrs(lower, lapack.dpotrs(factor, right, lower=1)[0], lower=1, trans=1)[0] * size
 
     def predictor(there: Inputs) -> Prediction:
-        means, left = np.empty((len(there), 3)), np.empty(len(there))
-        for first in range(0, len(there), _AT_ONCE):
-            some = slice(first, first + _AT_ONCE)
-            asked = features((there.columns[some, taken] - middle) / spread)
-            means[some] = asked.T @ along * size + mean
-            unsure = noise * (lapack.dtrtrs(factor, asked, lower=1)[0] ** 2).sum(axis=0)
-            left[some] = variance + noise - (asked**2).sum(axis=0) + unsure
-        return Prediction(means, np.sqrt(np.maximum(left, 0.0))[:, None] * size)
+        asked = (there.columns[:, taken] - middle) / spread
+        parts = [asked[first : first + _AT_ONCE] for first in range(0, len(asked), _AT_ONCE)]
+
+        def std() -> np.ndarray:
+            left = [np.zeros(0)]
+            for part in parts:
+                known = features(part)
+                unsure = noise * (lapack.dtrtrs(factor, known, lower=1)[0] ** 2).sum(axis=0)
+                left.append(variance + noise - (known**2).sum(axis=0) + unsure)
+            return np.sqrt(np.maximum(np.concatenate(left), 0.0))[:, None] * size
+
+        found = [np.zeros((0, 3)), *(_matern(part / lengths, places)[0] @ weights + mean for part in parts)]
+        return Prediction(np.concatenate(found), std)
 
     yield from (predictor for _ in settings)
 

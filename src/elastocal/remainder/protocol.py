@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -19,9 +20,9 @@ if TYPE_CHECKING:
 class Inputs:
     """What a regression may know of an observation; arrays of M.
 
-    `joint_angles` (M, n): rad. `others` (M, k): wrench, place of the target in its measuring point, time and temperature, as
-    far as the measurements have them. `jacobian` (M, 3, C): of the target's position with respect to the joints, first, and
-    whatever else of the chain may be displaced: base and links; base axes, m per rad or m.
+    `joint_angles` (M, n): rad. `others` (M, k): wrench and place of the target in its measuring point; neither time nor
+    temperature, of which a correction knows nothing. `jacobian` (M, 3, C): of the target's position with respect to the joints,
+    first, and whatever else of the chain may be displaced: base and links; base axes, m per rad or m.
     """
 
     joint_angles: np.ndarray
@@ -45,12 +46,17 @@ class Inputs:
 class Prediction:
     """Predicted residuals.
 
-    `mean` (M, 3): m, base axes. `std` (M, 3): standard deviation of a new measurement about it; None where the regression
-    states none.
+    `mean` (M, 3): m, base axes. `spread`: gives the standard deviation (M, 3) of a new measurement about it, which costs more
+    than the mean; None where the regression states none.
     """
 
     mean: np.ndarray
-    std: np.ndarray | None = None
+    spread: Callable[[], np.ndarray] | None = None
+
+    @cached_property
+    def std(self) -> np.ndarray | None:
+        """ndarray (M, 3), m; None where the regression states none."""
+        return None if self.spread is None else self.spread()
 
 
 @dataclass(frozen=True)

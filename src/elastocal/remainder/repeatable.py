@@ -80,7 +80,7 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
     count, draws = int(group.max()) + 1, np.random.default_rng(seed)
     if count < FEWEST_CONFIGURATIONS:
         return None
-    fold, inputs = draws.permutation(count) % _FOLDS, inputs_of(fitted.model, fitted.estimate, some, elsewhere=True)
+    fold, inputs = draws.permutation(count) % _FOLDS, inputs_of(fitted.model, fitted.estimate, some)
     kinds = _kinds(inputs, int(np.clip(count, _FEWEST, _MOST)), draws)
     sizes, parameters = [kind(inputs.select(np.arange(1))).shape[2] for kind in kinds], len(fitted.held)
     alongs, grams = [np.zeros((count, size)) for size in sizes], [np.zeros((_FOLDS, size, size)) for size in sizes]

@@ -51,10 +51,24 @@ class Gain:
 
 
 @dataclass(frozen=True)
+class Spread:
+    """What poses left out say of a regression's standard deviations.
+
+    `times`: by how much its own are to be multiplied for intervals that hold; None where no fold states any. `otherwise_m`: of
+    a coordinate where it states none, m. `typical`: root mean square of the errors over that, which tails make large.
+    """
+
+    times: float | None
+    otherwise_m: float
+    typical: float
+
+
+@dataclass(frozen=True)
 class Tuned:
     """A regression with the setting that poses chose; neither where nothing is corrected.
 
-    `gain`: of the outer folds; None where there are too few configurations. `level`: of the test that it had to pass.
+    `gain`: of the outer folds; None where there are too few configurations. `level`: of the test that it had to pass. `spread`:
+    by the outer folds too. `seed`: by which it was fitted.
     """
 
     predictor: Predictor
@@ -62,6 +76,8 @@ class Tuned:
     setting: Setting | None = None
     gain: Gain | None = None
     level: float = _LEVEL
+    spread: Spread | None = None
+    seed: int = 0
 
 
 def tuned(regressions: Sequence[Regression], folds: Folds, inputs: Inputs, residual: np.ndarray, seed: int) -> Tuned:
@@ -89,9 +105,9 @@ def tuned(regressions: Sequence[Regression], folds: Folds, inputs: Inputs, resid
     if gain.p_value > level or chosen is None:
         return Tuned(no_correction, gain=gain, level=level)
     regression, setting = pairs[chosen]
-    predictor = next(iter(regression.fitted(inputs, residual, [setting], seed)))
-    scores = np.abs(off - gain.factor * predicted) / std
-    return Tuned(calibrated(predictor, scores[np.isfinite(scores)], gain.factor), regression, setting, gain, level)
+    spread = spread_of(np.abs(off - gain.factor * predicted), std)
+    predictor = shrunk(regression, setting, gain.factor, spread, inputs, residual, seed)
+    return Tuned(predictor, regression, setting, gain, level, spread, seed)
 
 
 def gain_of(along: np.ndarray, square: np.ndarray, rows: int, folds: int) -> Gain:
@@ -160,24 +176,48 @@ def no_correction(inputs: Inputs) -> Prediction:
     return Prediction(np.zeros((len(inputs), 3)))
 
 
-def calibrated(predictor: Predictor, scores: np.ndarray, factor: float) -> Predictor:
-    """A predictor shrunk by a factor, with standard deviations scaled by what left-out training poses say of them.
+def spread_of(errors: np.ndarray, std: np.ndarray) -> Spread:
+    """How large standard deviations must be for intervals to hold `CONFIDENCE` of the errors of poses left out.
 
     Locally weighted conformal prediction [1] by cross-validation: a regression's own standard deviations say where it is less
     sure, residuals of poses left out, with what the physical model errs by beyond its training poses, how large these must be.
 
-    `predictor`: fitted to all training poses. `scores`: of poses left out, errors over the standard deviations stated for them;
-    empty where no fold states any, nor does then what is returned.
+    `errors`, `std` (M, 3): magnitudes, and what was stated for them, not a number where nothing was.
 
     [1] Lei, J., G'Sell, M., Rinaldo, A., Tibshirani, R. J. and Wasserman, L., Distribution-free predictive inference for
         regression, Journal of the American Statistical Association 113, 2018.
     """
-    # The quantile with conformal prediction's correction for a finite sample; the largest where that asks for more.
-    share = min(CONFIDENCE * (1.0 + 1.0 / max(scores.size, 1)), 1.0)
-    widened = float(np.quantile(scores, share, method="higher")) / NORMAL_WIDTH if scores.size else None
 
-    def scaled(inputs: Inputs) -> Prediction:
-        found = predictor(inputs)
-        return Prediction(factor * found.mean, None if found.std is None or widened is None else widened * found.std)
+    def width(scores: np.ndarray) -> float:
+        # The quantile with conformal prediction's correction for a finite sample; the largest where that asks for more.
+        return float(np.quantile(scores, min(CONFIDENCE * (1.0 + 1.0 / scores.size), 1.0), method="higher")) / NORMAL_WIDTH
+
+    own = np.isfinite(std)
+    otherwise = width(errors)
+    typical = float(np.sqrt((errors**2).mean())) / otherwise
+    return Spread(width(errors[own] / std[own]) if own.any() else None, otherwise, typical)
+
+
+def shrunk(
+    regression: Regression,
+    setting: Setting,
+    factor: float,
+    spread: Spread,
+    inputs: Inputs,
+    residual: np.ndarray,
+    seed: int,
+) -> Predictor:
+    """A regression fitted to all training poses, shrunk by a factor, with intervals as wide as poses left out say."""
+    predictor = next(iter(regression.fitted(inputs, residual, [setting], seed)))
+
+    def scaled(there: Inputs) -> Prediction:
+        found = predictor(there)
+
+        def std() -> np.ndarray:
+            if spread.times is None or found.std is None:
+                return np.full_like(found.mean, spread.otherwise_m)
+            return spread.times * found.std
+
+        return Prediction(factor * found.mean, std)
 
     return scaled

@@ -24,6 +24,8 @@ _SHARES = {
     "uncorrected": "no correction at all",
     "form of the model": "form of the model",
     "not commanded": "effects that no command contains",
+    "regression": "regression on the remainder",
+    "left by the regression": "left by the regression on the remainder",
 }
 # Below the digits of any tracker.
 _NOTHING_M = 1e-7

@@ -23,7 +23,7 @@ from elastocal.application.compensation import find_joint_targets
 from elastocal.application.frames import find_absorbed, placement, scope_about
 from elastocal.campaigns.reading import read_robot
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import without_gross_errors
+from elastocal.diagnosis.judge import as_delivered, without_gross_errors
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import effects as catalogue
@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any
 
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
@@ -190,7 +191,7 @@ def closed_loop(robot_file: Path, effect: str, seed: int, slips: bool = False) -
     models = {
         GEOMETRY: calibrate_by_fit(_geometry(made.training, made.found), replace(robot, masses=())),
         DECLARED: calibrate_by_fit(made.found.declared, robot),
-        FOUND: calibrated_by(made.found, without_gross_errors(made.found, made.held_out)[1]),
+        FOUND: _corrected(made, seed),
     }
     # Commands, the errors that a model states, and whether a pose could be corrected.
     commanded = {UNCORRECTED: (wanted.start, np.zeros(count), np.ones(count, bool))}
@@ -206,6 +207,12 @@ def closed_loop(robot_file: Path, effect: str, seed: int, slips: bool = False) -
     named = effect in {entry["name"] for entry in made.found.document["effects"] if entry["adopted"]}
     head = {"effect": effect, "seed": seed, "verdict": made.found.document["verdict"], "named": named}
     return {name: np.concatenate([np.broadcast_to((head | row)[name], count) for row in rows]) for name in (*head, *rows[0])}
+
+
+def _corrected(made: Measured, seed: int) -> CalibratedRobot:
+    """The robot as the diagnosis corrects it."""
+    part = without_gross_errors(made.found, made.held_out)[1]
+    return calibrated_by(made.found, part, as_delivered(made.found, part, seed))
 
 
 def _geometry(case: Case, found: Diagnosis) -> Fit:
@@ -254,7 +261,7 @@ def stated_accuracy(robot_file: Path, effect: str, seed: int, frame: str) -> lis
     """
     made = measure(robot_file, effect, seed, frame)
     plant, wanted, operating = made.plant, made.wanted, OperatingConditions(made.wanted.wrench)
-    calibrated = calibrated_by(made.found, without_gross_errors(made.found, made.held_out)[1])
+    calibrated = _corrected(made, seed)
     targets = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
     good = targets.status == OK
     off = reached(plant, targets.joint_angles, wanted.wrench, seed + 1)[0] - wanted.position

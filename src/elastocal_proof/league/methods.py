@@ -105,13 +105,12 @@ def entered(method: Method, fitted: Fit, case: Case, held_out: Case, split: str,
 
     `fitted`: its physical model, fitted to the training poses. `case`: of the training poses.
     """
-    beyond = outside_poses(fitted, case, held_out)
+    beyond, there = outside_poses(fitted, case, held_out), held_out.observations
     if method.regression is not None:
         plan = Plan(method.regression, blocks=split != RANDOM, within_range=method.within_range, seed=seed)
-        found = corrected(plan, fitted, case, held_out, beyond)
+        found = corrected(plan, fitted, case, held_out)
         std = np.full_like(found.residual, np.nan) if found.std is None else found.std
-        return Entry(held_out.observations, found.residual, std, found.outside, found.chosen.setting)
-    there = held_out.observations
+        return Entry(there, found.residual, std, beyond[there.cluster], found.chosen.setting)
     residual = position_residuals(*placed(fitted, case, held_out), there)
     return Entry(there, residual, np.full_like(residual, np.nan), beyond[there.cluster], None)
 
