@@ -123,7 +123,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         # Where all measurements mean something else, no single row is wrong.
         part = fitted_to(case, np.ones(len(case.campaign.measurements), bool), settings)
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
-    found, about, near, most_pose_error_rad = None, part.declared, None, np.inf
+    found: Evidence | None = None
+    about, near, most_pose_error_rad = part.declared, None, np.inf
     errors = Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
@@ -147,7 +148,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
         near = (about, found.conclusion.best.named) if relinearized else None
         # Its statistics make room for those of the next search.
-        found, most_pose_error_rad = None, found.linearized.most_pose_error_rad
+        most_pose_error_rad = found.linearized.most_pose_error_rad
+        found = None
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared_to_all()
     final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True) if found else declared
@@ -168,16 +170,16 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
             kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
             steps.append(Step("frames and targets, kept", "kept", kept))
     kept = steps[-1].fitted
-    repeatable, contradicting = repeatable_part(kept, case.observations, seed) if found else None, []
-    remaining = remainder_sentences(repeatable)
+    repeatable = repeatable_part(kept, case.observations, seed) if found else None
+    unnamed, contradicting = remainder_sentences(repeatable), list[str]()
     if found and found.conclusion.verdict == ADEQUATE:
-        contradicting = remaining or contradictions(final, noise, settings)
+        contradicting = unnamed or contradictions(final, noise, settings)
     elif found and found.conclusion.verdict == NOT_TESTABLE:
-        contradicting = remaining
+        contradicting = unnamed
     if found and contradicting:
         found = replace(found, conclusion=replace(found.conclusion, verdict=UNEXPLAINED))
     warnings = [*contradicting, *part.warnings, *filter(None, lost)]
-    if found and not remaining:
+    if found and not unnamed:
         warnings += pose_error_warnings(kept.noise, found.linearized.pose_std_error_rad)
     document = _document(case, noise, steps, final, found, known, settings, warnings)
     left_out = entries_of(errors, whole, held_out=False)
@@ -264,6 +266,9 @@ def _explained(
                 break
             most_pose_error_rad = settings.pose_repeatability_rad
         before = named
+        if round_number + 1 < settings.linearizations:
+            # The next problem takes the room of this one.
+            del problem, found, conclusion
     else:
         settled = False
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
