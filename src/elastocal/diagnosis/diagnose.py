@@ -168,16 +168,17 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
             kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
             steps.append(Step("frames and targets, kept", "kept", kept))
     kept = steps[-1].fitted
-    repeatable, contradicting = repeatable_part(kept, case.observations, seed) if found else None, []
-    remaining = remainder_sentences(repeatable)
+    repeatable = repeatable_part(kept, case.observations, seed) if found else None
+    contradicting: list[str] = []
+    nameless = remainder_sentences(repeatable)
     if found and found.conclusion.verdict == ADEQUATE:
-        contradicting = remaining or contradictions(final, noise, settings)
+        contradicting = nameless or contradictions(final, noise, settings)
     elif found and found.conclusion.verdict == NOT_TESTABLE:
-        contradicting = remaining
+        contradicting = nameless
     if found and contradicting:
         found = replace(found, conclusion=replace(found.conclusion, verdict=UNEXPLAINED))
     warnings = [*contradicting, *part.warnings, *filter(None, lost)]
-    if found and not remaining:
+    if found and not nameless:
         warnings += pose_error_warnings(kept.noise, found.linearized.pose_std_error_rad)
     document = _document(case, noise, steps, final, found, known, settings, warnings)
     left_out = entries_of(errors, whole, held_out=False)
