@@ -147,8 +147,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
         near = (about, found.conclusion.best.named) if relinearized else None
-        # Its statistics make room for those of the next search.
         most_pose_error_rad = found.linearized.most_pose_error_rad
+        # Its statistics make room for those of the next search.
         found = None
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared_to_all()
