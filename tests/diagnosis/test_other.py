@@ -63,7 +63,7 @@ def test_it_displaces_its_coordinates_by_about_its_size_in_any_state_each_in_its
 
 @EVERY
 def test_no_law_has_a_part_that_the_catalogue_has_a_name_for(law):
-    """A zero offset, a compliance, a transmission ratio; what time brings begins at nothing, a place may shift all alike."""
+    """A zero offset, a compliance, a transmission ratio; what time brings a joint begins at nothing, a place may shift all."""
     location, name = law
     states = around()
     found = waves(displacements(states, law))
@@ -71,7 +71,7 @@ def test_no_law_has_a_part_that_the_catalogue_has_a_name_for(law):
         found = found / states.total[:, 3]
     free = found if location else found[:3]
     size = np.abs(free).max()
-    begins = name.startswith(TIME)
+    begins = location and name.startswith(TIME)
     constant = np.abs(free[:, np.argmin(states.progress)] if begins else free.mean(axis=1)).max()
     assert constant > 0.1 * size if name.startswith(PLACE) else constant < 1e-9 * size
     straight = np.abs(free @ (states.joint_angles[:, 3] - states.joint_angles[:, 3].mean())).max()

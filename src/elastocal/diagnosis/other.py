@@ -3,9 +3,9 @@
 A displacement is a random function of a few inputs, an approximate Gaussian process: the principal components over the states
 of a campaign (Karhunen-Loeve) of a sum of random Fourier features [1] with normal coefficients. Such a discrepancy [2] should
 leave to the model what the model explains [3]: what is constant of it, or at a joint straight in its angle, is taken off, for a
-zero offset, a compliance and a transmission ratio have names. What comes with time begins at nothing, as a zero that slips
-does; what goes by the place of the end keeps its constant part. A function of everything at once would fit nothing better than
-chance does, so that each law has the inputs of one cause, as terms of an additive Gaussian process have [4]: a joint's own
+zero offset, a compliance and a transmission ratio have names. What comes with time at a joint begins at nothing, as a zero
+that slips; what goes by the place of the end keeps its constant part. A function of everything at once would fit nothing better
+than chance does, so that each law has the inputs of one cause, as terms of an additive Gaussian process have [4]: a joint's own
 angle, torque and approach; the angles of the joints beside it; time and temperature; the load on the base along each of its
 axes; the place of the end. At a joint each acts in proportion to the load or without it: what yields turns nothing that is not
 loaded, and one law for both would be charged for what it does not do. Alone it means that the residual is *unexplained*; beside
@@ -156,8 +156,8 @@ def _principal(
     random = size * np.cos(known @ frequency + phase)
     straight = inputs.cause in (OWN, NEIGHBOURS) and not loaded
     angle = campaign.joint_angles[:, inputs.coordinate if straight else 0]
-    # Of what is taken off: the first in time, or all.
-    first = np.argmin(known[:, -1]) if inputs.cause == TIME else slice(None)
+    # Of what is taken off: the first in time of a joint, or all.
+    first = np.argmin(known[:, -1]) if location and inputs.cause == TIME else slice(None)
     mean = np.zeros(_DRAWN) if inputs.cause == PLACE else random[first].reshape(-1, _DRAWN).mean(axis=0)
     center, squares = angle.mean(), ((angle - angle.mean()) ** 2).sum()
     slope = (angle - center) @ random / squares if straight and squares > _ROUNDING else np.zeros_like(mean)
