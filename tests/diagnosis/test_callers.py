@@ -203,7 +203,9 @@ def test_benchmark_of_the_engine_times_the_same_verdict(kind, both, monkeypatch,
     assert json.loads(capsys.readouterr().out)["measurements"] == len(cases_in(folder, ROBOTS)[0].observations)
     (verdict,) = seen
     # A benchmark of the engine states no accuracy of a corrected robot, nor what each cause costs, nor what is misplaced.
-    wanted = {name: value for name, value in expected.items() if name not in ("accuracy", "uncorrected_m", "misplaced", "physics")}
+    wanted = {
+        name: value for name, value in expected.items() if name not in ("accuracy", "uncorrected_m", "misplaced", "physics")
+    }
     wanted["effects"] = [{name: v for name, v in effect.items() if name != "cost_m"} for effect in expected["effects"]]
     same(as_json(verdict.document), wanted)
 

@@ -110,7 +110,7 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
         return Conclusion(UNEXPLAINED, hypotheses, best if stated else nothing, {}, mechanisms, unknown)
     named = sure and kind == CLASS and OTHER not in best.mechanisms
     alternatives = {name: () if named else _instead_of(name, best, stated) for name in best.named}
-    probability = best.probability if named else sum(h.probability for h in stated)
+    probability = min(best.probability if named else sum(h.probability for h in stated), 1.0)
     return Conclusion(NAMED if named else kind, hypotheses, best, alternatives, mechanisms, probability)
 
 
