@@ -200,8 +200,10 @@ def test_every_effect_of_the_catalogue_is_described_without_formulas():
 def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_whom_they_are():
     effect, heldout = effect_entry(), CAMPAIGNS["named"]["heldout"]
     assert effect_facts(effect, heldout)["parameters"] == [["half play", "120.0 ± 3.0", "µrad", "measurements"]]
-    effect["parameters"][0] |= {"std_error": 9e-6}
-    assert effect_facts(effect, heldout)["parameters"][0][3] == "mostly the prior"
+    # What the measurements do not identify is counted, and no number of it is printed.
+    effect["parameters"][0] |= {"identifiable": False}
+    facts = effect_facts(effect, heldout)
+    assert (facts["parameters"], facts["held"]) == ([], 1)
     # What belongs to an effect as a whole, such as its largest sag, stands without a member.
     effect = effect_entry("link_weight", ("link_weight@2", "link_weight@3"), (2, 3), ("compliance_times_mass",))
     effect["parameters"].insert(0, effect["parameters"][0] | {"name": "link_weight largest_sag", "unit": "m"})

@@ -193,7 +193,7 @@ def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str, Any]:
     """Facts of one effect or fault of the data; `heldout`: of verdict.json."""
-    known = [entry for entry in effect["parameters"] if not entry.get("held") or entry.get("shape")]
+    known = [entry for entry in effect["parameters"] if entry.get("identifiable", not entry.get("held"))]
     shown = known
     if len(known) > _MOST_PARAMETERS:
         shown = sorted(known, key=lambda e: abs(e["value"]) / e["std_error"] if e["std_error"] else 0.0, reverse=True)[
@@ -262,7 +262,4 @@ def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str
     row = [where + name, *say.scaled(entry["value"], entry["std_error"], entry["unit"])]
     if entry["unit"] == "–" and float(entry["value"]).is_integer():
         row[1] = grouped(int(entry["value"]))
-    prior = entry.get("prior_std")
-    if prior and entry["std_error"] > tables.MOSTLY_PRIOR * prior:
-        return [*row, "mostly the prior"]
     return [*row, "measurements" if entry["std_error"] else "the best of those tried" if entry.get("shape") else ""]
