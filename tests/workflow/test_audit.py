@@ -53,7 +53,7 @@ def test_a_finished_study_holds_in_every_check(folder):
         (f"data/campaigns/{CAMPAIGN}/measurements.parquet", "x", 1.00001),
         (MEASURED, "dx", 1.01),
         ("results/design/kuka/6DoF.parquet", "cov_4_4", 2),
-        (IDENTIFIED, "c2", 1.0001),
+        (IDENTIFIED, "compliance_2", 1.0001),
         (f"results/loop/{CAMPAIGN}/held_out.parquet", "z", 1.00001),
         (f"results/loop/{CAMPAIGN}/steps.parquet", "std_error", 0.5),
         (f"results/loop/{CAMPAIGN}/correlations.parquet", "correlation", -1),
@@ -97,7 +97,7 @@ def test_the_command_says_which_file_is_wrong(finished):
     done = finished.snakemake("-j2", "audit")
     assert done.returncode == 0, done.stderr[-3000:]
     assert finished.path("reports/audit.txt").read_text("utf-8").endswith("all hold\n")
-    with altered(finished.folder, IDENTIFIED, ("c2", slice(None)), lambda values: 1.001 * values):
+    with altered(finished.folder, IDENTIFIED, ("compliance_2", slice(None)), lambda values: 1.001 * values):
         # As of the time of the job that made it, so that no job is run again.
         shutil.copystat(finished.path(OF_STRATEGY), finished.path(IDENTIFIED))
         finished.path("reports/audit.csv").unlink()
