@@ -9,27 +9,22 @@ the RMS of all as delivered is more than `GOAL` times what chance leaves of a ro
 import argparse
 import sys
 import time
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
-from common import ROOT
-from remainder_rates import HELD_OUT, JOINT_RAD, NOISE_M, OFFSET_RAD
+from remainder_rates import HELD_OUT, JOINT_RAD, NOISE_M, OFFSET_RAD, ROBOTS, measured_cases
 
 from elastocal.application.calibrated import NEUTRAL, CalibratedRobot, nominal_forward
 from elastocal.application.compensation import find_joint_targets
 from elastocal.application.frames import root_mean_square, subtract_placement
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.simulation import Plan, draw_measurements
-from elastocal.campaigns.writing import write_campaign
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.exchange.target_path import OK
-from elastocal.loop.whole import calibrated_by, cases_in
+from elastocal.loop.whole import calibrated_by
 
 GOAL = 1.3
-ROBOTS = ROOT / "config" / "robots"
 
 
 def closed(poses: int, size: float, seed: int) -> dict[str, float]:
@@ -51,20 +46,7 @@ def closed(poses: int, size: float, seed: int) -> dict[str, float]:
 
     table, angles = surveyed(poses + HELD_OUT, 0)
     table |= {f"q{joint}": column for joint, column in enumerate((angles - off(angles)).T, 1)}
-    document = {
-        "campaign": "loop",
-        "robot": "kuka",
-        "measured": "position",
-        "frame": "tracker",
-        "targets": {"6DoF": {"point": "6DoF", "offset_m": "unknown"}},
-        "compliance": "nominal",
-        "declared": ["joint_offset", "link_geometry"],
-        "noise": {"position_m": NOISE_M},
-        "holdout": {"fraction": HELD_OUT / (poses + HELD_OUT), "seed": 1},
-    }
-    with TemporaryDirectory() as folder:
-        write_campaign(Path(folder) / "loop", document, table, robot.joints, "csv")
-        case, held_out = cases_in(Path(folder) / "loop", ROBOTS)
+    case, held_out = measured_cases("loop", table, poses)
     found = diagnose(case, Settings(), seed)
     verdict = judge(found, held_out, seed)
     wanted = robot.reported_angles(surveyed(HELD_OUT, 1)[1])

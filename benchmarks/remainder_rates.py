@@ -30,15 +30,13 @@ from elastocal.validation.placing import placed
 NOISE_M, JOINT_RAD, OFFSET_RAD, HELD_OUT = 5e-5, 2e-5, 2e-4, 150
 NOISE = Noise("declared", NOISE_M, NOISE_M, np.full(6, JOINT_RAD))
 LEVELS = (0.01, 0.05)
+ROBOTS = ROOT / "config" / "robots"
 
 
-def exact_cases(poses: int) -> tuple[Case, Case]:
-    """Cases to fit and to judge, whose measurements are exact."""
-    robots, total = ROOT / "config" / "robots", poses + HELD_OUT
-    robot = read_robot(robots / "kuka.yaml")
-    table = draw_measurements(robot, Survey(("6DoF",), total, 100.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-9, 1e-9), 1, "rates")
+def measured_cases(name: str, table: dict[str, np.ndarray], poses: int) -> tuple[Case, Case]:
+    """Cases to fit and to judge, of the measurements of a campaign; `poses`: to fit."""
     document = {
-        "campaign": "rates",
+        "campaign": name,
         "robot": "kuka",
         "measured": "position",
         "frame": "tracker",
@@ -46,11 +44,17 @@ def exact_cases(poses: int) -> tuple[Case, Case]:
         "compliance": "nominal",
         "declared": ["joint_offset", "link_geometry"],
         "noise": {"position_m": NOISE_M},
-        "holdout": {"fraction": HELD_OUT / total, "seed": 1},
+        "holdout": {"fraction": HELD_OUT / (poses + HELD_OUT), "seed": 1},
     }
     with TemporaryDirectory() as folder:
-        write_campaign(Path(folder) / "rates", document, table, robot.joints, "csv")
-        return cases_in(Path(folder) / "rates", robots)
+        write_campaign(Path(folder) / name, document, table, 6, "csv")
+        return cases_in(Path(folder) / name, ROBOTS)
+
+
+def exact_cases(poses: int) -> tuple[Case, Case]:
+    """Cases whose measurements are exact."""
+    survey = Survey(("6DoF",), poses + HELD_OUT, 100.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-9, 1e-9)
+    return measured_cases("rates", draw_measurements(read_robot(ROBOTS / "kuka.yaml"), survey, 1, "rates"), poses)
 
 
 def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarray]:

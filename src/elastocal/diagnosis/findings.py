@@ -18,7 +18,7 @@ from elastocal.effects.sizes import lever_m
 from elastocal.fitting.linearization import effect_columns
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.alarm import Alarm
@@ -218,12 +218,14 @@ def fault_entry(fault: Fault) -> dict[str, Any]:
 
 def oversized(final: Fit, names: Collection[str]) -> set[str]:
     """Which of some effects have a parameter beyond what such an effect reaches: size or name is wrong."""
-    found = set()
-    for effect in [effect for effect in final.model.effects if effect.effect in names]:
-        errors = np.sqrt(np.diag(final.covariance))[final.places_of(effect.key)]
-        known = zip(final.values_of(effect.key)[0], errors, effect.parameters, strict=False)
-        found |= {effect.effect for entry in known if _too_large(*entry)}
-    return found
+    some = [effect for effect in final.model.effects if effect.effect in names]
+    return {effect.effect for effect in some if any(_too_large(*entry) for entry in _estimates(final, effect))}
+
+
+def _estimates(final: Fit, effect: Candidate) -> Iterator[tuple[float, float, Parameter]]:
+    """Value, standard error and kind of each parameter of an effect, its shapes aside."""
+    errors = np.sqrt(np.diag(final.covariance)[final.places_of(effect.key)])
+    yield from zip(final.values_of(effect.key)[0], errors, effect.parameters, strict=False)
 
 
 def _too_large(value: float, std_error: float, parameter: Parameter) -> bool:
@@ -239,9 +241,7 @@ def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: floa
     fitted = {effect.key: effect for effect in final.model.effects}
     found = []
     for key in [key for entry in entries for key in entry["members"]]:
-        known = zip(fitted[key].parameters, final.values_of(key)[0], final.places_of(key), strict=False)
-        for parameter, value, index in known:
-            error = float(np.sqrt(final.covariance[index, index]))
+        for value, error, parameter in _estimates(final, fitted[key]):
             size = f"{value:.3g} ± {error:.2g} {parameter.unit}"
             if parameter.sign * value < -_SURE * error:
                 needed = "positive" if parameter.sign > 0 else "negative"
