@@ -21,7 +21,6 @@ FIGURES = [
     "scores_against_paper",
     "ladder",
     "designs",
-    "arm_map",
     "metrics",
 ]
 
@@ -43,7 +42,7 @@ DRAWN = {
     ),
     "draw_scores": (
         ("scores", "scores_against_paper", "scores_against_paper", PAPER, "Table 4 against further studies"),
-        {"comparison": rules.compare_with_studies.output.table, "expectations": rules.tabulate_expectations.output.table},
+        {"comparison": rules.compare_with_studies.output.table},
         {"titles": REDUCED_TITLES},
     ),
     "draw_ladder": (
@@ -65,10 +64,15 @@ DRAWN = {
         {"table": rules.tabulate_costs.output.costs, "break_even": rules.tabulate_costs.output.break_even},
         {"titles": REDUCED_TITLES, "accuracy_um": QUESTIONS["accuracies_um"][0]},
     ),
+    "draw_metrics": (
+        ("metrics", "metrics", "metrics", ABOUT, "Metrics against one another (RQ4)"),
+        {"table": rules.tabulate_uses.output.scores},
+        {"titles": REDUCED_TITLES},
+    ),
     "draw_studies": (
         ("over_studies", "studies", "studies", PAPER, "Strategies over studies"),
         {
-            "studies": expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
+            "studies": ONE_STUDY["studies"],
             "printed": f"{CONFIG}/paper/reference.csv",
         },
         {"titles": REDUCED_TITLES, "order": list(NAMES.values())},
@@ -97,14 +101,9 @@ for drawn, ((function, file, caption, category, words), tables, settings) in DRA
             drawn
         input:
             **tables,
-            sources=sources("draw_study.py"),
         output:
             pdf=f"reports/figures/{file}.pdf",
             png=shown(f"reports/figures/{file}.png", caption, category, shows=words, kind="figure"),
-        log:
-            f"results/logs/{drawn}/{file}.log",
-        benchmark:
-            f"results/timings/{drawn}/{file}.tsv"
         wildcard_constraints:
             panel="|".join(PANELS[drawn][0] if drawn in PANELS else ()) or "none",
         params:
@@ -117,8 +116,6 @@ for drawn, ((function, file, caption, category, words), tables, settings) in DRA
 
 
 rule draw_scheme:
-    input:
-        sources=sources("draw_scheme.py"),
     output:
         pdf="reports/figures/{scheme}.pdf",
         png=shown(
@@ -128,10 +125,6 @@ rule draw_scheme:
             shows="Figures 2 and 3: {scheme}",
             kind="figure",
         ),
-    log:
-        "results/logs/draw_scheme/{scheme}.log",
-    benchmark:
-        "results/timings/draw_scheme/{scheme}.tsv"
     wildcard_constraints:
         scheme="|".join(SCHEME_ROBOTS),
     params:
@@ -139,50 +132,3 @@ rule draw_scheme:
         scheme=lambda wildcards: "spring_scheme" if wildcards.scheme == "figure3" else "kinematic_scheme",
     script:
         "../scripts/draw_scheme.py"
-
-
-rule draw_arm_map:
-    input:
-        table=rules.tabulate_places.output.table,
-        sources=sources("draw_arm_map.py"),
-    output:
-        pdf="reports/figures/arm_map.pdf",
-        png=shown(
-            "reports/figures/arm_map.png",
-            "arm_map",
-            "Questions beyond the paper",
-            shows="A second target anywhere on the arm (RQ2)",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_arm_map.log",
-    benchmark:
-        "results/timings/draw_arm_map.tsv"
-    params:
-        robots={name: STUDY.robots[name] for name in REDUCED},
-        titles=REDUCED_TITLES,
-    script:
-        "../scripts/draw_arm_map.py"
-
-
-rule draw_metrics:
-    input:
-        table=rules.tabulate_uses.output.scores,
-        sources=sources("draw_metrics.py"),
-    output:
-        pdf="reports/figures/metrics.pdf",
-        png=shown(
-            "reports/figures/metrics.png",
-            "metrics",
-            "Questions beyond the paper",
-            shows="Metrics against one another (RQ4)",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_metrics.log",
-    benchmark:
-        "results/timings/draw_metrics.tsv"
-    params:
-        titles=REDUCED_TITLES,
-    script:
-        "../scripts/draw_metrics.py"

@@ -12,6 +12,7 @@ from matplotlib.ticker import NullLocator
 
 from elastocal.figures.style import MICRO, PALETTE, label_decades, legend_below, line_style, note, panels, styled
 from elastocal.study.printed import LEVEL
+from elastocal.study.uses import METRICS
 
 # Of the linear panels of the noise impact: what a reader compares with the wanted accuracy.
 _LINEAR_UM = 20.0
@@ -202,10 +203,10 @@ def _limit(axis: Axes, value: float, unit: str) -> None:
 
 
 @styled
-def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
-    """Table 4 among studies of the same size: the paper's figures, how studies scatter, and what is expected of them.
+def scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
+    """Table 4 among studies of the same size: the paper's figures, and how studies scatter.
 
-    `comparison`, `expectations`: the tables of these names. `titles`: name of each robot to draw, by its key.
+    `comparison`: the table of this name. `titles`: name of each robot to draw, by its key.
     """
     shown = comparison[(comparison.table == "4") & comparison.studies_mean.notna()]
     quantities, strategies = list(dict.fromkeys(shown.quantity)), list(dict.fromkeys(shown.strategy))
@@ -219,8 +220,6 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
             look: dict[str, Any] = {"color": PALETTE[0], "markersize": 3, "elinewidth": 3, "alpha": 0.6}
             name = "further studies, mean ± 2 standard deviations"
             axis.errorbar(cells.studies_mean, rows, xerr=2 * cells.studies_std, fmt="o", label=name, **look)
-            expected = _read_expected(expectations, robot, quantity)
-            axis.plot(expected, [strategies.index(name) for name in expected.index], "|", color="black", markersize=8)
             for differs, colour, name in ((False, "white", "paper"), (True, PALETTE[1], "paper, differs (Holm)")):
                 some = ((cells.p_holm < LEVEL) == differs).to_numpy()
                 at = np.array(rows)[some]
@@ -229,15 +228,8 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
             axis.grid(visible=False, axis="y")
         line[0].set(yticks=range(len(strategies)), ylabel=title)
         line[0].set_yticklabels(strategies)
-    legend_below(figure, 2, more={"expectation in closed form": axes[0, 0].lines[-3]})
+    legend_below(figure, 2)
     return figure
-
-
-def _read_expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Series:
-    """Expectations of one quantity by strategy; none of lengths."""
-    names = {f"{quantity}_percent_fixed_joints", f"{quantity}_um"}
-    mine = expectations[(expectations.robot == robot) & expectations.quantity.isin(names) & expectations.paper.notna()]
-    return mine.set_index("strategy").expected
 
 
 @styled
@@ -323,26 +315,26 @@ def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, 
 
 
 @styled
-def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, str]) -> Figure:
+def metrics(table: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
     """Scores of the strategies over those of the classical one, metric by metric.
 
-    `table`: from `uses.ranks_table`. `titles`: name of each robot to draw, by its key. `names`: what each metric is called.
-    Returns one estimator under several names is drawn once, under the first of them.
+    `table`: from `uses.ranks_table`. `titles`: name of each robot to draw, by its key. One estimator under several METRICS is
+    drawn once, under the first of them.
     """
-    figure, axes = panels(1, len(titles), 26 + 8 * len(names), sharey=True, sharex=True)
+    figure, axes = panels(1, len(titles), 26 + 8 * len(METRICS), sharey=True, sharex=True)
     for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
         mine = table[table.robot == robot]
-        strategies = mine[mine.metric == next(iter(names))].drop_duplicates("value").strategy
+        strategies = mine[mine.metric == next(iter(METRICS))].drop_duplicates("value").strategy
         for index, strategy in enumerate(strategies):
-            cells = mine[mine.strategy == strategy].set_index("metric").reindex([*names])
-            rows = np.arange(len(names)) + 0.7 * ((index + 0.5) / len(strategies) - 0.5)
+            cells = mine[mine.strategy == strategy].set_index("metric").reindex([*METRICS])
+            rows = np.arange(len(METRICS)) + 0.7 * ((index + 0.5) / len(strategies) - 0.5)
             spans = np.abs(cells[["ratio_low", "ratio_high"]].to_numpy() - cells[["ratio"]].to_numpy()).T
             axis.errorbar(cells.ratio, rows, xerr=spans, fmt="o", color=PALETTE[index], markersize=3.5, label=strategy)
         axis.axvline(1.0, color="black", linewidth=0.7)
-        axis.set(title=title, xscale="log", yticks=range(len(names)), ylim=(len(names) - 0.5, -0.5))
+        axis.set(title=title, xscale="log", yticks=range(len(METRICS)), ylim=(len(METRICS) - 0.5, -0.5))
         label_decades(axis.xaxis)
         axis.grid(visible=False, axis="y")
-    axes[0, 0].set_yticklabels([name.replace("k_Σ", r"$k_\Sigma$") for name in names.values()])
+    axes[0, 0].set_yticklabels([name.replace("k_Σ", r"$k_\Sigma$") for name in METRICS.values()])
     title = "score over that of the first strategy, 95 % intervals"
     legend_below(figure, 5, title)
     return figure

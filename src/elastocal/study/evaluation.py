@@ -14,10 +14,8 @@ import numpy as np
 
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import Column, TableSchema, read_blocks, read_table, write_table
-from elastocal.study.columns import LENGTH, group, real, table
-from elastocal.study.equation_11 import prefix_information
-from elastocal.study.identify import Design, identified, identified_blocks, read_measured
-from elastocal.study.jobs import Job, origin, robot_of
+from elastocal.study.equation_11 import identified, identified_blocks, prefix_information, read_measured, regressors_of
+from elastocal.study.jobs import LENGTH, Job, group, origin, real, robot_of, table
 from elastocal.study.metrics import (
     Judge,
     first_length_below,
@@ -126,7 +124,7 @@ def bound_blocks(
     moment, sets = judge.form[:-1, :-1], 0
     sums: dict[tuple[str, ...], np.ndarray] = dict.fromkeys(distinct, np.zeros(()))
     for block in experiment_blocks:
-        regressors = Design(to_experiments(block), chain, names, rows, wrench_at).regressors
+        regressors = regressors_of(to_experiments(block), chain, names, rows, wrench_at)
         information = {name: prefix_information(matrix) for name, matrix in regressors.items()}
         sets += regressors[names[0]].shape[-1]
         for points in distinct:
@@ -152,26 +150,19 @@ class Averages:
     relative_spread: np.ndarray
 
 
-def average(
-    blocks: Iterable[tuple[np.ndarray, np.ndarray]], judge: Judge, method: str, deviation_of: str, test_weights: np.ndarray
-) -> Averages:
+def average(blocks: Iterable[tuple[np.ndarray, np.ndarray]], judge: Judge, method: str, test_weights: np.ndarray) -> Averages:
     """Average the estimates over data sets (equation 12) and score the averaged model (equation 15).
 
     A replicate multiplies weights of data sets by independent weights of test configurations: the product-weight bootstrap of
     crossed factors [1].
 
     `blocks` (compliance, weights): compliances (sets, lengths, n) and bootstrap weights (1 + replicates, sets). `method`: what
-    is averaged: 1/c or c, by its mean; or the median of c (interpretation R7). `deviation_of`: whether equation 15 scores the
-    averaged model or averages the scores of the data sets (interpretation R8), which then has the weights of data sets alone.
-    `test_weights` (1 + replicates, tests).
+    is averaged: stiffness 1/c or compliance c (interpretation R7). `test_weights` (1 + replicates, tests).
 
     [1] Owen, A. B. and Eckles, D., Bootstrapping data arrays of arbitrary order, Annals of Applied Statistics 6, 2012.
     """
-    if method == "median":
-        compliances, weights = zip(*blocks, strict=True)
-        blocks = [(np.concatenate(compliances), np.concatenate(weights, axis=1))]
     zero: np.ndarray = np.zeros(())
-    total = sums = scores = moments = nonpositive = zero
+    total = sums = moments = nonpositive = zero
     sets = 0
     for compliance, weights in blocks:
         sets += len(compliance)
@@ -179,17 +170,10 @@ def average(
         nonpositive = nonpositive + (compliance <= 0).any(axis=-1).sum(axis=0)
         scaled = compliance / judge.reference
         moments = moments + np.stack([scaled.sum(axis=0), (scaled**2).sum(axis=0)])
-        if method == "median":
-            counts = weights.astype(int)
-            averaged = np.stack([np.median(np.repeat(compliance, count, axis=0), axis=0) for count in counts])
-        else:
-            sums = sums + np.tensordot(weights, compliance if method == "compliance" else 1.0 / compliance, axes=1)
-        if deviation_of == "each_data_set":
-            scores = scores + weights @ mean_deviation(judge, compliance)
-    if method != "median":
-        averaged = sums / total[:, None, None]
-        averaged = averaged if method == "compliance" else 1.0 / averaged
-    deviation = mean_deviation(judge, averaged, test_weights) if deviation_of == "averaged_model" else scores / total[:, None]
+        sums = sums + np.tensordot(weights, compliance if method == "compliance" else 1.0 / compliance, axes=1)
+    averaged = sums / total[:, None, None]
+    averaged = averaged if method == "compliance" else 1.0 / averaged
+    deviation = mean_deviation(judge, averaged, test_weights)
     initial = np.broadcast_to((test_weights @ judge.initial_errors / test_weights.sum(axis=1))[:, None], deviation.shape)
     mean, square = moments / sets
     spread = (np.sqrt(np.maximum(square - mean**2, 0.0)) / np.abs(mean)).max(axis=-1)
@@ -287,12 +271,11 @@ def evaluate_strategy(
     judge: Judge,
     fixed_joints: Sequence[int],
     method: str,
-    deviation_of: str,
     lengths: Sequence[int],
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Tables of metrics, bootstrap replicates and accuracy of one strategy from blocks of its estimates and of the weights.
 
-    `method`, `deviation_of`: interpretations R7 and R8, see `average`. `lengths`: for the accuracy of one data set.
+    `method`: interpretation R7, see `average`. `lengths`: for the accuracy of one data set.
     """
     joints, evaluated_rows = len(judge.reference), np.asarray(lengths) - 1
     sums: list[np.ndarray] = []
@@ -305,7 +288,7 @@ def evaluate_strategy(
             sums.append(accuracy_sums(compliance[:, evaluated_rows], judge))
             yield compliance, to_weights(counts)
 
-    averages = average(weigh(), judge, method, deviation_of, to_weights(test_weights))
+    averages = average(weigh(), judge, method, to_weights(test_weights))
     return (
         metrics_table(averages, judge.reference, fixed_joints),
         replicates_table(averages, judge.reference, fixed_joints),
@@ -348,9 +331,8 @@ def identify(job: Job) -> None:
     """One strategy for one robot at one noise level: compliances at every prefix length, and what they are worth."""
     asked, robot = job.params, robot_of(job)
     n, strategy = robot.joints, strategy_from_document(asked.strategy)
-    solvable = drop_forgotten_stages(strategy, n) if asked.start is None else strategy
     blocks = read_measured(job, n, strategy.points)
-    solved = identified_blocks(blocks, robot.chain, solvable, asked.rows, asked.wrench_at, asked.start)
+    solved = identified_blocks(blocks, robot.chain, drop_forgotten_stages(strategy, n), asked.rows, asked.wrench_at)
     write_table(job.output.identified, identified(n), solved, origin(job))
 
     counts = ["replicate", "count"]
@@ -362,7 +344,6 @@ def identify(job: Job) -> None:
         judge_of(job, robot),
         strategy.fixed_joints,
         asked.average,
-        asked.deviation_of,
         asked.lengths,
     )
     scores = (job.output.metrics, metrics(n)), (job.output.replicates, REPLICATES), (job.output.accuracy, accuracy(n))

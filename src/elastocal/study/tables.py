@@ -16,7 +16,7 @@ import pandas as pd
 from elastocal.io.data_frames import read_long
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.evaluation import BOUNDS, REPLICATES, accuracy, find_length, metrics
-from elastocal.study.jobs import MICRO, MILLI, Job, frames, write_csvs
+from elastocal.study.jobs import MICRO, MILLI, Job, add_slugs, frames, write_csvs
 from elastocal.study.simulation import INITIAL, bootstrap_weights, find_statistics
 
 if TYPE_CHECKING:
@@ -178,13 +178,6 @@ def per_dataset_table(
     relative = [column for column in frame.columns if column.startswith("relative_error_")]
     percent = frame[relative].add_suffix("_percent")
     return result.join(percent.rename(columns=lambda name: name.replace("_std_error_percent", "_percent_std_error")))
-
-
-def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
-    """A table with the names of the strategies' files, `slugs` by the names of strategies, behind these."""
-    found = frame.copy()
-    found.insert([*frame.columns].index("strategy") + 1, "strategy_file", frame.strategy.map(slugs))
-    return found
 
 
 def merge_errors(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
