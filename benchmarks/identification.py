@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 from common import Row, interleaved, load_robot, load_strategy
+from elastocal.study.identify import Situation
 
 from elastocal.mechanics.robot import Robot
 from elastocal.study.equation_11 import Measurements, estimate_compliance, identify
-from elastocal.study.identify import Situation
 from elastocal.study.simulation import (
     Loading,
     blocks_of_sets,

@@ -34,18 +34,11 @@ FAULTS = {
         ("interpretations", "average"),
         "mean",
         "interpretations.average",
-        ["'mean'", "stiffness | compliance | median"],
+        ["'mean'", "stiffness | compliance"],
     ),
     "flat offset": (("loading", "offset_m"), [0, 0.5], "loading.offset_m", ["[0, 0.5]", "allowed: 3 entries"]),
     "noise that is not simulated": (("tables", "noise_um"), 300, "tables.noise_um", ["300", "one of noise_um", "200"]),
-    "length beyond the data": (("evaluation", "lengths", 3), 101, "evaluation.lengths[3]", ["101", "configurations = 100"]),
-    "length that is not evaluated": (("tables", "length"), 21, "tables.length", ["21", "one of evaluation.lengths", "20"]),
-    "interpretation that is switched to nothing known": (
-        ("switched", "R7_median_compliance", "average"),
-        "mean",
-        "switched.R7_median_compliance.average",
-        ["'mean'", "stiffness | compliance | median"],
-    ),
+    "length beyond the data": (("tables", "length"), 101, "tables.length", ["101", "configurations = 100"]),
     "one study has no distribution": (("evaluation", "studies"), 1, "evaluation.studies", ["found 1", "2 to 10000"]),
     "point that no robot has": (
         ("questions", "point_sets", "6DoF"),
@@ -67,17 +60,11 @@ def test_fault_is_one_line_that_names_file_key_and_what_is_allowed(config, confi
 def test_data_sets_too_short_for_a_strategy_are_refused(config, config_folder):
     short = deepcopy(config)
     short["interpretations"]["measured"], short["configurations"] = "position", 1
-    short["evaluation"]["lengths"], short["tables"]["length"] = [1], 1
+    short["tables"]["length"] = 1
     with refused("study.yaml", "configurations:", "found 1", "2 or more", "6DoF"):
         check_study(short, config_folder, "study.yaml")
     short["configurations"] = 2
     check_study(short, config_folder, "study.yaml")
-
-
-def test_a_strategy_with_a_prior_belongs_to_few_configurations(config, config_folder):
-    with refused(config_folder / "strategies/6DoF-shrunk.yaml", "prior_std:", "found 0.3", "questions.few.strategies"):
-        check_study(changed(config, ("strategies", 0), "6DoF-shrunk"), config_folder, "study.yaml")
-    assert [document["name"] for document in check_study(config, config_folder, "study.yaml").few] == ["6DoF", "6DoF shrunk"]
 
 
 @pytest.fixture
@@ -96,9 +83,7 @@ def other_folder(tmp_path):
 @pytest.fixture
 def other_config(config):
     other = deepcopy(config) | {"robots": ["arm"], "strategies": ["plain"]}
-    other["questions"]["few"]["strategies"] = ["plain"]
-    if "classical_strategy" in other["tables"]:
-        other["tables"]["classical_strategy"] = "plain"
+    other["tables"]["classical_strategy"] = "plain"
     other["questions"]["point_sets"] = {"B": ["B"]}
     return other
 
@@ -148,11 +133,9 @@ def test_two_strategies_of_one_name_are_refused(other_config, other_folder):
 
 
 def test_what_the_command_line_changes_is_read_as_in_the_file(config, config_folder):
-    changed = override(
-        config, ["seed=7", "evaluation={studies: 3, lengths: [5, 20]}", "switched={R4_tool_axes: {offset_frame: base}}"]
-    )
+    changed = override(config, ["seed=7", "evaluation={studies: 3}", "interpretations={offset_frame: tool}"])
     assert changed["seed"] == 7 and config["seed"] == 1
-    assert changed["evaluation"] == config["evaluation"] | {"studies": 3, "lengths": [5, 20]}
-    assert changed["switched"] == config["switched"] | {"R4_tool_axes": {"offset_frame": "base"}}
+    assert changed["evaluation"] == config["evaluation"] | {"studies": 3}
+    assert changed["interpretations"] == config["interpretations"] | {"offset_frame": "tool"}
     check_study(changed, config_folder, "config.yaml")
     assert override(config, []) == config

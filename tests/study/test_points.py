@@ -4,9 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_studies import USUAL
-from made_study_blocks import deflections_of, experiments_of, identified, judge
+from made_study_blocks import deflections_of, experiments_of, identified, judge, pinocchio_regressors
 
-from elastocal.study.evaluation import bound_blocks
 from elastocal.study.in_memory import Size, StudyInMemory
 from elastocal.study.metrics import position_errors
 from elastocal.study.points import (
@@ -135,12 +134,15 @@ def test_errors_are_those_of_the_strategy_that_measures_the_points_together(kuka
     np.testing.assert_allclose(found[points]["mean_square"][:, 5], expected, rtol=1e-6)
 
 
-def test_bounds_are_those_of_the_pipeline(kuka, found):
-    sets = [("6DoF",), ("3DoF", "6DoF")]
-    blocks = bound_blocks(experiments_of(kuka, 40, 6), kuka.chain, sets, 6, "end_effector", judge(kuka))
-    expected = {block["points"]: block["rms_per_noise"] for block in blocks}
-    for ours, theirs in (("6DoF", "6DoF"), ("3+6DoF", "3DoF+6DoF")):
-        np.testing.assert_allclose(np.sqrt(found[ours]["bound"].mean(axis=0))[2:], 1e-5 * expected[theirs][2:], rtol=1e-8)
+@pytest.mark.parametrize(("points", "names"), [("6DoF", ["6DoF"]), ("3+6DoF", ["3DoF", "6DoF"])])
+def test_bounds_are_traces_with_inverses_of_pinocchios_information(kuka, found, points, names):
+    (block,) = experiments_of(kuka, 40, 6)
+    moment = judge(kuka).form[:-1, :-1]
+    parts = [pinocchio_regressors(kuka.chain, block, name).reshape(40, 6, 6, 6) for name in names]
+    for number, length in ((0, 6), (7, 3), (39, 1)):
+        matrix = np.concatenate([part[number, :length].reshape(-1, 6) for part in parts])
+        expected = 1e-10 * np.trace(moment @ np.linalg.inv(matrix.T @ matrix))
+        assert found[points]["bound"][number, length - 1] == pytest.approx(expected, rel=1e-5)
 
 
 def test_a_point_measured_twice_has_half_the_variance_and_noise_of_its_own(found):

@@ -11,17 +11,13 @@ SCHEME_ROBOTS |= {"figure3": (EXTENDED or REDUCED)[-1]}
 # Figures 5a and 5c show the first robot, 5b and 5d the second, as in the paper.
 STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
 DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
-BEST_TWO = [name for name in (CLASSICAL, "3+6DoF-comb") if name in config["strategies"]]
 PAPER_FIGURES = [*SCHEME_ROBOTS, "figure4", *(f"figure5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS))]
 FIGURES = [
     *PAPER_FIGURES,
-    "studies",
     "costs",
-    "bias_and_accuracy",
     "scores_against_paper",
     "ladder",
     "designs",
-    "metrics",
 ]
 
 # Each other figure: its function, file, caption, category, what it shows, tables, settings.
@@ -30,15 +26,6 @@ DRAWN = {
         ("noise_impact", "figure4", "figure4", PAPER, "Figure 4: impact of noise"),
         {"metrics": cells("metrics", REDUCED, NOISE, CLASSICAL)},
         {"strategy": NAMES[CLASSICAL], "titles": REDUCED_TITLES},
-    ),
-    "draw_bias_and_accuracy": (
-        ("bias_and_accuracy", "bias_and_accuracy", "bias_and_accuracy", ABOUT, "What the paper's scores measure"),
-        {"metrics": cells("metrics", REDUCED, TABLE_NOISE, BEST_TWO), "per_dataset": rules.tabulate_accuracy.output.table},
-        {
-            "titles": REDUCED_TITLES,
-            "order": [NAMES[name] for name in BEST_TWO],
-            "accuracy_um": QUESTIONS["accuracies_um"][0],
-        },
     ),
     "draw_scores": (
         ("scores", "scores_against_paper", "scores_against_paper", PAPER, "Table 4 against further studies"),
@@ -63,19 +50,6 @@ DRAWN = {
         ("costs", "costs", "costs", ABOUT, "Cost of an accuracy (RQ2)"),
         {"table": rules.tabulate_costs.output.costs, "break_even": rules.tabulate_costs.output.break_even},
         {"titles": REDUCED_TITLES, "accuracy_um": QUESTIONS["accuracies_um"][0]},
-    ),
-    "draw_metrics": (
-        ("metrics", "metrics", "metrics", ABOUT, "Metrics against one another (RQ4)"),
-        {"table": rules.tabulate_uses.output.scores},
-        {"titles": REDUCED_TITLES},
-    ),
-    "draw_studies": (
-        ("over_studies", "studies", "studies", PAPER, "Strategies over studies"),
-        {
-            "studies": ONE_STUDY["studies"],
-            "printed": f"{CONFIG}/paper/reference.csv",
-        },
-        {"titles": REDUCED_TITLES, "order": list(NAMES.values())},
     ),
 }
 # Figures 5a and 5b, and 5c and 5d: their panels, function, caption, words, and the limit that they show.
@@ -110,7 +84,6 @@ for drawn, ((function, file, caption, category, words), tables, settings) in DRA
             figure=function,
             tables=[*tables],
             settings=settings,
-            noise_um=config["tables"]["noise_um"],
         script:
             "../scripts/draw_study.py"
 

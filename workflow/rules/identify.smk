@@ -1,7 +1,7 @@
-"""Estimates and their scores: each strategy on each robot at each noise level, its own job; and what is possible.
+"""Estimates and their scores: each strategy on each robot at each noise level, its own job.
 
-Needs data/simulated/. Writes results/weights/{robot}.parquet, results/identified/, results/metrics/, results/replicates/ and results/accuracy/, each
-{robot}/{noise}um/{strategy}.parquet, and results/bounds/{robot}.parquet.
+Needs data/simulated/. Writes results/weights/{robot}.parquet, results/identified/, results/metrics/ and results/replicates/, each
+{robot}/{noise}um/{strategy}.parquet.
 """
 
 
@@ -29,7 +29,6 @@ rule identify:
         identified="results/identified/{robot}/{noise}um/{strategy}.parquet",
         metrics="results/metrics/{robot}/{noise}um/{strategy}.parquet",
         replicates="results/replicates/{robot}/{noise}um/{strategy}.parquet",
-        accuracy="results/accuracy/{robot}/{noise}um/{strategy}.parquet",
     log:
         "results/logs/identify/{robot}/{noise}um/{strategy}.log",
     benchmark:
@@ -43,25 +42,5 @@ rule identify:
         tool_offset_m=INTERPRETATIONS["tool_offset_m"],
         wrench_at=INTERPRETATIONS["wrench_at"],
         average=INTERPRETATIONS["average"],
-        lengths=config["evaluation"]["lengths"],
-    script:
-        "../scripts/run_step.py"
-
-
-rule bound:
-    input:
-        experiments="data/simulated/{robot}/experiments.parquet",
-        test_experiments="data/simulated/{robot}/test/experiments.parquet",
-        test_ideal="data/simulated/{robot}/test/ideal.parquet",
-    output:
-        bounds="results/bounds/{robot}.parquet",
-    params:
-        step="elastocal.study.evaluation.bound",
-        robot=robot_document,
-        point_sets=list(STUDY.points.values()),
-        seed=config["seed"],
-        rows=rows_read(INTERPRETATIONS["measured"]),
-        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
-        wrench_at=INTERPRETATIONS["wrench_at"],
     script:
         "../scripts/run_step.py"

@@ -47,7 +47,6 @@ rule state_answers:
         extended=rules.tabulate_extended.output.table,
         studies=rules.tabulate_studies.output.table,
         joint=rules.compare_with_studies.output.joint,
-        costs=rules.tabulate_costs.output.costs,
         break_even=rules.tabulate_costs.output.break_even,
         simulated=rules.tabulate_simulated_designs.output.table,
         citation=placed(ROOT / "CITATION.cff"),

@@ -54,19 +54,6 @@ STUDY_TABLES |= {
         {"table": table_of("extended", ABOUT, "extended", "Elastic links")},
         {"robots": EXTENDED, "strategies": list(NAMES.values())} | AT,
     ),
-    "tabulate_accuracy": (
-        "tables",
-        {
-            "accuracy": cells("accuracy", config["robots"], NOISE),
-            "bounds": expand(rules.bound.output.bounds, robot=config["robots"]),
-        },
-        {"table": table_of("per_dataset", ABOUT, "per_dataset", "Accuracy of one data set")},
-        {
-            "robots": config["robots"],
-            "points": {NAMES[name]: list(points) for name, points in STUDY.points.items()},
-            "slugs": {name: key for key, name in NAMES.items()},
-        },
-    ),
     "compare_with_paper": (
         "printed",
         REFERENCE

@@ -11,10 +11,7 @@ from elastocal.io.documents import read_document
 from elastocal.report.study import brief_names, study_facts
 from elastocal.study.strategies import strategy_from_document
 
-_PLAIN = (
-    *("table2", "extended", "joint", "studies", "break_even", "costs"),
-    *("budget", "pairs", "needed", "scores", "score_pairs"),
-)
+_PLAIN = ("table2", "extended", "joint", "studies", "break_even", "budget", "pairs", "needed", "scores", "score_pairs")
 # Each table, and how it is read: what looks like a number may be none.
 _TABLES = {name: {} for name in _PLAIN} | {
     "comparison": {"dtype": {"table": str}},

@@ -12,7 +12,6 @@ from matplotlib.ticker import NullLocator
 
 from elastocal.figures.style import MICRO, PALETTE, label_decades, legend_below, line_style, note, panels, styled
 from elastocal.study.printed import LEVEL
-from elastocal.study.uses import METRICS
 
 # Of the linear panels of the noise impact: what a reader compares with the wanted accuracy.
 _LINEAR_UM = 20.0
@@ -94,71 +93,6 @@ def deviations(
     axis.set(title=title, xlabel=_LENGTH, ylabel="dev, equation 15 (µm)", yscale="log", ylim=(0.5, 80))
     label_decades(axis.yaxis)
     legend_below(figure, 4, _BANDS)
-    return figure
-
-
-@styled
-def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str]) -> Figure:
-    """k_sigma over the fixed joints and deviation against the data set length: mean over studies and how they scatter.
-
-    `studies`: robot and the columns of `repeated.repeated`. `printed`: the printed figures. `titles`: name of each robot
-    to draw, by its key. `order`: strategies; one estimator under several names is drawn once, under the first of them.
-    """
-    figure, axes = panels(2, len(titles), 118, sharex=True, sharey="row")
-    quantities = (("k_sigma_fixed_joints", 1.0, "k_sigma", (0.2, 20)), ("deviation", MICRO, "dev", (0.5, 40)))
-    for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
-        for axis, (quantity, scale, name, span) in zip(column, quantities, strict=True):
-            mine = studies[studies.robot == robot]
-            means = mine.pivot_table(index="length", columns="strategy", values=quantity, observed=True)
-            for index in _find_distinct(means, order):
-                strategy, style = order[index], line_style(index)
-                curves = scale * mine[mine.strategy == strategy].pivot(index="study", columns="length", values=quantity)
-                middle, spread = curves.mean(), curves.std()
-                axis.plot(middle.index, middle, label=strategy, **style)
-                axis.fill_between(middle.index, middle - spread, middle + spread, color=style["color"], alpha=0.12, linewidth=0)
-            _printed_marks(axis, printed, robot, name, order)
-            # A margin on the right, where diamonds at the longest length would be cut in halves.
-            axis.set(xscale="log", yscale="log", xlim=(8, 1.05 * studies.length.max()), ylim=span)
-            label_decades(axis.xaxis, axis.yaxis)
-        column[0].set_title(title)
-        column[1].set_xlabel(_LENGTH)
-    axes[0, 0].set_ylabel(r"$k_\Sigma$ of the fixed joints (%)")
-    axes[1, 0].set_ylabel("dev, equation 15 (µm)")
-    bands = "bands: ± one standard deviation between studies"
-    legend_below(figure, 4, f"{bands}; one estimator under several names is drawn once")
-    return figure
-
-
-@styled
-def bias_and_accuracy(
-    metrics: pd.DataFrame, per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str], accuracy_um: float
-) -> Figure:
-    """What the paper's metric hides: the bias of the averaged model against the error that one data set leaves.
-
-    `metrics`: long, of one noise level. `per_dataset`: the table of the same name, of the same noise level. `titles`: name of
-    each robot to draw, by its key. `order`: strategies to draw. `accuracy_um`: wanted; marked by a line.
-    """
-    figure, axes = panels(1, len(titles), 92, sharey=True)
-    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
-        for index, strategy in enumerate(order):
-            averaged = metrics[(metrics.robot == robot) & (metrics.strategy == strategy) & (metrics.length > 1)]
-            single = per_dataset[(per_dataset.robot == robot) & (per_dataset.strategy == strategy)]
-            color = PALETTE[index]
-            axis.fill_between(single.length, single.mean_um, single.p95_um, color=color, alpha=0.13, linewidth=0)
-            axis.plot(
-                single.length, single.rms_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, RMS"
-            )
-            bound = {"color": "black", "marker": "_", "markersize": 7, "linestyle": "none", "zorder": 3 + index}
-            axis.plot(single.length, single.crlb_rms_um, label=f"{strategy}: Cramér-Rao bound, RMS", **bound)
-            label = f"{strategy}: dev of the paper"
-            axis.plot(averaged.length, MICRO * averaged.deviation, color=color, linestyle="--", label=label)
-        _limit(axis, accuracy_um, "µm")
-        axis.set(title=title, xlabel=_LENGTH, xscale="log", yscale="log", xlim=(2, 100), ylim=(0.5, 2000))
-        for plain in (axis.xaxis, axis.yaxis):
-            plain.set_major_formatter("{x:g}")
-    axes[0, 0].set_ylabel("end-effector error (µm)")
-    title = "bands: from the mean to the 95th percentile of one data set's error"
-    legend_below(figure, len(order), title)
     return figure
 
 
@@ -310,31 +244,5 @@ def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, 
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("bound of the RMS error (µm)")
     title = f"band: 5 to 95 % of random designs; line: {accuracy_um:g} µm"
-    legend_below(figure, 5, title)
-    return figure
-
-
-@styled
-def metrics(table: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
-    """Scores of the strategies over those of the classical one, metric by metric.
-
-    `table`: from `uses.ranks_table`. `titles`: name of each robot to draw, by its key. One estimator under several METRICS is
-    drawn once, under the first of them.
-    """
-    figure, axes = panels(1, len(titles), 26 + 8 * len(METRICS), sharey=True, sharex=True)
-    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
-        mine = table[table.robot == robot]
-        strategies = mine[mine.metric == next(iter(METRICS))].drop_duplicates("value").strategy
-        for index, strategy in enumerate(strategies):
-            cells = mine[mine.strategy == strategy].set_index("metric").reindex([*METRICS])
-            rows = np.arange(len(METRICS)) + 0.7 * ((index + 0.5) / len(strategies) - 0.5)
-            spans = np.abs(cells[["ratio_low", "ratio_high"]].to_numpy() - cells[["ratio"]].to_numpy()).T
-            axis.errorbar(cells.ratio, rows, xerr=spans, fmt="o", color=PALETTE[index], markersize=3.5, label=strategy)
-        axis.axvline(1.0, color="black", linewidth=0.7)
-        axis.set(title=title, xscale="log", yticks=range(len(METRICS)), ylim=(len(METRICS) - 0.5, -0.5))
-        label_decades(axis.xaxis)
-        axis.grid(visible=False, axis="y")
-    axes[0, 0].set_yticklabels([name.replace("k_Σ", r"$k_\Sigma$") for name in METRICS.values()])
-    title = "score over that of the first strategy, 95 % intervals"
     legend_below(figure, 5, title)
     return figure

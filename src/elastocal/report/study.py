@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,13 +53,7 @@ def study_facts(
     Returns rows and paragraphs of `study.txt` under its headings, strings ready to print.
     """
     length, titles, accuracy = settings["length"], [names[robot] for robot in robots], settings["accuracy_um"]
-    whole = {name: frame.assign(robot=frame.robot.map(names)) if "robot" in frame else frame for name, frame in tables.items()}
-    # These have rows of robots with links, too.
-    linked = ("ladder", "extended", "comparison", "table2")
-    of = {
-        name: frame[frame.robot.isin(titles)] if "robot" in frame and name not in linked else frame
-        for name, frame in whole.items()
-    }
+    of = {name: frame.assign(robot=frame.robot.map(names)) if "robot" in frame else frame for name, frame in tables.items()}
     judged, pairs = of["comparison"][of["comparison"].p_holm.notna()], of["score_pairs"]
     of |= {
         "outside": judged[judged.p_value < LEVEL],
@@ -95,21 +88,13 @@ def study_facts(
     }
     helpers = {"word_value": word_value, "column_head": column_head, "ratio": ratio_words, "each": each, "at": at}
     constants = {"infinity": np.inf, "metrics": METRICS, "chosen": CHOSEN, "designs": _DESIGNS, "reference": REFERENCE}
-    chosen = {
-        "titles": titles,
-        "size": length,
-        "accuracy": accuracy,
-        "classical": settings["classical"],
-        "favoured": settings["best"],
-    }
+    chosen = {"titles": titles, "size": length, "accuracy": accuracy, "favoured": settings["best"]}
     more = {
         "measured": _measured(of["studies"], settings["configurations"]),
         "figures": _figures(of["studies"]),
-        "costs": {title: cheapest(of["costs"][of["costs"].robot == title]) for title in titles},
-        "summaries": _summaries(tables["ladder"], tables["pairs"]),
         "t": {name: _records(frame) for name, frame in of.items()},
     }
-    return sentences("study.txt", **helpers, **constants, **chosen, **more) | facts
+    return sentences("study.txt", classical=settings["classical"], **helpers, **constants, **chosen, **more) | facts
 
 
 def paper_rows(beside: pd.DataFrame, names: Mapping[str, str], configurations: int) -> list[dict[str, str]]:
@@ -155,10 +140,9 @@ def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
     return rows
 
 
-def ratio_words(row: Mapping[str, Any], name: str = "ratio", digits: int = 3) -> str:
+def ratio_words(row: Mapping[str, Any]) -> str:
     """A ratio of a row with its interval."""
-    value, low, high = (f"{row[name + end]:.{digits}f}" for end in ("", "_low", "_high"))
-    return f"{value} ({low} to {high})"
+    return f"{row['ratio']:.3f} ({row['ratio_low']:.3f} to {row['ratio_high']:.3f})"
 
 
 def _continued(quantity: str, value: float, error: float, configurations: int, longest: float = np.inf) -> str:
@@ -208,9 +192,8 @@ def _stages(strategy: Strategy) -> list[str]:
     """What a strategy does, stage by stage: its name, and points measured → compliances identified."""
 
     def springs(joints: Sequence[int]) -> str:
-        numbers = [joint + 1 for joint in joints]
-        whole = len(numbers) > 1 and numbers == [*range(numbers[0], numbers[-1] + 1)]
-        return f"c{numbers[0]}–c{numbers[-1]}" if whole else ", ".join(f"c{number}" for number in numbers)
+        whole = len(joints) > 1 and [*joints] == [*range(joints[0], joints[-1] + 1)]
+        return f"c{joints[0] + 1}–c{joints[-1] + 1}" if whole else ", ".join(f"c{joint + 1}" for joint in joints)
 
     stages = [
         f"{' and '.join(stage.points)} → {springs(stage.identified)}"
@@ -218,34 +201,3 @@ def _stages(strategy: Strategy) -> list[str]:
         for stage in strategy.stages
     ]
     return [strategy.name, "; then ".join(stages)]
-
-
-def cheapest(costs: pd.DataFrame) -> list[tuple[str, float]]:
-    """Sets of points of one robot, each with the cost of a configuration from which on it is the cheapest.
-
-    `costs`: from `costs.cost_table`. A cost is linear in that of a configuration: sets that follow each other on the grid meet
-    where their lines do.
-    """
-    lines = {}
-    for points, cell in costs.groupby("points"):
-        cell = cell.sort_values("configuration_cost")
-        first, last = cell.iloc[0], cell.iloc[-1]
-        slope = (last.cost - first.cost) / (last.configuration_cost - first.configuration_cost)
-        lines[points] = (slope, first.cost - slope * first.configuration_cost)
-    best = costs[costs.cheapest].sort_values("configuration_cost").points
-    order = list(dict.fromkeys(best))
-    meet = [(lines[b][1] - lines[a][1]) / (lines[a][0] - lines[b][0]) for a, b in pairwise(order)]
-    return list(zip(order, [0.0, *meet], strict=True))
-
-
-def _summaries(ladder: pd.DataFrame, pairs: pd.DataFrame) -> dict[str, Any]:
-    """Percent by which cross-validation's choice leaves more than the best number of link springs; ratios of sets of points."""
-    chosen, groups = ladder.link_springs == CHOSEN, ["robot", "noise_um", "length"]
-    excess = 100 * (ladder[chosen].groupby(groups).rms_um.first() / ladder[~chosen].groupby(groups).rms_um.min() - 1)
-    ratios = {
-        "worse": int((pairs.ratio_low > 1).sum()),
-        "sets": len(pairs),
-        "least": pairs.ratio.min(),
-        "largest": pairs.ratio.max(),
-    }
-    return {"median": excess.median(), "most": excess.max(), **ratios}

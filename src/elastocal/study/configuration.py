@@ -110,14 +110,11 @@ def _check_cells(config: Mapping[str, Any], source: str) -> None:
     for level in config["noise_um"]:
         if levels.setdefault(f"{level:g}", level) != level:
             raise InputError(source, "noise_um", f"{levels[f'{level:g}']} and {level}", "levels that differ in 6 digits")
-    lengths = config["evaluation"]["lengths"]
-    for index, length in enumerate(lengths):
-        if length > longest:
-            raise InputError(source, f"evaluation.lengths[{index}]", str(length), f"up to configurations = {longest}")
     for key, name, allowed in (
         ("classical_strategy", "strategies", config["strategies"]),
         ("noise_um", "noise_um", config["noise_um"]),
-        ("length", "evaluation.lengths", lengths),
     ):
         if tables[key] not in allowed:
             raise InputError(source, f"tables.{key}", repr(tables[key]), f"one of {name} {allowed}")
+    if tables["length"] > longest:
+        raise InputError(source, "tables.length", str(tables["length"]), f"up to configurations = {longest}")

@@ -77,12 +77,6 @@ def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarr
     return Judge(robot.compliance, forms, initial)
 
 
-def split_models(groups: int, models: int) -> list[slice]:
-    """Slices of groups of so many models each, small enough for the errors of one to stay in the cache."""
-    size = max(1, MODELS_AT_A_TIME // models)
-    return [slice(start, start + size) for start in range(0, groups, size)]
-
-
 def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
     """End-effector position error (models, tests), m, of models (models, n) at every test configuration."""
     error = np.column_stack([compliance - judge.reference, np.ones(len(compliance))])
@@ -91,17 +85,15 @@ def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(squares, 0.0, out=squares), out=squares)
 
 
-def mean_deviation(judge: Judge, compliance: np.ndarray, test_weights: np.ndarray | None = None) -> np.ndarray:
+def mean_deviation(judge: Judge, compliance: np.ndarray, test_weights: np.ndarray) -> np.ndarray:
     """Equation 15: position error of models, mean over the test configurations.
 
     `compliance` (groups, models, n). `test_weights` (groups, tests): how often each test configuration counts for a group of
-    models; once without. Returns (groups, models): m.
+    models. Returns (groups, models): m.
     """
-    if test_weights is None:
-        test_weights = np.ones((len(compliance), len(judge.initial_errors)))
     groups, models, joints = compliance.shape
-    means = np.empty((groups, models))
-    for part in split_models(groups, models):
+    means, size = np.empty((groups, models)), max(1, MODELS_AT_A_TIME // models)
+    for part in (slice(start, start + size) for start in range(0, groups, size)):
         errors = position_errors(judge, compliance[part].reshape(-1, joints)).reshape(-1, models, test_weights.shape[1])
         means[part] = (errors @ test_weights[part, :, None])[..., 0]
     return means / test_weights.sum(axis=1, keepdims=True)
