@@ -88,8 +88,7 @@ def strategies():
     for path in sorted((CONFIG / "strategies").glob("*.yaml")):
         document = read_document(path)
         check_document(document, "strategy", path)
-        if "prior_std" not in document:
-            found[path.stem] = strategy_from_document(document)
+        found[path.stem] = strategy_from_document(document)
     return found
 
 

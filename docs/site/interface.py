@@ -35,7 +35,7 @@ INTERFACE = {
         "elastocal.application.compensation": ("find_joint_targets",),
     },
     "Judge predictions": {"elastocal.validation.held_out": ("position_errors", "intervals")},
-    "Identify compliances as in the study": {"elastocal.study.equation_11": ("identify", "covariance")},
+    "Identify compliances as in the study": {"elastocal.study.equation_11": ("estimate_compliance", "undetermined")},
 }
 
 

@@ -98,7 +98,7 @@ def test_metrics_are_equations_13_and_14_of_the_averages(judge, estimates, weigh
     np.testing.assert_array_equal(table["deviation"], averages.deviation[0])
 
 
-def test_replicates_are_every_replicate_at_every_length_without_the_first(judge, estimates, weights, counts):
+def test_replicates_are_every_one_but_the_first_and_their_spread_is_the_standard_error(judge, estimates, weights, counts):
     averages = average(blocks_of(estimates, weights), judge, "stiffness", counts)
     table = replicates_table(averages, judge.reference, (0, 1))
     assert len(table["replicate"]) == REPLICATES * LENGTHS
@@ -108,13 +108,9 @@ def test_replicates_are_every_replicate_at_every_length_without_the_first(judge,
     delta = 100 * (judge.reference / averages.compliance[4, 1] - 1)
     np.testing.assert_allclose(table["k_sigma"][row], delta.sum(), rtol=1e-9)
     np.testing.assert_allclose(table["k_sigma_fixed_joints"][row], delta[:2].sum(), rtol=1e-9)
-
-
-def test_standard_errors_are_the_spread_of_the_replicates(judge, estimates, weights, counts):
-    averages = average(blocks_of(estimates, weights), judge, "stiffness", counts)
-    metrics, replicates = (make(averages, judge.reference, (0, 1)) for make in (metrics_table, replicates_table))
-    for name in ("k_sigma", "k_sigma_fixed_joints", "deviation", "initial_deviation"):
-        spread = replicates[name].reshape(REPLICATES, LENGTHS).std(axis=0, ddof=1)
+    metrics = metrics_table(averages, judge.reference, (0, 1))
+    for name in ("k_sigma", "deviation", "initial_deviation"):
+        spread = table[name].reshape(REPLICATES, LENGTHS).std(axis=0, ddof=1)
         np.testing.assert_allclose(metrics[f"{name}_std_error"], spread, rtol=1e-12)
 
 

@@ -9,7 +9,6 @@ from support import random_loads, without_tool
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.study import metrics
-from elastocal.study.equation_11 import Measurements, estimate_compliance, prefix_information
 from elastocal.study.metrics import (
     first_length_below,
     k_sigma,
@@ -117,16 +116,6 @@ def test_lengths_follow_a_bias_over_the_length_to_any_limit(bias, limit, sign, l
     assert length_to_reach(values, limit) == pytest.approx(whole if reached else crossing, rel=1e-12)
 
 
-def regressors(robot, configurations, names=("3DoF", "6DoF")):
-    """(rows, n, configurations, 1) of one data set at each point."""
-    loads, found = random_loads(robot, 1, configurations, seed=3), {}
-    torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, robot.chain.end_effector)
-    for name in names:
-        jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, robot.chain.point(name))[2]
-        found[name] = np.moveaxis(regressor(jacobian, torques), (2, 3, 1, 0), (0, 1, 2, 3))
-    return found
-
-
 def test_bound_is_the_trace_with_the_explicit_inverse():
     rng = np.random.default_rng(1)
     rows, half = rng.standard_normal((4, 3, 9, 6)), rng.standard_normal((6, 6))
@@ -142,27 +131,3 @@ def test_bound_is_infinite_where_the_information_is_singular_and_nowhere_else():
     information = np.concatenate([information, np.zeros((1, 1, 6, 6))])
     information[1, 0] = np.eye(6)
     np.testing.assert_allclose(squared_error_bounds(information, np.eye(6))[:, 0], [np.inf, 6.0, np.inf])
-
-
-def test_joint_least_squares_reaches_the_bound_at_small_noise(kuka, strategies):
-    # 3000 data sets of the same configurations, with other noise: their mean squared error over the bound is the efficiency.
-    draws, noise, configurations = 3000, 1e-6, 6
-    judge, matrices, rng = (
-        judge_of(kuka, random_loads(kuka, 1, 50, seed=9)),
-        regressors(kuka, configurations),
-        np.random.default_rng(4),
-    )
-    measurements = {}
-    for name, matrix in matrices.items():
-        exact = np.einsum("rnks,n->rks", matrix, kuka.compliance)
-        measured = exact + noise * rng.standard_normal((6, configurations, draws))
-        measurements[name] = Measurements(np.broadcast_to(matrix, (*matrix.shape[:3], draws)), measured)
-    bound = squared_error_bounds(sum(prefix_information(m) for m in matrices.values()), judge.form[:-1, :-1])[-1, 0]
-    for name in ("3+6DoF-comb", "4-6DoF-after-6+3DoF", "4-6DoF-after-3DoF"):
-        found = estimate_compliance(strategies[name], measurements, 6)[0][-1].T
-        efficiency = bound * noise**2 / (position_errors(judge, found) ** 2).mean()
-        if name == "4-6DoF-after-3DoF":
-            assert efficiency < 0.95  # it forgets what the end-effector says of joints 1-3
-        else:
-            # A mean of 3000 sums of a few squares: 2 %. An efficiency of 0.9 is seen with a power of 0.97.
-            assert efficiency == pytest.approx(1, abs=0.06)

@@ -4,14 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_studies import USUAL
-from made_study_blocks import deflections_of, experiments_of, identified, judge, pinocchio_regressors
+from made_study_blocks import experiments_of, judge, pinocchio_regressors
 
 from elastocal.study.in_memory import Size, StudyInMemory
-from elastocal.study.metrics import position_errors
 from elastocal.study.points import (
     break_even_table,
     budget_blocks,
-    budget_table,
     configurations_needed,
     lengths_table,
     paired_table,
@@ -43,12 +41,6 @@ def test_pairs_are_compared_data_set_by_data_set():
     np.testing.assert_allclose(table.ratio_high / table.ratio_low, 1.0, atol=1e-9)
     alone = root_mean(frame_of().query("points == 'three' and length == 4").mean_square.to_numpy())[1]
     assert (table.difference_um_std_error < 0.2 * 1e6 * alone).all()
-
-
-def test_data_sets_that_are_too_short_for_the_budget_have_no_row():
-    short = frame_of().query("length < 12")
-    assert paired_table({"arm": short}, POINT_SETS, 6).empty
-    assert set(budget_table({"arm": short}, POINT_SETS, 6).configurations) == {4, 6}
 
 
 def test_lengths_are_exact_with_an_interval():
@@ -123,15 +115,6 @@ SIZE = Size(data_sets=40, configurations=6, tests=30, noise=1e-5)
 def found(kuka):
     blocks = list(budget_blocks(StudyInMemory(kuka, "kuka", 1, USUAL, SIZE), POINT_SETS_OF_BUDGET))
     return {block["points"]: {name: block[name].reshape(40, 6) for name in ("mean_square", "bound")} for block in blocks}
-
-
-@pytest.mark.parametrize(("points", "strategy"), [("6DoF", "6DoF"), ("3+6DoF", "3+6DoF-comb")])
-def test_errors_are_those_of_the_strategy_that_measures_the_points_together(kuka, strategies, found, points, strategy):
-    experiments = experiments_of(kuka, 40, 6)
-    table = identified(kuka, strategies[strategy], experiments, deflections_of(kuka, experiments, 1e-5))
-    models = np.column_stack([table[f"compliance_{j}"] for j in range(1, 7)])[table["length"] == 6]
-    expected = (position_errors(judge(kuka), models) ** 2).mean(axis=1)
-    np.testing.assert_allclose(found[points]["mean_square"][:, 5], expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize(("points", "names"), [("6DoF", ["6DoF"]), ("3+6DoF", ["3DoF", "6DoF"])])

@@ -52,7 +52,6 @@ def test_a_finished_study_holds_in_every_check(folder):
         ("data/simulated/kuka_extended/ideal.parquet", "dz", -1),
         (f"data/campaigns/{CAMPAIGN}/measurements.parquet", "x", 1.00001),
         (MEASURED, "dx", 1.01),
-        ("results/design/kuka/6DoF.parquet", "cov_4_4", 2),
         (IDENTIFIED, "compliance_2", 1.0001),
         (f"results/loop/{CAMPAIGN}/held_out.parquet", "z", 1.00001),
         (f"results/loop/{CAMPAIGN}/steps.parquet", "std_error", 0.5),
