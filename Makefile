@@ -10,7 +10,7 @@ INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
 
-# Extended questions, repeated studies, designs and claims, with the report of the study.
+# Further questions, repeated studies and designs, with the report of the study.
 study: .venv/ready
 	$(BIN)/snakemake -j$(CORES) study
 
