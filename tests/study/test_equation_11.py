@@ -170,17 +170,6 @@ def test_undetermined_are_the_prefixes_beyond_the_largest_condition():
         assert 0 < found[length - 1].sum() < sets
 
 
-@pytest.mark.parametrize("at", AT)
-@pytest.mark.parametrize("name", ["3+6DoF-comb", "4-6DoF-after-3DoF", "5-6DoF-after-4DoF"])
-def test_exact_data_give_the_true_compliances(robot, strategies, name, at):
-    experiments = experiments_of(robot)
-    deflections = deflections_of(robot, experiments, at=at)
-    found = compliances(identified(robot, strategies[name], experiments, deflections, at=at), 4)
-    assert found.shape == (5, 6)
-    # As far as the exact kinematics are linear.
-    np.testing.assert_allclose(found, np.tile(robot.compliance, (5, 1)), rtol=0.05)
-
-
 @pytest.mark.parametrize("rows", [3, 6])
 def test_estimates_of_every_prefix_are_numpy_least_squares_of_its_measurements(kuka, strategies, rows):
     moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka, sets=3)

@@ -19,6 +19,7 @@ def test_data_sets_of_studies_follow_on_each_other_without_overlap(kuka):
     whole = study_of(kuka).measure(np.arange(8), ("6DoF",))["6DoF"]
     np.testing.assert_array_equal(later.deflection, whole.deflection[..., 4:])
     assert len(np.unique(whole.deflection[0, 0])) == 8
+    assert [sets.tolist() for sets in study_of(kuka).blocks(2)] == [[8, 9, 10, 11]]
 
 
 def test_measurements_are_those_of_the_pipelines_steps(kuka):

@@ -13,6 +13,7 @@ from elastocal.study.points import (
     configurations_needed,
     lengths_table,
     paired_table,
+    ratio_of_roots,
     root_mean,
 )
 
@@ -41,6 +42,15 @@ def test_pairs_are_compared_data_set_by_data_set():
     np.testing.assert_allclose(table.ratio_high / table.ratio_low, 1.0, atol=1e-9)
     alone = root_mean(frame_of().query("points == 'three' and length == 4").mean_square.to_numpy())[1]
     assert (table.difference_um_std_error < 0.2 * 1e6 * alone).all()
+
+
+def test_the_interval_of_a_ratio_is_that_of_the_bootstrap_over_data_sets():
+    """2,000 replicates: its ends are known to 3 %."""
+    rng = np.random.default_rng(4)
+    ours, theirs = rng.chisquare(5, (2, 200))
+    drawn = rng.integers(0, 200, (2000, 200))
+    expected = np.quantile(np.sqrt(ours[drawn].mean(axis=1) / theirs[drawn].mean(axis=1)), [0.025, 0.975])
+    assert ratio_of_roots(ours, theirs)[1:] == pytest.approx(expected, rel=0.02)
 
 
 def test_lengths_are_exact_with_an_interval():

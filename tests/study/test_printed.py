@@ -181,10 +181,3 @@ def test_the_smallest_ratio_is_of_the_robot_that_gains_least_from_its_best_strat
     # 40 / 20 for the arm by A, 40 / 25 for the other one by B.
     assert row.ours == pytest.approx(1.6)
     assert row.mc_std == pytest.approx(np.std([1.6 * 0.9 / 1.1, 1.6, 1.6 * 1.1 / 0.9], ddof=1))
-
-
-def test_a_robot_that_was_not_studied_has_an_empty_row_and_no_score(results):
-    row = compare(results, "3", "nobody", "6DoF", "c1", "um_per_N", 0.5)
-    assert row.paper == 0.5 and np.isnan([row.ours, row.mc_std, row.z]).all()
-    share = compare(results, "text", "", "", "share_compensated_joint_elasticity_only", "percent", 97.6)
-    assert np.isnan([share.ours, share.z]).all()
