@@ -15,8 +15,7 @@ from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects import catalogue
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Effect
-from elastocal.exchange.controllers.catalogue import controllers
-from elastocal.exchange.controllers.protocol import Controller, axes_of, targets_of
+from elastocal.exchange.controllers import CONTROLLERS, axes_of, targets_of
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.sites import sites_of
 from elastocal.study.strategies import check_strategy, strategy_from_document
@@ -97,9 +96,8 @@ def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(module
 
 
 def test_the_language_is_whole_and_writes_targets(module):
-    language = module("A controller's language")
-    assert language.NAME not in controllers()
-    assert {*Controller.__annotations__, "program"} <= set(vars(language))
+    language = module("A controller's language").LINES
+    assert language.name not in CONTROLLERS
     shifts = (True, *6 * (False,))
     targets = targets_of(np.array([[0.5, *6 * (np.pi / 6,)]]), shifts, axes_of(language, shifts, ""))
     assert language.program("GO", targets) == f"GO\n{6 * '30.000000 '}500.000000\n"
