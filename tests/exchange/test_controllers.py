@@ -1,4 +1,4 @@
-"""Programs say each target in the controller's words; names that it does not have are refused, what is not plain is asked for."""
+"""Programs say each target in the controller's words; names that it does not have are refused, unclear axes asked for."""
 
 import re
 from pathlib import Path
