@@ -19,8 +19,7 @@ from elastocal.application.compensation import (
     find_joint_targets,
     large_steps,
 )
-from elastocal.exchange.controllers.catalogue import controllers
-from elastocal.exchange.controllers.protocol import axes_of, targets_of
+from elastocal.exchange.controllers import CONTROLLERS, axes_of, targets_of
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
 
@@ -177,8 +176,8 @@ def test_random_paths_never_swing_and_their_programs_are_the_targets(name):
         assert not large_steps(robot.robot, position[good], rotation[good], found.joint_angles[good])
         prismatic = robot.robot.chain.prismatic
         for language, stated in STATED.items():
-            axes = axes_of(controllers()[language], prismatic, stated if robot.robot.joints == 7 else "")
-            text = controllers()[language].program("go", targets_of(found.joint_angles[good], prismatic, axes), ["robot: x"])
+            axes = axes_of(CONTROLLERS[language], prismatic, stated if robot.robot.joints == 7 else "")
+            text = CONTROLLERS[language].program("go", targets_of(found.joint_angles[good], prismatic, axes), ["robot: x"])
             read = np.array(numbers(text)).reshape(-1, robot.robot.joints)
             np.testing.assert_allclose(np.radians(read), found.joint_angles[good], atol=1e-8)
     assert whole >= 4

@@ -52,7 +52,7 @@ FAULTY_SOURCES = {
     "unknown importer": (
         {**dict.fromkeys(SIMULATED), "source": "public", "importer": "mine", "files": ["a"]},
         "importer",
-        ["'mine'", "fanuc_cpa, fanuc_joint, fanuc_static, jacobi, motoman, ur10_ipa"],
+        ["'mine'", "fanuc_static, fanuc_cpa, fanuc_joint, jacobi, motoman, ur10_ipa"],
     ),
     "unknown source": ({"source": "made up"}, "source", ["'made up'", "simulated"]),
 }
@@ -61,7 +61,8 @@ FAULTY_SOURCES = {
 @pytest.fixture
 def campaigns_folder(config_folder, tmp_path):
     """The repository's robots and one campaign."""
-    (tmp_path / "robots").symlink_to(config_folder / "robots")
+    for name in ("robots", "public_data.yaml"):
+        (tmp_path / name).symlink_to(config_folder / name)
     (tmp_path / "campaigns").mkdir()
     (tmp_path / "campaigns" / "mine.yaml").write_text(yaml.safe_dump(SIMULATED))
     return tmp_path

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_targets import made_targets
 
-from elastocal.exchange.controllers.catalogue import controllers
+from elastocal.exchange.controllers import CONTROLLERS
 
-ALL = controllers()
 EVIL = st.sampled_from(
     [*"\r\n\v\f\x1c\x85\u2028\u2029\0\x1b\"'`;!#%&{}[]()*/\\:=@$", "\r\n", "END", "ENDPROC", "end", "/POS", "/END", "*/", "//"]
 )
@@ -37,10 +36,10 @@ def statements(language, text):
     return [part for part in kept if part]
 
 
-@pytest.mark.parametrize("language", ALL)
+@pytest.mark.parametrize("language", CONTROLLERS)
 @given(NOTES)
 def test_no_text_adds_a_statement_to_a_program_and_the_targets_come_back(language, notes):
-    module = ALL[language]
+    module = CONTROLLERS[language]
     targets = made_targets(module)
     text = module.program("go", targets, notes)
     assert statements(language, text) == statements(language, module.program("go", targets))

@@ -32,7 +32,7 @@ POSITIONS = {
     "A.x": lambda marker, axis: f"{marker}{'.' if marker else ''}{axis}",
 }
 ROTATIONS = ("none", "vector", "quaternion", "matrix", "homogeneous", "euler:ZYX", "euler:xyz", "euler:ZYZ")
-TIMES = ("none", "s", "ms", "epoch ms", "iso", "clock", "german")
+TIMES = ("none", "s", "ms", "iso", "clock")
 UNIT_STYLES = ("bracket", "parenthesis", "ending", "row", "none")
 
 
@@ -64,11 +64,9 @@ def written_campaigns(draw):
     if decimal == "comma" and separator == "comma":
         quotes = True
     length, angle, force = pick("m", "mm", "in"), pick("rad", "deg", "mrad"), pick("none", "N", "kN")
-    shape = pick("one target", "a column", "wide", "wide", "two lines") if separator != "space" else "one target"
+    shape = pick("one target", "a column", "wide") if separator != "space" else "one target"
     targets = ("SMR",) if shape == "one target" else pick(("A", "B"), ("T1", "T2", "T3"))
-    rotation, time = pick(*ROTATIONS), pick(*TIMES)
-    if shape == "two lines" and rotation in ("matrix", "homogeneous"):
-        rotation = "none"
+    rotation, time = "none" if shape == "wide" else pick(*ROTATIONS), pick(*TIMES)
     poses = int(rng.integers(3, 7))
     # What is measured.
     prismatic = tuple(bool(rail and j == 0) for j in range(joints))
@@ -77,7 +75,7 @@ def written_campaigns(draw):
     turns = Rotation.random(poses * len(targets), rng=rng)
     wrench = rng.uniform(-900, 900, (poses, 6)) if force != "none" else np.zeros((poses, 6))
     columns: list[tuple[str, str, list]] = []  # header, unit, cells
-    per_pose = shape in ("wide", "two lines")
+    per_pose = shape == "wide"
     options: dict = {"units": {}}
 
     def rounded(values, scale, digits):
@@ -86,25 +84,17 @@ def written_campaigns(draw):
         return cells, cells * scale
 
     # Joints.
-    style = pick(*JOINTS, "robot", "states") if joints != 4 else "q1"
+    style = pick(*JOINTS, "robot") if joints != 4 else "q1"
     q_written = np.empty_like(q)
     names = tuple(f"axis_of_{letter}" for letter in "kjihgfedc"[:joints])
-    joint_names = names if style in ("robot", "states") else ()
+    joint_names = names if style == "robot" else ()
     joint_units = [length if slides else angle for slides in prismatic]
     for j in range(joints):
         q_written[:, j], q[:, j] = rounded(q[:, j], SCALES[joint_units[j]], 6)
-    each = {"robot": lambda j: names[j - 1], "states": lambda j: ""}.get(style) or JOINTS[style]
-    if style == "states":
-        order = rng.permutation(joints)
-        for place, j in enumerate(order):
-            columns.append((f"field.name{place}", "", [names[j]] * poses))
-            columns.append((f"field.position{place}", joint_units[j], [*q_written[:, j]]))
-    else:
-        columns += [(each(j + 1), joint_units[j], [*q_written[:, j]]) for j in range(joints)]
+    each = {"robot": lambda j: names[j - 1]}.get(style) or JOINTS[style]
+    columns += [(each(j + 1), joint_units[j], [*q_written[:, j]]) for j in range(joints)]
     # Positions and orientations, of each marker in a row or of each row.
     called = pick(*POSITIONS) if separator != "space" else pick("x", "X", "tcp/position/x", "A.x")
-    if shape == "two lines":
-        called = "X"
     p_written, position = rounded(position, SCALES[length], 5)
     matrices = turns.as_matrix().reshape(poses, len(targets), 3, 3)
     own: list[tuple[str, str, np.ndarray]] = []  # quantity, unit, (poses, targets)
@@ -130,17 +120,11 @@ def written_campaigns(draw):
         names_of = [f"r{letter}" for letter in letters.lower()] if by_axis else ["e1", "e2", "e3"]
         own += [(name, angle, cells[:, k].reshape(poses, -1)) for k, name in enumerate(names_of)]
     heads = POSITIONS[called]
-    above: dict[str, str] = {}
     if per_pose:
+        # Topics of one end are one column to the import: of several targets they are called otherwise.
+        heads = POSITIONS["x" if called == "tcp/position/x" else called]
         for t, target in enumerate(targets):
-            for quantity, unit, cells in own:
-                header = heads(target, quantity) if quantity in "xyz" else f"{target}_{quantity}"
-                if called == "tcp/position/x" and quantity not in "xyz":
-                    header = f"/{target}/{quantity}"
-                if shape == "two lines":
-                    header = f"{quantity.upper()}|{target}"
-                    above[header] = target
-                columns.append((header, unit, [*cells[:, t]]))
+            columns += [(heads(target, axis), unit, [*cells[:, t]]) for axis, unit, cells in own]
     rows = poses if per_pose else poses * len(targets)
     if not per_pose:
         # Long: every row one target, robots' columns repeated.
@@ -162,12 +146,11 @@ def written_campaigns(draw):
     # Time, a pose's number or label, and what nobody needs.
     start, step = 1683195633, 60 * np.arange(poses)
     forms = {
-        "s": lambda s: f"{s}", "ms": lambda s: f"{1000 * s}", "epoch ms": lambda s: f"{1000 * (start + s)}",
+        "s": lambda s: f"{s}", "ms": lambda s: f"{1000 * s}",
         "iso": lambda s: str(np.datetime64(start + s, "s")), "clock": lambda s: str(np.datetime64(start + s, "s"))[11:],
-        "german": lambda s: "{2}.{1}.{0} {3}".format(*str(np.datetime64(start + s, "s")).replace("T", "-").split("-")),
     }  # fmt: skip
     seconds = None
-    if time != "none" and not (separator == "space" and time == "german"):
+    if time != "none":
         cells = [forms[time](int(s)) for s in step for _ in range(each_row)]
         columns.append(("Time", "ms" if time == "ms" else "", cells))
         zero = {"s": 0, "ms": 0, "clock": start % 86400}.get(time, start)
@@ -223,16 +206,7 @@ def written_campaigns(draw):
     )
     preamble = draw(st.integers(0, 3))
     buffer.write("".join(f"Recorded by program {k}\n" for k in range(preamble)))
-    if shape == "two lines":
-        writer.writerow([above.get(header, "") for header, _, _ in columns])
-        headers = [header.partition("|")[0] for header in headers]
-        called_so = [
-            f"{above[header]} {name}" if header in above else name
-            for (header, _, _), name in zip(columns, headers, strict=True)
-        ]
-        if units in ("bracket", "parenthesis", "ending"):
-            options["units"] |= {"angles": angle, "lengths": length}
-    comment = pick("", "", "#", "%", "//") if not quotes and units != "row" and shape != "two lines" else ""
+    comment = pick("", "", "#", "%", "//") if not quotes and units != "row" else ""
     if comment:
         buffer.write(comment + " ")
     writer.writerow(headers)
@@ -242,13 +216,14 @@ def written_campaigns(draw):
     if pick(False, True):
         writer.writerow([""] * len(columns))
     content = buffer.getvalue().replace("\n", pick("\n", "\r\n", "\r"))
-    encoding = pick("utf-8", "utf-8-sig", "utf-16", "cp1252", "utf-16-le")
+    encoding = pick("utf-8", "utf-8-sig", "utf-16", "cp1252")
     if rotation.startswith("euler:") or rotation == "vector":
         options["rotation"] = rotation
     if shape == "one target":
         options["target"] = "SMR"
     elif per_pose:
-        options["targets"] = {target: target for target in targets}
+        written_as = dict(zip((header for header, _, _ in columns), headers, strict=True))
+        options["targets"] = {target: [written_as[heads(target, axis)] for axis in "xyz"] for target in targets}
     if pick(False, True):
         options["separator"] = separator
     expected = {f"q{j + 1}": np.repeat(q[:, j], len(targets)) for j in range(joints)}
@@ -265,5 +240,4 @@ def written_campaigns(draw):
         "separator": separator, "decimal": decimal, "quotes": quotes, "encoding": encoding,
         "comment": comment, "poses": numbered, "beside": beside,
     }  # fmt: skip
-    named = called_so if shape == "two lines" else headers
-    return Written(content.encode(encoding), expected, options, joint_names, prismatic, named, dialect)
+    return Written(content.encode(encoding), expected, options, joint_names, prismatic, headers, dialect)

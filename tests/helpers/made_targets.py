@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from elastocal.exchange.controllers.protocol import axes_of, targets_of
+from elastocal.exchange.controllers import axes_of, targets_of
 
 ANGLES = np.random.default_rng(6).uniform(-3, 3, (4, 6))
 RAIL = np.array([[0.25], [-1.5], [0.0], [3.125]])

@@ -11,7 +11,7 @@ from pathlib import Path
 import elastocal
 from snakemake.iocontainers import Wildcards
 
-from elastocal.campaigns.importers.catalogue import importer
+from elastocal.campaigns.importers import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
 from elastocal.errors import InputError
@@ -286,9 +286,9 @@ def files_of_campaign(campaign):
 
 
 def robots_of_import(wildcards):
-    """Files of the robots that an importer reads or names; importers are imported only where one is needed."""
-    source = importer(SOURCES[wildcards.campaign]["importer"], f"campaign {wildcards.campaign}")
-    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.ROBOTS)
+    """Files of the robots that an importer reads or names."""
+    source = importer(SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}")
+    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.all_robots)
 
 
 def loop_reports(campaigns):

@@ -42,6 +42,7 @@ rule simulate_campaign:
 
 rule import_campaign:
     input:
+        sources=f"{CONFIG}/public_data.yaml",
         robots=robots_of_import,
     output:
         document="data/campaigns/{campaign}/campaign.yaml",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.accuracy import Prediction
     from elastocal.application.compensation import Correction
-    from elastocal.exchange.controllers.protocol import Controller
+    from elastocal.exchange.controllers import Controller
     from elastocal.exchange.target_path import TargetPath
     from elastocal.loop.calibrated_files import Diagnosed
     from elastocal.mechanics.robot import Robot
@@ -74,7 +74,7 @@ def correct(
     from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted, regressed
     from elastocal.application.compensation import find_joint_targets
     from elastocal.diagnosis.misplaced import point_sentence
-    from elastocal.exchange.controllers.protocol import axes_of, check_name, targets_of
+    from elastocal.exchange.controllers import axes_of, check_name, targets_of
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.data_frames import write_csv
@@ -150,7 +150,7 @@ def correct(
         lines.append(f"a {words} on what the model leaves corrects {acts} by {size}; --physics-only leaves it out")
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
-        lines.append(f"{program.name} goes to {share}: {controller.WORDS}, {called}")
+        lines.append(f"{program.name} goes to {share}: {controller.words}, {called}")
     lines += [f"! {each['sentence']}" for each in campaign.verdict["misplaced"]]
     lines += [f"! {line}" for line in swings[:_NAMED]]
     if len(swings) > _NAMED:
@@ -182,16 +182,16 @@ def _swings(wanted: TargetPath, found: Correction, good: np.ndarray, robot: Robo
 
 def _places_of(output: Path, language: str) -> tuple[Controller | None, Path, Path]:
     """The language of a program, if there shall be one, and where the CSV and the program go."""
-    from elastocal.exchange.controllers.catalogue import controller_of
+    from elastocal.exchange.controllers import controller_of
 
     by_suffix = controller_of("", output.suffix)
     controller = controller_of(language, "") if language else by_suffix
     if controller is None:
         return None, output, output
     if by_suffix not in (None, controller):
-        allowed = f"{controller.SUFFIX} | .csv"
-        raise InputError(output, "--output", f"a program in another language than {controller.WORDS}", allowed)
-    return controller, output.with_suffix(".csv") if by_suffix else output, output.with_suffix(controller.SUFFIX)
+        allowed = f"{controller.suffix} | .csv"
+        raise InputError(output, "--output", f"a program in another language than {controller.words}", allowed)
+    return controller, output.with_suffix(".csv") if by_suffix else output, output.with_suffix(controller.suffix)
 
 
 def _notes(campaign: Diagnosed, wrench: np.ndarray, day: date) -> list[str]:

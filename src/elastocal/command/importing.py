@@ -14,7 +14,7 @@ from elastocal.command.printed import example
 from elastocal.command.quantities import LARGEST_RELATIVE_STD, MOST_ROWS
 from elastocal.counting import counted
 from elastocal.errors import InputError, printable
-from elastocal.exchange import DH_MASS_STD, URDF_MASS_STD
+from elastocal.exchange import URDF_MASS_STD
 
 if TYPE_CHECKING:
     from elastocal.exchange.measurement_table import ImportedMeasurements
@@ -70,14 +70,12 @@ def dh(
     decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of a CSV table. Default: found out.")] = None,
     ignore: Annotated[list[str] | None, Option(help="Column to leave out; as often as needed.")] = None,
     name: Annotated[str | None, Option(help="Maker and model. Default: the name of the file.")] = None,
-    mass_std: _MassStd = DH_MASS_STD,
     force: _Force = False,
 ) -> None:
     """Make a robot file of a Denavit-Hartenberg table.
 
     The table has one row for each joint. Columns: theta_offset_deg, d_m, a_m, alpha_deg; optionally joint, type (R, P or F),
-    lower_deg, upper_deg, compliance_urad_per_Nm, mass_kg, cx_m, cy_m, cz_m, point. The first two rows of a UR5e, standard
-    notation:
+    lower_deg, upper_deg, point. The first two rows of a UR5e, standard notation:
 
     joint, theta_offset_deg, d_m, a_m, alpha_deg, type
 
@@ -90,7 +88,7 @@ def dh(
 
     refuse_existing(output, force)
     options = DhOptions(angles, lengths, decimal, tuple(ignore or ()))
-    _write(robot_from_dh(file, modified, options, name, mass_std), output)
+    _write(robot_from_dh(file, modified, options, name), output)
 
 
 @importing.command(epilog=example("elastocal import csv tracker.csv --folder campaigns/cell --target SMR1"))
@@ -114,7 +112,7 @@ def csv(
     unit: Annotated[list[str] | None, Option(help="NAME=UNIT of one column, such as fx=kN.")] = None,
     target: Annotated[
         list[str] | None,
-        Option(help="Name of the target where no column has it; of each of several markers in a row, or NAME=MARKER."),
+        Option(help="Name of the target where no column has it; of each of several in a row NAME=X,Y,Z, its columns."),
     ] = None,
     wrench: Annotated[
         Literal["on-robot", "by-robot"] | None, Option(help="Forces on the robot, or those that it exerts.")
@@ -159,12 +157,12 @@ def csv(
     units = _pairs("--unit", unit) | {
         key: value for key, value in {"angles": angles, "lengths": lengths}.items() if value is not None
     }
-    several = target if target and (len(target) > 1 or "=" in target[0]) else []
-    markers = {
-        name.strip(): (marker if equals else name).strip() for name, equals, marker in (t.partition("=") for t in several)
+    targets = {
+        name.strip(): [header.strip() for header in headers.split(",")]
+        for name, headers in _pairs("--target", target if target and (len(target) > 1 or "=" in target[0]) else None).items()
     }
-    if len(markers) < len(several) or "" in markers:
-        raise InputError("--target", "", ", ".join(several), "a name for each marker, such as A, or A=MARKER")
+    if wrong := next((name for name, headers in targets.items() if len({*headers}) != 3), None):
+        raise InputError("--target", "", f"{wrong}={','.join(targets[wrong])}", "NAME=X,Y,Z, the columns of its position")
     stated: dict[str, Any] = {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty, "separator": separator}
     stated |= {"decimal": decimal, "header": header, "encoding": encoding}
     stated |= {"names": [name.strip() for name in names.split(",")] if names else None}
@@ -173,8 +171,8 @@ def csv(
         ignore=[*(earlier.ignore or ()), *(ignore or ())] or None,
         columns=dict(earlier.columns or {}) | _pairs("--column", column),
         units=dict(earlier.units or {}) | units,
-        target=(target[0] if target else earlier.target) if not markers else None,
-        targets=markers or (earlier.targets if not target else None),
+        target=(target[0] if target else earlier.target) if not targets else None,
+        targets=targets or (earlier.targets if not target else None),
         **{name: value for name, value in stated.items() if value},
     )
     arm, known = _described(robot, folder)

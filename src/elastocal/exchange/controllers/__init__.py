@@ -1,1 +1,0 @@
-"""Programs with joint targets in the languages of robot controllers, one module each: `catalogue` finds them."""

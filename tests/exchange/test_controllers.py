@@ -1,0 +1,94 @@
+"""Programs say each target in the controller's words; names that it does not have are refused, unclear axes asked for."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_targets import ANGLES, RAIL, made_targets, numbers
+from support import refused
+
+from elastocal.exchange.controllers import CONTROLLERS, axes_of, check_name, controller_of
+
+ALL, SIX = CONTROLLERS, (False,) * 6
+# What a line, or in TP a block, of a target begins with, and what the whole begins and ends with.
+TARGET = {"krl": r"  PTP .*", "rapid": r"  CONST .*", "tp": r"(?s)P\[\d\]\{.*?\};", "urscript": r"  movej.*"}
+WHOLE = {
+    "krl": ("&ACCESS RVP\nDEF go()\n", "\nEND\n"),
+    "rapid": ("MODULE go\n", "  ENDPROC\nENDMODULE\n"),
+    "tp": ("/PROG  GO\n/ATTR\n", "};\n/END\n"),
+    "urscript": ("def go():\n", "\nend\n"),
+}
+
+
+def targets(name, **options):
+    text = ALL[name].program("go", made_targets(ALL[name], **options))
+    assert text.startswith(WHOLE[name][0]) and text.endswith(WHOLE[name][1])
+    return re.findall(TARGET[name], text), text
+
+
+def test_a_language_is_found_by_its_name_and_by_the_suffix_of_its_files():
+    assert {name: each.suffix for name, each in ALL.items()} == {
+        "krl": ".src",
+        "rapid": ".mod",
+        "tp": ".ls",
+        "urscript": ".script",
+    }
+    assert all(controller_of("", each.suffix.upper()) is controller_of(name, "") is each for name, each in ALL.items())
+    assert controller_of("", ".csv") is None
+    with refused("--format", "'karel'", "krl"):
+        controller_of("karel", "")
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_target_stands_in_the_program_to_a_microdegree(name):
+    found, text = targets(name)
+    read = np.array([numbers(each)[:6] for each in found])
+    np.testing.assert_allclose(read if name == "urscript" else np.radians(read), ANGLES, atol=1e-8)
+    moves = {"rapid": r"MoveAbsJ target_(\d), v100, fine", "tp": r" \d:J P\[(\d)\] 10% FINE    ;"}.get(name)
+    assert moves is None or re.findall(moves, text) == ["1", "2", "3", "4"]
+
+
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [
+        ("krl", "{{E6AXIS: E1 {}, A1"),
+        ("rapid", "],[{},9E9,9E9,9E9,9E9,9E9]];"),
+        ("tp", ",\n\tE1= {} mm"),
+    ],
+)
+def test_a_rail_is_the_first_external_axis_in_millimetres(name, written):
+    found, _ = targets(name, rail=True)
+    for target, place in zip(found, RAIL[:, 0], strict=True):
+        assert written.format(f"{1e3 * place:.6f}") in target
+
+
+def test_joints_stand_in_the_controllers_order_whatever_theirs_is():
+    found, _ = targets("urscript", stated="wrist3,wrist2,wrist1,elbow,shoulder,base")
+    np.testing.assert_allclose(numbers(found[0])[:6], ANGLES[0, ::-1], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_name_that_no_program_may_have_is_refused(name):
+    words = {"krl": ["PTP", "i"], "rapid": ["Module", "TARGET_3"], "tp": ["con"], "urscript": ["while"]}[name]
+    longest = [] if name == "urscript" else ["x" * 40]
+    for stem in ("1st", "my targets", "größe", "a-b", *longest, *words):
+        with refused(stem, "name of a program", ALL[name].words):
+            check_name(ALL[name], Path(stem + ALL[name].suffix))
+    assert check_name(ALL[name], Path("out/targets_2.any")) == "targets_2"
+
+
+def test_six_joints_that_turn_are_plain_a_rail_is_an_external_axis_and_others_are_asked_for():
+    assert axes_of(ALL["krl"], (True, *SIX), "") == ("E1", "A1", "A2", "A3", "A4", "A5", "A6")
+    assert axes_of(ALL["rapid"], (True, True, *SIX), "")[:3] == ("eax_a", "eax_b", "rax_1")
+    assert axes_of(ALL["tp"], (*SIX, True), "")[-2:] == ("J6", "E1")
+    for prismatic in ((False,) * 7, (False,) * 4, (True,) + (False,) * 5):
+        with refused("--format", "joints that turn", "--axes", "A1", "E1"):
+            axes_of(ALL["krl"], prismatic, "")
+    with refused("--format", "joints that turn", "6 joints", "URScript"):
+        axes_of(ALL["urscript"], (False,) * 7, "")
+    stated = ("A1", "A2", "E1", "A3", "A4", "A5", "A6")
+    assert axes_of(ALL["krl"], (False,) * 7, ", ".join(stated)) == stated
+    for wrong in ("A1,A2", "A1,A1,A2,A3,A4,A5,A6", "J1,A2,E1,A3,A4,A5,A6"):
+        with refused("--axes", wrong, "7 different names"):
+            axes_of(ALL["krl"], (False,) * 7, wrong)
