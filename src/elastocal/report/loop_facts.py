@@ -131,8 +131,8 @@ def loop_facts(
 def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence[str], origin: Origin | None = None) -> None:
     """Compile the report of a campaign; the file appears whole or not at all.
 
-    `path`: the PDF. `facts`: from `loop_facts`. `figures`: PDF files, named before_after, residuals, arrows, candidates and,
-    where there are pairs, confounding. `origin`: named in the foot of each page.
+    `path`: the PDF. `facts`: from `loop_facts`. `figures`: PDF files, named before_after, arrows and candidates.
+    `origin`: named in the foot of each page.
     """
     names = [Path(figure).stem for figure in figures]
     compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures, origin)
