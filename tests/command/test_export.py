@@ -10,7 +10,7 @@ from analysed_robots import analysed
 from made_calibrated import made_calibrated
 from made_urdf import joint, link, written
 
-from elastocal.application.forward_model import fold_effects
+from elastocal.application.exported import fold_effects
 from elastocal.campaigns.reading import read_robot
 from elastocal.command.export import _drop_in
 from elastocal.exchange.dh import robot_from_dh

@@ -12,10 +12,6 @@ def step(model, rms, open_above=False):
     return {"model": model, "step": {"corrected": "with lost_motion"}.get(model, model)} | values
 
 
-def line(name, rms, known=True):
-    return {"name": name, "rms_m": rms, "low_m": 0.8 * rms if known else None, "high_m": 1.2 * rms if known else None}
-
-
 def made_accuracy():
     noise = "the tracker's noise is not in it"
     return Accuracy("base", "predicted", 1.2e-4, 3e-4, 1.6e-4, None, noise, 9, "some poses").document()
@@ -56,11 +52,11 @@ def made_document(decision="pass", misplaced=False, **conformity):
         }
         | conformity,
         "budget": [
-            line("uncorrected", 1.5e-3, False),
-            line("joint_compliance", 1e-3),
-            line("lost_motion", 2e-4),
-            line("uncertainty of the parameters", 2e-5, False),
-            line("repeatability", 0.0, False),
+            {"name": "uncorrected", "rms_m": 1.5e-3},
+            {"name": "joint_compliance", "rms_m": 1e-3},
+            {"name": "lost_motion", "rms_m": 2e-4},
+            {"name": "uncertainty of the parameters", "rms_m": 2e-5},
+            {"name": "repeatability", "rms_m": 0.0},
         ],
         "budget_states": 100,
         "tracker_rms_m": 1.5e-4,

@@ -14,7 +14,7 @@ from elastocal.exchange.target_path import TargetPath
 from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.loop.certificate import Wanted, certificate, use_at
 
-WANTED = Wanted(2e-4, 0.05, "SN 7", "2026-11-23", 1)
+WANTED = Wanted(2e-4, 0.05, "SN 7", "2026-11-23")
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from typer import Argument, Option
 from elastocal.command.campaign import AcceptEnvironment, PhysicsOnly, diagnosed_campaign
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import iso_date, print_answer, printed
-from elastocal.command.quantities import LARGEST_SEED, length_m
+from elastocal.command.quantities import length_m
 from elastocal.errors import InputError
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
@@ -31,7 +31,6 @@ def certificate(
     serial: Annotated[str | None, Option(help="Serial number of the robot. Default: the campaign's.")] = None,
     date: Annotated[str | None, Option(help="Date of the certificate, such as 2026-11-20. Default: today.")] = None,
     output: Annotated[Path | None, Option(help="Folder for both files. Default: the campaign's reports.")] = None,
-    seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1,
     physics_only: PhysicsOnly = False,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
@@ -68,7 +67,7 @@ def certificate(
     used = None if use is None else use_at(found.calibrated, read_target_path_of(use, found.calibrated.robot))
     if data_at_fault(found.verdict):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
-    wanted = Wanted(limit, risk, number, day, seed, stated)
+    wanted = Wanted(limit, risk, number, day, stated)
     with console.status("working"):
         document = certified(folder, robots, found, wanted, used)
         facts = certificate_facts(document)

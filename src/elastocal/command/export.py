@@ -46,7 +46,7 @@ def export(
 
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
     from elastocal.application.calibrated import OperatingConditions, regressed
-    from elastocal.application.forward_model import find_left_out_m, fold_effects, sidecar
+    from elastocal.application.exported import find_left_out_m, fold_effects, sidecar
     from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.json_files import write_json

@@ -12,13 +12,12 @@ import numpy as np
 
 from elastocal.application.accuracy import REGION, campaign_poses, error_rows, predict_errors
 from elastocal.application.calibrated import OperatingConditions, beyond_fitted
-from elastocal.application.certificate import error_budget
+from elastocal.application.certificate import TOTAL, error_budget
 from elastocal.application.compensation import find_joint_targets
 from elastocal.campaigns.reading import campaign_files
 from elastocal.diagnosis.misplaced import point_sentence
 from elastocal.exchange.target_path import OK
 from elastocal.io.records import checksum
-from elastocal.random_streams import stream
 from elastocal.validation.conformity import PASS, UNDECIDED, predicted_conformity
 from elastocal.validation.span import joint_ranges, shortfalls
 
@@ -32,8 +31,6 @@ if TYPE_CHECKING:
     from elastocal.loop.calibrated_files import Diagnosed
     from elastocal.mechanics.robot import Robot
 
-# Of intervals of the budget.
-_DRAWS = 2000
 _LIBRARIES = ("elastocal", "numpy", "scipy")
 USE = "the poses and loads of its use"
 _MODELS = {"frames": "uncorrected", "declared": "declared", "effect": "corrected"}
@@ -51,7 +48,6 @@ class Wanted:
     accepted_risk: float
     serial: str
     date: str
-    seed: int
     stated: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -96,8 +92,7 @@ def certificate(
         missing = ["nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted", *missing]
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
-    budget = error_budget(calibrated, *poses, _DRAWS, stream(wanted.seed, found.name, "certificate: budget", 0))
-    uncorrected = next(share.rms_m for share in budget if share.name == "uncorrected")
+    budget = error_budget(calibrated, *poses)
     return {
         "campaign": found.name,
         "robot": robot.name,
@@ -109,7 +104,7 @@ def certificate(
         "files": {Path(file).name: checksum(file) for file in campaign_files(folder, robots_folder)},
         "verdict": found.verdict["verdict"],
         "effects": [effect["name"] for effect in found.verdict["effects"]],
-        "errors": error_rows(found.verdict, *([] if use is None else [(accuracy, uncorrected)])),
+        "errors": error_rows(found.verdict, *([] if use is None else [(accuracy, budget[TOTAL])])),
         "held_out": [*(_step(row) for _, row in found.errors.iterrows()), *_delivered(found.verdict)],
         "regression": (found.verdict["remainder"] or {}).get("words", ""),
         "noise_floor_rms_m": found.verdict["heldout"]["noise_floor_rms_m"],
@@ -119,7 +114,7 @@ def certificate(
         "worst_pose": _worst_pose(robot, poses[0], prediction.error_m),
         "conformity": asdict(decision) | {"configurations": judged, "shortfalls": missing},
         "joint_ranges": joint_ranges(states, robot),
-        "budget": [asdict(share) for share in budget],
+        "budget": [{"name": name, "rms_m": rms} for name, rms in budget.items()],
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
     }

@@ -53,7 +53,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "decision": document["conformity"]["decision"],
         "errors": document["errors"],
         "floor": say.length(document["noise_floor_rms_m"]),
-        "budget": [[share_name(line["name"]), *_share(line)] for line in document["budget"]],
+        "budget": [[share_name(line["name"]), _share(line)] for line in document["budget"]],
         "budget_states": counted(document["budget_states"], "state"),
     }
 
@@ -63,10 +63,9 @@ def share_name(name: str) -> str:
     return _SHARES.get(name) or say.physical_name(name)
 
 
-def _share(line: Mapping[str, Any]) -> list[str]:
-    """A line of the error budget: RMS and its interval."""
-    rms, known = line["rms_m"], line["low_m"] is not None and line["rms_m"] >= _NOTHING_M
-    limits = f"{say.length(line['low_m'])} to {say.length(line['high_m'])}" if known else "–"
+def _share(line: Mapping[str, Any]) -> str:
+    """A line of the error budget: its RMS."""
+    rms = line["rms_m"]
     if 0.0 < rms < _NOTHING_M:
-        return [f"below {say.length(_NOTHING_M, 1)}", limits]
-    return ["hidden by the tracker's noise" if line["name"] == "repeatability" and not rms else say.length(rms), limits]
+        return f"below {say.length(_NOTHING_M, 1)}"
+    return "hidden by the tracker's noise" if line["name"] == "repeatability" and not rms else say.length(rms)
