@@ -20,8 +20,7 @@ INTERFACE = {
     },
     "Simulate a campaign": {"elastocal.campaigns.simulation": ("Plan", "draw_measurements")},
     "Plan measurements": {
-        "elastocal.application.planning.survey": ("Survey",),
-        "elastocal.application.planning.plan": ("find_allowed_candidates", "choose_plan"),
+        "elastocal.application.planning.plan": ("Survey", "find_allowed_candidates", "choose_plan"),
     },
     "Diagnose": {
         "elastocal.diagnosis.diagnose": ("diagnose",),
@@ -29,7 +28,6 @@ INTERFACE = {
         "elastocal.effects.catalogue": ("effects",),
     },
     "Use a calibrated robot": {
-        "elastocal.application.forward_model": ("ForwardModel", "read_calibrated"),
         "elastocal.application.calibrated": ("calibrate_by_fit", "forward", "pose_sensitivities"),
         "elastocal.application.accuracy": ("predict_errors",),
         "elastocal.application.compensation": ("find_joint_targets",),

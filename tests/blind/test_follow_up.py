@@ -5,8 +5,7 @@ import pytest
 from made_folders import made_folder
 
 from elastocal.campaigns.reading import read_campaign
-from elastocal.diagnosis.new_states import Entries
-from elastocal.diagnosis.next_experiment import Proposal
+from elastocal.diagnosis.next_experiment import Entries, Proposal
 from elastocal_proof.blind import follow_up as module
 from elastocal_proof.blind.follow_up import followed_up, proposed
 from elastocal_proof.blind.verdicts import POSES
@@ -29,7 +28,7 @@ def made_proposal(joints, poses, ladder, draws):
     count = np.arange(poses, dtype=float)
     wrench = np.tile([0.0, 0.0, -500.0, 0.0, 0.0, 0.0], (poses, 1))
     angles = draws.uniform(-1, 1, (poses, joints))
-    entries = Entries(angles, wrench, None, np.zeros(poses, bool))
+    entries = Entries(angles, wrench, None)
     return Proposal(("a",), nearest=("b",), entries=entries, shares=ladder, points=("6DoF",), separation=count, resolved=count)
 
 

@@ -12,7 +12,7 @@ from planned_robots import ROBOTS
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
-from elastocal.application.planning.survey import SENSORS
+from elastocal.application.planning.plan import SENSORS
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
 from elastocal.command.main import app

@@ -14,7 +14,7 @@ from made_calibrated import made_calibrated
 from made_urdf import Pinocchio, assert_same_poses, joint, link, segments, written
 from support import refused
 
-from elastocal.application.forward_model import fold_effects
+from elastocal.application.exported import fold_effects
 from elastocal.effects.catalogue import candidates_on
 from elastocal.exchange.urdf import read_urdf, robot_from_urdf
 from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins

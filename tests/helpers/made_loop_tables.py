@@ -4,7 +4,6 @@ import numpy as np
 
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.settings import Settings
-from elastocal.effects.protocol import at_shapes
 
 FAMILIES = ("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift")
 
@@ -60,23 +59,8 @@ def candidate_table(count=30, untestable=5, chosen=1, note="no time in the data"
         "parameters": np.ones(total, int),
         "log_bayes_factor": where_tested(100.0 - 7 * rank),
         "probability": where_tested(np.where(rank < chosen, 0.94, 0.01)),
-        "noncentrality": where_tested(200.0),
-        "angle_deg": where_tested(50.0),
         "chosen": rank < chosen,
         "note": np.where(tested, "", note).astype(object),
-    }
-
-
-def confounding_table(candidates):
-    """Angles of all pairs of the tested candidates of a table."""
-    shapes = [[shape] if np.isfinite(shape) else [] for shape in candidates["shape"]]
-    named = np.array(list(map(at_shapes, candidates["candidate"], shapes)), object)
-    names = named[np.isfinite(candidates["log_bayes_factor"])]
-    pairs = [(one, other) for number, one in enumerate(names) for other in names[:number]]
-    return {
-        "one": np.array([one for one, _ in pairs], object),
-        "other": np.array([other for _, other in pairs], object),
-        "angle_deg": np.linspace(0, 90, len(pairs)),
     }
 
 
@@ -131,7 +115,7 @@ def experiment_rows(effect="link_elasticity", count=10):
         row = {"effect": effect, "pose": number, "load": 1, "point": "6DoF"}
         row |= {f"q{joint}": -0.1 * joint for joint in range(1, 7)}
         row |= {"fx": 910.1, "fy": -0.2, "fz": -411.8, "mx": -205.9, "my": 0.0, "mz": 455.1}
-        rows.append(row | {"separation": 10.0 + number, "separation_without": 6.0})
+        rows.append(row | {"separation": 10.0 + number, "resolved": 0.5 + 0.04 * number})
     return rows
 
 
@@ -163,7 +147,6 @@ def effect_entry(
         "adopted": adopted,
         "cost_m": cost_m if adopted else None,
         "alternatives": list(alternatives),
-        "angle_to_nearest_deg": None,
     }
 
 

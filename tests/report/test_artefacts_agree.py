@@ -21,7 +21,7 @@ from elastocal.report.loop_facts import write_loop_report
 from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.outcome import outcome
 
-PICTURES = ["arrows", "before_after", "residuals", "candidates", "confounding"]
+PICTURES = ["arrows", "before_after", "candidates"]
 DIAGNOSED = sorted(Path("reports/loop").glob("*/report.html"))
 
 

@@ -231,7 +231,7 @@ def test_what_a_regression_adds_is_said_with_shares_intervals_and_where_it_corre
 def pictures(tmp_path_factory):
     """One in the place of each."""
     folder = tmp_path_factory.mktemp("figures")
-    names = [str(folder / f"{name}.pdf") for name in ("before_after", "arrows", "residuals", "candidates", "confounding")]
+    names = [str(folder / f"{name}.pdf") for name in ("before_after", "arrows", "candidates")]
     save(before_after(step_rows(), 5e-5), names[0], str(folder / "before_after.png"))
     return [names[0], *(shutil.copy(names[0], name) for name in names[1:])]
 

@@ -28,12 +28,11 @@ def test_the_next_experiment_is_in_degrees_and_says_what_it_brings():
     facts = facts_of(CAMPAIGNS["class"], experiment=experiment_rows(count=3))["experiment"]
     loads = ["fx N", "fy N", "fz N", "mx N·m", "my N·m", "mz N·m"]
     # All states have one point, which the caption names.
-    assert facts["heads"] == [*(f"q{k} °" for k in range(1, 7)), *loads, "separation"] and facts["points"] == "6DoF"
+    assert facts["heads"] == [*(f"q{k} °" for k in range(1, 7)), *loads, "separation", "resolved"] and facts["points"] == "6DoF"
     angles, wrench = ["−5.7", "−11.5", "−17.2", "−22.9", "−28.6", "−34.4"], ["910", "0", "−412", "−206", "0", "455"]
-    assert facts["rows"][2] == [*angles, *wrench, "12.0"]
-    assert facts["gains"] == [["elastic bending and torsion", "6.00", "12.0"]]
+    assert facts["rows"][2] == [*angles, *wrench, "12.0", "58\u00a0%"]
     unloaded = [row | dict.fromkeys(("fx", "fy", "fz", "mx", "my", "mz"), 0.0) for row in experiment_rows()]
-    assert facts_of(CAMPAIGNS["class"], experiment=unloaded)["experiment"]["heads"][-2:] == ["q6 °", "separation"]
+    assert facts_of(CAMPAIGNS["class"], experiment=unloaded)["experiment"]["heads"][-3:-1] == ["q6 °", "separation"]
 
 
 def test_what_was_measured_is_stated_apart_for_fitted_and_held_out_poses():

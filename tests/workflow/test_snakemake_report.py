@@ -8,7 +8,7 @@ from study_folder import PAPER, REPOSITORY
 CAPTIONS = REPOSITORY / "workflow" / "report"
 SHOWN = re.compile(r'shown\(\s*"(reports/[^"]+)",\s*"(\w+)",\s*"([^"]+)"')
 # Of a campaign's pictures, which one rule draws.
-DRAWN = [f"loop_{figure}" for figure in ("before_after", "arrows", "residuals", "candidates", "confounding")]
+DRAWN = [f"loop_{figure}" for figure in ("before_after", "arrows", "candidates")]
 RULES = [path.read_text(encoding="utf-8") for path in sorted((REPOSITORY / "workflow" / "rules").glob("*.smk"))]
 
 

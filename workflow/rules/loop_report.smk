@@ -15,7 +15,6 @@ rule draw_campaign:
         before_after=rules.judge_campaign.output.before_after,
         diagnosis=rules.diagnose_campaign.output.diagnosis,
         candidates=rules.diagnose_campaign.output.candidates,
-        confounding=rules.diagnose_campaign.output.confounding,
     output:
         pdf=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=[*LOOP_FIGURES]),
         png=[

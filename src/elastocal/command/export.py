@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 ROBOT, URDF, SIDECAR = "robot.yaml", "robot.urdf", "effects.json"
 _ROUNDING_MM = 1e-5
-DH, DELTAS, FRAMES = "dh.csv", "dh_deltas.csv", ("dh_frames.pdf", "dh_frames.png")
-_NAMES = (ROBOT, URDF, SIDECAR, DH, DELTAS, *FRAMES)
+DH, DELTAS = "dh.csv", "dh_deltas.csv"
+_NAMES = (ROBOT, URDF, SIDECAR, DH, DELTAS)
 
 
 def export(
@@ -46,7 +46,7 @@ def export(
 
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
     from elastocal.application.calibrated import OperatingConditions, regressed
-    from elastocal.application.forward_model import find_left_out_m, fold_effects, sidecar
+    from elastocal.application.exported import find_left_out_m, fold_effects, sidecar
     from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.json_files import write_json
@@ -120,18 +120,14 @@ def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, a
 
 
 def _denavit_hartenberg(nominal: Robot, robot: Robot, partial: Path, output: Path) -> list[str]:
-    """Write the DH parameters, by how much they differ from the nominal ones, and their frames; lines to print."""
-    from elastocal.exchange.dh_writing import dh_deltas, dh_frames, dh_table
-    from elastocal.figures.dh_frames import dh_frames_picture
-    from elastocal.figures.style import save
+    """Write the DH parameters, and by how much they differ from the nominal ones; lines to print."""
+    from elastocal.exchange.dh_writing import dh_deltas, dh_table
     from elastocal.io.data_frames import write_csv
 
     try:
-        frames = dh_frames(nominal)
+        table = dh_table(robot, nominal)
     except InputError as error:
         return [f"no DH parameters: {error}"]
-    write_csv(partial / DH, dh_table(robot, nominal), digits=12)
+    write_csv(partial / DH, table, digits=12)
     write_csv(partial / DELTAS, dh_deltas(nominal, robot))
-    names = [str(number) for number in range(len(frames) - 1)] + [nominal.chain.end_effector.name]
-    save(dh_frames_picture(frames, nominal.name, names), str(partial / FRAMES[0]), str(partial / FRAMES[1]))
-    return [str(output / name) for name in (DH, DELTAS, FRAMES[1])]
+    return [str(output / name) for name in (DH, DELTAS)]

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from elastocal.application.planning.cell import Cell
-    from elastocal.application.planning.plan import Candidates, Loads, Plan
-    from elastocal.application.planning.survey import Sensor, Survey
+    from elastocal.application.planning.plan import Candidates, Loads, Plan, Sensor, Survey
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.chain import Chain
 
@@ -130,8 +129,7 @@ def _read_task(options: _Options) -> _Task:
     from elastocal.application.inverse_kinematics import reach_m
     from elastocal.application.planning.cell import COLUMN_SHARE, RADIUS_SHARE, Cell
     from elastocal.application.planning.designs import CRITERIA
-    from elastocal.application.planning.plan import Loads
-    from elastocal.application.planning.survey import Survey
+    from elastocal.application.planning.plan import Loads, Survey
     from elastocal.campaigns.reading import read_robot
 
     arm = read_robot(options.robot)
@@ -267,7 +265,7 @@ def _read_targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
 
 def _find_sensor(name: str | None, measured: str | None) -> tuple[Sensor, str]:
     """What reads the targets, and whether it reads positions or poses."""
-    from elastocal.application.planning.survey import SENSORS
+    from elastocal.application.planning.plan import SENSORS
 
     if measured not in (None, "position", "pose"):
         raise InputError("--measured", "", repr(measured), "position, pose")

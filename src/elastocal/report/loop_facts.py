@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal import __version__
+from elastocal.application.accuracy import error_rows
 from elastocal.counting import grouped, plural
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
-from elastocal.loop.error_table import error_rows
 from elastocal.report import loop_tables as tables
 from elastocal.report import words as say
 from elastocal.report.typesetting import compile_document, sentences
@@ -131,8 +131,8 @@ def loop_facts(
 def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence[str], origin: Origin | None = None) -> None:
     """Compile the report of a campaign; the file appears whole or not at all.
 
-    `path`: the PDF. `facts`: from `loop_facts`. `figures`: PDF files, named before_after, residuals, arrows, candidates and,
-    where there are pairs, confounding. `origin`: named in the foot of each page.
+    `path`: the PDF. `facts`: from `loop_facts`. `figures`: PDF files, named before_after, arrows and candidates.
+    `origin`: named in the foot of each page.
     """
     names = [Path(figure).stem for figure in figures]
     compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures, origin)

@@ -86,36 +86,19 @@ def as_judged(
 
 
 def experiment_facts(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Table of the states proposed, angles in degrees, and for each ambiguity what they bring and what there is."""
-    found: dict[str, Any] = {"loaded": False, "approach": False, "heads": [], "rows": [], "gains": [], "points": ""}
+    """Table of the states proposed, angles in degrees."""
     if not rows:
-        return found
+        return {"loaded": False, "heads": [], "rows": [], "points": ""}
     angles = [name for name in rows[0] if re.fullmatch(r"q\d+", name)]
     loads = {"fx": "N", "fy": "N", "fz": "N", "mx": "N·m", "my": "N·m", "mz": "N·m"}
     # There are no columns of loads where all states are unloaded.
     loads = loads if any(row[name] for row in rows for name in loads) else {}
-    sides = [name for name in rows[0] if re.fullmatch(r"approach\d+", name)]
-    weighed = any(row.get("reference_weight_kg") for row in rows)
-    several, apart = (len({row[name] for row in rows}) > 1 for name in ("effect", "point"))
-    heads = [*(["effect"] if several else []), *(["point"] if apart else []), *(f"{name} °" for name in angles)]
-    heads += [*(f"{name} {unit}" for name, unit in loads.items()), *(["approach"] if sides else [])]
-    shown, gains = [], {}
+    shown = []
     for row in rows:
-        name = say.in_words(row["effect"])
-        cells = [row["point"]] if apart else []
-        cells += [*(f"{np.degrees(row[name]):.1f}" for name in angles), *(f"{round(row[name])}" for name in loads)]
-        cells += ["".join("-0+"[int(np.sign(row[name])) + 1] for name in sides)] if sides else []
-        cells += [*([say.plain(row["reference_weight_kg"])] if weighed else []), say.plain(row["separation"])]
-        shown.append([*([name] if several else []), *map(say.minus, cells)])
-        gains[name] = [say.plain(row["separation_without"]), say.plain(row["separation"])]
-    return {
-        "loaded": bool(loads),
-        "approach": bool(sides),
-        "heads": [*heads, *(["weight kg"] if weighed else []), "separation"],
-        "rows": shown,
-        "gains": [[name, *ends] for name, ends in gains.items()],
-        "points": "" if apart else say.listed(rows[0]["point"].split()),
-    }
+        cells = [*(f"{np.degrees(row[name]):.1f}" for name in angles), *(f"{round(row[name])}" for name in loads)]
+        shown.append([say.minus(cell) for cell in (*cells, say.plain(row["separation"]), say.percent(row["resolved"]))])
+    heads = [*(f"{name} °" for name in angles), *(f"{name} {unit}" for name, unit in loads.items()), "separation", "resolved"]
+    return {"loaded": bool(loads), "heads": heads, "rows": shown, "points": say.listed(rows[0]["point"].split())}
 
 
 def measured_rows(table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]) -> list[list[str]]:

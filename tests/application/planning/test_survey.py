@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.survey import SENSORS, accuracy_rows, information, model_of, observe
+from elastocal.application.planning.plan import SENSORS, accuracy_rows, information, model_of, observe
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise

@@ -1,48 +1,28 @@
-"""The calibrated robot as files, and from them in one class: joint angles to poses, and back.
+"""The calibrated robot as files.
 
 A robot file can say offsets and ratios of the joints, in what the controller's angles mean, q = M r + o; errors of a link, as
 six elementary transforms at its far end in the order in which the fit moved it there; compliances and masses. What it cannot
-say, such as a gear's harmonics, stands in a sidecar with all that the forward model takes; a regression on the remainder
-stands in neither.
+say, such as a gear's harmonics, stands in a sidecar; a regression on the remainder stands in neither.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal import __version__
 from elastocal.application.accuracy import accuracy_sentence
-from elastocal.application.calibrated import NEUTRAL, CalibratedRobot, calibrate_by_model, forward, without
-from elastocal.application.compensation import find_joint_targets
-from elastocal.application.frames import scope_from
-from elastocal.counting import counted
-from elastocal.effects.catalogue import candidates_on
+from elastocal.application.calibrated import forward, without
 from elastocal.effects.conditions import MASS_PARAMETERS
-from elastocal.effects.elastic import joint_compliance
-from elastocal.effects.gravity import DECLARED_WEIGHT, declared_weight
-from elastocal.errors import InputError
-from elastocal.fitting.model import Estimate, Model
-from elastocal.fitting.noise import Noise
-from elastocal.io.json_files import read_json
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
-from elastocal.mechanics.robot import with_rigid_joints
-from elastocal.mechanics.robot_file import document_of, robot_from_document
-from elastocal.mechanics.sites import sites_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from elastocal.application.accuracy import Accuracy
-    from elastocal.application.calibrated import OperatingConditions
-    from elastocal.application.compensation import Correction
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
     from elastocal.mechanics.robot import Robot
 
-# Of a folder that `elastocal export` wrote, and what it says of the model.
-SIDECAR, KEY = "effects.json", "forward_model"
 _SPRINGS = "joint_compliance"
 _CONVENTIONS = {
     "base": "poses are in the robot's base frame: the frame of the chain before its first transform, as the fit placed it",
@@ -55,92 +35,6 @@ _CONVENTIONS = {
     "theta is what the controller's angle is added to",
     "effects": "added to joints and links at the commanded angles; laws by name in the catalogue, elastocal.effects",
 }
-
-
-class ForwardModel:
-    """Where a calibrated robot really is.
-
-    >>> model = ForwardModel.read("calibrated")                                     # doctest: +SKIP
-    >>> position, rotation = model.pose([[0.0, -1.2, 1.4, 0.0, 0.6, 0.0]])          # doctest: +SKIP
-
-    Angles are the controller's, rad (m for prismatic joints); poses those of the last measuring point in base axes, m.
-    """
-
-    def __init__(self, calibrated: CalibratedRobot) -> None:
-        self.calibrated = calibrated
-
-    @classmethod
-    def read(cls, folder: str | Path) -> ForwardModel:
-        """The model of a folder that `elastocal export` wrote.
-
-        Raises `InputError`: a file that is not there or not readable, an effect that the catalogue does not have on this robot.
-        """
-        path = Path(folder) / SIDECAR
-        document = read_json(path)
-        if KEY not in document:
-            raise InputError(path, KEY, "nothing", "a file of elastocal export")
-        return cls(read_calibrated(document[KEY], path.as_posix()))
-
-    def pose(
-        self, joint_angles: Sequence[Sequence[float]] | np.ndarray, operating: OperatingConditions = NEUTRAL
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (N, 3) and rotations (N, 3, 3) at which the robot comes to rest, of joint angles (N, n)."""
-        return forward(self.calibrated, np.asarray(joint_angles, float), operating)
-
-    def joint_targets(
-        self,
-        position: np.ndarray,
-        rotation: np.ndarray,
-        operating: OperatingConditions = NEUTRAL,
-        start: np.ndarray | None = None,
-    ) -> Correction:
-        """Joint angles to command so that the robot comes to rest at wanted poses; as `compensation.find_joint_targets`."""
-        return find_joint_targets(self.calibrated, position, rotation, operating, start)
-
-
-def model_document(calibrated: CalibratedRobot) -> dict[str, Any]:
-    """A calibrated robot as JSON, from which `read_calibrated` makes the same but for the states that were fitted."""
-    model, estimate = calibrated.model, calibrated.estimate
-    values = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
-    return {
-        "robot": document_of(calibrated.robot),
-        "rigid_joints": not (calibrated.robot.compliance_known or calibrated.robot.compliance.any()),
-        "effects": [{"key": e.key, "values": linear.tolist(), "shapes": shapes.tolist()} for e, linear, shapes in values],
-        "covariance": calibrated.covariance.tolist(),
-        "joint_repeatability": calibrated.noise.joint_rad.tolist(),
-        "pose_error_rad": calibrated.noise.pose_rad,
-        "scope": calibrated.scope.document(),
-        "time_zero_s": model.time_zero_s,
-    }
-
-
-def read_calibrated(document: Mapping[str, Any], source: str) -> CalibratedRobot:
-    """A calibrated robot from the document of `model_document`; `source` is named in errors.
-
-    An InputError refuses an effect that the catalogue does not have on this robot, or has with other parameters.
-    """
-    robot = robot_from_document(document["robot"], source)
-    robot = with_rigid_joints(robot) if document["rigid_joints"] else robot
-    sites, entries = sites_of(robot), document["effects"]
-    known = candidates_on(sites) | {_SPRINGS: joint_compliance(sites)}
-    if sites.masses:
-        known[DECLARED_WEIGHT] = declared_weight(sites)
-    for number, entry in enumerate(entries):
-        where, key = f"{KEY}.effects[{number}]", entry["key"]
-        if key not in known:
-            raise InputError(source, where, repr(key), f"an effect of the catalogue on {robot.name}")
-        found, wanted = len(entry["values"]), len(known[key].parameters)
-        if found != wanted:
-            raise InputError(source, where, counted(found, "value"), f"{wanted}, as {key} has in this version")
-    effects, zero = tuple(known[entry["key"]] for entry in entries), float(document["time_zero_s"])
-    model = Model(sites, (), False, 6, robot.compliance, effects, zero, None, robot.compliance_known)
-    values, shapes = (tuple(np.array(entry[name], float) for entry in entries) for name in ("values", "shapes"))
-    base, nowhere = (np.eye(3)[None], np.zeros((1, 3))), (np.zeros((0, 3)), np.zeros((0, 3, 3)))
-    estimate = Estimate((0,), *base, *nowhere, values, shapes)
-    repeated = np.array(document["joint_repeatability"], float)
-    noise = Noise("declared", 0.0, 0.0, repeated, pose_rad=float(document["pose_error_rad"]))
-    found_by = calibrate_by_model(robot, model, estimate, np.array(document["covariance"], float), noise)
-    return replace(found_by, scope=scope_from(document["scope"]))
 
 
 def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accuracy) -> dict[str, Any]:
@@ -171,7 +65,6 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
         "accuracy": accuracy.document() | {"words": accuracy_sentence(accuracy)},
         "joint_compliance": springs,
         "effects": entries,
-        "forward_model": model_document(calibrated),
     }
 
 

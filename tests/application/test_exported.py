@@ -1,14 +1,11 @@
-"""The calibrated robot as files: the same robot to the bit, what a robot file can say, and what it leaves out."""
+"""The calibrated robot as files: what a robot file can say, and what it leaves out."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from analysed_robots import analysed
 from made_calibrated import made_calibrated, plain_estimate, plain_model
-from scipy.spatial.transform import Rotation
-from support import refused
 
 from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import (
@@ -16,24 +13,13 @@ from elastocal.application.calibrated import (
     OperatingConditions,
     calibrate_by_model,
     forward,
-    pose_sensitivities,
     without,
 )
-from elastocal.application.forward_model import (
-    KEY,
-    SIDECAR,
-    ForwardModel,
-    find_left_out_m,
-    fold_effects,
-    model_document,
-    read_calibrated,
-    sidecar,
-)
+from elastocal.application.exported import find_left_out_m, fold_effects, sidecar
 from elastocal.effects.catalogue import candidates_on
 from elastocal.mechanics.robot_file import document_of, robot_from_document
 from elastocal.mechanics.sites import sites_of
 
-KEYS = ("joint_offset@2", "link_geometry@3", "lost_motion@2", "transmission_harmonic@1[orders 1-2]", "thermal_growth[time]")
 GEOMETRY = ("joint_offset@2", "joint_offset@4", "link_geometry@1", "link_geometry@2", "link_geometry@3", "link_geometry@4")
 
 
@@ -52,46 +38,6 @@ def read_file_model(robot):
     count = sum(len(value) for value in values)
     noise = made_calibrated(robot).noise
     return calibrate_by_model(robot, model, plain_estimate(model, values), np.zeros((count, count)), noise)
-
-
-@pytest.mark.parametrize("name", ["gp180", "fanuc", "iiwa14"])
-def test_a_robot_with_weights_and_effects_comes_back_from_json_as_it_was(name):
-    calibrated = made_calibrated(analysed(name), *KEYS)
-    calibrated = replace(calibrated, model=replace(calibrated.model, time_zero_s=120.0))
-    back = read_calibrated(json.loads(json.dumps(model_document(calibrated), allow_nan=False)), "effects.json")
-    angles, operating = draw_states(calibrated.robot)
-    for one, other in zip(forward(calibrated, angles, operating), forward(back, angles, operating), strict=True):
-        np.testing.assert_array_equal(other, one)
-    np.testing.assert_array_equal(*(pose_sensitivities(each, angles, operating) for each in (back, calibrated)))
-    np.testing.assert_array_equal(back.covariance, calibrated.covariance)
-    np.testing.assert_array_equal(back.noise.joint_rad, calibrated.noise.joint_rad)
-
-
-def test_a_folder_gives_poses_and_targets_that_reach_them(tmp_path):
-    calibrated = made_calibrated(analysed("kuka"), "joint_offset@2", "lost_motion@3")
-    angles = analysed("kuka").joint_limits.mean(axis=1) + np.array([0.1, 0.2, 0.1, 0.3, 0.7, 0.0])
-    accuracy = predict_errors(calibrated, angles[None], NEUTRAL).accuracy("one pose")
-    (tmp_path / SIDECAR).write_text(json.dumps(sidecar(calibrated, "cell", "2026-11-23", accuracy)))
-    model = ForwardModel.read(tmp_path)
-    position, rotation = model.pose([angles])
-    targets = model.joint_targets(position, rotation, start=angles[None])
-    assert targets.status.tolist() == ["ok"]
-    reached = model.pose(targets.joint_angles)
-    np.testing.assert_allclose(reached[0], position, atol=1e-8)
-    assert (Rotation.from_matrix(reached[1]) * Rotation.from_matrix(rotation).inv()).magnitude().max() < 1e-7
-
-
-def test_effects_that_this_version_does_not_have_are_refused(tmp_path):
-    document = model_document(made_calibrated(analysed("kuka"), "joint_offset@2"))
-    unknown = document | {"effects": [*document["effects"], {"key": "magic@1", "values": [1.0], "shapes": []}]}
-    with refused("effects.json", f"{KEY}.effects[2]", "'magic@1'"):
-        read_calibrated(unknown, "effects.json")
-    other = document | {"effects": [document["effects"][0], document["effects"][1] | {"values": [1.0, 2.0]}]}
-    with refused("effects.json", f"{KEY}.effects[1]", "2 values", "1, as joint_offset@2"):
-        read_calibrated(other, "effects.json")
-    (tmp_path / SIDECAR).write_text("{}")
-    with refused((tmp_path / SIDECAR).as_posix(), KEY, "elastocal export"):
-        ForwardModel.read(tmp_path)
 
 
 @pytest.mark.parametrize(
