@@ -68,7 +68,7 @@ def _cases():
             *places,
             group=group,
             level=level,
-            robot="kuka" if number % 5 == 0 else "m900ib700",
+            robot="kuka" if number % 5 == 0 else "irb7600",
             setting="force_3kN" if group == "setting" else "usual",
             campaign=f"case_{number:03}",
         )
