@@ -23,7 +23,6 @@ SEED = 1
 CALLERS = {
     "src/elastocal/loop/whole.py": "the one call",
     "src/elastocal_proof/blind/verdicts.py": "blind proof",
-    "src/elastocal_proof/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
     "src/elastocal_proof/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",
     "src/elastocal/loop/diagnosis_tables.py": "rules",
     "src/elastocal_proof/league/methods.py": "makes the call on the training poses of each fold of the league",

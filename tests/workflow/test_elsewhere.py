@@ -13,7 +13,6 @@ TARGETS = (
     "league",
     "blind",
     "closed_loop",
-    "bad_rows",
     "audit",
 )
 
