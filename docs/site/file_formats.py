@@ -28,7 +28,7 @@ TABLES = {
     "elastocal.study": "The study: `data/simulated`, `results`.",
     "elastocal.loop.schemas": "The loop: `results/loop`, `reports/loop`.",
     "elastocal_proof.league.schemas": "The league of methods: `results/league`, `reports/league`.",
-    "elastocal_proof.blind.schemas": "The closed loop and bad rows: `results/closed_loop`, `results/bad_rows`.",
+    "elastocal_proof.blind.schemas": "The closed loop: `results/closed_loop`.",
 }
 # Robots have different numbers of joints; tables are shown for this one.
 JOINTS = 6

@@ -95,7 +95,6 @@ def test_a_sixth_of_the_cases_that_targets_compare_with_is_in_the_sample(monkeyp
                 "levels": [level],
                 "setting": "usual",
                 "seed": seed,
-                "alternative": "",
             },
             "defects": [{"of": of}],
         }

@@ -47,7 +47,7 @@ def test_outcome_is(name):
 
 
 def test_robots_of_the_plan_that_were_tuned_on_prove_nothing():
-    assert [outcome(PLAN, truth(robot=robot), silence())["robots"] for robot in ("kuka", "m900ib700")] == ["tuned", "proof"]
+    assert [outcome(PLAN, truth(robot=robot), silence())["robots"] for robot in ("kuka", "irb7600")] == ["tuned", "proof"]
 
 
 @pytest.mark.parametrize("hits, cases", [(0, 10), (1, 3), (7, 20), (59, 59), (150, 400)])
@@ -96,7 +96,7 @@ def test_exact_aliases_are_told_by_the_truth_its_joints_and_the_robot():
     places = [("transmission_harmonic", 2), ("transmission_harmonic", 3), ("link_weight", 2), ("link_weight", 2, 3)]
     assert frame(*((truth(place), silence(), oracle()) for place in places)).exact_alias.tolist() == [True, False, True, False]
     # An arm that has no compensator has no alias of it.
-    assert not score(PLAN, truth(places[0], robot="panda"), silence(), oracle())["exact_alias"]
+    assert not score(PLAN, truth(places[0], robot="gen3"), silence(), oracle())["exact_alias"]
 
 
 def test_a_fault_of_the_data_that_ended_a_diagnosis_has_no_errors_and_states_nothing():

@@ -2,7 +2,6 @@
 
 import ast
 import json
-import shutil
 import sys
 from pathlib import Path
 
@@ -13,11 +12,9 @@ from made_folders import PLAN, made_folder, made_table
 
 from elastocal.diagnosis import judge as judging
 from elastocal.diagnosis.judge import judge
-from elastocal.diagnosis.next_experiment import NOTHING_AMBIGUOUS, Proposal
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in, diagnosed
-from elastocal_proof.blind import follow_up, verdicts
-from elastocal_proof.blind.verdicts import ARMS, POSES, folder_of
+from elastocal_proof.blind import verdicts
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS, BENCHMARKS = ROOT / "config" / "robots", ROOT / "benchmarks"
@@ -25,9 +22,7 @@ SEED = 1
 # Where a campaign is diagnosed, and the test below that has its verdict.
 CALLERS = {
     "src/elastocal/loop/whole.py": "the one call",
-    "src/elastocal_proof/blind/follow_up.py": "the next experiment",
-    "src/elastocal_proof/blind/verdicts.py": "blind proof and follow-ups",
-    "src/elastocal_proof/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
+    "src/elastocal_proof/blind/verdicts.py": "blind proof",
     "src/elastocal_proof/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",
     "src/elastocal/loop/diagnosis_tables.py": "rules",
     "src/elastocal_proof/league/methods.py": "makes the call on the training poses of each fold of the league",
@@ -54,7 +49,7 @@ def test_every_caller_of_the_diagnosis_is_compared_here():
                 (n for tree in trees_in(text) for n in ast.walk(tree) if isinstance(n, ast.Call)) if "diagnose" in text else ()
             )
             names = {getattr(call.func, "id", getattr(call.func, "attr", "")) for call in calls}
-            if names & {"diagnose", "diagnosed", "diagnosed_anew"}:
+            if names & {"diagnose", "diagnosed"}:
                 found.add(path.relative_to(ROOT).as_posix())
     assert found == set(CALLERS)
 
@@ -159,29 +154,6 @@ def test_blind_proof_writes_the_verdict_of_the_one_call(folder, expected, tmp_pa
     found, asked = run_of(verdicts.diagnose_cases, tmp_path, monkeypatch, expected, input=blind)
     assert found == [expected]
     assert asked == [(folder.as_posix(), ROBOTS, SEED, Settings())]
-
-
-def test_follow_ups_write_the_verdict_of_the_one_call(folder, expected, tmp_path, monkeypatch):
-    """On the fewest further poses of each arm, for there a single name is the verdict."""
-    folders = []
-    for arm in ARMS:
-        folders.append(Path(folder_of(tmp_path / "campaigns", arm, POSES[0], "made")))
-        shutil.copytree(folder, folders[-1])
-    campaigns = _Named(campaigns=(tmp_path / "campaigns").as_posix())
-    anew, asked = run_of(verdicts.diagnose_follow_ups, tmp_path, monkeypatch, expected, input=campaigns)
-    assert asked == [(path.as_posix(), ROBOTS, SEED, Settings()) for path in folders]
-    assert anew == [{"campaign": "made", "arm": arm, "poses": POSES[0], "verdict": expected} for arm in ARMS]
-
-
-def test_next_experiment_is_proposed_for_the_same_diagnosis(folder, monkeypatch):
-    asked = []
-    none = Proposal((), reason=NOTHING_AMBIGUOUS)
-    monkeypatch.setattr(follow_up, "diagnose", lambda *parts: asked.append(parts) or "the diagnosis")
-    monkeypatch.setattr(follow_up, "propose", lambda diagnosis, *rest: asked.append(diagnosis) or none)
-    follow_up.proposed(folder, ROBOTS, SEED)
-    (case, *rest), diagnosis = asked
-    assert rest == [Settings(), SEED] and diagnosis == "the diagnosis"
-    same_case(case, cases_in(folder, ROBOTS)[0])
 
 
 @pytest.mark.parametrize("kind", ["named", "adequate"])

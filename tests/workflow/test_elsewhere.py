@@ -12,7 +12,6 @@ TARGETS = (
     "league",
     "blind",
     "closed_loop",
-    "bad_rows",
     "audit",
 )
 
