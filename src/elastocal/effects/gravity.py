@@ -27,6 +27,8 @@ DECLARED_WEIGHT = "declared_weight"
 # Links are as wide as a tenth of the arm is long (KUKA KR 270: 0.3 m of 2.7 m); motors and gears put the centre of a slender
 # one so far off the line as well.
 _WIDTH_OF_LENGTH, _LEAST_OFF_M = 0.1, 0.04
+# A centre on its joint's axis is stated no better than as so far from it.
+_LEAST_LEVER_M = 0.1
 
 
 def declared_weight(sites: Sites) -> Candidate:
@@ -47,9 +49,10 @@ def declared_weight(sites: Sites) -> Candidate:
         error = mass.relative_std * mass.mass_kg
         # Of a centre that is known as well as its mass is, and lies anywhere in the girth of its link (uniform distribution).
         of_girth = mass.mass_kg * max(_LEAST_OFF_M, width / 12**0.5)
-        moment = float(np.hypot(error * np.linalg.norm(mass.centre_m), of_girth))
+        stated = error * max(float(np.linalg.norm(mass.centre_m)), _LEAST_LEVER_M)
+        moment = float(np.hypot(stated, of_girth))
         parameters.append(Parameter(f"mass_error_of_link_{mass.link}", "kg", error, error))
-        parameters += [Parameter(f"moment_error_{axis}_of_link_{mass.link}", "kg m", moment, moment) for axis in "xyz"]
+        parameters += [Parameter(f"moment_error_{axis}_of_link_{mass.link}", "kg m", stated, moment) for axis in "xyz"]
     return Candidate(DECLARED_WEIGHT, "declared", (), "", tuple(parameters), law)
 
 
