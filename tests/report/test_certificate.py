@@ -34,11 +34,20 @@ def test_only_what_was_measured_is_called_so():
     said, told = measured["decision_sentences"], predicted["decision_sentences"]
     assert "Measured position error" in said and "Nobody has measured" not in said and "In 8 of 9 poses" in said
     assert "Measured" not in told and "poses every measurement" not in told
-    assert (predicted["title"], measured["title"]) == ("Pass, as predicted", "Pass, as measured")
+    assert (predicted["title"], measured["title"]) == tuple(
+        f"Pass, as {kind}: corrected by physics alone" for kind in ("predicted", "measured")
+    )
     assert predicted["worst"].endswith("at the command −28.6°, 250.0 mm") and "command" not in measured["worst"]
     assert "is predicted to keep" in predicted["now"] and "it keeps" in measured["now"]
     assert "0.120 mm at validation poses is the tracker against the model" in measured["whose"]
     assert predicted["verdict"] == "One mechanism is missing in the declared model: lost motion (backlash)."
+
+
+def test_what_has_no_name_is_in_the_title_and_in_the_verdict():
+    left = {"remains": True, "rms_m": 5e-5, "rms_std_error_m": 1e-5}
+    facts = certificate_facts(made_document() | {"regression": "Gaussian process", "repeatable": left})
+    assert facts["title"] == "Pass, as predicted: corrected by physics with a regression"
+    assert "more is missing that has no name" in facts["verdict"]
 
 
 def test_the_tracker_is_named_where_it_hides_the_repeatability():
