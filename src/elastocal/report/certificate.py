@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.counting import counted
 from elastocal.report import words as say
-from elastocal.report.loop_facts import TITLES
+from elastocal.report.loop_facts import title_of
 from elastocal.report.typesetting import compile_document, sentences
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
 
     `document`: of `loop.certificate.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
-    spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": TITLES[document["verdict"]]}
+    spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": title_of(document)}
     stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken)
     return {
         **{name: lines if name in _LISTS else " ".join(lines) for name, lines in stated.items()},

@@ -52,6 +52,13 @@ _FINEST_M = 1e-6
 _MOST_NAMES, _MOST_PARAMETERS, _SHOWN_PARAMETERS = 8, 16, 10
 
 
+def title_of(verdict: Mapping[str, Any]) -> str:
+    """Verdict in one line, with what remains without a name."""
+    repeatable = verdict.get("repeatable")
+    more = AND_MORE if repeatable and repeatable["remains"] and verdict["effects"] else ""
+    return TITLES[verdict["verdict"]] + more
+
+
 def campaign_sentences(
     verdict: Mapping[str, Any],
     steps: Sequence[Mapping[str, Any]] = (),
@@ -101,14 +108,12 @@ def loop_facts(
     # Probabilities are then those from before the measurements.
     searched = {entry["name"] for effect in verdict["effects"] for entry in effect["parameters"] if entry.get("shape")}
     held = [*(name for name in verdict["held"] if name not in searched), *tables.left_to_priors(parameters)]
-    repeatable = verdict.get("repeatable")
-    more = AND_MORE if repeatable and repeatable["remains"] and verdict["effects"] else ""
     return {
         **{name: lines if name in _LISTS else " ".join(lines) for name, lines in stated.items()},
         "method": dict(stated["method"]),
         "campaign": verdict["campaign"],
         "robot": descriptions["robot"]["name"],
-        "verdict": AT_FAULT if faulty else TITLES[verdict["verdict"]] + more,
+        "verdict": AT_FAULT if faulty else title_of(verdict),
         "faulty": faulty,
         "headline": dict(stated["headline"]) or None,
         "causes": [] if verdict["verdict"] == "not_testable" else cause_rows(verdict),
