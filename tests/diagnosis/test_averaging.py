@@ -175,21 +175,6 @@ def test_a_gain_helps_where_its_interval_excludes_nothing(made, times, helps):
     assert expected_to_help(problem, found, found.models[0]) == helps
 
 
-def test_squares_explained_are_those_of_the_displacements_that_each_mechanism_makes(made):
-    """Of its units together: of a mechanism at two locations their columns add up before they are squared."""
-    rows, _ = made
-    units = (UNITS[0], made_unit("a", (2,), 2), UNITS[2])
-    problem, _ = made_problem(rows, units, tau=TAU)
-    model = Model((0, 1, 2), 0.0, np.array([0.3, 1.0, 0.1]), 0.0)
-    coefficients, gram = most_probable(rows, problem, model), projected_gram(rows)
-    expected = {}
-    for mechanism, columns in (("a", [0, 1, 2]), ("other", [3, 4])):
-        some = np.zeros(len(coefficients))
-        some[columns] = coefficients[columns]
-        expected[mechanism] = some @ gram @ some
-    assert squares_explained(problem, model) == pytest.approx(expected, rel=1e-6)
-
-
 def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_with_their_priors(made):
     """As the least penalised sum of squares, found by a search, and all of them where nothing else is in the model."""
     rows, _ = made

@@ -10,7 +10,6 @@ from planted import planted
 
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import diagnose as module
-from elastocal.diagnosis import kept_rows
 from elastocal.diagnosis.diagnose import _effect_steps, diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.linearize import linearized
@@ -36,12 +35,6 @@ def diagnosed(kuka, config_folder, tmp_path_factory):
         case, _ = cases_in(made_folder(folder, kuka, table=table, **changes), config_folder / "robots")
         found[declared_m] = diagnose(case, Settings(), 1)
     return found
-
-
-def test_the_problem_is_whitened_by_the_noise_that_is_there(diagnosed):
-    rows = [diagnosed[level].evidence.linearized for level in (6e-5, 1e-6)]
-    assert rows[0].about.noise.position_m == pytest.approx(6e-5, rel=0.3)
-    assert rows[1].about.noise.position_m == pytest.approx(6e-5, rel=0.3)
 
 
 def test_a_model_that_is_kept_without_what_was_found_has_the_noise_that_it_leaves(kuka, config_folder, tmp_path):
@@ -115,14 +108,6 @@ def found(case):
     return diagnose(replace(case, candidates=few), Settings(), 1, lines.append), lines
 
 
-def test_progress_has_the_measurements_first_and_then_what_leads_in_each_search_but_no_verdict(found, case):
-    _, lines = found
-    assert lines[0] == f"declared model fitted to {len(case.observations)} measurements"
-    most = Settings().linearizations
-    assert lines[1:] == [f"search {number} of at most {most}: leading so far, zero offset" for number in range(1, len(lines))]
-    assert 2 <= len(lines) <= 1 + most
-
-
 def test_steps_go_from_the_frames_alone_to_the_springs_to_the_effect(found):
     """Springs are declared as to be identified; the frame is the base, so that the first step has nothing to fit."""
     diagnosis, _ = found
@@ -132,15 +117,6 @@ def test_steps_go_from_the_frames_alone_to_the_springs_to_the_effect(found):
     assert diagnosis.declared is diagnosis.steps[1].fitted and diagnosis.final is diagnosis.steps[2].fitted
     size = diagnosis.final.estimate.coefficients[-1][0]
     assert size == pytest.approx(OFFSET, abs=4 * np.sqrt(diagnosis.final.covariance[-1, -1]))
-
-
-def test_every_candidate_is_tested_or_has_a_reason(found):
-    diagnosis, _ = found
-    document, evidence = diagnosis.document, diagnosis.evidence.linearized
-    tested = {unit.candidate.key for unit in evidence.problem.units if unit.candidate}
-    assert document["candidates_tested"] == len(tested)
-    assert tested | set(document["untestable"]) == set(diagnosis.case.candidates)
-    assert not tested & set(document["untestable"]) and all(document["untestable"].values())
 
 
 def test_compliances_before_and_after_are_those_of_the_fits_in_microradians(found):
@@ -176,18 +152,6 @@ def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(decisive,
     # What is not decisive is a warning, and nothing else is.
     minor = [line for line in document["warnings"] if line.startswith("fault_")]
     assert minor == [f"fault_{n}: as measured" for n, is_decisive in enumerate(decisive) if not is_decisive]
-
-
-def test_a_fit_that_does_not_converge_is_a_warning(case, monkeypatch):
-    monkeypatch.setattr(module, "faults", lambda campaign, measurements: faults(True))
-    fitted = kept_rows.fit_declared
-    monkeypatch.setattr(kept_rows, "fit_declared", lambda *args, **options: replace(fitted(*args, **options), converged=False))
-    document = diagnose(case, Settings(), 1).document
-    assert document["converged"] == {"declared": False, "final": False}
-    assert [line.split(" did")[0] for line in document["warnings"] if "did not converge" in line] == [
-        "the fit of the declared model",
-        "the fit of the final model",
-    ]
 
 
 @pytest.mark.parametrize(

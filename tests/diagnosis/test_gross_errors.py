@@ -12,7 +12,6 @@ from elastocal.diagnosis.gross_errors import (
     entries_of,
     gross_errors,
 )
-from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.kept_rows import fitted_to
 from elastocal.diagnosis.settings import Settings
 
@@ -69,32 +68,6 @@ def test_where_too_many_rows_stand_out_none_is_a_gross_error():
     distance = np.ones(40)
     distance[:9] = 1e3
     assert not beyond_chance(distance, 3, np.ones(40, bool), SETTINGS)[1].any()
-
-
-@pytest.mark.parametrize("shift", [20 * NOISE_M, 1e2])
-def test_a_bad_row_is_named_and_changes_no_verdict(cases, clean, shift):
-    found = diagnose(damaged(cases[0], {BAD: shift}), SETTINGS, 1)
-    (entry,) = found.document["gross_errors"]
-    measurements = cases[0].campaign.measurements
-    assert entry["rows"] == [measurements.row[BAD]] and entry["distance_m"] == pytest.approx(shift, rel=0.2)
-    assert entry["detail"] in found.document["warnings"] and f"line {measurements.row[BAD] + 1} of" in entry["detail"]
-    assert found.document["verdict"] == clean.document["verdict"]
-    effects = [[(e["name"], e["joints"]) for e in each.document["effects"]] for each in (found, clean)]
-    assert effects[0] == effects[1] and len(found.left_out) == 1
-
-
-def test_a_bad_held_out_row_is_judged_by_the_same_rule_and_both_errors_are_given(cases, clean):
-    held_out = cases[1]
-    without = judge(clean, held_out, 1).document["heldout"]
-    verdict = judge(clean, damaged(held_out, {2: 0.5}), 1)
-    (entry,) = verdict.document["gross_errors"]
-    assert entry["held_out"] and entry["rows"] == [held_out.campaign.measurements.row[2]]
-    found = verdict.document["heldout"]
-    assert without["with_gross_errors"] is None
-    assert found["after"]["rms_m"] == pytest.approx(without["after"]["rms_m"], rel=0.2)
-    assert found["with_gross_errors"]["after"]["rms_m"] > 100 * found["after"]["rms_m"]
-    assert all(row["heldout_rms_all_rows_m"] > 10 * row["heldout_rms_m"] for row in verdict.rows[1:])
-    assert len(verdict.left_out) == 1 and any("with all rows the RMS" in line for line in verdict.document["warnings"])
 
 
 def test_sentences_say_what_a_row_reads(cases, clean):

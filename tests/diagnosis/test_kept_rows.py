@@ -7,7 +7,7 @@ import pytest
 from bad_rows import damaged
 from scipy.stats import multivariate_normal
 
-from elastocal.diagnosis.kept_rows import _log_likelihood, _precision, _without, first_kept, fitted_to
+from elastocal.diagnosis.kept_rows import _log_likelihood, _precision, _without, first_kept
 from elastocal.diagnosis.settings import Settings
 
 SETTINGS, BAD = Settings(), 11
@@ -23,14 +23,6 @@ def test_rows_are_found_beside_an_effect_that_the_model_lacks(case, shifts):
     kept = first_kept(damaged(case, shifts), SETTINGS).kept
     # A bad repeat takes the others of its state along, until a model says which it is.
     assert not kept[list(shifts)].any() and (~kept).sum() <= 2 * len(shifts)
-
-
-def test_the_same_rows_are_fitted_once(case):
-    every = np.ones(len(case.campaign.measurements), bool)
-    part = fitted_to(case, every, SETTINGS)
-    assert fitted_to(case, every.copy(), SETTINGS, part) is part
-    fewer = np.arange(len(every)) != 3
-    assert len(fitted_to(case, fewer, SETTINGS, part).case.campaign.measurements) == len(every) - 1
 
 
 @pytest.mark.parametrize("times", [-4.0, 30.0, 300.0])

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from open_alternatives import ELASTIC, LADDER, SETTINGS, diagnosed, keys_like, limits, pieces
+from open_alternatives import SETTINGS, keys_like, limits, pieces
 from planted import planted, two_loads_a_pose
 
 from elastocal.campaigns.campaign import Target
@@ -74,29 +74,6 @@ def test_a_reference_weight_shows_what_the_load_cell_cannot(kuka):
     assert (shown[~entries.weighed] > 0).all() and not shown[entries.weighed].any()
 
 
-def test_further_targets_at_unknown_places_tell_only_beyond_their_offsets(kuka):
-    """A campaign with unknown target offsets: those of further targets are unknown as well, and start without information."""
-    states = two_loads_a_pose(6, 8, (5, 3), 1500.0)
-    targets = (Target("hand", "6DoF", None),)
-    campaign = planted(kuka, {"link_elasticity@2": (3.9e-8, 5.2e-8)}, seed=3, poses=8, states=states, targets=targets)
-    diagnosis = diagnosed(campaign, kuka, keys_like(campaign, *ELASTIC))
-    kept = list(range(len(diagnosis.evidence.linearized.problem.units)))
-    reach = new_states.reach_of(states, kuka, limits(kuka), None, False)
-    made = diagnosis.evidence.linearized, campaign.declared, kept, campaign.declared.noise, states, reach, True
-    instrument = new_states.instrument_of(*made)
-    further = len(list(instrument.extra_points))
-    assert further == len(kuka.chain.points) - 1 and instrument.added.sum() == 3 * further
-    entries = new_states.drawn(reach, 5, np.random.default_rng(0))
-    every = instrument.information(entries, range(1 + further)).sum(axis=0)
-    own = instrument.information(entries, [0]).sum(axis=0)
-    added = slice(len(every) - 3 * further, None)
-    assert not own[added].any() and (np.diag(every)[added] > 0).all()
-    # With its offset open, a target that is read once more tells no more than how it moves from pose to pose.
-    one = instrument.information(entries.at([0]), [1])[0]
-    rank = np.linalg.matrix_rank(one, hermitian=True, tol=1e-9 * np.linalg.norm(one))
-    assert rank <= 3 * len(reach.shares)
-
-
 def test_reach_has_the_directions_and_shares_that_the_campaign_had(states, kuka):
     """Loads of one sense, of both senses along one line, and in all directions; and none."""
     up, size = np.array([0.0, 0.0, 1.0, 0.0, 0.5, 0.0]), np.linspace(100.0, 800.0, len(states))
@@ -110,14 +87,6 @@ def test_reach_has_the_directions_and_shares_that_the_campaign_had(states, kuka)
     # Loads to draw from are the heavier half; the heaviest decides how much may be pulled.
     assert np.linalg.norm(one.wrenches[:, :3], axis=1).min() >= np.median(size)
     assert one.largest_N == pytest.approx(800.0)
-
-
-def test_a_reference_weight_is_considered_only_where_gravity_loads_and_no_ladder_allow_it(states, kuka):
-    assert reached(states, kuka, weights=True).weights
-    assert not reached(states, kuka, LADDER, weights=True).weights
-    assert not reached(states, replace(kuka, gravity_m_s2=(0.0, 0.0, 0.0)), weights=True).weights
-    assert not reached(under(states, np.zeros((len(states), 6))), kuka, weights=True).weights
-    np.testing.assert_allclose(reached(states, replace(kuka, gravity_m_s2=(3.0, 0.0, -4.0))).down, [0.6, 0.0, -0.8])
 
 
 def test_loads_that_are_chosen_are_from_a_fifth_of_the_largest_to_all_of_it_with_the_campaigns_lever_or_none(states, kuka):
@@ -139,22 +108,6 @@ def test_loads_that_are_chosen_are_from_a_fifth_of_the_largest_to_all_of_it_with
     assert np.abs(found[:, None] - own).max(axis=2).min(axis=1).max() < 1e-9
     # All directions: the mean of the unit vectors is that of none, at 5 standard deviations of 1 / sqrt(3 N).
     assert np.abs((force / np.linalg.norm(force, axis=1)[:, None]).mean(axis=0)).max() < 5 / np.sqrt(3 * 400)
-
-
-def test_loads_along_one_line_are_pulled_either_way_and_never_across(states, kuka):
-    line = np.array([0.6, 0.0, 0.8, 0.1, 0.0, 0.0]) * np.where(np.arange(len(states)) % 2, 500.0, -500.0)[:, None]
-    drawn = new_states.drawn(reached(under(states, line), kuka), 60, np.random.default_rng(0))
-    np.testing.assert_allclose(np.cross(drawn.wrench[:, :3], [0.6, 0.0, 0.8]), 0.0, atol=1e-9)
-    along = np.sign(drawn.wrench[:, 2])
-    assert set(along) == {-1.0, 1.0}
-
-
-def test_a_side_of_approach_is_one_for_all_shares_where_it_is_chosen_and_drawn_for_each_where_a_ladder_is_given(states, kuka):
-    rng = np.random.default_rng(2)
-    chosen, given = (new_states.approaches(reached(states, kuka, ladder), 50, rng) for ladder in (None, LADDER))
-    assert chosen.shape == given.shape == (50, 3, 6) and set(np.unique(given)) == {-1.0, 1.0}
-    assert (chosen == chosen[:, :1]).all() and not (given == given[:, :1]).all()
-    assert new_states.approaches(reached(replace(states, approach=None), kuka), 50, rng) is None
 
 
 def test_neighbours_stay_close_within_limits_and_keep_the_size_of_their_load(states, kuka):

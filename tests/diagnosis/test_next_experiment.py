@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from open_alternatives import ELASTIC, LADDER, SETTINGS, diagnosed, keys_like, limits, pieces
-from planted import planted, two_loads_a_pose
+from open_alternatives import LADDER, SETTINGS, diagnosed, limits, pieces
+from planted import planted
 
-from elastocal.diagnosis import new_states, next_experiment, verdict
+from elastocal.diagnosis import new_states
 from elastocal.diagnosis.alternatives import Promise
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.next_experiment import (
@@ -22,7 +22,6 @@ from elastocal.diagnosis.next_experiment import (
     sentence_of,
     table_of,
 )
-from elastocal.diagnosis.verdict import mechanisms_of_models
 
 
 def test_proposal_separates_half_as_much_again_as_random_poses_and_resolves_more(ambiguous, proposal, kuka):
@@ -39,23 +38,6 @@ def test_proposal_separates_half_as_much_again_as_random_poses_and_resolves_more
     assert (np.diff(proposal.separation) > -0.3).all() and proposal.separation[-1] > proposal.separation[0]
 
 
-def test_models_belong_to_the_hypothesis_that_they_state_and_not_to_that_of_their_parts(ambiguous, kuka, monkeypatch):
-    """A model of a law beside a smooth error may state one alone, for all models of a hypothesis even."""
-
-    def stated(problem, posterior):
-        return [tuple(f"stated {name}" for name in names) for names in mechanisms_of_models(problem, posterior)]
-
-    diagnosis, _ = ambiguous
-    monkeypatch.setattr(verdict, "mechanisms_of_models", stated)
-    monkeypatch.setattr(next_experiment, "mechanisms_of_models", stated)
-    evidence = diagnosis.evidence
-    hypotheses = verdict.hypotheses_of(evidence.linearized.problem, evidence.posterior)
-    conclusion = replace(evidence.conclusion, hypotheses=hypotheses, best=hypotheses[0])
-    found = SimpleNamespace(**vars(diagnosis) | {"evidence": SimpleNamespace(**vars(evidence) | {"conclusion": conclusion})})
-    proposal = propose(found, limits(kuka), SETTINGS, np.random.default_rng(0), 4, LADDER)
-    assert {*proposal.best, *proposal.nearest} <= {f"stated {name}" for name in ELASTIC}
-
-
 def test_of_an_exact_alias_no_pose_is_asked_for(kuka):
     """The same law under two names; nothing tells them apart, and no pose is asked for."""
     names = ("compensator_torque", "transmission_harmonic")
@@ -68,20 +50,6 @@ def test_of_an_exact_alias_no_pose_is_asked_for(kuka):
     assert json.loads(json.dumps(facts_of(found), allow_nan=False))["reason"] == found.reason
     table = table_of(found, kuka)
     assert table.empty and list(table.columns[:5]) == ["effect", "pose", "load", "point", "q1"]
-
-
-def test_an_alias_does_not_keep_the_others_from_being_distinguished(kuka):
-    """Beside its alias, which leaves the promise, a tilt is distinguished from the link that bends."""
-    states = two_loads_a_pose(6, 8, (5, 3), 1500.0)
-    campaign = planted(kuka, {"joint_tilt@2": (1e-7, 1e-7)}, seed=3, poses=8, states=states)
-    # At every joint, or the tilt of several would not be what the alias of one is.
-    alias = [replace(campaign.candidates[key], effect="twin") for key in keys_like(campaign, "joint_tilt")]
-    candidates = campaign.candidates | {each.key: each for each in alias}
-    keys = [*keys_like(campaign, *ELASTIC), *(each.key for each in alias)]
-    diagnosis = diagnosed(replace(campaign, candidates=candidates), kuka, keys)
-    found = propose(diagnosis, limits(kuka), SETTINGS, np.random.default_rng(0), 6, LADDER)
-    assert sorted([found.best, *found.indistinguishable]) == [("joint_tilt",), ("twin",)]
-    assert len(found) == 6 and found.separation[-1] > 2
 
 
 def test_nothing_is_proposed_where_nothing_is_ambiguous(kuka):

@@ -63,15 +63,6 @@ def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurem
     np.testing.assert_allclose(deviations, [0.5 * before, before, before], rtol=1e-12)
 
 
-def test_the_fit_finds_what_was_planted_and_converges(found):
-    campaign, declared, line, models = found
-    final = fit_with_sizes(declared, campaign.observations, declared.noise, selected(line, models.models[0]))
-    assert final.converged
-    for key, true in (("joint_offset@2", 3e-4), ("offset@3", 5e-4)):
-        number = [owner for owner, _ in final.parameters].index(key)
-        assert final.values_of(key)[0][0] == pytest.approx(true, abs=4 * np.sqrt(final.covariance[number, number]))
-
-
 @pytest.mark.parametrize("with_it", [True, False])
 def test_a_fit_that_starts_near_another_one_ends_where_it_ends_without(found, with_it):
     """Of a fit with the same effect and one more, or with another one alone: what both have begins with its values there."""

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from made_folders import PLAN, made_folder, made_table
 
-from elastocal.diagnosis.confounding import angles_between
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.next_experiment import propose
-from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
@@ -137,27 +135,6 @@ def test_every_candidate_is_in_the_table_tested_or_with_a_reason(found, tmp_path
     assert table["probability"][table["chosen"]][0] > 0.9 and table["angle_deg"][table["chosen"]][0] < 1e-3
     for key, joints, effect in zip(table["candidate"], table["joints"], table["effect"], strict=True):
         assert joints == "+".join(map(str, diagnosis.case.candidates[key].joints)) and key.startswith(effect)
-
-
-def test_bayes_factors_of_the_table_are_those_of_single_units(found):
-    diagnosis, _ = found
-    columns, problem = tables.candidate_columns(diagnosis), diagnosis.evidence.linearized.problem
-    factors = initial_screening(problem)[1]
-    number = next(n for n, unit in enumerate(problem.units) if unit.key == "joint_offset@2")
-    place = columns["candidate"].index("joint_offset@2")
-    assert columns["log_bayes_factor"][place] == factors[number]
-
-
-def test_confounding_has_every_pair_of_tested_candidates_once(found, tmp_path):
-    diagnosis, _ = found
-    table = there_and_back(tmp_path / "f.parquet", CONFOUNDING, [tables.confounding_columns(diagnosis)])
-    problem = diagnosis.evidence.linearized.problem
-    numbers = [n for n, unit in enumerate(problem.units) if unit.candidate]
-    assert len(table["one"]) == len(numbers) * (len(numbers) - 1) // 2
-    angles, keys = angles_between(problem, numbers), [problem.units[n].key for n in numbers]
-    for place in range(0, len(table["one"]), 997):
-        one, other = keys.index(table["one"][place]), keys.index(table["other"][place])
-        assert table["angle_deg"][place] == angles[one, other]
 
 
 def test_tables_of_a_faulty_campaign_have_no_rows_but_for_the_candidates(faulty, tmp_path):

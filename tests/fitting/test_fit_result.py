@@ -87,11 +87,3 @@ def test_parts_are_whole_poses_and_hold_each_observation_once(fitted, monkeypatc
     assert sum(map(len, poses)) == len(set().union(*poses)) == 12
     np.testing.assert_allclose(plain, whole[0], rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(white, whole[1], rtol=1e-9, atol=1e-9 * np.abs(white).max())
-
-
-def test_a_fit_that_keeps_neither_conditions_nor_jacobian_finds_the_same_again(fitted):
-    found, seen = fitted
-    forgotten = replace(found, conditions=None, joint_jacobian=None)
-    for one, other in zip(gathered(forgotten, seen)[:2], gathered(found, seen)[:2], strict=True):
-        # What was kept is that of the last step, which ended a thousandth of a standard error away.
-        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(other).max())

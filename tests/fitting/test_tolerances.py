@@ -3,7 +3,6 @@
 Noise of a campaign that neither repeats nor declares: what the declared model leaves of positions and of orientations.
 """
 
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -145,25 +144,3 @@ def test_repeats_come_before_the_residual(fanuc):
     # Within four standard errors of what 192 contrasts tell.
     assert noise.position_m == pytest.approx(30e-6, rel=4 / np.sqrt(2 * 192))
     assert noise.orientation_rad == pytest.approx(15e-6, rel=4 / np.sqrt(2 * 192))
-
-
-def peak_bytes(robot, poses):
-    """Most memory that the noise of a campaign takes which has 12 measurements a pose and neither repeats nor a declaration."""
-    plan = Plan(poses=poses, loads=2, repeats=1, noise=1e-5)
-    campaign = replace(made(robot, 3, plan), compliance="identify", noise=None)
-    case = Case(campaign, averaged(campaign.measurements), declared_model(campaign), {})
-    assert len(campaign.measurements) == 12 * poses
-    tracemalloc.start()
-    estimated_noise(case)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return peak
-
-
-def test_a_measurement_more_takes_no_more_than_its_residual(fanuc, monkeypatch):
-    """A million measurements took 19.8 GB here once; held at once, each takes 13 kB."""
-    monkeypatch.setattr("elastocal.fitting.displacement._MOST_STATES", 40)
-    monkeypatch.setattr("elastocal.fitting.displacement._MOST_AT_ONCE", 40)
-    monkeypatch.setattr("elastocal.fitting.displacement._MOST_HELD", 40 * 6 * 60)
-    few, more = peak_bytes(fanuc, 24), peak_bytes(fanuc, 96)
-    assert more - few < 400 * 12 * (96 - 24)

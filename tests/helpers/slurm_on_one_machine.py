@@ -16,36 +16,7 @@ NODES = ("node1", "node2")
 # Where Slurm's commands look inside of a job, whose environment the plugin clears of Slurm's variables.
 _SYSTEM = Path("/etc/slurm/slurm.conf")
 DAEMONS = ("munged", "slurmctld", "slurmd", "sbatch")
-# A job that takes more memory than it asked for is killed at the next look, each second, as by a cluster's own limits.
-_CONFIGURATION = """\
-ClusterName=one_machine
-SlurmctldHost={host}(127.0.0.1)
-SlurmUser=root
-SlurmctldPort={port}
-AuthType=auth/munge
-CredType=cred/munge
-AuthInfo=socket={folder}/munge.socket
-StateSaveLocation={folder}/state
-SlurmdSpoolDir={folder}/spool-%n
-SlurmctldPidFile={folder}/slurmctld.pid
-SlurmdPidFile={folder}/slurmd-%n.pid
-SelectType=select/cons_tres
-SelectTypeParameters=CR_Core_Memory,CR_LLN
-ProctrackType=proctrack/linuxproc
-TaskPlugin=task/none
-MpiDefault=none
-AccountingStorageType=accounting_storage/none
-JobCompType=jobcomp/filetxt
-JobCompLoc={folder}/{ended}
-JobAcctGatherType=jobacct_gather/linux
-JobAcctGatherFrequency=task=1
-JobAcctGatherParams=OverMemoryKill
-SchedulerParameters=sched_min_interval=100000,batch_sched_delay=0,sched_interval=1,bf_interval=1
-MinJobAge=600
-ReturnToService=2
-SlurmdParameters=config_overrides
-PartitionName=tests Nodes=ALL Default=YES MaxTime=1440 DefMemPerCPU=500 State=UP
-"""
+_CONFIGURATION = Path(__file__).with_suffix(".conf").read_text(encoding="utf-8")
 # What Slurm writes on each job that has ended.
 _ENDED = "ended.txt"
 # Each node is a daemon with a port of its own.

@@ -4,18 +4,7 @@ import re
 
 from snakemake_starts import started
 
-TARGETS = (
-    "paper",
-    "study",
-    "extended_study",
-    "loop",
-    "measured",
-    "league",
-    "blind",
-    "closed_loop",
-    "bad_rows",
-    "audit",
-)
+TARGETS = ["paper", "study", "extended_study", "loop", "measured", "league", "blind", "closed_loop", "bad_rows", "audit"]
 
 
 def test_every_target_finds_its_sources_and_its_jobs_can_be_grouped(unstarted, tmp_path):

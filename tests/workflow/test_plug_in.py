@@ -55,11 +55,6 @@ SWITCHES = {
     "offset_frame tool": ({"interpretations": {"offset_frame": "tool"}}, "draw_experiments"),
     "tool offset": ({"interpretations": {"tool_offset_m": [0.1, 0.05, 0.02]}}, "simulate"),
     "wrench_at measuring_point": ({"interpretations": {"wrench_at": "measuring_point"}}, "simulate"),
-    "position with tool offset": (
-        {"interpretations": {"measured": "position", "tool_offset_m": [0.1, 0.05, 0.02]}},
-        "simulate",
-    ),
-    "average compliance": ({"interpretations": {"average": "compliance"}}, "identify"),
     "average median": ({"interpretations": {"average": "median"}}, "identify"),
     "deviation_of each_data_set": ({"interpretations": {"deviation_of": "each_data_set"}}, "identify"),
     "solver gauss_newton": ({"identification": {"solver": "gauss_newton"}}, "identify"),
