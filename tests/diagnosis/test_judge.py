@@ -128,27 +128,19 @@ def test_a_step_that_makes_predictions_worse_is_a_warning(made):
     assert said[-1] == "the step 'with joint_offset' raised the RMS error of the validation poses"
 
 
-def with_first_pose_turned(case, held_out, turn):
-    """The first held-out pose, with its third joint said to stand elsewhere, and its number."""
-    first = held_out.observations.states.pose.min()
-
-    def turned(states):
-        away = np.zeros(case.campaign.robot.joints)
-        away[2] = turn
-        return replace(states, joint_angles=states.joint_angles + (states.pose == first)[:, None] * away)
-
-    observations, measurements = held_out.observations, held_out.campaign.measurements
-    return first, replace(
-        held_out,
-        observations=replace(observations, states=turned(observations.states)),
-        campaign=replace(held_out.campaign, measurements=turned(measurements)),
-    )
-
-
 def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
     """A whole turn brings the joint out of its range and the target nowhere else."""
     case, held_out, steps = made
-    first, away = with_first_pose_turned(case, held_out, 2.0 * np.pi)
+    observations, measurements = held_out.observations, held_out.campaign.measurements
+    first = observations.states.pose.min()
+
+    def turned(states):
+        away = 2.0 * np.pi * (states.pose == first)[:, None] * (np.arange(case.campaign.robot.joints) == 2)
+        return replace(states, joint_angles=states.joint_angles + away)
+
+    moved = replace(observations, states=turned(observations.states))
+    campaign = replace(held_out.campaign, measurements=turned(measurements))
+    away = replace(held_out, observations=moved, campaign=campaign)
     found = judged(steps, case, away)
     beyond, poses = found.document["heldout"]["outside_range"], found.document["heldout"]["poses"]
     assert 1 <= beyond["poses"] < poses

@@ -17,12 +17,10 @@ from fitted_models import (
     seen_off,
     waves,
 )
-from planted import two_loads_a_pose
 from scipy.linalg import block_diag
-from synthetic import NOISE, made_estimate, made_states, seen_exactly, with_noise
+from synthetic import NOISE, made_estimate, made_states, seen_exactly
 
 from elastocal.fitting.least_squares import fit, fit_frames
-from elastocal.fitting.linearization import linearize
 
 
 def assert_covariance(found, expected, atol):
@@ -65,31 +63,6 @@ def test_noiseless_measurements_give_back_every_parameter(fanuc, keys, rows):
     # The last step is a thousandth of a standard error at most; the next one would be its square.
     assert (np.abs(values[0] - values[1]) <= 1e-4 * deviation[order] + 1e-12 * np.abs(values[1])).all()
     assert (found.weights == 1.0).all()
-
-
-def test_an_error_of_the_pose_counts_once_for_all_its_measurements(fanuc):
-    """Two loads and two targets a pose, repeated: estimate and covariance are those of statsmodels with it written out."""
-    model = model_of(fanuc, "joint_offset@3", targets=TARGETS, identified=True)
-    states = two_loads_a_pose(6, 15, seed=60)
-    states.repeats[:] = np.random.default_rng(9).integers(1, 4, 30)
-    seen = seen_exactly(model, made_estimate(model, seed=61), states)
-    noise = replace(NOISE, joint_rad=1e-6 * np.array([20.0, 20, 20, 30, 30, 30]), pose_rad=1e-4)
-    found = fit(model, with_noise(seen, np.random.default_rng(62)), noise)
-    line = linearize(model, found.estimate, seen, found.conditions)
-    jacobian = line.coordinate_jacobian[..., :6].reshape(-1, 6)
-    state, pose = np.repeat(seen.state, 3), np.repeat(seen.cluster, 3)
-    sigma = (jacobian * noise.joint_rad**2) @ jacobian.T * (state[:, None] == state)
-    sigma = (sigma + noise.position_m**2 * np.eye(len(sigma))) / states.repeats[state]
-    sigma += noise.pose_rad**2 * (jacobian @ jacobian.T) * (pose[:, None] == pose)
-    root = np.repeat(1 / np.sqrt(found.weights), 3)
-    scale = np.array([p.plausible for _, p in found.parameters])
-    left = line.sensitivities.reshape(len(sigma), -1) * scale
-    reference = sm.GLS(found.residual.ravel(), left, sigma=root[:, None] * sigma * root).fit()
-    deviation = assert_covariance(found, reference.normalized_cov_params * np.outer(scale, scale), 5e-3)
-    assert found.converged and (np.abs(reference.params * scale) / deviation).max() < 5e-3
-    # The offset is known by the poses alone, so much worse than their many measurements would tell.
-    without = fit(model, replace(seen), replace(noise, pose_rad=0.0))
-    assert found.covariance[-1, -1] > 2 * without.covariance[-1, -1]
 
 
 PRIORS = [None, None, 2e-5, 1e-3, 5e-6]
