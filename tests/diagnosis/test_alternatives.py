@@ -163,17 +163,6 @@ def test_log_factors_of_two_fixed_hypotheses_are_normal_with_mean_half_the_separ
     assert abs(promise.resolved(logs) - often) < 5 * np.sqrt(often * (1 - often) / (2 * PROMISE_DRAWS))
 
 
-def test_models_of_one_hypothesis_count_together_by_their_weights():
-    """Two models of one hypothesis that are as far apart as can be are nothing to resolve, and their prior is their sum."""
-    promise = fixed([1, 0], [-1, 0], [0, 1], weights=(0.15, 0.45, 0.4), names=("h0", "h0", "h1"), seed=3)
-    np.testing.assert_allclose(np.exp(promise.log_prior), [0.6, 0.4])
-    # 600 draws of two models with 1/4 and 3/4: 5 standard errors are 0.09.
-    assert abs((promise.truths[promise.source == 0, 0] > 0).mean() - 0.25) < 5 * np.sqrt(0.25 * 0.75 / PROMISE_DRAWS)
-    assert promise.resolved(promise.log_factors(1e4 * np.eye(2))) == pytest.approx(1.0)
-    # What tells nothing has no factor, however probable each hypothesis was.
-    np.testing.assert_allclose(promise.log_factors(np.zeros((2, 2))), 0.0, atol=1e-9)
-
-
 def test_separation_resolved_solves_its_equation_and_is_none_where_nothing_is_resolved():
     """ln 19 = lambda / 2 - z sqrt(lambda), with z of the probability."""
     assert separation_resolved(0.0) == 0.0 and separation_resolved(0.5) == pytest.approx(HALF_RESOLVED)

@@ -5,23 +5,12 @@ import pytest
 from bad_rows import damaged
 from scipy.stats import binom, chi2
 
-from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.gross_errors import (
-    _Beside,
-    beyond_chance,
-    entries_of,
-    gross_errors,
-)
+from elastocal.diagnosis.gross_errors import beyond_chance, entries_of, gross_errors
 from elastocal.diagnosis.kept_rows import fitted_to
 from elastocal.diagnosis.settings import Settings
 
 SETTINGS = Settings()
 NOISE_M, BAD = 6e-5, 11
-
-
-@pytest.fixture(scope="module")
-def clean(cases):
-    return diagnose(cases[0], SETTINGS, 1)
 
 
 def test_the_distance_of_a_row_is_that_from_a_fit_without_it(cases):
@@ -34,18 +23,6 @@ def test_the_distance_of_a_row_is_that_from_a_fit_without_it(cases):
         found.append(gross_errors(part.declared, whole.noise, measurements, part.kept, SETTINGS).distance)
     # Weights of the robust fit differ a little, since the model lacks something.
     assert found[0][BAD] == pytest.approx(found[1][BAD], rel=0.1)
-
-
-def test_a_row_that_was_fitted_is_farther_off_than_one_of_the_same_residual_that_was_not(cases):
-    """A fit takes of the residual of its own rows, and adds to the variance of others."""
-    measurements = cases[0].campaign.measurements
-    every = np.ones(len(measurements), bool)
-    part = fitted_to(cases[0], every, SETTINGS)
-    rows = _Beside.of(part.declared.model, part.declared.estimate, measurements, part.noise, every)
-    yardstick = rows.yardstick(part.declared, part.noise, every)
-    farther = rows.distances(yardstick, every) > rows.distances(yardstick, ~every)
-    # No parameter shows in rows without a load.
-    assert farther[measurements.wrench.any(axis=1)].all() and not farther.all()
 
 
 def test_rows_stand_out_by_chance_as_often_as_the_settings_say():
@@ -70,12 +47,12 @@ def test_where_too_many_rows_stand_out_none_is_a_gross_error():
     assert not beyond_chance(distance, 3, np.ones(40, bool), SETTINGS)[1].any()
 
 
-def test_sentences_say_what_a_row_reads(cases, clean):
+def test_sentences_say_what_a_row_reads(cases, diagnosis):
     case = damaged(cases[0], {})
     position = case.campaign.measurements.position
     position[4], position[8] = 0.0, position[7]
     measurements, every = case.campaign.measurements, np.ones(len(position), bool)
-    errors = gross_errors(clean.final, clean.declared.noise, measurements, every, SETTINGS)
+    errors = gross_errors(diagnosis.final, diagnosis.declared.noise, measurements, every, SETTINGS)
     told = {entry["rows"][0]: entry["detail"] for entry in entries_of(errors, case.campaign, held_out=False)}
     assert "reads 0, 0, 0" in told[measurements.row[4]]
     assert f"the same point as line {measurements.row[7] + 1} of" in told[measurements.row[8]]

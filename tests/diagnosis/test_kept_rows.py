@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bad_rows import damaged
-from scipy.stats import multivariate_normal
 
-from elastocal.diagnosis.kept_rows import _log_likelihood, _precision, _without, first_kept
+from elastocal.diagnosis.kept_rows import first_kept
 from elastocal.diagnosis.settings import Settings
 
 SETTINGS, BAD = Settings(), 11
@@ -41,18 +40,3 @@ def test_a_repeat_that_is_in_no_average_stays_out(case):
     state = list(zip(measurements.pose, measurements.load, measurements.target, strict=True))
     repeated = [place for place, key in enumerate(state) if state.count(key) > 2][:1]
     assert not first_kept(damaged(case, dict.fromkeys(repeated, 2.0)), SETTINGS).kept[repeated].any()
-
-
-def test_the_inverse_covariance_is_that_of_the_sum_and_of_its_part():
-    draws = np.random.default_rng(2)
-    loads, declared = draws.standard_normal((12, 5)), draws.standard_normal((12, 2))
-    covariance = np.eye(12) + loads @ loads.T
-    whole = covariance + declared @ declared.T
-    precision, residual = _precision(covariance, declared), draws.standard_normal(12)
-    np.testing.assert_allclose(precision, np.linalg.inv(whole), atol=1e-12)
-    expected = multivariate_normal(cov=whole).logpdf(residual) + 6 * np.log(2 * np.pi)
-    assert _log_likelihood(covariance, declared, residual) == pytest.approx(expected)
-    part = _without(precision, np.array([3, 4]))
-    kept = np.delete(np.arange(12), [3, 4])
-    np.testing.assert_allclose(part[np.ix_(kept, kept)], np.linalg.inv(whole[np.ix_(kept, kept)]), atol=1e-12)
-    assert not part[3].any() and not part[:, 4].any()

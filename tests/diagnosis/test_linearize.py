@@ -197,26 +197,6 @@ def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_
     np.testing.assert_allclose(found["thermal_growth[time]"], closer)
 
 
-def ends_of(candidate):
-    (shape,) = candidate.shapes
-    return shape.lowest, shape.highest
-
-
-@pytest.mark.parametrize("key", ["setup_step", "thermal_growth[time]", "link_elasticity@3"])
-def test_a_closer_look_stays_within_the_range_and_keeps_all_that_was_tried(bent, key):
-    units = [unit for unit in bent.units if unit.candidate and unit.candidate.key == key]
-    lowest, highest = ends_of(units[0].candidate)
-    before = sorted(unit.shapes[0] for unit in units)
-    for place in range(len(units)):
-        (values,) = looked_at(bent, factors(bent, {(key, place): 30.0})).values()
-        assert set(before) < set(values) and min(values) >= lowest and max(values) <= highest
-        assert values == sorted(values) and np.diff(values).min() > 1e-6
-        # Three new ones or more, none of them beyond a neighbour of the best.
-        best, found = before.index(units[place].shapes[0]), set(values) - set(before)
-        edges = [lowest, *before, highest]
-        assert len(found) >= 3 and all(edges[best] <= value <= edges[best + 2] for value in found)
-
-
 def test_the_prior_of_a_declared_parameter_is_kept(kuka):
     """An effect that is declared with a prior keeps it: it is projected off no further than its prior lets it be."""
     campaign = planted(kuka, {}, seed=6)

@@ -60,20 +60,6 @@ def test_loads_that_always_hang_stay_vertical(ambiguous, kuka):
         assert (wrench[:, 2] < 0).all() and not wrench[:, [0, 1, 3, 4, 5]].any()
 
 
-def test_a_reference_weight_shows_what_the_load_cell_cannot(kuka):
-    """Force scale and compliances of all joints do the same under loads that only the cell knows."""
-    campaign = planted(kuka, {"force_scale": (0.02,)}, poses=15, identified=False)
-    line = linearized(campaign.declared, campaign.observations, [campaign.candidates["force_scale"]], SETTINGS)
-    reach = new_states.reach_of(campaign.observations.states, kuka, limits(kuka), None, True)
-    made = line, campaign.declared, [0], campaign.declared.noise, campaign.observations.states, reach, False
-    instrument = new_states.instrument_of(*made)
-    entries = new_states.drawn(reach, 80, np.random.default_rng(0))
-    assert 5 < entries.weighed.sum() < 40
-    assert not entries.wrench[entries.weighed][:, [0, 1, 3, 4, 5]].any() and (entries.wrench[entries.weighed, 2] < 0).all()
-    shown = instrument.information(entries, [0, 1])[:, -1, -1]
-    assert (shown[~entries.weighed] > 0).all() and not shown[entries.weighed].any()
-
-
 def test_reach_has_the_directions_and_shares_that_the_campaign_had(states, kuka):
     """Loads of one sense, of both senses along one line, and in all directions; and none."""
     up, size = np.array([0.0, 0.0, 1.0, 0.0, 0.5, 0.0]), np.linspace(100.0, 800.0, len(states))

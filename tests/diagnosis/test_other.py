@@ -110,20 +110,6 @@ def test_a_law_goes_by_its_own_cause_alone(joint, law, what):
     assert (np.abs(one - other).max() > 0.02 * min(JOINT_RAD, BASE_M)) == (what in DEPENDS[joint, law])
 
 
-@pytest.mark.parametrize("motion", ["shift", "turn"])
-def test_each_coordinate_of_the_base_goes_by_the_load_along_it(motion):
-    """The force of the pull and of the weight along each axis, and the moment about it: of the first half of the features."""
-    states = around()
-    for changed in states.sites.base[:3] if motion == "shift" else states.sites.base[3:]:
-        total = states.total.copy()
-        total[:, changed] = total[::-1, changed]
-        moved = replace(states)
-        vars(moved)["total"] = total
-        pairs = zip(*(displacements(each, ((), f"{FORCE} {motion}"), states) for each in (states, moved)), strict=True)
-        differ = {at for one, other in pairs for at in one if np.abs(one[at] - other[at]).max() > 0.02 * BASE_M}
-        assert differ == {changed}
-
-
 @EVERY
 def test_it_is_the_same_function_of_some_of_the_states(law):
     """Normalised by the campaign: what is made in parts is what is made at once."""

@@ -81,16 +81,6 @@ def test_posterior_is_that_of_all_models(signal, seed):
     assert set(mine) <= set(expected)
 
 
-def test_nothing_is_always_among_the_models_however_improbable():
-    problem = problem_of("two mechanisms")
-    found, (nothing, _) = posterior(problem), initial_screening(problem)
-    (empty,) = [model for model in found.models if not model.units]
-    assert found.nothing is empty
-    assert empty.log_odds == nothing.log_odds == pytest.approx(0.0, abs=1e-9)
-    assert empty.pose_error_rad == nothing.pose_error_rad
-    assert len(nothing.scales) == 0
-
-
 def test_laws_of_the_competitor_at_one_location_join_in_one_model():
     rows, laws = made_rows(poses=14), (made_unit(OTHER, (1,), [0, 1]), made_unit(OTHER, (1,), [2, 3], law=NEIGHBOURS))
     rows = replace(rows, residual=rows.residual + 0.8 * rows.candidates[:, :4].sum(axis=1))

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from fitted_models import TARGETS, model_of
 from planted import two_loads_a_pose
-from synthetic import made_estimate, seen_exactly, slopes, small_steps, with_noise
+from synthetic import made_estimate, seen_exactly, with_noise
 
 from elastocal.fitting import fit_result
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
 
@@ -42,17 +41,6 @@ def test_values_are_those_of_the_effect_asked_for(fitted):
     assert [part.tolist() for part in made.values_of("stiffening@2")] == [[1.5], [300.0]]
     with pytest.raises(ValueError, match="hysteresis"):
         made.values_of("hysteresis@1")
-
-
-def test_sensitivities_are_central_differences_of_the_prediction(fitted):
-    found, seen = fitted
-    # Without residuals, of which frames and targets turn a part with them.
-    seen = seen_exactly(found.model, found.estimate, seen.states)
-    plain, _, _ = gathered(found, seen)
-    around = conditions(found.model, found.estimate, seen.states)
-    steps = small_steps(found.model, found.estimate)
-    expected = slopes(found.model, found.estimate, seen, around, np.diag(steps))
-    np.testing.assert_allclose(plain * steps, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
 def test_whitened_sensitivities_are_the_plain_ones_weighted_and_whitened_as_in_the_fit(fitted):

@@ -108,20 +108,6 @@ def test_few_repeats_have_the_pooled_standard_deviation_of_states_with_different
     assert found.orientation_rad == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("position_m", "orientation_rad", "told"),
-    [(1.02e-8, 1e-6, True), (0.98e-8, 1e-6, False), (1e-6, 1.02e-8, True), (1e-6, 0.98e-8, False)],
-)
-def test_positions_and_orientations_must_both_differ_by_more_than_a_sensor_can_resolve(position_m, orientation_rad, told):
-    model, estimate = gantry(rows=6)
-    signs = np.random.default_rng(22).choice([-1.0, 1.0], (4, 1, 3))
-    measurements = off_by(model, mirrored(position_m * signs), mirrored(orientation_rad * signs))
-    found = noise_from_repeats(model, estimate, measurements)
-    assert (found is not None) == told
-    if told:
-        assert (found.position_m, found.orientation_rad) == pytest.approx((position_m, orientation_rad), rel=1e-6)
-
-
 @pytest.mark.parametrize("rows", [3, 6])
 def test_a_joint_that_shifts_all_targets_has_the_maximum_of_its_likelihood_in_closed_form(rows):
     """What two targets make along the joint together has variance 2 s^2 + sigma^2, every other direction sigma^2."""

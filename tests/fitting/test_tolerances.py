@@ -92,13 +92,6 @@ def test_effective_parameters_are_the_trace_of_the_hat_matrix(kuka):
     assert effective_parameters(fitted) < (~fitted.held).sum() - 0.5
 
 
-def test_a_model_without_geometry_is_fitted_as_it_is(kuka):
-    campaign, _ = campaign_of(kuka, 1e-4)
-    model = campaign.declared.model
-    one, other = (call(model, campaign.observations, campaign.declared.noise) for call in (fit, fit_declared))
-    np.testing.assert_array_equal(one.estimate.coefficients[0], other.estimate.coefficients[0])
-
-
 def case_of(robot, off=0.0, turned=0.0, noise=None, oriented=True, repeats=1):
     """A known robot whose measurements are off by so much and turned by so much: nothing is left to fit."""
     plan = Plan(poses=8, loads=1, repeats=repeats, noise=0.0, force=0.0, oriented=oriented)
@@ -135,12 +128,3 @@ def test_a_residual_finer_than_any_sensor_is_taken_as_what_a_sensor_resolves(fan
     noise, _ = estimated_noise(case_of(fanuc, off, turned))
     for found, part in ((noise.position_m, off), (noise.orientation_rad, turned)):
         assert found == pytest.approx(max(np.sqrt((part**2).mean()), FINEST), rel=1e-6)
-
-
-def test_repeats_come_before_the_residual(fanuc):
-    """Measurements a millimetre off the model and repeated to some hundredths."""
-    noise, warnings = estimated_noise(case_of(fanuc, 1e-3 + errors(1, 30e-6, 2), 1e-3 + errors(2, 15e-6, 2), repeats=2))
-    assert noise.source == "repeats" and warnings == []
-    # Within four standard errors of what 192 contrasts tell.
-    assert noise.position_m == pytest.approx(30e-6, rel=4 / np.sqrt(2 * 192))
-    assert noise.orientation_rad == pytest.approx(15e-6, rel=4 / np.sqrt(2 * 192))

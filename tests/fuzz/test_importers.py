@@ -13,12 +13,7 @@ from elastocal.campaigns.measurements import write_measurements
 from elastocal.campaigns.reading import read_robot
 from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS
 from elastocal.exchange.dh import DhOptions, robot_from_dh
-from elastocal.exchange.measurement_table import (
-    ImportOptions,
-    import_options_text,
-    read_import_options,
-    read_measurement_table,
-)
+from elastocal.exchange.measurement_table import ImportOptions, import_options_text, read_import_options, read_measurement_table
 from elastocal.exchange.robot_text import write_robot
 from elastocal.exchange.target_path import read_target_path
 from elastocal.exchange.urdf import robot_from_urdf

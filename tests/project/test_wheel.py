@@ -18,12 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "Snakefile", "config.yaml", "config", "profiles", "src", "workflow")
 SOURCES += ("paper", "CITATION.cff", "data/measured")
 # Of the checkout alone: it checks, rehearses and explains.
-LEFT_OUT = (
-    "workflow/lint.py",
-    "workflow/examples/",
-    "workflow/searches/",
-    "config/README.md",
-)
+LEFT_OUT = ("workflow/lint.py", "workflow/examples/", "workflow/searches/", "config/README.md")
 OUTSIDE = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {"OMP_NUM_THREADS": "1"}
 IGNORED = shutil.ignore_patterns("__pycache__", "*.egg-info")
 
