@@ -39,7 +39,7 @@ test-slurm: .venv/ready-for-tests
 fuzz: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q tests/fuzz --hypothesis-profile=long
 
-# Forty kills at random moments, full disks, read-only folders, wrong clocks, two runs at once.
+# Forty kills at random moments, full disks, two runs at once.
 soak: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python tests/faults/soak.py $(SOAK)
 

@@ -20,11 +20,7 @@ CONFIG = Path(__file__).resolve().parents[1] / "config"
 
 # The same examples in every run: a test that fails must fail again. A machine that is too slow to draw them is no fault.
 hypothesis.settings.register_profile(
-    "repeatable",
-    deadline=None,
-    max_examples=40,
-    derandomize=True,
-    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+    "repeatable", deadline=None, max_examples=40, derandomize=True, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
 hypothesis.settings.load_profile("repeatable")
 

@@ -8,7 +8,6 @@ import pandas as pd
 import yaml
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from planned_robots import ROBOTS
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
@@ -18,6 +17,8 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.command.main import app
 from elastocal.errors import InputError
 from elastocal.mechanics.kinematics import poses
+
+ROBOTS = yaml.safe_load(Path(__file__).with_name("planned_robots.yaml").read_text(encoding="utf-8"))
 
 OFFSETS = ("", "=0,0,0", "=0.1,0,0", "=0,-0.1,0.05")
 BASE = Rotation.from_rotvec([0.3, -0.2, 1.0]), np.array([2.0, -1.0, 0.5])

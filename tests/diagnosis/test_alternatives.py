@@ -96,15 +96,6 @@ def test_misfits_are_log_densities_of_measurements_written_out_on_average_and_wi
                 assert each[t, j] == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-def test_entropy_left_is_all_of_it_without_information_and_nothing_with_very_much():
-    criterion = Criterion(made(["h0", "h1", "h1", "h2"], seed=2, certain=1e6), np.random.default_rng(3))
-    weights = np.exp(criterion.log_weights)
-    each = np.array([weights[0], weights[1] + weights[2], weights[3]])
-    none, much = criterion.left(np.array([np.zeros((5, 5)), 1e9 * np.eye(5)]))
-    assert none == pytest.approx(-(each * np.log(each)).sum(), rel=1e-9)
-    assert much == pytest.approx(0.0, abs=1e-9)
-
-
 def test_entropy_of_fixed_models_is_that_of_their_bhattacharyya_coefficients():
     """Of known coefficients: sum of w_i ln (1 + w_j / w_i exp(-separation / 8)), with the separation d'G d."""
     models, half = (
@@ -147,25 +138,6 @@ def test_log_factors_of_two_fixed_hypotheses_are_normal_with_mean_half_the_separ
     # With 1,200 draws in all: of a share of 0.9 the standard error is 0.009, of a half 0.014.
     often = norm.cdf((separation / 2 - np.log(19)) / np.sqrt(separation))
     assert abs(promise.resolved(logs) - often) < 5 * np.sqrt(often * (1 - often) / (2 * PROMISE_DRAWS))
-
-
-def test_stated_separation_is_the_smaller_of_twice_the_mean_and_that_of_hypotheses_resolved_as_often():
-    promise, logs = fixed([1, 0], [0, 1]), np.zeros((2 * PROMISE_DRAWS, 2))
-    own, source = np.arange(len(logs)), promise.source
-    for factor, expected in ((np.where(own % 4 == 0, 1e3, 1.0), separation_resolved(0.25)), (3.0, 6.0), (-1.0, 0.0)):
-        logs[own, source] = factor
-        assert promise.separations(logs).tolist() == [0.0, pytest.approx(expected)]
-
-
-def test_models_of_one_hypothesis_count_together_by_their_weights():
-    """Two models of one hypothesis that are as far apart as can be are nothing to resolve, and their prior is their sum."""
-    promise = fixed([1, 0], [-1, 0], [0, 1], weights=(0.15, 0.45, 0.4), names=("h0", "h0", "h1"), seed=3)
-    np.testing.assert_allclose(np.exp(promise.log_prior), [0.6, 0.4])
-    # 600 draws of two models with 1/4 and 3/4: 5 standard errors are 0.09.
-    assert abs((promise.truths[promise.source == 0, 0] > 0).mean() - 0.25) < 5 * np.sqrt(0.25 * 0.75 / PROMISE_DRAWS)
-    assert promise.resolved(promise.log_factors(1e4 * np.eye(2))) == pytest.approx(1.0)
-    # What tells nothing has no factor, however probable each hypothesis was.
-    np.testing.assert_allclose(promise.log_factors(np.zeros((2, 2))), 0.0, atol=1e-9)
 
 
 def test_separation_resolved_solves_its_equation_and_is_none_where_nothing_is_resolved():

@@ -166,11 +166,7 @@ def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
 def test_hypotheses_gather_locations_laws_and_sum_to_one():
     posterior = made_posterior(((OFFSET_2,), 0.3), ((OFFSET_3,), 0.3), ((OFFSET_2, OFFSET_3), 0.1), ((OTHER_1, OTHER_2), 0.1))
     found = hypotheses_of(PROBLEM, posterior)
-    assert [(h.mechanisms, pytest.approx(h.probability)) for h in found] == [
-        (("offset",), 0.7),
-        ((), 0.2),
-        ((OTHER,), 0.1),
-    ]
+    assert [(h.mechanisms, pytest.approx(h.probability)) for h in found] == [(("offset",), 0.7), ((), 0.2), ((OTHER,), 0.1)]
     # The most probable of its models stands for each.
     assert [h.model for h in found] == [0, 2, 4]
     where = location_probabilities(PROBLEM, posterior, "offset")

@@ -1,6 +1,7 @@
-"""What jobs and commands may load before they need it: imports are a third of a job of the study, and all of a help text."""
+"""What jobs and commands may load before they need it, a third of a job of the study; and the tool never loads its proof."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -69,3 +70,10 @@ assert {{name: values.tolist() for name, values in read.items()}} == kinds
 """)
     assert "elastocal.io.storage" in found
     assert not found & _OF_STUDY
+
+
+def test_the_tool_imports_the_proof_in_its_demonstration_alone():
+    """For annotations too, which import-linter leaves out."""
+    importing = re.compile(r"^ *(?:from|import) elastocal_proof", re.MULTILINE)
+    found = [path for path in (TOP / "src/elastocal").rglob("*.py") if importing.search(path.read_text(encoding="utf-8"))]
+    assert [path.relative_to(TOP).as_posix() for path in found] == ["src/elastocal/command/demo.py"]

@@ -31,7 +31,8 @@ def test_decisions_come_with_their_criterion_and_risk(decision, changed, words):
 
 def test_what_is_predicted_is_called_so():
     facts = certificate_facts(made_document())
-    assert facts["title"] == "Pass, as predicted: corrected by physics alone" and facts["worst"].endswith("at the command −28.6°, 250.0 mm")
+    assert facts["title"] == "Pass, as predicted: corrected by physics alone"
+    assert facts["worst"].endswith("at the command −28.6°, 250.0 mm")
     assert "is predicted to keep" in facts["now"]
     assert "0.120 mm at validation poses is the tracker against the model" in facts["whose"]
     assert facts["verdict"] == "One mechanism is missing in the declared model: lost motion (backlash)."

@@ -65,16 +65,6 @@ def test_edit_reruns_scores_and_no_diagnosis_of(edit, copy):
     assert not planned & ({"make_cases", "seal_cases"} | ANALYSIS)
 
 
-def test_a_picture_reruns_itself_alone(copy):
-    copy.edit("src/elastocal_proof/figures/blind.py")
-    assert rules(copy.planned(*BLIND)) == {"draw_blind", "blind"}
-
-
-def test_a_size_that_the_plan_does_not_have_is_refused_in_one_line(copy):
-    ended = copy.snakemake("-n", "blind", "--config", "blind=huge")
-    assert ended.returncode != 0 and "blind: found 'huge'; allowed: smoke, quick, development, full" in ended.stderr
-
-
 @pytest.mark.parametrize("module", ["oracle", "summary"])
 def test_a_truth_that_was_edited_ends_in_one_line_with_its_file(copy, module):
     truth = copy.files(f"{SEALED}/*.json")[0]

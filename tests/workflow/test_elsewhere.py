@@ -4,16 +4,7 @@ import re
 
 from snakemake_starts import started
 
-TARGETS = (
-    "paper",
-    "study",
-    "loop",
-    "measured",
-    "league",
-    "blind",
-    "closed_loop",
-    "audit",
-)
+TARGETS = ["paper", "study", "loop", "measured", "league", "blind", "closed_loop", "audit"]
 
 
 def test_every_target_finds_its_sources_and_its_jobs_can_be_grouped(unstarted, tmp_path):

@@ -22,14 +22,6 @@ def test_every_caption_is_there_and_every_page_is_a_caption():
     assert {caption for _, caption, _ in shown()} <= pages <= named
 
 
-def test_every_picture_of_a_rule_is_shown():
-    pictures = {
-        path for text in RULES for path in re.findall(r'^\s+\w+=(?:shown\(\s*)?"(reports/[^"]+\.png)"', text, re.MULTILINE)
-    }
-    patterns = [re.compile(re.sub(r"\\{\w+\\}", ".+", re.escape(path))) for path, _, _ in shown()]
-    assert {picture for picture in pictures if not any(pattern.fullmatch(picture) for pattern in patterns)} == set()
-
-
 @pytest.fixture(scope="module")
 def report(paper, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
