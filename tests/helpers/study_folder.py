@@ -32,7 +32,7 @@ SMALL = {
     "data_sets": 12,
     "configurations": 20,
     "test_configurations": 20,
-    "evaluation": {"bootstrap_replicates": 10, "lengths": [5, 10, 20]},
+    "evaluation": {"bootstrap_replicates": 10},
     "tables": {"noise_um": 200, "length": 20, "classical_strategy": "6DoF"},
     # So many configurations reach them.
     "questions": {"accuracies_um": [120, 90]},
