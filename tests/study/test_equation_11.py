@@ -1,6 +1,7 @@
 """Equation 11 for every prefix, against a plain loop of numpy.linalg.lstsq and against explicit matrices."""
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -93,16 +94,6 @@ def plain(strategy, matrix, measured, joints=6):
     return compliance
 
 
-def first(data, data_set, length):
-    matrix = {name: array[data_set, :length] for name, array in data.matrix.items()}
-    return matrix, {name: array[data_set, :length] for name, array in data.measured.items()}
-
-
-def prefixes(strategy, rows):
-    start = first_solvable_length(strategy, rows)
-    return [(k, s) for k in range(start, CONFIGURATIONS + 1) for s in range(SETS)]
-
-
 @pytest.fixture
 def strategy_called(strategies):
     return lambda name: (UNUSUAL | {"seven": SEVEN} | strategies)[name]
@@ -114,8 +105,10 @@ def test_estimates_of_every_prefix_are_those_of_a_plain_loop(robots, strategy_ca
     strategy, data = strategy_called(name), data_of(key, rows, robots)
     found = estimate_compliance(strategy, data.measurements(), 6)[0]
     # One position says two things about three joints that meet in a wrist, so one configuration is not enough.
-    for k, s in [(k, s) for k, s in prefixes(strategy, rows) if rows == 6 or k > 1]:
-        expected = plain(strategy, *first(data, s, k))
+    for k, s in product(range(1 if rows == 6 else 2, CONFIGURATIONS + 1), range(SETS)):
+        expected = plain(
+            strategy, *({name: part[s, :k] for name, part in all_.items()} for all_ in (data.matrix, data.measured))
+        )
         tolerance = {6: 1e-9, 3: 1e-8}[rows]
         np.testing.assert_allclose(found[k - 1, :, s], expected, rtol=0, atol=tolerance * np.abs(expected).max())
 
