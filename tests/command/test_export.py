@@ -56,7 +56,8 @@ def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_i
     in_checkout, elastocal, refusal, tmp_path
 ):
     mine, output = tmp_path / "mine.urdf", tmp_path / "out"
-    mine.write_text(urdf_of(analysed("kuka")).replace("<link ", "<!-- mine --><link ", 1).replace('effort="1e9"', 'effort="77"'))
+    text = urdf_of(analysed("kuka")).replace("<link ", "<!-- mine --><link ", 1)
+    mine.write_text(text.replace('effort="1e9"', 'effort="77"'))
     result = elastocal("export", "made", "--urdf", mine, "--output", output)
     assert result.exit_code == 0, result.output
     told = " ".join(result.stderr.split())
