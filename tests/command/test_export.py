@@ -9,13 +9,14 @@ import pytest
 from analysed_robots import analysed
 from made_calibrated import made_calibrated
 from made_urdf import joint, link, written
+from made_urdf import robot as made
 
 from elastocal.application.exported import fold_effects
 from elastocal.campaigns.reading import read_robot
 from elastocal.command.export import _drop_in
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
+from elastocal.exchange.urdf_writing import write_calibrated_origins
 from elastocal.mechanics.kinematics import poses
 
 
@@ -26,7 +27,7 @@ def test_robot_file_urdf_and_sidecar_hold_what_was_found(in_checkout, elastocal,
     nominal = analysed("kuka")
     assert abs(robot.reported_offset[2] - nominal.reported_offset[2]) == pytest.approx(3e-4, rel=0.2)
     assert (robot.compliance != nominal.compliance).any()
-    assert robot_from_urdf(tmp_path / "out" / "robot.urdf", "base", robot.chain.end_effector.name).robot.joints == 6
+    assert not (tmp_path / "out" / "robot.urdf").exists()
     by_table = robot_from_dh(tmp_path / "out" / "dh.csv").robot
     angles = 0.5 * np.linspace(-1, 1, 6)[None]
     mine = poses(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
@@ -51,17 +52,30 @@ def test_a_regression_that_no_file_can_hold_is_said_with_its_size(elastocal, reg
     assert stated["rms_m"] == pytest.approx(verdict["physics"]["accuracy"]["rms_m"], rel=1e-3)
 
 
+def urdf_of(arm):
+    """A robot as URDF, a joint for each of its transforms."""
+    parts, above = [link("base")], "base"
+    for number, each in enumerate(arm.chain.transforms[: arm.chain.end_effector.after], 1):
+        name = arm.chain.end_effector.name if number == arm.chain.end_effector.after else f"l{number}"
+        axis = np.eye(3)[each.axis]
+        place = {"xyz" if each.kind == "T" else "rpy": each.constant * axis} if each.coordinate is None else {}
+        kind = "fixed" if place else "revolute"
+        parts += [link(name), joint(f"j{number}", above, name, kind, axis=(each.sign or 1) * axis, **place)]
+        above = name
+    return made(*parts)
+
+
 def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(
     in_checkout, elastocal, refusal, tmp_path
 ):
     mine, output = tmp_path / "mine.urdf", tmp_path / "out"
-    mine.write_text(urdf_of(analysed("kuka")).replace("<robot ", "<!-- mine --><robot ").replace('effort="1e9"', 'effort="77"'))
+    mine.write_text(urdf_of(analysed("kuka")).replace("<link ", "<!-- mine --><link ", 1))
     result = elastocal("export", "made", "--urdf", mine, "--output", output)
     assert result.exit_code == 0, result.output
     told = " ".join(result.stderr.split())
     assert re.search(r"robot\.urdf: \d+ joint origins? changed, nothing else", told) and "cannot hold" not in told
     text = (output / "robot.urdf").read_text()
-    assert text.count('effort="77"') == 6 and "<!-- mine -->" in text and text != mine.read_text()
+    assert text.count('effort="1"') == 6 and "<!-- mine -->" in text and text != mine.read_text()
     robot = read_robot(output / "robot.yaml")
     back = robot_from_urdf(output / "robot.urdf", "base", robot.chain.end_effector.name).robot
     angles = 0.5 * np.linspace(-1, 1, 6)[None]

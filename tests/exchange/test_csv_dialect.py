@@ -31,12 +31,10 @@ def test_separator_decimal_mark_encoding_and_header_are_found_out(tmp_path, sepa
     ("text", "words"),
     [
         ("", ["nothing but comments"]),
-        ("# a\n\n", ["nothing but comments"]),
         ("a;b\n1;2\n", ["line 1", "--header"]),
         ("x;y\n", ["a header alone"]),
         ("x;y;x\n1;2;3\n", ["line 1", "'x' twice", "--ignore 'x'"]),
         ("x;y\n1;2\n1\n", ["line 3", "1 cell", "2, one for each"]),
-        ("x,y\n1,2,,3\n", ["line 2", "one for each column"]),
         ("x;y\n1,5;2.5\n", ["'2.5' in line 2", "'1,5' in line 2", "--decimal"]),
         # Three digits behind each comma, or a comma in quotes between commas, may be either.
         ("x;y\n1,234;22,500\n", ["line 2", "'1,234'", "--decimal comma"]),
@@ -59,7 +57,6 @@ def test_what_cannot_be_read_or_in_two_ways_is_refused_with_its_line(tmp_path, t
         ("x;y\n1,234;22,500\n", Dialect(decimal="comma"), "1.234"),
         ("x;y\n1,234;0,500\n", Dialect(), "1.234"),
         ("# x;y;n\n# n;y;x\n1;2;3\n", Dialect(header=2), "3"),
-        ("x;y;n\ny;x;n\n1;2;3\n", Dialect(header=2), "2"),
     ],
 )
 def test_what_an_option_or_another_number_says_is_read(tmp_path, text, dialect, x):
@@ -117,10 +114,6 @@ def test_a_header_behind_a_comment_mark_is_found_and_a_plain_one_goes_before(tmp
 )
 def test_nameless_columns_and_rows_that_are_empty_throughout_are_left_out(tmp_path, text):
     assert read(tmp_path, text).columns == {"x": ("1",), "y": ("2",)}
-
-
-def test_a_nameless_column_with_values_is_called_by_its_place(tmp_path):
-    assert read(tmp_path, ",x,y\n0,1,2\n,3,4\n").columns == {"column 1": ("0", ""), "x": ("1", "3"), "y": ("2", "4")}
 
 
 def test_columns_to_ignore_are_left_out_whatever_they_hold(tmp_path):

@@ -47,7 +47,7 @@ def export(
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
     from elastocal.application.calibrated import OperatingConditions, regressed
     from elastocal.application.exported import find_left_out_m, fold_effects, sidecar
-    from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
+    from elastocal.exchange.urdf_writing import write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.json_files import write_json
     from elastocal.mechanics.robot_file import document_of
@@ -66,16 +66,10 @@ def export(
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
     accuracy = campaign_accuracy(calibrated)
     document = sidecar(calibrated, found.name, date or calendar.today().isoformat(), accuracy)
-    lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, URDF, SIDECAR))]
+    lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, *([URDF] if urdf else []), SIDECAR))]
     with write_together(output, _NAMES) as partial:
         write_text(partial / ROBOT, f"# {stated}\n{text}")
-        if drop_in is None:
-            write_text(partial / URDF, urdf_of(robot, f"{stated} Geometry alone: springs and effects are in {SIDECAR}."))
-            if calibrated.robot.joint_names:
-                lines.append(
-                    f"{URDF} has points for links, no meshes; --urdf FILE gives back the URDF that the robot was imported from"
-                )
-        else:
+        if drop_in is not None:
             (partial / URDF).write_bytes(drop_in.content)
             lines += _drop_in(drop_in, partial / URDF, calibrated.robot, robot, found.case.observations.states.joint_angles)
         write_json(partial / SIDECAR, document)
