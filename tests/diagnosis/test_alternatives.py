@@ -105,21 +105,6 @@ def test_entropy_left_is_all_of_it_without_information_and_nothing_with_very_muc
     assert much == pytest.approx(0.0, abs=1e-9)
 
 
-def test_entropy_of_fixed_models_is_that_of_their_bhattacharyya_coefficients():
-    """Of known coefficients: sum of w_i ln (1 + w_j / w_i exp(-separation / 8)), with the separation d'G d."""
-    models, half = (
-        made(["h0", "h1"], seed=4, certain=1e12, weights=(0.7, 0.3)),
-        np.random.default_rng(6).standard_normal((5, 5)),
-    )
-    information = np.array([scale * half @ half.T for scale in (0.1, 1.0, 4.0)])
-    apart = models[0].mean - models[1].mean
-    separation = np.einsum("i,nij,j->n", apart, information, apart)
-    close = np.exp(-separation / 8)
-    expected = 0.7 * np.log1p(0.3 / 0.7 * close) + 0.3 * np.log1p(0.7 / 0.3 * close)
-    np.testing.assert_allclose(Criterion(models, np.random.default_rng(5)).left(information), expected, rtol=1e-4)
-    assert separation.min() < 2 < separation.max()
-
-
 def fixed(*means, weights=(0.5, 0.5), names=("h0", "h1"), seed=0):
     """The promise of models whose coefficients are as good as known."""
     known = [alternative([0, 1], m, 1e12 * np.eye(2), n, w) for m, w, n in zip(means, weights, names, strict=True)]
@@ -166,11 +151,3 @@ def test_models_of_one_hypothesis_count_together_by_their_weights():
     assert promise.resolved(promise.log_factors(1e4 * np.eye(2))) == pytest.approx(1.0)
     # What tells nothing has no factor, however probable each hypothesis was.
     np.testing.assert_allclose(promise.log_factors(np.zeros((2, 2))), 0.0, atol=1e-9)
-
-
-def test_separation_resolved_solves_its_equation_and_is_none_where_nothing_is_resolved():
-    """ln 19 = lambda / 2 - z sqrt(lambda), with z of the probability."""
-    assert separation_resolved(0.0) == 0.0 and separation_resolved(0.5) == pytest.approx(HALF_RESOLVED)
-    for often in (0.01, 0.3, 0.5, 0.9, 0.99):
-        size = separation_resolved(often)
-        assert size / 2 - norm.ppf(often) * np.sqrt(size) == pytest.approx(np.log(19))

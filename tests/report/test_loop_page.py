@@ -12,7 +12,7 @@ from made_loop_facts import CAMPAIGNS, facts_of, plainly
 from made_loop_tables import candidate_table, residual_table
 
 from elastocal.io.origin import Origin
-from elastocal.loop.schemas import angles_of, worst_measurement
+from elastocal.loop.schemas import angles_of
 from elastocal.mechanics.kinematics import corners
 from elastocal.report.loop_page import loop_page, write_loop_page
 
@@ -80,14 +80,6 @@ def test_measurements_are_in_metres_and_micrometres_with_what_they_may_be_drawn_
     assert all(np.ptp(entry["values"]) > 0 for entry in data["against"])
 
 
-def test_the_robot_stands_where_its_chain_says(kuka):
-    _, data = page_of(kuka)
-    assert len(data["outlines"]) == len(data["poses"])
-    # Base, and behind each of the six lengths.
-    assert np.shape(data["outlines"][0]) == (7, 3)
-    np.testing.assert_allclose(data["outlines"][0][:2], [[0, 0, 0], [0, 0, 0.675]], atol=1e-4)
-
-
 def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_reports(kuka):
     table, verdict = residual_table(), CAMPAIGNS["named"]
     other = replace(kuka, reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]), reported_offset=np.full(6, 0.3))
@@ -108,16 +100,6 @@ def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at
             np.testing.assert_allclose(outline, corners(kuka.chain, joints[[row]])[:, 0], atol=1e-4)
 
 
-def test_the_leading_candidates_stand_by_falling_bayes_factor(kuka):
-    table = candidate_table()
-    page, _ = page_of(kuka)
-    assert len(page["candidates"]) == 15
-    factors = [float(row["factor"].replace("\u2212", "-")) for row in page["candidates"]]
-    expected = np.sort(table["log_bayes_factor"][np.isfinite(table["log_bayes_factor"])])[::-1][:15]
-    np.testing.assert_allclose(factors, expected, atol=0.051)
-    assert [row["chosen"] for row in page["candidates"]].count("yes") == table["chosen"].sum()
-
-
 def test_a_candidate_of_several_shapes_has_the_factor_of_the_best_and_the_probability_of_all(kuka):
     """A model has one of them at most. The page once stated 62 % of a step of which verdict.json has over 99 %."""
     table = candidate_table()
@@ -136,17 +118,6 @@ def test_a_candidate_of_several_shapes_has_the_factor_of_the_best_and_the_probab
     )
     assert plainly(once[0]["words"]) == "62 %" and plainly(both[0]["words"]) == "> 99 %"
     assert [row | {"words": ""} for row in once] == [row | {"words": ""} for row in both]
-
-
-def test_joints_are_drawn_on_the_arm_and_the_page_opens_at_the_worst_pose(kuka):
-    table = residual_table()
-    _, data = page_of(kuka)
-    assert np.shape(data["joints"]) == (len(data["poses"]), 6, 2, 3)
-    np.testing.assert_allclose(np.linalg.norm(np.array(data["joints"])[:, :, 1], axis=2), 1, atol=1e-3)
-    worst = worst_measurement(table)
-    assert data["poses"][data["worst"]].split(",")[0] == str(table["pose"][worst])
-    size = np.linalg.norm(data["before"], axis=1)
-    assert size.max() == size[data["targets"][data["worst"]]].max() or table["load"][worst]
 
 
 def test_texts_of_other_people_stay_texts(kuka, tmp_path):
