@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from drawn_figures import empty_pictures
 from made_loop_facts import CAMPAIGNS, facts_of, plainly
-from made_loop_tables import candidate_table, residual_table
+from made_loop_tables import residual_table
 
 from elastocal.report.loop_facts import write_loop_report
 from elastocal.report.loop_page import loop_page, write_loop_page
@@ -36,7 +36,7 @@ def test_artefacts_of_every_verdict_agree(campaign, kuka, pictures, tmp_path, mo
     facts = facts_of(verdict)
     (folder / "verdict.json").write_text(json.dumps(verdict), encoding="utf-8")
     write_loop_report(folder / "report.pdf", facts, pictures)
-    write_loop_page(folder / "report.html", *loop_page(facts, residual_table(), candidate_table(), kuka))
+    write_loop_page(folder / "report.html", *loop_page(facts, residual_table(), kuka))
     assert_agree(folder)
 
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from durations import HUNG_S
-from made_loop_facts import CAMPAIGNS, facts_of, plainly
-from made_loop_tables import candidate_table, residual_table
+from made_loop_facts import CAMPAIGNS, facts_of
+from made_loop_tables import residual_table
 
 from elastocal.io.origin import Origin
 from elastocal.loop.schemas import angles_of
@@ -53,7 +53,7 @@ LEAST_CONTRAST = """() => {
 
 def page_of(kuka, name="named", **changed):
     verdict = CAMPAIGNS[name] | changed
-    return loop_page(facts_of(verdict), residual_table(), candidate_table(), kuka)
+    return loop_page(facts_of(verdict), residual_table(), kuka)
 
 
 def data_in(path):
@@ -83,7 +83,7 @@ def test_measurements_are_in_metres_and_micrometres_with_what_they_may_be_drawn_
 def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_reports(kuka):
     table, verdict = residual_table(), CAMPAIGNS["named"]
     other = replace(kuka, reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]), reported_offset=np.full(6, 0.3))
-    _, data = loop_page(facts_of(verdict), table, candidate_table(), other)
+    _, data = loop_page(facts_of(verdict), table, other)
     np.testing.assert_allclose(data["outlines"][0], corners(kuka.chain, angles_of(table, 6)[:1])[:, 0], atol=1e-4)
 
 
@@ -91,33 +91,13 @@ def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at
     """Both campaigns count their poses from nought."""
     table, verdict = residual_table(poses=6), CAMPAIGNS["named"]
     table |= {"held_out": table["pose"] >= 3, "pose": table["pose"] % 3}
-    _, data = loop_page(facts_of(verdict), table, candidate_table(), kuka)
+    _, data = loop_page(facts_of(verdict), table, kuka)
     assert data["poses"] == ["0", "1", "2", "0, validation", "1, validation", "2, validation"]
     joints = angles_of(table, 6)
     for outline, rows in zip(data["outlines"], data["targets"], strict=True):
         assert sorted(table["target"][rows]) == [0, 1]
         for row in rows:
             np.testing.assert_allclose(outline, corners(kuka.chain, joints[[row]])[:, 0], atol=1e-4)
-
-
-def test_a_candidate_of_several_shapes_has_the_factor_of_the_best_and_the_probability_of_all(kuka):
-    """A model has one of them at most. The page once stated 62 % of a step of which verdict.json has over 99 %."""
-    table = candidate_table()
-    key = table["candidate"][np.nanargmax(table["log_bayes_factor"])]
-    best = table["candidate"] == key
-    table["probability"] = np.where(best, 0.62, table["probability"])
-    lesser = {name: values[best][:1].copy() for name, values in table.items()}
-    lesser |= {
-        "log_bayes_factor": lesser["log_bayes_factor"] - 1,
-        "probability": np.array([0.379]),
-        "chosen": np.zeros(1, bool),
-    }
-    twice = {name: np.concatenate([lesser[name], values]) for name, values in table.items()}
-    once, both = (
-        loop_page(facts_of(CAMPAIGNS["named"]), residual_table(), some, kuka)[0]["candidates"] for some in (table, twice)
-    )
-    assert plainly(once[0]["words"]) == "62 %" and plainly(both[0]["words"]) == "> 99 %"
-    assert [row | {"words": ""} for row in once] == [row | {"words": ""} for row in both]
 
 
 def test_texts_of_other_people_stay_texts(kuka, tmp_path):
