@@ -33,9 +33,9 @@ _ARROW = 0.03
 def loop_page(facts: Mapping[str, Any], table: Mapping[str, np.ndarray], robot: Robot) -> tuple[dict[str, Any], dict[str, Any]]:
     """What the page of a campaign says, and what it draws.
 
-    `facts`: from `loop_facts.loop_facts`. `table` (N,): columns of the residuals; joint
-    angles are the model's, as in a campaign, not the controller's. `robot`: as declared. Returns `page`: texts and tables, worded; `data`: JSON-serialisable: positions (m), residuals (µm), what they
-    may be drawn against, corners, joints and axes of the robot (m).
+    `facts`: from `loop_facts.loop_facts`. `table` (N,): columns of the residuals; joint angles are the model's, as in a
+    campaign, not the controller's. `robot`: as declared. Returns `page`: texts and tables, worded; `data`: JSON-serialisable:
+    positions (m), residuals (µm), what they may be drawn against, corners, joints and axes of the robot (m).
     """
     count = len(table["x"])
     shown = _spread(count, _MOST_SHOWN)
