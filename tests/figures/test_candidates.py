@@ -1,14 +1,11 @@
 """Hypotheses, and candidates one by one: what is drawn is what the tables hold."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from drawn_figures import row_labels, texts
+from drawn_figures import texts
 from made_loop_facts import plainly
 from made_loop_tables import candidate_table
 from made_loop_tables import probabilities as stated
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from elastocal.figures.candidates import probabilities, rank_candidates
 
@@ -49,19 +46,6 @@ def test_each_candidate_stands_once_at_its_best_shape():
     table["candidate"][3] = table["candidate"][1]
     assert 3 not in rank_candidates(table) and 1 in rank_candidates(table)
     assert rank_candidates(table)[0] == 0
-
-
-@pytest.mark.parametrize("which", [0, 1])
-def test_labels_of_two_lines_have_room_of_their_own(which):
-    table = candidate_table(count=6)
-    table["candidate"][1:4] = [f"transmission_harmonic@{k}[non-integer order between {k} and {k + 1}]" for k in range(1, 4)]
-    sets = [({"link_elasticity": [f"links 1 and 2 and {k} one section"], "payload": []}, 0.3) for k in (3, 4, 5)]
-    figure = probabilities(stated(sets), table)
-    renderer = FigureCanvasAgg(figure).get_renderer()
-    figure.draw(renderer)
-    boxes = [label.get_window_extent(renderer) for label in figure.axes[which].get_yticklabels()]
-    assert any("\n" in label for label in row_labels(figure.axes[which]))
-    assert all(above.y0 >= below.y1 - 1 for above, below in pairwise(boxes))
 
 
 def test_where_nothing_can_be_tested_the_figure_says_so():

@@ -47,7 +47,7 @@ def test_what_has_no_name_is_in_the_title_and_in_the_verdict():
 
 def test_a_correction_that_makes_validation_poses_worse_is_advised_against():
     document = made_document()
-    document["held_out"][-1]["rms_m"] = 2e-3
+    document["validation_rms_m"]["corrected"] = 2e-3
     assert certificate_facts(document)["now"].startswith("Do not correct the robot by this campaign")
 
 

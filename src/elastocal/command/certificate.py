@@ -21,13 +21,6 @@ def certificate(
     folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
     tolerance: Annotated[str, Option(help="Largest allowed RMS position error, such as 0.2mm.")],
     risk: Annotated[float, Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
-    use: Annotated[
-        Path | None,
-        Option(
-            help="CSV of the poses and loads that the robot is used at, as for `elastocal correct`: they are judged then, and "
-            "must lie within what was fitted. Without, the poses of the campaign."
-        ),
-    ] = None,
     serial: Annotated[str | None, Option(help="Serial number of the robot. Default: the campaign's.")] = None,
     date: Annotated[str | None, Option(help="Date of the certificate, such as 2026-11-20. Default: today.")] = None,
     output: Annotated[Path | None, Option(help="Folder for both files. Default: the campaign's reports.")] = None,
@@ -46,12 +39,11 @@ def certificate(
 
     from elastocal.campaigns.reading import read_descriptions
     from elastocal.data_checks.protocol import data_at_fault
-    from elastocal.exchange.target_path import read_target_path_of
     from elastocal.figures.certificate import budget_bars
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
-    from elastocal.loop.certificate import Wanted, use_at
+    from elastocal.loop.certificate import Wanted
     from elastocal.loop.certificate import certificate as certified
     from elastocal.report.certificate import certificate_facts, write_certificate
 
@@ -64,12 +56,11 @@ def certificate(
     found = diagnosed_campaign(folder, accept_environment, physics_only)
     place = output or workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=output or workplace() / "reports")
-    used = None if use is None else use_at(found.calibrated, read_target_path_of(use, found.calibrated.robot))
     if data_at_fault(found.verdict):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
     wanted = Wanted(limit, risk, number, day, stated)
     with console.status("working"):
-        document = certified(folder, robots, found, wanted, used)
+        document = certified(folder, robots, found, wanted)
         facts = certificate_facts(document)
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             names = [row[0] for row in facts["budget"]]

@@ -70,14 +70,10 @@ def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[st
 
 def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
     """What diagnosis.json holds."""
+    fits = [(step, step.fitted.model.effects) for step in diagnosis.steps]
     steps = [
-        {
-            "name": step.name,
-            "kind": step.kind,
-            "noise": noise_facts(step.fitted.noise),
-            "effects": [effect.key for effect in step.fitted.model.effects],
-        }
-        for step in diagnosis.steps
+        {"name": s.name, "kind": s.kind, "noise": noise_facts(s.fitted.noise), "effects": [effect.key for effect in effects]}
+        for s, effects in fits
     ]
     return {"document": diagnosis.document, "steps": steps}
 
@@ -135,7 +131,8 @@ def step_model(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.nd
 def candidate_columns(diagnosis: Diagnosis) -> dict[str, list[Any]]:
     """Columns of the candidates table: those tested by falling Bayes factor, then the others with the reason."""
     evidence, candidates = diagnosis.evidence, diagnosis.case.candidates
-    rows, untestable = [], dict.fromkeys(candidates, "the measurements are at fault")
+    rows: list[tuple[Any, ...]] = []
+    untestable = dict.fromkeys(candidates, "the measurements are at fault")
     if evidence:
         problem, untestable = evidence.linearized.problem, evidence.linearized.untestable
         factors = initial_screening(problem)[1]
@@ -147,24 +144,15 @@ def candidate_columns(diagnosis: Diagnosis) -> dict[str, list[Any]]:
         for number in np.argsort(-factors):
             unit = problem.units[number]
             if unit.candidate:
-                figures = {
-                    "shape": unit.shapes[0] if unit.shapes else np.nan,
-                    "log_bayes_factor": factors[number],
-                    "probability": inclusion[number],
-                    "chosen": number in chosen,
-                }
-                rows.append(_candidate(unit.candidate) | figures)
-    tested = {row["candidate"] for row in rows}
-    rows += [_candidate(candidate) | {"note": untestable[key]} for key, candidate in candidates.items() if key not in tested]
-    return {column.name: [row[column.name] for row in rows] for column in CANDIDATES.columns}
-
-
-def _candidate(candidate: Candidate) -> dict[str, Any]:
-    """A row of the candidates table of one that was not tested."""
-    unknown = dict.fromkeys(("shape", "log_bayes_factor", "probability"), np.nan)
-    named = {"candidate": candidate.key, "effect": candidate.effect, "family": candidate.family}
-    joints = {"joints": "+".join(map(str, candidate.joints)), "parameters": len(candidate.parameters)}
-    return named | joints | unknown | {"chosen": False, "note": ""}
+                shape = unit.shapes[0] if unit.shapes else np.nan
+                rows.append((unit.candidate, shape, factors[number], inclusion[number], number in chosen, ""))
+    tested = {row[0].key for row in rows}
+    rows += [(candidates[key], np.nan, np.nan, np.nan, False, untestable[key]) for key in candidates if key not in tested]
+    listed = [
+        (each.key, each.effect, each.family, "+".join(map(str, each.joints)), shape, len(each.parameters), *figures)
+        for each, shape, *figures in rows
+    ]
+    return {column.name: [row[place] for row in listed] for place, column in enumerate(CANDIDATES.columns)}
 
 
 def _with_priors(effect: Candidate, columns: Mapping[str, np.ndarray]) -> Candidate:

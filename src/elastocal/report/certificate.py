@@ -28,7 +28,7 @@ _SHARES = {
 }
 # Below the digits of any tracker.
 _NOTHING_M = 1e-7
-_LISTS = ("misplaced", "identity", "steps", "data")
+_LISTS = ("misplaced", "identity", "data")
 
 
 def write_certificate(path: str | Path, facts: Mapping[str, Any], figures: Iterable[str]) -> None:
