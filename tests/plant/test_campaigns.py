@@ -46,15 +46,6 @@ def test_a_repeat_comes_from_the_same_side_and_a_ladder_without_moves_from_one(f
         assert (schedule.previous < 0).all() == each
 
 
-def test_loads_without_a_move_share_their_approach(fanuc_arm, small):
-    schedule = schedule_of(fanuc_arm, replace(small, approach_each_load=False), 2)
-    for state in np.flatnonzero(schedule.previous >= 0):
-        assert schedule.previous[state] == state - 1
-        assert schedule.approach[state] == schedule.approach[state - 1]
-        assert (schedule.pose[state], schedule.repeat[state]) == (schedule.pose[state - 1], schedule.repeat[state - 1])
-    assert len(np.unique(schedule.approach)) == (schedule.load == 0).sum()
-
-
 def test_in_the_trackers_frame_all_measurements_are_moved_as_one_body(fanuc_specimen, small):
     tracker = Tracker(sigma_m=0.0, sigma_rad=0.0, frame_turn=(0.2, 0.1, -0.7))
     robot, schedule = replace(fanuc_specimen, tracker=tracker), schedule_of(fanuc_specimen.arm, small, 2)

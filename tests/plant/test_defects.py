@@ -13,10 +13,9 @@ from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.sites import sites_of
 from elastocal_proof.plant.arm import rotation_vector
-from elastocal_proof.plant.campaigns import schedule_of
 from elastocal_proof.plant.defects import Defect, drawn_defect, truth_of, with_defects
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE
-from elastocal_proof.plant.physical_robot import seen_poses, specimen
+from elastocal_proof.plant.physical_robot import seen_poses
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
 FOREIGN = sorted(set(KINDS) - set(NAMED))
@@ -71,15 +70,6 @@ def test_a_defect_of_no_size_leaves_the_robot_as_it_was_and_a_plausible_one_does
     assert 0 <= signal.retained <= signal.raw * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
-def test_a_defects_measurements_depend_on_its_seed_and_on_nothing_else(fanuc_specimen, schedule, kind):
-    defect = drawn_defect(kind, fanuc_specimen.arm, 8)
-    first, second = (seen_poses(with_defects(fanuc_specimen, [defect]), schedule) for _ in range(2))
-    np.testing.assert_array_equal(first[0], second[0])
-    np.testing.assert_array_equal(first[1], second[1])
-    assert truth_of(fanuc_specimen, defect) == truth_of(fanuc_specimen, drawn_defect(kind, fanuc_specimen.arm, 8))
-
-
 @pytest.mark.parametrize("kind", NAMED)
 def test_what_acts_without_a_load_is_what_the_catalogue_counts_as_such(weightless, schedule, kind):
     """Class A of the catalogue at load zero; the elastic, the gearbox but for hysteresis, and the load not."""
@@ -130,26 +120,3 @@ def test_a_defect_is_refused_where_it_cannot_be_or_is_too_large(fanuc_specimen):
     for wrong in (Defect("joint_offset", (7,), 1e-3), Defect("nonsense", (), 1.0), Defect("stiffening", (1,), 1.5)):
         with pytest.raises(InputError):
             with_defects(fanuc_specimen, [wrong])
-
-
-def test_an_eccentric_nest_is_the_catalogues_law_on_every_arm(name, arm, small):
-    """Across the axis of the last joint, whichever that is of the target's frame, and of the flange's target alone."""
-    robot = specimen(arm, 4, weighs=False)
-    schedule = schedule_of(arm, small, 2)
-    bad = with_defects(robot, [Defect("nest_eccentricity", (), 1e-4, 1)])
-    change = seen_poses(bad, schedule)[0] - seen_poses(robot, schedule)[0]
-    assert not change[:, :-1].any()
-    np.testing.assert_allclose(np.linalg.norm(change[:, -1], axis=1), 1e-4, rtol=1e-6)
-    sites = sites_of(analysed(name).chain)
-    states = states_of(schedule)
-    # Where the loaded arm has yielded to the target's frame is turned a little.
-    bare = schedule.load == 0
-    (candidate,) = effects()["nest_eccentricity"].candidates(sites)
-    given = conditions_of(sites, robot.compliance, states)
-    coordinates = np.zeros((len(schedule.pose), sites.chain.coordinates))
-    coordinates[:, : sites.joints] = schedule.angle
-    jacobian = poses_and_jacobians(sites.chain, coordinates, sites.chain.end_effector)[2][:, :3]
-    columns = [sum(jacobian[..., at] * law[at][:, None] for at in law)[bare].ravel() for law in candidate.displacement(given)]
-    found = np.linalg.lstsq(np.column_stack(columns), change[bare, -1].ravel())[0]
-    left = change[bare, -1].ravel() - np.column_stack(columns) @ found
-    assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(change[bare, -1])

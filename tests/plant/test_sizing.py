@@ -79,13 +79,6 @@ def shifted(robot, *shift, turn=(0.0, 0.0, 0.0)):
     return replace(robot, tracker=replace(robot.tracker, move=Move(-1.0, shift, turn)))
 
 
-def test_a_shift_of_all_measurements_has_its_length_and_the_non_centrality_of_its_count(weightless, schedule):
-    signal = Yardstick(weightless, schedule).signal(shifted(weightless, 3e-5, 0.0, -4e-5))
-    assert (signal.rms_m, signal.rms_rad) == (pytest.approx(5e-5), pytest.approx(0.0, abs=1e-12))
-    # Four targets in each state that is not held out; sigma is 60 um.
-    assert signal.raw == pytest.approx(4 * schedule.training.sum() * (5 / 6) ** 2)
-
-
 def test_a_tracker_farther_away_makes_the_same_shift_weigh_less(weightless, schedule):
     tracker = replace(weightless.tracker, sigma_m=0.0, sigma_m_per_m=1e-5)
     robot = replace(weightless, tracker=tracker)
