@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from analysed_robots import ROBOTS, analysed
+from analysed_robots import ROBOTS
 from made_proofs import made_moves
 
 from elastocal_proof.blind import closed_loop as module
@@ -24,7 +24,6 @@ from elastocal_proof.blind.closed_loop import (
     summary,
 )
 from elastocal_proof.blind.folders import write_blind_campaign
-from elastocal_proof.blind.rehearsal import hidden_robot
 
 
 @pytest.fixture(scope="module")
@@ -52,33 +51,6 @@ def test_the_model_found_is_nearer_than_the_declared_one_and_that_nearer_than_a_
     assert rms(table, TRUE) < rms(table, FOUND) < rms(table, DECLARED)
     assert rms(table, DECLARED) < min(rms(table, GEOMETRY), rms(table, UNCORRECTED))
     assert table["named"].all()
-
-
-@pytest.mark.slow
-def test_the_plants_own_inverse_leaves_its_repeatability(table):
-    """Six joints of 5 µrad at levers of up to 3 m."""
-    assert 1e-6 < rms(table, TRUE) < 4e-5
-
-
-@pytest.mark.slow
-def test_the_tracker_adds_its_noise(table):
-    mine = table[table["model"] == TRUE]
-    assert 4e-5 < np.sqrt((mine["measured_error_m"] ** 2).mean()) < 2e-4
-
-
-@pytest.mark.slow
-def test_the_milling_path_is_smooth_at_one_orientation_and_pushes_against_the_feed():
-    robot, plant = analysed("gp180"), hidden_robot(ROBOTS / "gp180.yaml", 3, ["payload"])[0]
-    wanted = module.wanted_poses(robot, plant, 3)
-    path = wanted.part == "milling"
-    at = wanted.position[path]
-    assert np.ptp(at[:, 2]) < 1e-12
-    assert np.abs(np.diff(wanted.start[path], axis=0)).max() < 0.1
-    np.testing.assert_array_equal(wanted.rotation[path], np.broadcast_to(wanted.rotation[path][0], (path.sum(), 3, 3)))
-    force = wanted.wrench[path, :3]
-    np.testing.assert_allclose(np.linalg.norm(force, axis=1), 500.0, rtol=1e-9)
-    assert ((np.gradient(at, axis=0) * force).sum(axis=1) < 0).all()
-    assert not wanted.wrench[wanted.part == "unloaded"].any()
 
 
 @pytest.mark.slow
