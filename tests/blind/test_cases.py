@@ -118,13 +118,6 @@ def test_each_setting_makes_a_campaign_that_can_be_read(tmp_path, setting):
     assert bool(campaign.robot.masses) == (setting != "weight_compensated")
 
 
-def test_weight_is_hidden_where_it_is_the_effect_and_declared_elsewhere(tmp_path):
-    hidden, truth = made(a_case(("link_weight",), (50.0,)), tmp_path)
-    assert not hidden.robot.masses and len(truth["masses"]) in (1, 5)
-    told, truth = made(a_case(("payload",), (50.0,)), tmp_path)
-    assert len(told.robot.masses) == len(truth["masses"]) == 7
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_groups_put_their_defects_where_they_belong(seed):
     _, ((defect, _),) = sized(a_case(("stiffening",), (200.0,), seed=seed, group="gear_gravity"))

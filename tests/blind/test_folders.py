@@ -20,7 +20,7 @@ from elastocal_proof.blind.folders import (
 )
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.defects import Defect, truth_of
+from elastocal_proof.plant.kinds import Defect, truth_of
 from elastocal_proof.plant.physical_robot import specimen
 from elastocal_proof.plant.weights import declared_masses
 

@@ -85,15 +85,6 @@ def test_p_values_of_effects_that_are_not_there_are_uniform(tmp_path):
     assert low < -2 * np.log(p_values).sum() < high
 
 
-@pytest.mark.slow
-def test_without_its_covariate_not_even_the_oracle_sees_it(offset, tmp_path):
-    truth, folder = made(tmp_path, "hysteresis", setting="without_approach")
-    verdict = diagnosed(folder, ROBOTS.as_posix(), 1)
-    found = oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
-    assert (found["candidates"], found["p_value"]) == ([], 1.0)
-    assert found["heldout"]["rms_m"] == pytest.approx(verdict["heldout"]["before"]["rms_m"], rel=1e-6)
-
-
 SOME = ("force_bias", "joint_tilt", "setup_step", "tracker_scale")
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from elastocal_proof.plant.campaigns import Design, dynamic_table, measured_table, schedule_of
-from elastocal_proof.plant.defects import Defect, with_defects
 from elastocal_proof.plant.instruments import Tracker
+from elastocal_proof.plant.kinds import Defect, with_defects
 from elastocal_proof.plant.physical_robot import Schedule, seen_poses
 
 

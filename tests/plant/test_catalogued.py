@@ -14,8 +14,7 @@ from analysed_robots import ROBOTS
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
 from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.catalogued import wound
-from elastocal_proof.plant.defects import drawn_defect, truth_of, with_defects
-from elastocal_proof.plant.kinds import KINDS
+from elastocal_proof.plant.kinds import KINDS, drawn_defect, truth_of, with_defects
 from elastocal_proof.plant.physical_robot import seen_poses, specimen
 
 GOLDEN = ROBOTS.parents[1] / "tests/golden/plant_defects.csv"

@@ -23,7 +23,6 @@ from elastocal.mechanics.robot import Link, Tube
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.machine import (
     Compensator,
-    Loading,
     Mass,
     Structure,
     TaperedTube,
@@ -34,7 +33,6 @@ from elastocal_proof.plant.machine import (
 # One joint about y, its link forwards along x, and a measuring point at its end.
 LEVER = arm_of("Ry(q1) Tx(1.0) [A]", compliance_urad_per_Nm=[50.0])
 TWO = arm_of("Tz(0.4) Rz(q1) Tx(1) [A] Ry(q2) Tx(0.5) [B]")
-DOWN = np.array([0.0, 0.0, -9.80665])
 
 
 def everything(arm):
@@ -173,20 +171,20 @@ def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
 def test_a_structural_spring_yields_by_its_compliance_its_law_and_its_offset():
     machine = machine_of(LEVER, Structure(base=(0.0, 0.0, 2e-8, 0.0, 0.0, 0.0)))
     index, wrench = machine.springs["base_z"], np.array([[0.0, 0.0, 1000.0, 0.0, 0.0, 0.0], [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]])
-    loading = Loading(np.full((2, 1), np.pi / 2), wrench, np.zeros((2, 2)), {index: np.array([1e-5, 3e-5])})
+    loading, offsets = (np.full((2, 1), np.pi / 2), wrench, np.zeros((2, 2))), {index: np.array([1e-5, 3e-5])}
     laws = [("base_z", lambda force: 1e-11 * force**2), ("nothing", lambda force: force)]
-    found = equilibrium(machine, loading, lambda torque, unloaded: 0.0 * torque, laws)
+    found = equilibrium(machine, *loading, lambda torque, unloaded: 0.0 * torque, laws, offsets)
     np.testing.assert_allclose(found.coordinates[:, index], [2e-5 + 1e-5 + 1e-5, -1e-5 + 0.25e-5 + 3e-5], rtol=1e-9)
 
 
 def test_an_arm_that_finds_no_rest_is_an_error_and_a_start_near_it_saves_sweeps():
-    signs, loading = cycle([0.01, -0.01]), Loading(np.zeros((1, 1)), np.zeros((1, 6)), np.zeros((1, 2)))
+    signs, loading = cycle([0.01, -0.01]), (np.zeros((1, 1)), np.zeros((1, 6)), np.zeros((1, 2)))
     with pytest.raises(RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"):
-        equilibrium(machine_of(LEVER, Structure()), loading, lambda torque, _: 0 * torque + next(signs))
+        equilibrium(machine_of(LEVER, Structure()), *loading, lambda torque, _: 0 * torque + next(signs))
     wrench = np.tile([0.0, 0.0, -900.0, 0.0, 0.0, 0.0], (1, 1))
     machine, first = at_rest(LEVER, np.array([[0.9]]), wrench)
-    loading, start = Loading(np.array([[0.9]]), wrench, np.zeros((1, 2))), first.coordinates[:, machine.gear]
-    again = equilibrium(machine, loading, lambda torque, _: LEVER.compliance * torque, start=start)
+    loading, start = (np.array([[0.9]]), wrench, np.zeros((1, 2))), first.coordinates[:, machine.gear]
+    again = equilibrium(machine, *loading, lambda torque, _: LEVER.compliance * torque, start=start)
     np.testing.assert_allclose(again.coordinates, first.coordinates, atol=1e-12)
     assert again.sweeps == 1 < first.sweeps
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.defects import Defect, with_defects
-from elastocal_proof.plant.kinds import OUTSIDE
+from elastocal_proof.plant.kinds import OUTSIDE, Defect, with_defects
 
 
 @pytest.fixture(scope="module")

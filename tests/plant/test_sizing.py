@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.defects import Defect, drawn_defect, with_defects
 from elastocal_proof.plant.instruments import Move
-from elastocal_proof.plant.kinds import KINDS
+from elastocal_proof.plant.kinds import KINDS, Defect, drawn_defect, with_defects
 from elastocal_proof.plant.sizing import Yardstick, size_for
 from elastocal_proof.plant.weights import declared_masses, on_stretches
 

@@ -40,8 +40,7 @@ from elastocal.validation.fitted_range import outside_poses
 from elastocal_proof.blind.cases import NAMED, absent_on, defects_of, yardstick_of
 from elastocal_proof.blind.cases import Case as BlindCase
 from elastocal_proof.blind.folders import load_ground_truth
-from elastocal_proof.plant.defects import Defect, with_defects
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, with_defects
 from elastocal_proof.plant.random_numbers import stream
 
 if TYPE_CHECKING:
