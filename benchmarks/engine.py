@@ -28,7 +28,7 @@ from elastocal.loop.whole import cases_in
 from elastocal_proof.blind.cases import cases_of, make_case
 from elastocal_proof.blind.folders import write_dynamic_campaign
 from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.defects import Defect, with_defects
+from elastocal_proof.plant.kinds import Defect, with_defects
 from elastocal_proof.plant.physical_robot import specimen
 from elastocal_proof.plant.weights import declared_masses
 

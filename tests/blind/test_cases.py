@@ -21,10 +21,7 @@ from elastocal_proof.blind.cases import (
     make_case,
     yardstick_of,
 )
-from elastocal_proof.plant.campaigns import schedule_of
-from elastocal_proof.plant.defects import with_defects
 from elastocal_proof.plant.kinds import KINDS
-from elastocal_proof.plant.physical_robot import seen_poses
 
 SETTINGS = PLAN["settings"]
 # Of names and seeds of the quick cases of seed 1, before the plan stood in a file of its own.
@@ -121,13 +118,6 @@ def test_each_setting_makes_a_campaign_that_can_be_read(tmp_path, setting):
     assert bool(campaign.robot.masses) == (setting != "weight_compensated")
 
 
-def test_weight_is_hidden_where_it_is_the_effect_and_declared_elsewhere(tmp_path):
-    hidden, truth = made(a_case(("link_weight",), (50.0,)), tmp_path)
-    assert not hidden.robot.masses and len(truth["masses"]) in (1, 5)
-    told, truth = made(a_case(("payload",), (50.0,)), tmp_path)
-    assert len(told.robot.masses) == len(truth["masses"]) == 7
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_groups_put_their_defects_where_they_belong(seed):
     _, ((defect, _),) = sized(a_case(("stiffening",), (200.0,), seed=seed, group="gear_gravity"))
@@ -136,26 +126,6 @@ def test_groups_put_their_defects_where_they_belong(seed):
     assert 3 <= len({defect.joints for defect, _ in several}) == len(several) <= 6
     _, ((everything, _),) = sized(a_case(("link_weight",), (1e6,), seed=seed, group="undeclared"))
     assert everything.joints == (2, 3, 4, 5)
-
-
-@pytest.mark.parametrize("setting", ["usual", "without_time_and_temperature"])
-def test_a_stand_that_is_knocked_moves_all_measurements_after_one_row_among_the_training_poses(setting):
-    case = a_case(("setup_step",), (200.0,), setting=setting, group="moved")
-    robot, defects = sized(case)
-    schedule = schedule_of(robot.arm, case.design, case.seed)
-    bad = with_defects(robot, [defect for defect, _ in defects])
-    change = np.abs(seen_poses(bad, schedule)[0] - seen_poses(robot, schedule)[0]).max(axis=(1, 2))
-    first = int(np.argmax(change > 1e-9))
-    assert (change[:first] < 1e-12).all() and (change[first:] > 1e-6).all()
-    poses = np.unique(schedule.pose[schedule.training & (np.arange(len(change)) < first)]).size
-    assert 2 <= poses <= 12
-
-
-def test_chance_of_the_drives_is_the_settings():
-    by_approach = a_case(setting="repeatability").specimen(ROBOTS).repeatability_rad
-    assert 1e-5 <= min(by_approach) <= max(by_approach) <= 3e-5
-    assert a_case(setting="pose_common_15urad").specimen(ROBOTS).pose_rad == (1.5e-5,) * 6
-    assert not any((*a_case().specimen(ROBOTS).repeatability_rad, *a_case().specimen(ROBOTS).pose_rad))
 
 
 def test_a_case_is_made_the_same_again_and_nothing_of_its_truth_lies_in_the_blind_folder(tmp_path):

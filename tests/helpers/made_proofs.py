@@ -15,8 +15,7 @@ from elastocal.io.data_frames import write_csv
 from elastocal.io.storage import write_table
 from elastocal.random_streams import stream
 from elastocal_proof.blind import schemas as of_blind
-from elastocal_proof.blind.closed_loop import MODELS, PARTS
-from elastocal_proof.blind.closed_loop_summary import case_errors, goals, summary
+from elastocal_proof.blind.closed_loop import MODELS, PARTS, case_errors, goals, summary
 from elastocal_proof.blind.scores import intervals_of
 from elastocal_proof.blind.summary import rates, reliability
 from elastocal_proof.blind.summary import summarize as summarize_cases

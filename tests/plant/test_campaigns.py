@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from elastocal_proof.plant.campaigns import Design, dynamic_table, measured_table, schedule_of
-from elastocal_proof.plant.defects import Defect, with_defects
 from elastocal_proof.plant.instruments import Tracker
+from elastocal_proof.plant.kinds import Defect, with_defects
 from elastocal_proof.plant.physical_robot import Schedule, seen_poses
 
 
@@ -44,15 +44,6 @@ def test_a_repeat_comes_from_the_same_side_and_a_ladder_without_moves_from_one(f
         first = schedule.sense[(schedule.pose == 0)]
         assert (first == first[0]).all() != each
         assert (schedule.previous < 0).all() == each
-
-
-def test_loads_without_a_move_share_their_approach(fanuc_arm, small):
-    schedule = schedule_of(fanuc_arm, replace(small, approach_each_load=False), 2)
-    for state in np.flatnonzero(schedule.previous >= 0):
-        assert schedule.previous[state] == state - 1
-        assert schedule.approach[state] == schedule.approach[state - 1]
-        assert (schedule.pose[state], schedule.repeat[state]) == (schedule.pose[state - 1], schedule.repeat[state - 1])
-    assert len(np.unique(schedule.approach)) == (schedule.load == 0).sum()
 
 
 def test_in_the_trackers_frame_all_measurements_are_moved_as_one_body(fanuc_specimen, small):

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.defects import Defect, drawn_defect, with_defects
 from elastocal_proof.plant.instruments import Move
-from elastocal_proof.plant.kinds import KINDS
+from elastocal_proof.plant.kinds import KINDS, Defect, drawn_defect, with_defects
 from elastocal_proof.plant.sizing import Yardstick, size_for
 from elastocal_proof.plant.weights import declared_masses, on_stretches
 
@@ -77,13 +76,6 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_speci
 def shifted(robot, *shift, turn=(0.0, 0.0, 0.0)):
     """All that the tracker reads is moved as one body."""
     return replace(robot, tracker=replace(robot.tracker, move=Move(-1.0, shift, turn)))
-
-
-def test_a_shift_of_all_measurements_has_its_length_and_the_non_centrality_of_its_count(weightless, schedule):
-    signal = Yardstick(weightless, schedule).signal(shifted(weightless, 3e-5, 0.0, -4e-5))
-    assert (signal.rms_m, signal.rms_rad) == (pytest.approx(5e-5), pytest.approx(0.0, abs=1e-12))
-    # Four targets in each state that is not held out; sigma is 60 um.
-    assert signal.raw == pytest.approx(4 * schedule.training.sum() * (5 / 6) ** 2)
 
 
 def test_a_tracker_farther_away_makes_the_same_shift_weigh_less(weightless, schedule):

@@ -19,9 +19,8 @@ from elastocal_proof.blind.folders import write_blind_campaign, write_truth
 from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
 from elastocal_proof.plant.bad_rows import possible_kinds, with_bad_rows
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.defects import Defect, drawn_defect, truth_of, with_defects
 from elastocal_proof.plant.instruments import Tracker, misplaced_base
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
 from elastocal_proof.plant.physical_robot import PhysicalRobot, specimen
 from elastocal_proof.plant.random_numbers import stream
 from elastocal_proof.plant.sizing import Yardstick, size_for
@@ -208,10 +207,10 @@ def defects_of(case: Case, robot: PhysicalRobot, yardstick: Yardstick) -> list[S
     `robot`: faultless; `yardstick`: of it. Returns (Defect, dict): each with its size as in the ground truth: target, quantity,
     signal, which draw. Of one mechanism at several joints each has its own signal; the target is that of all together.
 
-    Where a location has no size of the wanted non-centrality, or one beyond three times the plausible, the next one is
-    drawn; of eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the
-    raw non-centrality is taken instead, and the ground truth states so: nothing can find that. Where even that is less at the
-    largest size that means anything, it is that size.
+    Where a location has no size of the wanted non-centrality at which the arm finds rest, or one beyond three times the
+    plausible, the next one is drawn; of eight that are all implausible the least is taken. Where none has a size at all, as
+    with a wrong force scale, the raw non-centrality is taken instead, and the ground truth states so: nothing can find that.
+    Where even that is less at the largest size that means anything, it is that size.
     """
     found: list[Sized] = []
     for order, (effect, level) in enumerate(zip(case.effects, case.levels, strict=True)):
@@ -269,7 +268,8 @@ def _first_plausible(
         largest = min(KINDS[defect.effect].largest / defect.size for defect in defects)
         try:
             factor = size_for(yardstick, robot_of, 1.0, level, quantity, largest)
-        except ValueError:
+        except (ValueError, RuntimeError):
+            # No size has it, or on the way to it the arm finds no rest.
             continue
         share = max(_share_of_plausible(robot, defect) for defect in times(factor))
         if least is None or share < least[0]:
