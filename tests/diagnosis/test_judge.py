@@ -18,24 +18,6 @@ from elastocal.validation.held_out import METRICS
 NOISE = Noise("declared", 6e-5, 6e-5, np.zeros(6))
 
 
-def with_effects(case, declared, *keys):
-    members = [case.candidates[key] for key in keys]
-    return fit(case.model.with_effects(members), case.observations, NOISE, declared.estimate.with_effects(members))
-
-
-def steps_of(case, *keys):
-    """From frames to an effect of some candidates, which is found or not."""
-    bare = fit(replace(case.model, effects=()), case.observations, NOISE)
-    declared = fit(case.model, case.observations, NOISE)
-    final = with_effects(case, declared, *keys)
-    name = case.candidates[keys[0]].effect
-    return (
-        Step("frames and targets", "frames", bare),
-        Step("declared model", "declared", declared),
-        Step(f"with {name}", "effect", final),
-    )
-
-
 def diagnosis_of(case, steps):
     """A diagnosis whose document has what `judge` adds to and one thing that it must leave alone."""
     names = [step.name.removeprefix("with ") for step in steps if step.kind == "effect"]
@@ -47,8 +29,12 @@ def diagnosis_of(case, steps):
 
 @pytest.fixture(scope="module")
 def made(cases):
-    """Those cases, and the steps of the first."""
-    return *cases, steps_of(cases[0], "joint_offset@3")
+    """Those cases, and the steps of the first, from frames to an offset."""
+    case, members = cases[0], [cases[0].candidates["joint_offset@3"]]
+    bare, declared = (fit(model, case.observations, NOISE) for model in (replace(case.model, effects=()), case.model))
+    final = fit(case.model.with_effects(members), case.observations, NOISE, declared.estimate.with_effects(members))
+    steps = ("frames and targets", "frames", bare), ("declared model", "declared", declared)
+    return *cases, tuple(Step(*each) for each in (*steps, ("with joint_offset", "effect", final)))
 
 
 def judged(steps, case, held_out):

@@ -165,36 +165,20 @@ def test_a_step_that_was_fitted_is_tried_close_to_where_it_was_within_its_range(
     assert (shape.shares(tried) > 0).all()
 
 
-def looked_at(problem, alone):
-    return {key: [value for (value,) in values] for key, values in shapes_looked_at_closely(problem, np.array(alone)).items()}
-
-
-@pytest.fixture(scope="module")
-def bent(campaign):
-    """The problem of two laws with a shape that is tried at several values, one with a single one, and one without."""
-    keys = ("setup_step", "thermal_growth[time]", "link_elasticity@3", "joint_offset@3")
-    return problem_of(campaign, keys=keys).problem
-
-
-def factors(problem, sizes):
-    """Log Bayes factors of units alone: those given for a candidate at one of its shapes, nothing for all others."""
-    found = np.zeros(len(problem.units))
+def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(campaign):
+    """Of laws with a shape that is tried at several values, at a single one, and without one."""
+    problem = problem_of(campaign, keys=("setup_step", "thermal_growth[time]", "link_elasticity@3", "joint_offset@3")).problem
+    sizes = {("setup_step", 5): 30.0, ("setup_step", 6): 25.0, ("thermal_growth[time]", 1): 28.0, ("joint_offset@3", 0): 29.0}
+    alone = np.zeros(len(problem.units))
     for (key, place), size in sizes.items():
         numbers = [n for n, unit in enumerate(problem.units) if unit.candidate and unit.candidate.key == key]
-        found[numbers[place]] = size
-    return found
-
-
-def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(bent):
-    sizes = {("setup_step", 5): 30.0, ("setup_step", 6): 25.0, ("thermal_growth[time]", 1): 28.0, ("joint_offset@3", 0): 29.0}
-    found = looked_at(bent, factors(bent, sizes))
+        alone[numbers[place]] = size
+    found = {key: [value for (value,) in values] for key, values in shapes_looked_at_closely(problem, alone).items()}
     assert set(found) == {"setup_step", "thermal_growth[time]"}
-    twelfths = np.arange(1, 12) / 12
     closer = np.linspace(5 / 12, 7 / 12, 9)[1:-1]
-    np.testing.assert_allclose(found["setup_step"], np.unique(np.round([*twelfths, *closer], 12)))
+    np.testing.assert_allclose(found["setup_step"], np.unique(np.round([*np.arange(1, 12) / 12, *closer], 12)))
     lags = np.geomspace(900.0, 36000.0, 5)
-    closer = np.geomspace(lags[1], lags[3], 9)
-    np.testing.assert_allclose(found["thermal_growth[time]"], closer)
+    np.testing.assert_allclose(found["thermal_growth[time]"], np.geomspace(lags[1], lags[3], 9))
 
 
 def test_the_prior_of_a_declared_parameter_is_kept(kuka):

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from synthetic import measurements_of
 
-from elastocal.campaigns.campaign import Measurements
 from elastocal.fitting.observations import (
     averaged,
     each_approach,
@@ -21,19 +21,11 @@ from elastocal.fitting.observations import (
 
 def measurements(keys, position=None, **others):
     """Measurements from rows of (session, pose, load, repeat, target)."""
-    session, pose, load, repeat, target = np.array(keys).T
-    count = len(pose)
-    rng = np.random.default_rng(0)
-    given_values = {
-        "joint_angles": rng.standard_normal((count, 2)),
-        "wrench": rng.standard_normal((count, 6)),
-        "position": rng.standard_normal((count, 3)) if position is None else np.array(position, float),
-        "rotation_vector": None,
-        "approach": None,
-        "time_s": None,
-        "temperature_c": None,
-    }
-    return Measurements(session, pose, load, repeat, target, **{**given_values, **others}, row=np.arange(1, count + 1))
+    names, rng = ("session", "pose", "load", "repeat", "target"), np.random.default_rng(0)
+    angles, wrench, place = (rng.standard_normal((len(keys), size)) for size in (2, 6, 3))
+    places = dict(zip(names, np.array(keys).T, strict=True))
+    position = place if position is None else np.array(position, float)
+    return measurements_of(joint_angles=angles, wrench=wrench, position=position, **places, **others)
 
 
 def test_each_approach_is_a_state_and_knows_the_averaged_one():

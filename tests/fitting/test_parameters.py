@@ -6,7 +6,7 @@ from fitted_models import model_of
 from synthetic import made_estimate, made_model
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.parameters import limits, nonlinear_parameters, parameters, stepped
+from elastocal.fitting.parameters import limits, nonlinear_parameters, parameter_values, parameters, stepped
 
 
 def test_parameters_are_named_in_the_order_of_the_sensitivities(full_case):
@@ -88,3 +88,16 @@ def test_a_step_of_a_shape_ends_at_the_end_of_its_own_range(two_laws, place, ste
     assert there.shapes[place].tolist() == [getattr(model.effects[place].shapes[0], end)]
     for number in {0, 1, 2} - {place}:
         np.testing.assert_array_equal(there.shapes[number], estimate.shapes[number])
+
+
+def test_values_are_zero_for_frames_and_targets_and_those_of_coefficients_before_shapes(two_laws):
+    model, estimate = two_laws
+    whole = 1e-6 * np.arange(1.0, len(parameters(model, estimate)) + 1)
+    there = stepped(model, estimate, whole)
+    found = parameter_values(model, there)
+    np.testing.assert_array_equal(found[:9], np.zeros(9))
+    (play, taken_up), geometry, (beyond, meeting) = (
+        np.concatenate([a, b]) for a, b in zip(estimate.coefficients, estimate.shapes, strict=True)
+    )
+    before = np.array([play, taken_up, *geometry, beyond, meeting])
+    np.testing.assert_allclose(found[9:], before + whole[9:], rtol=1e-12, atol=0)

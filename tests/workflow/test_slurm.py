@@ -1,4 +1,4 @@
-"""The profile for Slurm, on two nodes on this machine: the same bytes as without it, in few jobs.
+"""The profile for Slurm, on two nodes on this machine: the same bytes as without it, in few jobs, and more memory after a kill.
 
 Daemons are started only where somebody asks for it by ELASTOCAL_SLURM=1, as CI does: a developer's machine is no cluster.
 """
@@ -139,6 +139,15 @@ TINY = {"robots": ["kuka"], "strategies": ["6DoF"], "noise_um": [0, 200]}
 # beside one another, on both nodes, from data that one of these wrote.
 TARGETS = ("results/identified/kuka/0um/6DoF.parquet", "results/identified/kuka/200um/6DoF.parquet")
 ONE_EACH = ("--group-components", "robot=10", "cell=1")
+# The first attempt holds its memory until Slurm, which looks each second, has killed it; before its time is over, 2 minutes.
+NEEDS_MORE = """
+rule needs_more:
+    output: "made.txt"
+    resources: mem_mb=lambda wildcards, attempt: attempt * 500
+    params: seconds=lambda wildcards, resources: 60 if resources.mem_mb == 500 else 0
+    shell: "{python} -c 'import time; held = bytearray(450_000_000); time.sleep({{params.seconds}})'"
+        " && echo {{resources.mem_mb}} > {{output}}"
+"""
 # A rule of the profile's array jobs, whose file says which part of an array made it, and one of its groups. The first part
 # waits for another, so that they run beside one another, and therefore on both nodes, whatever Slurm takes to start them.
 LONG_AND_SHORT = """
@@ -199,3 +208,10 @@ def test_long_jobs_are_parts_of_an_array_on_both_nodes_and_short_ones_share_a_jo
     ended = ended_jobs(cluster, tmp_path)
     # The plugin runs the jobs of a group one after another: more than one core would stand idle.
     assert len(ended) == 5 and set(ended) == {(node, "1") for node in NODES}
+
+
+def test_a_job_that_slurm_killed_for_its_memory_runs_again_with_more(cluster, tmp_path):
+    (tmp_path / "Snakefile").write_text(NEEDS_MORE.format(python=sys.executable), encoding="utf-8")
+    done = on_slurm(tmp_path, cluster, "made.txt")
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert (tmp_path / "made.txt").read_text(encoding="utf-8") == "1000\n"
