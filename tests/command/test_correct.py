@@ -112,7 +112,7 @@ def test_a_pose_out_of_reach_is_named_and_nothing_is_written(elastocal, refusal,
     assert "7 of 8 targets corrected" in result.stderr
 
 
-def test_a_program_for_the_controller_stands_beside_the_table(elastocal, words, output, tmp_path):
+def test_a_program_for_the_controller_stands_beside_the_table(elastocal, words, output):
     result = elastocal(*words, "--format", "krl")
     assert result.exit_code == 0, result.stderr
     assert "targets.src goes to 8 of 8 targets: KUKA KRL, q1 as A1" in " ".join(result.stderr.split())
@@ -121,9 +121,6 @@ def test_a_program_for_the_controller_stands_beside_the_table(elastocal, words, 
     np.testing.assert_allclose(
         np.radians([[float(word.split()[1]) for word in move[15:-1].split(", ")] for move in moves]), targets, atol=1e-8
     )
-    result = elastocal(*words, "--output", tmp_path / "go.MOD")
-    assert result.exit_code == 0, result.stderr
-    assert (tmp_path / "go.mod").read_text().startswith("MODULE go") and len(pd.read_csv(tmp_path / "go.csv")) == 8
 
 
 def test_targets_that_are_not_reached_are_in_no_program(elastocal, refusal, words, path, output):
@@ -142,7 +139,7 @@ def test_targets_that_are_not_reached_are_in_no_program(elastocal, refusal, word
         (("--format", "karel"), "krl | rapid | tp | urscript"),
         (("--axes", "A1,A2"), "with --format"),
         (("--format", "krl", "--axes", "A1,A2"), "6 different names"),
-        (("--format", "krl", "--output", "x.mod"), "another language"),
+        (("--output", "x.mod"), "ends in .csv"),
         (("--format", "krl", "--output", "my targets.csv"), "as the name of a program"),
     ],
 )

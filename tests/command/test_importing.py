@@ -34,11 +34,11 @@ def test_a_table_becomes_a_robot_file_in_the_units_and_the_notation_asked_for(el
 
 
 def test_a_urdf_becomes_a_robot_file_and_is_told(elastocal, output):
-    result = elastocal(*of_urdf(output, "--point", "arm", "--mass-std", "0.4"))
+    result = elastocal(*of_urdf(output, "--point", "arm"))
     assert result.exit_code == 0
     assert "2 joints" in result.output and "no compliances" in result.output and f"written: {output}" in result.output
     robot = read_robot(output)
-    assert [point.name for point in robot.chain.points] == ["arm", "hand"] and robot.masses[0].relative_std == 0.4
+    assert [point.name for point in robot.chain.points] == ["arm", "hand"] and robot.masses[0].relative_std == 0.2
     assert yaml.safe_load(output.read_text())["joint_names"] == ["j1", "j2"]
 
 

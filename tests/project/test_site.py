@@ -11,7 +11,7 @@ import pytest
 import yaml
 from durations import HUNG_S
 
-from elastocal.command.diagnose import diagnose
+from elastocal.command.campaign import diagnose
 from elastocal.effects.catalogue import effects
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -51,7 +51,7 @@ def test_options_of_the_readme_are_those_of_the_script():
 
 
 WAYS = {
-    "demo": ("elastocal", "demo", "campaigns/demo", "--no-open"),
+    "demo": ("elastocal", "demo", "campaigns/demo"),
     "kr16": ("workflow/examples/afternoon.sh", "campaigns/kr16"),
 }
 

@@ -42,8 +42,8 @@ _LEAST_SEEN = 1e-6
 _DRAWS = 4
 _FORBIDDEN = {
     "boxes": "the boxes leave the arm no room",
-    "floor": "forearm or target would be below the floor (--floor, --no-floor)",
-    "column": "forearm or hand would be in the robot's column (--column)",
+    "floor": "forearm or target would be below the floor (--floor)",
+    "column": "forearm or hand would be in the robot's own column",
     "sight": "the tracker sees the targets in none",
 }
 # From how many repeats of how many poses noise is estimated rather than declared: some sixty contrasts of positions.
