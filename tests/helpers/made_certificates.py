@@ -16,13 +16,12 @@ def line(name, rms, known=True):
     return {"name": name, "rms_m": rms, "low_m": 0.8 * rms if known else None, "high_m": 1.2 * rms if known else None}
 
 
-def made_accuracy(kind="predicted"):
+def made_accuracy():
     noise = "the tracker's noise is not in it"
-    return Accuracy("base", kind, 1.2e-4, 3e-4, 1.6e-4, None, noise, 9, "some poses").document()
+    return Accuracy("base", "predicted", 1.2e-4, 3e-4, 1.6e-4, None, noise, 9, "some poses").document()
 
 
-def made_document(decision="pass", repeats=True, measured=False, **conformity):
-    quantiles = {"median_m": 1e-3, "p95_m": 2e-3}
+def made_document(decision="pass", misplaced=False, **conformity):
     return {
         "campaign": "cell_7",
         "robot": "arm",
@@ -30,7 +29,7 @@ def made_document(decision="pass", repeats=True, measured=False, **conformity):
         "date": "2026-11-23",
         "stated": {"instrument": "Leica AT960, 751234"},
         "point": "All errors are those of tool0.",
-        "misplaced": [{"sentence": "reflector or tool sits 5.0 mm from where it is declared"}] if measured else [],
+        "misplaced": [{"sentence": "reflector or tool sits 5.0 mm from where it is declared"}] if misplaced else [],
         "worst_pose": {"joints": [{"value": -0.5, "unit": "rad"}, {"value": 0.25, "unit": "m"}], "error_m": 3e-4},
         "versions": {"elastocal": "0.1.0"},
         "origin": {"commit": "c0ffee", "code_sha256": "cd" * 32, "data_sha256": "da" * 32, "environment": {"numpy": "2"}},
@@ -42,10 +41,7 @@ def made_document(decision="pass", repeats=True, measured=False, **conformity):
         "held_out": [step("uncorrected", 1.5e-3), step("declared", 3e-4), step("corrected", 1.2e-4, True)],
         "noise_floor_rms_m": 1e-4,
         "joint_ranges": [{"low": -85.0, "high": 60.4, "unit": "deg"}, {"low": 0.0, "high": 1.5, "unit": "m"}],
-        "accuracy": made_accuracy("measured" if measured else "predicted"),
-        "predicted": made_accuracy(),
-        "measured": {"noise_m": 1e-4, "mean_m": 1e-4, "largest_m": 2.4e-4, "poses": 9} if measured else None,
-        "measured_files": {},
+        "accuracy": made_accuracy(),
         "conformity": {
             "decision": decision,
             "tolerance_m": 2e-4,
@@ -57,23 +53,8 @@ def made_document(decision="pass", repeats=True, measured=False, **conformity):
             "poses": 9,
             "configurations": 9,
             "shortfalls": [],
-            "poses_inside": 8 if measured else None,
-            "share_inside": 0.57 if measured else None,
-            "poses_needed": 40 if decision == "undecided" else None,
         }
         | conformity,
-        "iso_9283": {
-            "repeatability": {
-                "position_m": 1e-4,
-                "position_interval_m": [8e-5, 1.2e-4],
-                "orientation_rad": 5e-5,
-                "approaches": 40,
-                "poses": 10,
-            }
-            if repeats
-            else None,
-            "repeatability_of_sensor_m": 9e-5,
-        },
         "budget": [
             line("uncorrected", 1.5e-3, False),
             line("joint_compliance", 1e-3),
@@ -83,15 +64,4 @@ def made_document(decision="pass", repeats=True, measured=False, **conformity):
         ],
         "budget_states": 100,
         "tracker_rms_m": 1.5e-4,
-        "workspace": [
-            {
-                "force_N": force,
-                "uncorrected": quantiles,
-                "bound": quantiles,
-                "bound_inside": inside,
-                "share_outside": 0.3,
-                "share_regressed": 0.2,
-            }
-            for force, inside in ((0.0, quantiles), (100.0, None))
-        ],
     }

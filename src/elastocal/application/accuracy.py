@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from elastocal.remainder.protocol import Predictor
     from elastocal.remainder.tuning import Spread
 
-PREDICTED, MEASURED = "predicted", "measured"
+PREDICTED = "predicted"
 REGION = "the poses and loads that were fitted"
 # Of every bound, one-sided, as GUM and JCGM 106 have it; and how sure held-out poses must be that a prediction is too small
 # before they raise it: of honest campaigns one in twenty is.
@@ -68,7 +68,7 @@ _MOST_STATES = 1000
 class Accuracy:
     """Whose error, how large, how sure; lengths in m.
 
-    `frame`: "robot" or "base". `kind`: "predicted" or "measured". `rms_m`, `worst_m`: root mean square over the poses, and at
+    `frame`: "robot" or "base". `kind`: "predicted". `rms_m`, `worst_m`: root mean square over the poses, and at
     the worst of them; with one-sided confidence below `rms_bound_m`, `worst_bound_m`, None where nothing says so. `noise`: what
     became of the tracker's noise. `region`: which poses these are. `offset_removed`, `left_out`, `contradicted`: as in
     `frames.Scope`. `left_out_m`, `form_m`, `repeated_m`: of `rms_m`, by what is left out, by what the form of the model leaves
@@ -419,6 +419,26 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
         why = "validation poses were missed by more than the fit says" if accuracy.contradicted else "other models fit as well"
         text += f" {millimetres(accuracy.form_m)} of it stand for the form of the model: {why}."
     return text
+
+
+def error_rows(verdict: Mapping[str, Any], *others: tuple[Accuracy, float]) -> list[list[str]]:
+    """How far the robot is off before and after its correction: one table, the same in report, certificate and on the terminal.
+
+    What is measured and what is predicted, over which poses and in which frame, are different errors; each row says which.
+    Columns: which RMS error, of the uncorrected robot, of the corrected one; no row where the data are at fault. `verdict`:
+    contents of verdict.json. `others`: accuracies over other poses, each with that of the uncorrected robot, m.
+    """
+    if not verdict.get("accuracy"):
+        return []
+    heldout, measured = verdict["heldout"], "measured at validation poses, noise included, after the best placement of the base"
+    stated = [(accuracy_from(verdict["accuracy"]), verdict["uncorrected_m"]), *others]
+    return [
+        [measured, millimetres(heldout["uncalibrated"]["rms_m"]), millimetres(heldout["delivered"]["rms_m"])],
+        *(
+            [f"{each.kind} over {each.region}, {FRAMES[each.frame]}", millimetres(before), millimetres(each.rms_m)]
+            for each, before in stated
+        ),
+    ]
 
 
 def millimetres(length_m: float) -> str:

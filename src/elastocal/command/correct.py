@@ -58,7 +58,7 @@ def correct(
     import numpy as np
     from rich.console import Console
 
-    from elastocal.application.accuracy import accuracy_sentence, before_m, campaign_accuracy, predict_errors
+    from elastocal.application.accuracy import accuracy_sentence, before_m, campaign_accuracy, error_rows, predict_errors
     from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted, regressed
     from elastocal.application.compensation import find_joint_targets
     from elastocal.diagnosis.misplaced import point_sentence
@@ -66,7 +66,6 @@ def correct(
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.data_frames import write_csv
-    from elastocal.loop.error_table import error_lines
 
     console = Console(stderr=True)
     controller = controller_of(language, "") if language else None
@@ -122,7 +121,8 @@ def correct(
         accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
         stated.append((accuracy, float(np.sqrt((before[bounded] ** 2).mean()))))
         sentences.append(accuracy_sentence(accuracy))
-    lines = [*error_lines(campaign.verdict, *stated), *sentences]
+    table = error_rows(campaign.verdict, *stated)
+    lines = [*(f"{where}: {off} uncorrected, {after} corrected" for where, off, after in table), *sentences]
     if good.any():
         lines += [accuracy_sentence(campaign_accuracy(calibrated)), point_sentence(campaign.case.campaign)]
     if calibrated.remainder is not None:
@@ -143,10 +143,8 @@ def correct(
     if beyond.any():
         some = f"{grouped(beyond.sum())} of {counted(len(beyond), 'target')}"
         alarms.append(f"{some} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
-    certify = f"elastocal certificate {folder} --tolerance 0.2mm"
-    following = f"{certify}; or command 12 targets or more, measure them, and add --measured AFTER"
     lines += [*(f"! {alarm}" for alarm in alarms), *map(str, files)]
-    print_answer(bool(good.all()), f"{share} corrected", lines, following, console)
+    print_answer(good.all(), f"{share} corrected", lines, f"elastocal certificate {folder} --tolerance 0.2mm", console)
 
 
 def _swings(wanted: TargetPath, found: Correction, good: np.ndarray, robot: Robot) -> list[str]:

@@ -33,13 +33,6 @@ def certificate(
     folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
     tolerance: Annotated[str, Option(help="Largest allowed RMS position error, such as 0.2mm.")],
     risk: Annotated[float, Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
-    measured: Annotated[
-        Path | None,
-        Option(
-            help="Campaign that was measured at corrected targets, with the targets.csv of `elastocal correct` in its folder: "
-            "pose k is row k of it. Without, the certificate states what is predicted."
-        ),
-    ] = None,
     use: Annotated[
         Path | None,
         Option(
@@ -51,9 +44,9 @@ def certificate(
 ) -> None:
     """Certify a robot against a tolerance: pass, fail or undecided.
 
-    The certificate has the risk of being wrong, repeatability, error budget and a map of the workspace, and says of which point
-    it speaks. It stands beside the report. The exit code is 0 if the robot passes, and 1 if it fails or is undecided. A robot
-    that nobody measured after correction is predicted to pass or fail; --measured states what was measured.
+    The certificate has the risk of being wrong and the error budget, and says of which point it speaks. It stands beside the
+    report. The exit code is 0 if the robot passes, and 1 if it fails or is undecided. A robot that nobody measured after
+    correction is predicted to pass or fail.
     """
     from datetime import date
 
@@ -62,13 +55,12 @@ def certificate(
     from elastocal.campaigns.reading import read_descriptions
     from elastocal.data_checks.protocol import data_at_fault
     from elastocal.exchange.target_path import read_target_path_of
-    from elastocal.figures.certificate import budget_bars, workspace_map
+    from elastocal.figures.certificate import budget_bars
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
     from elastocal.loop.certificate import Wanted, use_at
     from elastocal.loop.certificate import certificate as certified
-    from elastocal.loop.measured import measured_errors
     from elastocal.report.certificate import certificate_facts, write_certificate
 
     console = Console(stderr=True)
@@ -77,22 +69,18 @@ def certificate(
     found = diagnosed_campaign(folder, physics_only)
     place = workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=workplace() / "reports")
-    after = None if measured is None else measured_errors(measured, robots(), found)
     used = None if use is None else use_at(found.calibrated, read_target_path_of(use, found.calibrated.robot))
     if data_at_fault(found.verdict):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
     stated = {"measured_on": campaign.get("measured_on", "")} | campaign.get("certificate", {})
     wanted = Wanted(limit, risk, campaign.get("serial_number", ""), date.today().isoformat(), _SEED, stated)
     with console.status("working"):
-        document, maps = certified(folder, robots(), found, wanted, after, used)
+        document = certified(folder, robots(), found, wanted, used)
         facts = certificate_facts(document)
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
-            forces, names = [each["force_N"] for each in document["workspace"]], [row[0] for row in facts["budget"]]
-            drawn = {
-                "workspace": workspace_map(maps, forces, limit),
-                "budget": budget_bars(document["budget"], names, limit, document["tracker_rms_m"]),
-            }
-            write_certificate(partial / PAGES, facts, [*save_all(drawn, scratch).values()])
+            names = [row[0] for row in facts["budget"]]
+            budget = budget_bars(document["budget"], names, limit, document["tracker_rms_m"])
+            write_certificate(partial / PAGES, facts, [*save_all({"budget": budget}, scratch).values()])
             write_json(partial / DOCUMENT, document)
     passed, (answer, *details) = facts["decision"] == "pass", _lines(document)
     print_answer(passed, answer, [*details, str(place / PAGES), str(place / DOCUMENT)], facts["now"], console)
@@ -115,11 +103,8 @@ def _lines(document: Mapping[str, Any]) -> list[str]:
     poses = f"In {FRAMES[accuracy.frame].removeprefix('in ')}, over {accuracy.region} ({accuracy.poses})"
     where = f"{poses}, {millimetres(accuracy.worst_m)} at the worst of them. {document['point']}"
     rest = [f"Too little for a pass: {'; '.join(found['shortfalls'])}."] if found["shortfalls"] else []
-    if found["poses_needed"] is not None:
-        rest.append(f"About {counted(found['poses_needed'], 'measured pose')} would decide.")
-    if accuracy.kind == "predicted":
-        rest.append("Nobody has measured the corrected robot: command corrected targets, measure, and give --measured.")
-    return [answer, where, *([" ".join(rest)] if rest else []), *(f"! {each['sentence']}" for each in document["misplaced"])]
+    rest.append("Nobody has measured the corrected robot: command corrected targets, measure them, and compare.")
+    return [answer, where, " ".join(rest), *(f"! {each['sentence']}" for each in document["misplaced"])]
 
 
 def export(

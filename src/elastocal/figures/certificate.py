@@ -1,23 +1,14 @@
-"""Figures of a certificate: errors over the workspace, and what each effect costs."""
+"""The figure of a certificate: what each effect costs."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 
-from elastocal.application.certificate import WorkspaceErrors
 from elastocal.figures.style import MILLI, PALETTE, panels, styled
 
-_BINS = 24
-_FEWEST = 3
-# Light to dark: the larger error is the darker one, in grey too.
-_COLOURS = "viridis_r"
 # What is left however well the robot is corrected.
 _REST = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded", "left by the regression")
 TRACKER = "tracker"
@@ -27,72 +18,6 @@ _KINDS = {
     "rest": (PALETTE[2], "left after correction"),
     TRACKER: ("#ffffff", "in no robot: noise of a single measurement"),
 }
-
-
-@styled
-def workspace_map(maps: Sequence[WorkspaceErrors], forces_N: Sequence[float], tolerance_m: float) -> Figure:
-    """RMS error over distance from the base axis and height, uncorrected and corrected, on one logarithmic scale.
-
-    `maps`: one row of panels each. `forces_N`: hanging load of each. `tolerance_m`: drawn as a contour.
-    """
-    figure, axes = panels(len(maps), 2, 62 * len(maps) + 16, sharex=True, sharey=True)
-    grids = [[np.sqrt(_grid(errors, values**2)[0]) for values in (errors.uncorrected_m, errors.corrected_m)] for errors in maps]
-    known = np.concatenate([found[np.isfinite(found)] for pair in grids for found in pair] + [[tolerance_m]])
-    scale = LogNorm(MILLI * known[known > 0].min(), MILLI * known.max())
-    for row, errors, pair, force in zip(axes, maps, grids, forces_N, strict=True):
-        load = f"{force:.0f} N hanging" if force else "no load"
-        for axis, found, title in zip(row, pair, ("uncorrected", "corrected"), strict=True):
-            image = _panel(axis, errors, found, scale, tolerance_m)
-            axis.set_title(f"{title}, {load}")
-        row[0].set_ylabel("height above the base (m)")
-        if errors.regressed.any():
-            acts, edges = _grid(errors, errors.regressed.astype(float))
-            _mark(row[1], edges, acts > 0.0, "....", "#000000aa")
-    for axis in axes[-1]:
-        axis.set_xlabel("distance from the base's vertical axis (m)")
-    bar = figure.colorbar(image, ax=axes.ravel().tolist(), label="predicted RMS position error (mm)")
-    bar.ax.yaxis.set_major_formatter("{x:g}")
-    bar.ax.axhline(MILLI * tolerance_m, color="black", lw=1.6)
-    handles = [
-        Line2D([], [], color="black", lw=1.6, label=f"tolerance {MILLI * tolerance_m:g} mm"),
-        Patch(facecolor="none", edgecolor="#555555", hatch="////", lw=0.0, label="mostly beyond the range of the fitted poses"),
-    ]
-    if any(errors.regressed.any() for errors in maps):
-        words = "some poses corrected by the regression too"
-        handles.append(Patch(facecolor="none", edgecolor="#555555", hatch="....", lw=0.0, label=words))
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
-    return figure
-
-
-def _grid(errors: WorkspaceErrors, values: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Mean of values (N,) over distance from the base axis and height, (bins, bins), and the edges of the cells in m.
-
-    Not a number in cells of few poses.
-    """
-    at = np.hypot(errors.position[:, 0], errors.position[:, 1]), errors.position[:, 2]
-    counts, *edges = np.histogram2d(*at, bins=_BINS)
-    sums = np.histogram2d(*at, bins=edges, weights=values)[0]
-    return np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts >= _FEWEST), edges
-
-
-def _panel(axis: Axes, errors: WorkspaceErrors, found: np.ndarray, scale: LogNorm, tolerance_m: float) -> Any:
-    outside, edges = _grid(errors, errors.outside.astype(float))
-    image = axis.pcolormesh(edges[0], edges[1], MILLI * found.T, cmap=_COLOURS, norm=scale, rasterized=True)
-    middles = [(ends[1:] + ends[:-1]) / 2 for ends in edges]
-    if np.nanmin(found) < tolerance_m < np.nanmax(found):
-        axis.contour(*middles, found.T, levels=[tolerance_m], colors="black", linewidths=1.6)
-    _mark(axis, edges, np.isfinite(found) & (outside > 0.5), "////", "#ffffffaa")
-    axis.set_aspect("equal")
-    axis.grid(visible=False)
-    return image
-
-
-def _mark(axis: Axes, edges: list[np.ndarray], cells: np.ndarray, hatch: str, color: str) -> None:
-    """Hatch some cells (bins, bins) of a map."""
-    size = edges[0][1] - edges[0][0], edges[1][1] - edges[1][0]
-    for across, up in np.argwhere(cells):
-        corner = edges[0][across], edges[1][up]
-        axis.add_patch(Rectangle(corner, *size, fill=False, hatch=hatch, lw=0.0, edgecolor=color))
 
 
 @styled

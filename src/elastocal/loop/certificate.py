@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.accuracy import REGION, campaign_poses, predict_errors
+from elastocal.application.accuracy import REGION, campaign_poses, error_rows, predict_errors
 from elastocal.application.calibrated import OperatingConditions, beyond_fitted
-from elastocal.application.certificate import draw_angles, error_budget, of_sensor, repeatability, workspace_errors
+from elastocal.application.certificate import error_budget
 from elastocal.application.compensation import find_joint_targets
 from elastocal.campaigns.reading import campaign_files
 from elastocal.diagnosis.misplaced import point_sentence
 from elastocal.exchange.target_path import OK
 from elastocal.io.records import checksum
-from elastocal.loop.error_table import error_rows
 from elastocal.random_streams import stream
-from elastocal.validation.conformity import PASS, UNDECIDED, conformity, predicted_conformity
+from elastocal.validation.conformity import PASS, UNDECIDED, predicted_conformity
 from elastocal.validation.span import joint_ranges, shortfalls
 
 if TYPE_CHECKING:
@@ -29,16 +28,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.application.certificate import WorkspaceErrors
     from elastocal.exchange.target_path import TargetPath
     from elastocal.loop.calibrated_files import Diagnosed
-    from elastocal.loop.measured import MeasuredErrors
     from elastocal.mechanics.robot import Robot
 
-# Poses of the map: a bin of 25 by 25 has some ten.
-_POSES = 6000
-# Of intervals of the budget, and of the bootstrap over measured poses.
-_DRAWS, _REPLICATES = 2000, 2000
+# Of intervals of the budget.
+_DRAWS = 2000
 _LIBRARIES = ("elastocal", "numpy", "scipy")
 USE = "the poses and loads of its use"
 _MODELS = {"frames": "uncorrected", "declared": "declared", "effect": "corrected"}
@@ -82,43 +77,28 @@ def certificate(
     robots_folder: str | Path,
     found: Diagnosed,
     wanted: Wanted,
-    measured: MeasuredErrors | None = None,
     use: Use | None = None,
-) -> tuple[dict[str, Any], list[WorkspaceErrors]]:
+) -> dict[str, Any]:
     """Contents of a certificate.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign. `measured`: of the
-    corrected robot; without, what is stated of it is predicted. `use`: where the robot is used; without, at the poses and loads
-    of the campaign. Returns `document`: JSON-serialisable; `maps`: without load, and under the
-    largest force of the campaign where it has any, hanging.
+    All of the corrected robot is predicted. `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign.
+    `use`: where the robot is used; without, at the poses and loads of the campaign. Returns JSON-serialisable.
     """
     calibrated, case = found.calibrated, found.case
-    robot, campaign, states = calibrated.robot, case.campaign, case.observations.states
-
-    def draws(purpose: str) -> np.random.Generator:
-        return stream(wanted.seed, found.name, f"certificate: {purpose}", 0)
-
+    robot, states = calibrated.robot, case.observations.states
     poses = campaign_poses(calibrated) if use is None else (use.reported_angles, use.operating)
     prediction = predict_errors(calibrated, *poses)
     accuracy = prediction.accuracy(REGION if use is None else USE)
     decision = predicted_conformity(prediction.rms_m, accuracy.poses, wanted.tolerance_m, wanted.accepted_risk)
-    if measured is not None:
-        terms = wanted.tolerance_m, wanted.accepted_risk, _REPLICATES
-        decision = conformity(measured.errors, *terms, draws("conformity"), measured.noise_m)
-    judged = found.verdict["heldout"]["configurations"] if measured is None else measured.configurations
+    judged = found.verdict["heldout"]["configurations"]
     missing = shortfalls(judged, states, robot, None if use is None else use.outside)
-    if measured is None and not accuracy.fitted:
+    if not accuracy.fitted:
         missing = ["nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted", *missing]
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
-    angles = draw_angles(calibrated, _POSES, draws("workspace"))
-    largest = float(np.linalg.norm(states.wrench[:, :3], axis=1).max())
-    forces = [0.0, largest] if largest > 0.0 else [0.0]
-    budget = error_budget(calibrated, *poses, _DRAWS, draws("budget"))
+    budget = error_budget(calibrated, *poses, _DRAWS, stream(wanted.seed, found.name, "certificate: budget", 0))
     uncorrected = next(share.rms_m for share in budget if share.name == "uncorrected")
-    maps = [workspace_errors(calibrated, angles, np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0])) for force in forces]
-    repeats = repeatability(campaign.measurements, campaign.targets, robot.chain.end_effector.name)
-    document: dict[str, Any] = {
+    return {
         "campaign": found.name,
         "robot": robot.name,
         "serial": wanted.serial,
@@ -127,31 +107,22 @@ def certificate(
         "versions": {name: metadata.version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
         "origin": found.origin,
         "files": {Path(file).name: checksum(file) for file in campaign_files(folder, robots_folder)},
-        "measured_files": {} if measured is None else {name: checksum(file) for name, file in measured.files.items()},
         "verdict": found.verdict["verdict"],
         "effects": [effect["name"] for effect in found.verdict["effects"]],
         "errors": error_rows(found.verdict, *([] if use is None else [(accuracy, uncorrected)])),
         "held_out": [*(_step(row) for _, row in found.errors.iterrows()), *_delivered(found.verdict)],
         "regression": (found.verdict["remainder"] or {}).get("words", ""),
         "noise_floor_rms_m": found.verdict["heldout"]["noise_floor_rms_m"],
-        "accuracy": (accuracy if measured is None else measured.accuracy).document(),
-        "predicted": accuracy.document(),
-        "point": point_sentence(campaign),
+        "accuracy": accuracy.document(),
+        "point": point_sentence(case.campaign),
         "misplaced": found.verdict["misplaced"],
         "worst_pose": _worst_pose(robot, poses[0], prediction.error_m),
         "conformity": asdict(decision) | {"configurations": judged, "shortfalls": missing},
         "joint_ranges": joint_ranges(states, robot),
-        "measured": None if measured is None else measured.document(),
-        "iso_9283": {
-            "repeatability": None if repeats is None else asdict(repeats),
-            "repeatability_of_sensor_m": of_sensor(calibrated.noise.position_m),
-        },
         "budget": [asdict(share) for share in budget],
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
-        "workspace": [_summary(force, each) for force, each in zip(forces, maps, strict=True)],
     }
-    return document, maps
 
 
 def _step(row: pd.Series) -> dict[str, Any]:
@@ -184,19 +155,3 @@ def _worst_pose(robot: Robot, reported_angles: np.ndarray, error_m: np.ndarray) 
         for value, slides in zip(reported_angles[place], robot.chain.prismatic, strict=True)
     ]
     return {"joints": joints, "error_m": float(error_m[place])}
-
-
-def _summary(force_N: float, errors: WorkspaceErrors) -> dict[str, Any]:
-    def quantiles(values: np.ndarray) -> dict[str, float]:
-        return {"median_m": float(np.median(values)), "p95_m": float(np.quantile(values, 0.95))}
-
-    inside = ~errors.outside
-    return {
-        "force_N": force_N,
-        "poses": len(errors.position),
-        "uncorrected": quantiles(errors.uncorrected_m),
-        "bound": quantiles(errors.bound_m),
-        "bound_inside": quantiles(errors.bound_m[inside]) if inside.any() else None,
-        "share_outside": float(errors.outside.mean()),
-        "share_regressed": float(errors.regressed.mean()),
-    }

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
-from elastocal.application.certificate import ISO_CYCLES, ISO_POSES
 from elastocal.counting import counted
 from elastocal.report import words as say
 from elastocal.report.loop_facts import TITLES
@@ -29,13 +28,13 @@ _SHARES = {
 }
 # Below the digits of any tracker.
 _NOTHING_M = 1e-7
-_LISTS = ("misplaced", "identity", "steps", "iso", "workspace", "data")
+_LISTS = ("misplaced", "identity", "steps", "data")
 
 
 def write_certificate(path: str | Path, facts: Mapping[str, Any], figures: Iterable[str]) -> None:
     """Compile a certificate; the file appears whole or not at all.
 
-    `path`: the PDF. `facts`: from `certificate_facts`. `figures`: PDF files, named workspace and budget.
+    `path`: the PDF. `facts`: from `certificate_facts`. `figures`: PDF files, named budget.
     """
     compile_document(path, "certificate.typ", {"facts": facts}, figures)
 
@@ -46,8 +45,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     `document`: of `loop.certificate.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
     spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": TITLES[document["verdict"]]}
-    constants = {"iso_poses": ISO_POSES, "iso_cycles": ISO_CYCLES}
-    stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken, **constants)
+    stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken)
     return {
         **{name: lines if name in _LISTS else " ".join(lines) for name, lines in stated.items()},
         "campaign": document["campaign"],

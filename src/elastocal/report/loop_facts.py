@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal import __version__
+from elastocal.application.accuracy import error_rows
 from elastocal.counting import grouped, plural
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
-from elastocal.loop.error_table import error_rows
 from elastocal.report import loop_tables as tables
 from elastocal.report import words as say
 from elastocal.report.typesetting import compile_document, sentences
