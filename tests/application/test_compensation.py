@@ -20,8 +20,7 @@ from elastocal.application.compensation import (
     large_steps,
 )
 from elastocal.exchange.controllers import CONTROLLERS, axes_of, targets_of
-from elastocal.mechanics.kinematics import jacobians
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import jacobians, pose_differences
 
 EFFECTS = (*(key for key in USUAL if "weight" not in key), "transmission_harmonic@1[orders 1-2]")
 # From the middle of the limits to a posture that is not singular.

@@ -15,10 +15,9 @@ from support import OTHER_CHAINS, robot_of
 
 from elastocal.errors import InputError
 from elastocal.mechanics.chain import stretches
+from elastocal.mechanics.elastostatics import extended_chain, spring_compliance
 from elastocal.mechanics.elastostatics import generalized_forces as joint_torques
-from elastocal.mechanics.kinematics import poses, poses_and_jacobians
-from elastocal.mechanics.links import extended_chain, spring_compliance
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
 from elastocal.mechanics.robot import Link, Tube
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.machine import (

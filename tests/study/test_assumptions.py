@@ -11,8 +11,8 @@ from statsmodels.api import WLS
 from support import random_loads
 
 from elastocal.mechanics.chain import parse_chain
+from elastocal.mechanics.elastostatics import with_tube
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.links import with_tube
 from elastocal.study.assumptions import (
     AT_ONCE,
     DIFFERENCES,

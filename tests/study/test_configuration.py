@@ -24,7 +24,6 @@ FAULTS = {
     "more data sets than fit anywhere": (("data_sets",), 1_000_000_000, "data_sets", ["1000000000", "10 to 1000000"]),
     "noise beyond all robots": (("noise_um", 1), 1e20, "noise_um[1]", ["1e+20", "0 to 100000"]),
     "noise of one name": (("noise_um",), [200, 200.00000001], "noise_um", ["200 and 200.00000001", "6 digits"]),
-    "number without a point": (("noise_um", 1), "5e1", "noise_um[1]", ["'5e1'", "5.0e+1"]),
     "robot twice": (("robots",), ["kuka", "kuka"], "robots", ["each entry once"]),
     "no robot": (("robots",), [], "robots", ["1 or more entries"]),
     "negative noise": (("noise_um", 1), -50, "noise_um[1]", ["-50", "0 to 100000", "µm"]),

@@ -16,7 +16,7 @@ from elastocal.application.calibrated import (
     without,
 )
 from elastocal.application.frames import root_mean_square, subtract_placement
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import pose_differences
 
 if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions

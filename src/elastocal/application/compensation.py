@@ -19,8 +19,7 @@ import numpy as np
 from elastocal.application.calibrated import come_to_rest, parts, regressed
 from elastocal.application.inverse_kinematics import SOLVED_M, allowed_steps, along_path, find_beyond_limits, reach_m, refine
 from elastocal.exchange.target_path import OK
-from elastocal.mechanics.kinematics import jacobians
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import jacobians, pose_differences
 
 if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions

@@ -19,8 +19,8 @@ import numpy as np
 from elastocal.application.planning.designs import mean_squares
 from elastocal.io.storage import write_table
 from elastocal.mechanics.chain import with_inserted
+from elastocal.mechanics.elastostatics import with_tube
 from elastocal.mechanics.kinematics import jacobians, poses
-from elastocal.mechanics.links import with_tube
 from elastocal.study.columns import SET, real, table, text
 from elastocal.study.equation_11 import estimate_compliance
 from elastocal.study.in_memory import ask, study_of

@@ -5,6 +5,7 @@ Pandas is imported where a frame is made: most jobs make none.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from elastocal.io.provenance import SOURCES_DIGEST, STEP, provenance
@@ -47,9 +48,8 @@ def robot_of(job: Job) -> Robot:
 
 def chain_of(job: Job) -> Chain:
     """The chain of a rule that needs no more of its robot."""
-    return with_target_offset(
-        parse_chain(job.params.chain, job.params.lengths_m, job.wildcards.robot), job.params.tool_offset_m
-    )
+    chain = parse_chain(job.params.chain, job.params.lengths_m, job.wildcards.robot)
+    return replace(chain, points=tuple(replace(p, offset_m=tuple(job.params.tool_offset_m)) for p in chain.points))
 
 
 def strategies_of(job: Job) -> list[Strategy]:
