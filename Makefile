@@ -84,7 +84,7 @@ installed: dist
 	$(BIN)/uv pip compile -q --system-certs --resolution $(RESOLUTION) --python .installed/env/bin/python pyproject.toml -o .installed/versions.txt
 	$(BIN)/uv pip install -q --system-certs --python .installed/env/bin/python -r .installed/versions.txt
 	$(BIN)/uv pip install -q --no-deps --python .installed/env/bin/python dist/*.whl
-	work="$$(mktemp -d)" && cd "$$work" && OMP_NUM_THREADS=1 "$(CURDIR)/.installed/env/bin/elastocal" demo --no-open && rm -r "$$work"
+	work="$$(mktemp -d)" && cd "$$work" && OMP_NUM_THREADS=1 "$(CURDIR)/.installed/env/bin/elastocal" demo && rm -r "$$work"
 
 # What the environment consists of, as CycloneDX, and what is known to be vulnerable in it: asks the vulnerability service of PyPI.
 supply: .venv/ready .venv-supply/ready

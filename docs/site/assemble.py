@@ -11,8 +11,6 @@ import shutil
 import sys
 from pathlib import Path
 
-import gallery
-
 import catalogue
 import commands
 import file_formats
@@ -50,7 +48,6 @@ def made_pages() -> dict[str, str]:
         "reference/interpretations.md": interpretations.page(),
         **{f"reference/files/{name}": text for name, text in file_formats.pages().items()},
         "reference/interface.rst": interface.page(),
-        "reference/gallery.rst": gallery.page(repository_pages()),
     }
 
 

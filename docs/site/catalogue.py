@@ -6,15 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import yaml
-from gallery import anchor, thumbnail, thumbnails
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.effects.catalogue import effects
 from elastocal.figures.effect_signatures import list_candidates, signature
 
-from docstrings import with_plain_references
+from extensions import with_plain_references
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from elastocal.effects.protocol import Effect
 
 HEAD = """The catalogue of effects
@@ -72,11 +73,22 @@ def page() -> str:
         raise KeyError(
             f"docs/site: words of families in catalogue.py and effect_formulas.yaml differ from the catalogue in {differ}"
         )
-    parts = [HEAD, thumbnails(thumbnail(f"/signatures/{n}.svg", e.words, f"#{anchor(n)}") for n, e in listed.items())]
+    parts = [HEAD, _thumbnails(listed)]
     for family, words in FAMILIES.items():
         parts.append(_headed(words, "-"))
         parts += [_section(effect) for effect in listed.values() if family == effect.family]
     return "".join(parts)
+
+
+def _thumbnails(listed: Mapping[str, Effect]) -> str:
+    """A grid of the effects' figures, each with a line below it that leads to its section."""
+    figures = []
+    for name, effect in listed.items():
+        # Sphinx makes such an anchor of the label of an effect.
+        options = f"   :alt: {effect.words}\n   :target: #{name.replace('_', '-')}\n"
+        figures.append(f".. figure:: /signatures/{name}.svg\n{options}\n   {effect.words}\n\n")
+    body = "".join(figures).replace("\n", "\n   ").rstrip()
+    return f".. container:: gallery\n\n   {body}\n\n"
 
 
 def _headed(title: str, underline: str) -> str:

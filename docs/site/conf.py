@@ -10,7 +10,7 @@ import elastocal
 project = "elastocal"
 copyright = "the elastocal developers"
 release = elastocal.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "accessible", "docstrings", "formulas"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "extensions"]
 
 myst_enable_extensions = ["dollarmath"]
 # Links to headings, as the hosting site makes them too.

@@ -1,55 +1,114 @@
-"""Where the result of a campaign is looked for, and by which libraries and pins it may have been made."""
+"""A campaign's folder: begun, checked, and handed to its Snakemake target."""
 
+import numpy as np
 import pytest
-from analysed_robots import ROBOTS
-from certified import record_jobs
-from selected import slow_but
+from analysed_robots import analysed
+from made_folders import made_folder, made_table
 
-from elastocal.campaigns.reading import campaign_files
+from elastocal.campaigns.reading import read_descriptions
 from elastocal.command import campaign
-from elastocal.command.campaign import diagnosed_campaign
-from elastocal.io.origin import environment
+
+ARM = "name: arm\nchain: Rz(q1) Tx(1.0) [tip]\n"
 
 
-def test_robots_are_those_of_the_pipeline_and_results_those_of_the_workplace(checkout, tmp_path, monkeypatch):
-    (tmp_path / "installed").mkdir()
-    (tmp_path / "installed/config").symlink_to(ROBOTS.parent)
-    monkeypatch.setattr(campaign, "pipeline", lambda: tmp_path / "installed")
-    monkeypatch.setattr(campaign, "workplace", lambda: checkout)
-    assert diagnosed_campaign(checkout / "made").name == "made"
+def test_a_new_folder_is_a_campaign_that_lacks_measurements_and_what_is_there_stays(elastocal, refusal, tmp_path):
+    result = elastocal("init", tmp_path / "cell")
+    assert result.exit_code == 0 and "template" in result.output
+    assert {path.name for path in (tmp_path / "cell").iterdir()} == {"campaign.yaml", "robot.yaml", "measurements.csv"}
+    document, robot = read_descriptions(tmp_path / "cell", tmp_path)
+    assert document["campaign"] == "cell" and robot == tmp_path / "cell" / "robot.yaml"
+    (tmp_path / "measurements.csv").write_text("pose,load,repeat,target\n")
+    (tmp_path / "robot.yaml").write_text(ARM)
+    result = elastocal("init", tmp_path)
+    assert result.exit_code == 0 and "template" not in result.output
+    assert (tmp_path / "measurements.csv").read_text() == "pose,load,repeat,target\n"
+    assert "point: tip" in (tmp_path / "campaign.yaml").read_text()
+    assert refusal("init", tmp_path)
 
 
-WANTED = {
-    "certificate": ["--tolerance", "0.5mm"],
-    "correct": ["nowhere.csv", "--output", "targets.csv"],
-    "export": ["--output", "out"],
-}
+def test_targets_are_those_of_the_measurements_that_lie_there(elastocal, refusal, tmp_path):
+    (tmp_path / "robot.yaml").write_text(ARM)
+    (tmp_path / "t.csv").write_text("q1,x,y,z,rx,ry,rz,target\n" + "".join(f"{n},1,2,3,0,0,0,TCP\n" for n in range(9)))
+    words = ("--folder", tmp_path, "--angles", "deg", "--lengths", "m", "--rotation", "vector")
+    assert elastocal("import", "csv", tmp_path / "t.csv", *words).exit_code == 0
+    result = elastocal("init", tmp_path)
+    assert result.exit_code == 0 and "fill in" not in result.output
+    document, _ = read_descriptions(tmp_path, tmp_path)
+    assert (document["measured"], document["targets"]) == ("pose", {"TCP": {"point": "tip", "offset_m": "unknown"}})
+    # The other way round: what is imported beside a campaign is compared with it.
+    assert "! campaign.yaml" not in elastocal("import", "csv", tmp_path / "t.csv", *words, "--force").output
+    (tmp_path / "t.csv").write_text((tmp_path / "t.csv").read_text().replace("TCP", "SMR"))
+    again = elastocal("import", "csv", tmp_path / "t.csv", *words, "--force")
+    assert again.exit_code == 0 and "has no target SMR" in again.output
+    (tmp_path / "campaign.yaml").unlink()
+    (tmp_path / "measurements.csv").write_text("mine")
+    assert "unknown column 'mine'" in refusal("init", tmp_path)
 
 
-def edited_pins(checkout):
-    (checkout / "requirements").mkdir(exist_ok=True)
-    (checkout / "requirements/run.lock").write_text("numpy==2.0\n", encoding="utf-8")
-    return "requirements/run.lock none", "requirements/run.lock "
+def test_a_robot_that_cannot_be_read_leaves_nothing_behind(refusal, tmp_path):
+    (tmp_path / "arm.yaml").write_text("name: arm\n")
+    for name in ("arm.yaml", "none.yaml"):
+        assert refusal("init", tmp_path / "cell", "--robot", tmp_path / name)
+    assert not (tmp_path / "cell").exists()
 
 
-def another_numpy(_):
-    record_jobs("made", campaign_files("made", ROBOTS), environment(".") | {"numpy": "1.0"})
-    return "numpy 1.0", f"numpy {environment('.')['numpy']}"
+def test_a_check_says_what_was_read_identified_and_testable(elastocal, tmp_path):
+    folder = made_folder(tmp_path / "made", analysed("kuka"))
+    result = elastocal("check", folder)
+    assert result.exit_code == 0, result.output
+    answer, *rest = result.output.splitlines()
+    assert answer.startswith("✓ made can be diagnosed: ")
+    for words in ("read", "validation poses", "noise", "compliance", "testable"):
+        assert any(line.startswith(f"  {words}") or words in line for line in rest), words
+    assert any(line.startswith("! ") for line in rest)
+    assert "not determined by these poses: joint 6" in result.output
+    assert rest[-1] == f"next: elastocal diagnose {folder}"
 
 
-@pytest.mark.parametrize("change", slow_but([another_numpy], [edited_pins, another_numpy]))
-def test_results_of_another_environment_are_refused_by_every_command_unless_that_is_accepted(
-    in_checkout, elastocal, refusal, capsys, change
-):
-    was, now = change(in_checkout)
-    for command, words in WANTED.items():
-        line = refusal(command, "made", *words)
-        assert line.startswith(f"made: found results by {was}") and f"those of now, {now}" in line
-        assert line.endswith("elastocal diagnose made; or --accept-environment")
-    assert diagnosed_campaign(in_checkout / "made", True).name == "made"
-    assert capsys.readouterr().err.startswith(f"warning: {in_checkout}/made: found results by {was}")
-    for command, words in WANTED.items():
-        result = elastocal(command, "made", *words, "--accept-environment")
-        assert "nowhere" in str(result.exception) or result.exit_code == 0
-    (in_checkout / "requirements/run.lock").unlink(missing_ok=True)
-    record_jobs("made", campaign_files("made", ROBOTS))
+def test_faults_of_the_data_end_in_exit_code_one_and_an_empty_sheet_is_refused_with_its_row(elastocal, refusal, tmp_path):
+    table = made_table(analysed("kuka"), "made")
+    result = elastocal("check", made_folder(tmp_path / "made", analysed("kuka"), table=table | {"q3": -table["q3"]}))
+    assert result.exit_code == 1 and "next: mend the data" in result.output
+    assert result.output.startswith("! made cannot be diagnosed: the data are at fault")
+    table = {name: values.astype(object) for name, values in table.items()}
+    table["x"][3] = ""
+    folder = made_folder(tmp_path / "empty", analysed("kuka"), table={k: np.asarray(v) for k, v in table.items()})
+    assert "row 4, column x (line 5): found nothing" in refusal("check", folder)
+
+
+@pytest.fixture
+def run(elastocal, tmp_path, monkeypatch):
+    """Diagnose a campaign with a pipeline and in a workplace; what is called, and the exit code of that."""
+
+    def called(pipeline, code=0, prints=""):
+        # In place of Python: shows its arguments and where it runs.
+        stand_in = tmp_path / "python"
+        stand_in.write_text(f'#!/bin/sh\necho "$PWD" "$@"\necho "{prints}"\nexit {code}\n')
+        stand_in.chmod(0o755)
+        monkeypatch.setattr(campaign.sys, "executable", str(stand_in))
+        monkeypatch.setattr(campaign, "pipeline", lambda: pipeline)
+        monkeypatch.setattr(campaign, "workplace", lambda: tmp_path)
+        return elastocal("diagnose", tmp_path / "cell7", "-j", 1)
+
+    return called
+
+
+def test_the_target_of_the_campaign_runs_where_the_pipeline_is_and_its_exit_code_counts(tmp_path, run):
+    called = f"{tmp_path} -m snakemake -j1 diagnose --config campaign={tmp_path}/cell7"
+    for code in (0, 3):
+        result = run(tmp_path, code)
+        assert result.exit_code == code and result.stderr.strip() == called
+    assert run(tmp_path / "installed").stderr.strip() == f"{called} --snakefile {tmp_path}/installed/Snakefile"
+
+
+def test_lines_of_a_run_are_printed_as_they_are_and_the_outcome_again_where_all_is_up_to_date(run, monkeypatch, tmp_path):
+    monkeypatch.setattr(campaign, "_outcome", lambda folder, place: [f"the outcome of {folder.name}"])
+    shown = run(tmp_path, prints="1 of 3: read_campaign [bold]\nUsing workflow specific profile x").stderr
+    assert "1 of 3: read_campaign [bold]\n" in shown and "profile" not in shown and "the outcome" not in shown
+    current = run(tmp_path, prints="Nothing to be done (all requested files are present and up to date).").stderr
+    assert current.endswith("the outcome of cell7\n")
+
+
+@pytest.mark.parametrize("mark", ["{x}", ": ", " #", "\n", "\x1b", "\u202e"])
+def test_a_path_that_snakemake_takes_for_something_else_is_refused(refusal, tmp_path, mark):
+    assert "a path without it" in refusal("diagnose", f"{tmp_path}/a{mark}b")

@@ -52,14 +52,3 @@ def test_a_step_that_fails_ends_it_with_its_exit_code(run):
     result, called = run(diagnose=3)
     assert result.exit_code == 3
     assert [words[0] for words in called] == ["plan", "check", "diagnose"]
-
-
-@pytest.mark.parametrize(("desktop", "opened"), [(True, 1), (False, 0)])
-def test_the_report_is_opened_where_somebody_sits_at_a_desktop(run, monkeypatch, tmp_path, desktop, opened):
-    pages = []
-    monkeypatch.setattr(demo, "_has_browser", lambda: desktop)
-    monkeypatch.setattr(demo.webbrowser, "open", pages.append)
-    run()
-    assert pages == [(tmp_path / "reports/loop/cell/report.html").as_uri()] * opened
-    run("--no-open")
-    assert len(pages) == opened

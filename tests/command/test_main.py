@@ -1,3 +1,5 @@
+"""The application: one line for what is wrong, a help that fits, every subcommand registered."""
+
 import re
 from pathlib import Path
 
@@ -7,43 +9,26 @@ from typer.testing import CliRunner
 from elastocal.command import main
 from elastocal.errors import InputError
 
-NO_SUBCOMMANDS = {"__init__", "main", "pipeline", "campaign", "printed", "quantities"}
-
-
-def test_bad_input_ends_in_one_line_and_exit_code_one(monkeypatch):
-    def refuse():
-        raise InputError("robot.yaml", "chain", "'X'", "Tz(l1)")
-
-    monkeypatch.setattr(main, "app", refuse)
-    with pytest.raises(SystemExit) as stopped:
-        main.main()
-    # Python writes a text to standard error and ends with 1.
-    assert stopped.value.code == "robot.yaml: chain: found 'X'; allowed: Tz(l1)"
+NO_SUBCOMMANDS = {"__init__", "main", "pipeline", "terminal"}
 
 
 @pytest.mark.parametrize(
     ("fault", "line"),
     [
+        (InputError("robot.yaml", "chain", "'X'", "Tz(l1)"), "robot.yaml: chain: found 'X'; allowed: Tz(l1)"),
         (FileExistsError(17, "File exists", "cell"), "cell: found File exists; allowed: a name that nothing else has"),
-        (OSError(28, "No space left on device"), "disk: found No space left on device; allowed: a place with space"),
         (MemoryError(), "memory: found none left; allowed: "),
     ],
 )
-def test_faults_of_the_machine_end_in_one_line_too(monkeypatch, fault, line):
+def test_bad_input_and_faults_of_the_machine_end_in_one_line(monkeypatch, fault, line):
     def fail():
         raise fault
 
     monkeypatch.setattr(main, "app", fail)
     with pytest.raises(SystemExit) as stopped:
         main.main()
-    assert str(stopped.value.code).startswith(line) and len(str(stopped.value.code).splitlines()) == 1
-
-
-def test_the_last_line_says_what_is_wrong_with_an_option(capsys):
-    with pytest.raises(SystemExit) as stopped:
-        main.app(["plan", "robot.yaml", "--poses", "few"])
-    assert stopped.value.code == 2
-    assert "'--poses'" in capsys.readouterr().err.splitlines()[-1]
+    # Python writes a text to standard error and ends with 1.
+    assert stopped.value.code.startswith(line) and len(stopped.value.code.splitlines()) == 1
 
 
 def callbacks(app):

@@ -1,22 +1,17 @@
-"""Where the pipeline and its results are: in a checkout, beside an installed package, nowhere."""
+"""Where the pipeline and its results are: in a checkout, beside an installed package, nowhere; by which libraries."""
 
 from importlib import metadata
 from importlib.metadata import PackageNotFoundError, PathDistribution
 
 import pytest
+from analysed_robots import ROBOTS
+from certified import record_jobs
 
+from elastocal.campaigns.reading import campaign_files
 from elastocal.command import pipeline as module
-from elastocal.command.pipeline import pipeline, workplace
+from elastocal.command.pipeline import diagnosed_campaign, pipeline, robots, workplace
 from elastocal.errors import InputError
-
-
-@pytest.fixture
-def made(tmp_path):
-    """What a checkout is recognized by."""
-    (tmp_path / "config" / "robots").mkdir(parents=True)
-    (tmp_path / "Snakefile").write_text("")
-    (tmp_path / "campaigns" / "cell7").mkdir(parents=True)
-    return tmp_path
+from elastocal.io.origin import environment
 
 
 @pytest.fixture
@@ -35,23 +30,18 @@ def installed(tmp_path, monkeypatch):
     return found
 
 
-def test_a_checkout_above_the_working_directory_is_found(made, monkeypatch):
-    monkeypatch.chdir(made / "campaigns" / "cell7")
-    assert pipeline() == workplace() == made
-
-
-def test_without_a_checkout_here_the_one_of_the_package_is_used(tmp_path, monkeypatch):
+def test_a_checkout_above_the_working_directory_is_found_before_that_of_the_package(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert (pipeline() / "src" / "elastocal").is_dir()
-    assert workplace() == pipeline()
+    assert (pipeline() / "src" / "elastocal").is_dir() and workplace() == pipeline()
+    for folder in ("config/robots", "campaigns/cell7"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "Snakefile").write_text("")
+    monkeypatch.chdir(tmp_path / "campaigns" / "cell7")
+    assert pipeline() == workplace() == tmp_path and robots() == tmp_path / "config" / "robots"
 
 
-def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_working_directory(installed, tmp_path):
-    assert pipeline() == installed
-    assert workplace() == tmp_path / "mine"
-
-
-def test_a_package_without_a_pipeline_is_refused_in_one_line(installed, monkeypatch):
+def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_working_directory(installed, tmp_path, monkeypatch):
+    assert pipeline() == installed and workplace() == tmp_path / "mine"
     (installed / "Snakefile").unlink()
     with pytest.raises(InputError, match="no Snakefile here or above"):
         pipeline()
@@ -62,3 +52,11 @@ def test_a_package_without_a_pipeline_is_refused_in_one_line(installed, monkeypa
     monkeypatch.setattr(metadata, "distribution", not_installed)
     with pytest.raises(InputError, match="no Snakefile here or above"):
         pipeline()
+
+
+def test_results_of_another_environment_come_with_a_warning(in_checkout, capsys):
+    assert diagnosed_campaign(in_checkout / "made").name == "made" and not capsys.readouterr().err
+    record_jobs("made", campaign_files("made", ROBOTS), environment(".") | {"numpy": "1.0"})
+    assert diagnosed_campaign(in_checkout / "made").name == "made"
+    here = environment(".")["numpy"]
+    assert capsys.readouterr().err == (f"warning: {in_checkout}/made was diagnosed with numpy 1.0; here are numpy {here}\n")

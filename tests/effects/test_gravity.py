@@ -29,8 +29,7 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.chain import MeasuringPoint
-from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.motion import motion
+from elastocal.mechanics.kinematics import motion, poses
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 

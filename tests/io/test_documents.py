@@ -106,7 +106,7 @@ def test_every_quantity_has_a_least_and_a_largest(name):
         (("stages", 0, "joints"), [1, 1], "stages[0].joints", ["[1, 1]", "each entry once"]),
         (("stages", 0, "joints"), [0], "stages[0].joints[0]", ["found 0", "1 or more"]),
         (("stages", 0, "joints"), [1.5], "stages[0].joints[0]", ["1.5", "integer"]),
-        (("stages", 0, "joints"), "1-6", "stages[0].joints", ["'1-6'", "array"]),
+        (("stages", 0, "joints"), "1-6", "stages[0].joints", ["'1-6'", "1 or more entries"]),
         (("stages",), [], "stages", ["[]", "1 or more entries"]),
     ],
 )
@@ -128,20 +128,18 @@ def test_a_value_on_one_line_reads_back(value):
     assert "\n" not in text and yaml.safe_load(f"key: {text}") == {"key": value}
 
 
-# Each name stands for nine of the one before.
-BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
-    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n" for before, name in zip("abcdefgh", "bcdefghi", strict=True)
-)
+# Each alias stands for so many values.
+BOMB = "a: &a [" + "x, " * 500 + "x]\nb: [" + "*a, " * 400 + "*a]\n"
 
 
 @pytest.mark.parametrize(
     ("text", "where", "words"),
     [
-        (BOMB, "line 6", ["more values", str(MOST_VALUES), "aliases"]),
-        ("a: &a [*a]\n", "line 1", ["alias *a", "not complete"]),
+        (BOMB, "line 2", ["more values", str(MOST_VALUES), "aliases"]),
+        ("a: &a [*a]\n", "line 1", ["alias *a", "complete"]),
+        ("a: &a [x]\nb: &b [*a]\n", "line 2", ["alias *a", "no other anchor"]),
         ("[" * 100_000, "line 1", ["in each other", f"{DEEPEST} deep"]),
         ("- " * 50_000, "line 1", ["in each other"]),
-        (f"a0: &a0 [x]\n{''.join(f'a{n}: &a{n} [*a{n - 1}]' + chr(10) for n in range(1, 30))}", "line 20", ["in each other"]),
         ("#" * (LARGEST_BYTES + 1), "", [f"more than {LARGEST_BYTES} bytes", f"at most {LARGEST_BYTES}"]),
         ("x: 1\na: !!python/object/apply:os.system [true]\n", "line 2", ["tag", "without tags"]),
         ("a: 1\nb: x\0\n", "line 2", ["control character", "x00"]),
@@ -160,12 +158,9 @@ def test_what_is_no_plain_document_is_refused_at_once(tmp_path, text, where, wor
         read(tmp_path, text)
 
 
-@pytest.mark.parametrize(("text", "written"), [("6e-5", "6.0e-5"), ("6E5", "6.0e+5"), ("-1.5e5", "-1.5e+5")])
-def test_numbers_that_yaml_takes_for_text_come_with_the_way_to_write_them(tmp_path, text, written):
-    document = read(tmp_path, f"name: x\nchain: x\nlengths_m: {{l: {text}}}\n")
-    with refused("a.yaml", "lengths_m.l", repr(text), written):
-        check_document(document, "robot", "a.yaml")
-    assert isinstance(read(tmp_path, f"a: {written}")["a"], float)
+def test_numbers_are_read_as_people_write_them(tmp_path):
+    found = read(tmp_path, "[6e-5, 6E5, -1.5e5, 1.e3, .5, 17, +3, '1e5', a1e5]")
+    assert found == [6e-5, 6e5, -1.5e5, 1e3, 0.5, 17, 3, "1e5", "a1e5"]
 
 
 STEERING = ["a\x1b[2Jb", "a\u202eb", "a\u2067b", "a\u200bb", "a\nb", "a\tb", "a\x85b", "a\ufeffb"]
@@ -212,7 +207,7 @@ def test_a_document_is_named_and_not_reached_by_a_path(tmp_path, name):
             "",
         ),
         ("\n\nnmae: x\n", "line 3, nmae: ", "name"),
-        ("name: x\nstages:\n", "line 2, stages: found nothing", "array"),
+        ("name: x\nstages:\n", "line 2, stages: found nothing", "1 or more entries"),
         ("name: x\n", "yaml: stages: found nothing", ""),
         ("- 1\n", "yaml: found [1]", "keys with values"),
     ],

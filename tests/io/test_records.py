@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -107,15 +106,6 @@ def test_other_code_than_made_the_results_is_found(jobs):
     Path(CODE).unlink()
     with refused(CODE, "", "not what measure kuka was made with", "a rerun"):
         check_sources(jobs, "", "a rerun")
-
-
-def test_a_module_that_is_new_beside_a_catalogue_is_found(jobs):
-    Path("src/catalogue.py").write_text("", encoding="utf-8")
-    job = replace(jobs[0], inputs=input_digests([CODE, "src/catalogue.py"])[0])
-    check_sources([job], "", "a rerun")
-    Path("src/sag.py").touch()
-    with refused("src/sag.py", "", "a module that measure kuka was made without", "a rerun"):
-        check_sources([job], "", "a rerun")
 
 
 def test_any_altered_character_of_a_record_is_found():

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import chain_of, refused
 
-from elastocal.mechanics.chain import Transform, parse_chain, stretches
+from elastocal.mechanics.chain import Transform, parse_chain
 
 
 def test_each_token_becomes_one_transform():
@@ -94,16 +94,6 @@ def test_any_written_chain_is_read_as_written(written):
 def test_faulty_chain_is_refused_in_one_line(text, words):
     with refused("robots/x.yaml", "chain", *words):
         parse_chain(text, {"l1": 1.0, "l2": 2.0}, "robots/x.yaml")
-
-
-def test_stretches_are_the_rigid_parts_between_the_joints(kuka):
-    assert stretches(kuka.chain) == (
-        (1, (0.0, 0.0, 0.675)),
-        (3, (0.35, 0.0, 0.0)),
-        (5, (1.15, 0.0, 0.0)),
-        (8, (1.2, 0.0, -0.041)),
-        (12, (0.24, 0.0, 0.0)),
-    )
 
 
 @pytest.mark.parametrize("name", ["@SUM(A1)", "=1", "-x", "a\u202eb", "a\x1b[b"])

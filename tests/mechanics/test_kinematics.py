@@ -1,4 +1,4 @@
-"""Equations 1-4: poses and Jacobians against pinocchio, finite differences and the paper's own matrix products."""
+"""Equations 1-4 and what moves behind joints: against pinocchio, finite differences, scipy, the paper's own products."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from support import (
     ODD_CHAINS,
     OTHER_CHAINS,
@@ -21,11 +22,13 @@ from elastocal.mechanics.kinematics import (
     corners,
     jacobians,
     joint_axes,
+    motion,
+    pose_differences,
     poses,
     poses_and_jacobians,
     poses_of_points,
+    rotation_vectors,
 )
-from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.robot import with_target_offset
 
 # Metres and radians of order one through a dozen products: some tens of roundings of 1e-16.
@@ -143,10 +146,9 @@ def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size)
     np.testing.assert_allclose(jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole[2], rtol=0, atol=ROUNDING)
 
 
-@pytest.mark.parametrize("batch", [(), (5,), (2, 3)])
-def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka, batch):
+def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka):
     points = [*kuka.chain.points[::-1], with_target_offset(kuka, (0.1, -0.2, 0.3)).chain.end_effector, kuka.chain.points[0]]
-    angles = random_angles(np.random.default_rng(3), kuka.chain, *batch)
+    angles = random_angles(np.random.default_rng(3), kuka.chain, 2, 3)
     together = poses_of_points(kuka.chain, angles, points)
     for number, point in enumerate(points):
         for found, wanted in zip(together, poses(kuka.chain, angles, point), strict=True):
@@ -176,3 +178,41 @@ def test_joints_stand_at_their_places_along_their_axes():
     place, axis = joint_axes(chain, np.array([[np.pi / 2, 0.3]])).swapaxes(0, 1)
     np.testing.assert_allclose(place[:, 0], [[0, 0, 0.5], [0, 1, 0.5]], atol=1e-12)
     np.testing.assert_allclose(axis[:, 0], [[0, 0, 1], [-1, 0, 0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["kuka", *OTHER_CHAINS, *ODD_CHAINS])
+def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench(name, chain_called):
+    chain = chain_called(name)
+    rng = np.random.default_rng(31)
+    angles, wrench = random_angles(rng, chain, 7), rng.standard_normal((7, 6))
+    points = [replace(point, offset_m=(0.1, -0.2, 0.3)) for point in chain.points]
+    moved = motion(chain, angles, points)
+    for number, point in enumerate(points):
+        position, rotation, jacobian = poses_and_jacobians(chain, angles, point)
+        np.testing.assert_allclose(moved.position[number].T, position, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(np.moveaxis(moved.rotation[number], -1, 0), rotation, rtol=0, atol=ROUNDING)
+        found = moved.jacobian(point.after, moved.position[number])
+        np.testing.assert_allclose(np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING)
+        some = moved.jacobian(point.after, moved.position[number][:, [4, 1, 1]], 3, np.array([4, 1, 1]))
+        np.testing.assert_allclose(np.moveaxis(some, -1, 0), jacobian[[4, 1, 1], :3], rtol=0, atol=ROUNDING)
+        moment = wrench[:, 3:] + np.cross(position, wrench[:, :3])
+        forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T)
+        np.testing.assert_allclose(forces.T, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)
+
+
+@given(st.lists(st.floats(-1, 1), min_size=3, max_size=3), st.floats(0, np.pi - 1e-3))
+def test_rotation_vectors_agree_with_scipy(direction, angle):
+    norm = np.linalg.norm(direction)
+    vector = angle * (np.array(direction) / norm if norm > 1e-3 else np.array([0.0, 0.0, 1.0]))
+    rotation = Rotation.from_rotvec(vector)
+    # sin(angle) near pi - 1e-3 keeps 13 of 16 digits.
+    np.testing.assert_allclose(rotation_vectors(rotation.as_matrix()), rotation.as_rotvec(), rtol=0, atol=1e-12)
+
+
+def test_pose_difference_is_the_displacement_and_the_rotation_in_base_axes():
+    rng = np.random.default_rng(12)
+    start, turn = Rotation.random(20, rng=rng), Rotation.from_rotvec(rng.uniform(-1, 1, (20, 3)))
+    position, move = rng.uniform(-2, 2, (20, 3)), rng.uniform(-1, 1, (20, 3))
+    found = pose_differences(position + move, (turn * start).as_matrix(), position, start.as_matrix())
+    np.testing.assert_allclose(found[..., :3], move, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found[..., 3:], turn.as_rotvec(), rtol=0, atol=1e-13)

@@ -7,8 +7,8 @@ import pytest
 from support import refused
 
 from elastocal.io.documents import check_document
+from elastocal.mechanics.robot import usual_compliance
 from elastocal.mechanics.robot_file import document_of, joint_count, robot_from_document
-from elastocal.mechanics.usual_values import usual_compliance
 
 TWO_JOINTS = {
     "name": "two joints",
@@ -51,11 +51,9 @@ def test_robot_file_comes_in_si_units():
     np.testing.assert_allclose(robot.joint_limits, [[-np.pi, np.pi], [-np.pi / 2, np.pi / 4]], rtol=1e-15)
     np.testing.assert_array_equal(robot.reported_matrix, np.eye(2))
     np.testing.assert_array_equal(robot.reported_offset, np.zeros(2))
-
-
-def test_without_limits_a_joint_turns_once_either_way():
-    robot = robot_from_document(document(joint_limits_deg=None))
-    np.testing.assert_allclose(robot.joint_limits, [[-2 * np.pi, 2 * np.pi]] * 2, rtol=1e-15)
+    unlimited = robot_from_document(document(joint_limits_deg=None)).joint_limits
+    np.testing.assert_allclose(unlimited, [[-2 * np.pi, 2 * np.pi]] * 2, rtol=1e-15)
+    assert joint_count({"chain": TRACKED["chain"]}) == 3
 
 
 def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_written():
@@ -64,10 +62,6 @@ def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_wri
     assert not robot.compliance_known and robot_from_document(document()).compliance_known
     assert "compliance_urad_per_Nm" not in document_of(robot)
     assert not robot_from_document(document_of(robot)).compliance_known
-
-
-def test_joints_are_counted_without_more_than_the_chain():
-    assert joint_count({"chain": TRACKED["chain"]}) == 3
 
 
 @pytest.mark.parametrize(
@@ -135,24 +129,14 @@ def test_robot_becomes_a_document_that_gives_it_back(more):
     ("changes", "key"),
     [
         ({"masses": [{"link": 1, "mass_kg": 5, "centre_m": [0, 0, 0]}]}, "masses[0].relative_std"),
-        ({"masses": [WEIGHED["masses"][0] | {"mass_kg": 0}]}, "masses[0].mass_kg"),
         ({"masses": [WEIGHED["masses"][0] | {"centre_m": [0, 0]}]}, "masses[0].centre_m"),
-        ({"gravity_m_s2": [0, 0]}, "gravity_m_s2"),
         ({"gear_ratio": [0, 100]}, "gear_ratio[0]"),
         ({"compensator": {"joint": 2, "kind": "rope"}}, "compensator.kind"),
-        ({"payload_kg": 0}, "payload_kg"),
-        ({"compliance_urad_per_Nm": [1e-300, 1]}, "compliance_urad_per_Nm[0]"),
-        ({"gravity_m_s2": [0, 0, -9806.65]}, "gravity_m_s2[2]"),
-        ({"masses": [WEIGHED["masses"][0] | {"relative_std": 1e9}]}, "masses[0].relative_std"),
         ({"lengths_m": {"l1": 1500}}, "lengths_m.l1"),
-        ({"links": TUBES | {"youngs_modulus_GPa": 7e10}}, "links.youngs_modulus_GPa"),
         # Beyond all machines, and so large that sums and squares of it are infinite.
         ({"payload_kg": 1e300}, "payload_kg"),
-        ({"masses": [WEIGHED["masses"][0] | {"mass_kg": 1e300}]}, "masses[0].mass_kg"),
         ({"masses": [WEIGHED["masses"][0] | {"centre_m": [0, 0, -1e300]}]}, "masses[0].centre_m[2]"),
         ({"gravity_m_s2": [0, 0, -1e300]}, "gravity_m_s2[2]"),
-        ({"compliance_urad_per_Nm": [1e300, 1]}, "compliance_urad_per_Nm[0]"),
-        ({"name": "two\x1b[2J"}, "name"),
         ({"joint_names": ["a", "b\x07"]}, "joint_names[1]"),
     ],
 )

@@ -24,7 +24,9 @@ def extended(sites, angles):
     return np.concatenate([angles, np.zeros((*angles.shape[:-1], sites.chain.coordinates - sites.joints))], axis=-1)
 
 
-def test_sites_at_zero_leave_the_poses_and_jacobians_of_the_robot(chain):
+@pytest.mark.parametrize("name", [*NAMES, *ODD_CHAINS])
+def test_sites_at_zero_leave_the_poses_and_jacobians_of_the_robot(name, chain_called):
+    chain = chain_called(name)
     sites, angles = sites_of(chain), random_angles(np.random.default_rng(0), chain, 2, 3)
     assert [p.name for p in sites.chain.points] == [p.name for p in chain.points]
     for ours, point in zip(sites.chain.points, chain.points, strict=True):
@@ -92,14 +94,8 @@ def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_cal
     lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
     expected = [[link for link in links if lengths[link] > 0] for links in CARRIED[name]]
     assert [sites.carried_links(joint) for joint in range(sites.joints)] == expected
-
-
-@pytest.mark.parametrize(
-    ("name", "shoulder"),
-    [("fanuc", 1), ("kuka", 1), ("ur10", 1), ("three joints", 1), ("seven joints", 1), ("fixed rotations", 0)],
-)
-def test_shoulder_is_the_first_joint_that_carries_weight(name, shoulder, chain_called):
-    assert sites_of(chain_called(name)).shoulder == shoulder
+    # The first that carries weight.
+    assert sites.shoulder == next(joint for joint, links in enumerate(expected) if links)
 
 
 def test_sites_of_a_robot_on_a_track_and_of_one_with_a_parallelogram():
@@ -110,16 +106,6 @@ def test_sites_of_a_robot_on_a_track_and_of_one_with_a_parallelogram():
     assert (sites.joints, len(sites.tilt), len(sites.link_end)) == (4, 4, 5)
     # A link ends where a passive joint turns.
     np.testing.assert_allclose(sites.link_vectors_m[2:4], [(0, 0, 0.8), (0.9, 0, 0)], atol=1e-16)
-
-
-@pytest.mark.parametrize("name", ODD_CHAINS)
-def test_sites_leave_odd_robots_as_they_were(name, chain_called):
-    chain = chain_called(name)
-    sites, angles = sites_of(chain), random_angles(np.random.default_rng(7), chain, 5)
-    coordinates = np.concatenate([angles, np.zeros((5, sites.chain.coordinates - sites.joints))], axis=1)
-    for point, own in zip(sites.chain.points, chain.points, strict=True):
-        for found, expected in zip(poses(sites.chain, coordinates, point), poses(chain, angles, own), strict=True):
-            np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
 
 
 def test_the_longest_torque_of_a_weight_is_that_of_a_level_arm_with_the_mass_in_the_middle_of_its_link(kuka):

@@ -14,12 +14,10 @@ from scipy.optimize import brentq
 from support import OTHER_CHAINS, robot_of
 
 from elastocal.errors import InputError
-from elastocal.mechanics.chain import stretches
+from elastocal.mechanics.elastostatics import extended_chain, spring_compliance, with_tube
 from elastocal.mechanics.elastostatics import generalized_forces as joint_torques
-from elastocal.mechanics.kinematics import poses, poses_and_jacobians
-from elastocal.mechanics.links import extended_chain, spring_compliance
-from elastocal.mechanics.pose_differences import pose_differences
-from elastocal.mechanics.robot import Link, Tube
+from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.mechanics.robot import Tube
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.machine import (
     Compensator,
@@ -93,7 +91,7 @@ def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_a
 def test_a_tube_in_segments_bends_twists_and_stretches_as_the_catalogues_cantilever():
     arm, robot = arm_from_file(ROBOTS / "kuka.yaml"), analysed("kuka")
     tube = Tube(0.25, 0.02, 70e9, 26e9)
-    robot = replace(robot, links=tuple(Link(after, vector, tube) for after, vector in stretches(robot.chain)))
+    robot = replace(robot, links=with_tube(analysed("kuka_extended"), tube).links)
     inner = tube.outer_diameter_m - 2 * tube.wall_m
     second = np.pi * (tube.outer_diameter_m**4 - inner**4) / 64
     area = np.pi * (tube.outer_diameter_m**2 - inner**2) / 4

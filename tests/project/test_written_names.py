@@ -41,19 +41,17 @@ COMMANDS = {
     "import dh": (("import", "dh", "arm.csv", "-o", "out/arm.yaml", "--force"), "out"),
     "import csv": ((*CSV, "out"), "out"),
     "import csv again": ((*CSV, "out", "--force"), "out"),
-    "plan": ((*PLAN, "--output", "out/plan.csv"), "out"),
-    "plan of a campaign": ((*PLAN, "--folder", "out/cell"), "out"),
+    "plan": ((*PLAN, "--folder", "out/cell"), "out"),
     "correct": (("correct", "made", "path.csv", "--output", "out/targets.csv"), "out"),
     "export": (("export", "made", "--output", "out"), "out"),
-    "certificate": ((*CERTIFICATE, "--output", "out"), "out"),
-    "certificate of the campaign": (CERTIFICATE, "reports/loop/made"),
+    "certificate": (CERTIFICATE, "reports/loop/made"),
     "simulate_measurements.py": (("simulate_measurements.py", "simulated", "simulated/robot.yaml"), "simulated"),
     "rehearse.py measure": (("rehearse.py", "measure", "planned"), "planned"),
     "rehearse.py path": (("rehearse.py", "path", "planned", "out/path.csv"), "out"),
 }
 KINDS = ("link", "dangling link", "link to a folder", "pipe", "socket", "device", "folder")
 # Folders that are new as a whole: their own name is what is written, and nothing below it.
-WHOLE = {"plan of a campaign": "cell"}
+WHOLE = {"plan": "cell"}
 
 
 @pytest.fixture(scope="module")
@@ -171,7 +169,7 @@ def test_what_stands_at_a_name_that_is_written_is_refused_and_stays(checkout, na
             shutil.rmtree(top)
 
 
-@pytest.mark.parametrize("command", ["plan", "plan of a campaign", "export", "certificate"])
+@pytest.mark.parametrize("command", ["plan", "export", "certificate"])
 def test_a_command_that_is_killed_leaves_the_old_files_or_none(checkout, names_written, tmp_path, monkeypatch, command):
     """Killed while it draws: what it wrote has no final name; the next run replaces all of the old ones."""
     top = shutil.copytree(checkout, tmp_path / "top", symlinks=True)

@@ -6,9 +6,8 @@ import pytest
 from made_studies import few_of
 from made_study_blocks import PAPER, compliances, deflections_of, experiments_of, identified, judge
 
-from elastocal.mechanics.elastostatics import generalized_forces
+from elastocal.mechanics.elastostatics import extended_chain, generalized_forces, spring_compliance
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.mechanics.links import extended_chain, spring_compliance
 from elastocal.study.ladder import ladder, ladder_blocks, products_of, spring_columns
 from elastocal.study.metrics import position_errors
 from elastocal.study.simulation import random_experiments, true_deflections

@@ -46,7 +46,7 @@ def test_each_command_and_option_of_the_readme_is_one_of_the_script():
 
 
 WAYS = {
-    "demo": ("elastocal", "demo", "campaigns/demo", "--no-open"),
+    "demo": ("elastocal", "demo", "campaigns/demo"),
     "kr16": ("workflow/examples/afternoon.sh", "campaigns/kr16"),
 }
 

@@ -35,8 +35,7 @@ from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import hidden_repeatability
 from elastocal.fitting.parameters import parameters
-from elastocal.mechanics.kinematics import jacobians, poses
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -10,7 +10,7 @@ import numpy as np
 from elastocal.application.accuracy import before_m, predict_errors
 from elastocal.application.calibrated import forward, nominal_forward, without
 from elastocal.application.frames import root_mean_square, subtract_placement
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import pose_differences
 
 if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions

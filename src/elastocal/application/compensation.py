@@ -19,12 +19,9 @@ import numpy as np
 from elastocal.application.calibrated import come_to_rest, parts, regressed
 from elastocal.application.inverse_kinematics import SOLVED_M, allowed_steps, along_path, find_beyond_limits, reach_m, refine
 from elastocal.exchange.target_path import OK
-from elastocal.mechanics.kinematics import jacobians
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import jacobians, pose_differences
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
     from elastocal.mechanics.robot import Robot
 
@@ -68,7 +65,6 @@ def find_joint_targets(
     rotation: np.ndarray,
     operating: OperatingConditions,
     start: np.ndarray | None = None,
-    progress: Callable[[int], object] = lambda done: None,
 ) -> Correction:
     """Joint targets that bring the end effector to wanted poses.
 
@@ -76,7 +72,6 @@ def find_joint_targets(
     `position`, `rotation` (N, 3), (N, 3, 3): wanted pose of the last measuring point, m, base axes. `operating`: under which
     each target is reached. `start` (N, n): joint angles near which each target lies, as the controller reports them, rad:
     posture and turns are kept, or the target refused. Without, both are chosen for the path as a whole, see `along_path`.
-    `progress`: called with the number of targets that are done.
     """
     robot = calibrated.robot
     if start is None:
@@ -91,11 +86,8 @@ def find_joint_targets(
     def of(part: slice) -> Correction:
         return _find_chunk_targets(calibrated, position[part], rotation[part], operating.part(part), nominal[part], left[part])
 
-    done = []
     with ThreadPoolExecutor(2) as pool:
-        for found in pool.map(of, parts(len(position))):
-            done.append(found)
-            progress(sum(len(each.status) for each in done))
+        done = [*pool.map(of, parts(len(position)))]
     found = Correction(*(np.concatenate([getattr(each, name) for each in done]) for name in vars(done[0])))
     found.status[other & (found.status != UNREACHABLE)] = OTHER_POSTURE
     return found

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.kinematics import poses_and_jacobians
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import pose_differences, poses_and_jacobians
 
 if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot

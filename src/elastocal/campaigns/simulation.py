@@ -6,9 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.mechanics.components import WRENCH_NAMES
-from elastocal.mechanics.elastostatics import generalized_forces, wrench_of_offset_force
+from elastocal.mechanics.elastostatics import extended_chain, generalized_forces, spring_compliance, wrench_of_offset_force
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
-from elastocal.mechanics.links import extended_chain, spring_compliance
 from elastocal.mechanics.robot import Robot
 from elastocal.random_streams import stream
 

@@ -8,20 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from elastocal.command.campaign import AcceptEnvironment, PhysicsOnly, diagnosed_campaign
-from elastocal.command.printed import print_answer, print_lines
+from elastocal.command.pipeline import PhysicsOnly, diagnosed_campaign
+from elastocal.command.terminal import print_answer, print_lines
 from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from datetime import date
-
     import numpy as np
     import pandas as pd
 
     from elastocal.application.accuracy import Prediction
     from elastocal.application.compensation import Correction
-    from elastocal.exchange.controllers import Controller
     from elastocal.exchange.target_path import TargetPath
     from elastocal.loop.calibrated_files import Diagnosed
     from elastocal.mechanics.robot import Robot
@@ -35,12 +32,7 @@ _LOADS_BOUNDED = 2.0
 def correct(
     folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
     path: Annotated[Path, Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..fz or fx..mz, q1..qn.")],
-    output: Annotated[
-        Path,
-        Option(
-            help="CSV of joint targets; or a program for a controller by its suffix, .src, .mod, .ls, .script, beside a CSV."
-        ),
-    ],
+    output: Annotated[Path, Option(help="CSV of joint targets.")],
     language: Annotated[
         str, Option("--format", help="Write a program beside the CSV too: krl (KUKA), rapid (ABB), tp (FANUC), urscript.")
     ] = "",
@@ -53,7 +45,6 @@ def correct(
     ] = False,
     physics_only: PhysicsOnly = False,
     partial: Annotated[bool, Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
-    accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.
 
@@ -64,46 +55,39 @@ def correct(
     Predicted errors are stated as `elastocal certificate` states them: in the frame of the declared base, or, where the base is
     unknown, in the robot's own frame after its best placement over the campaign's poses.
     """
-    from datetime import date
-
     import numpy as np
     from rich.console import Console
-    from rich.progress import Progress
 
     from elastocal.application.accuracy import accuracy_sentence, before_m, campaign_accuracy, error_rows, predict_errors
     from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted, regressed
     from elastocal.application.compensation import find_joint_targets
     from elastocal.diagnosis.misplaced import point_sentence
-    from elastocal.exchange.controllers import axes_of, check_name, targets_of
+    from elastocal.exchange.controllers import axes_of, check_name, controller_of, targets_of
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.data_frames import write_csv
 
     console = Console(stderr=True)
-    controller, table, program = _places_of(output, language)
+    controller = controller_of(language, "") if language else None
+    check_places(output)
+    if output.suffix != ".csv":
+        raise InputError("--output", "", repr(output.name), "a name that ends in .csv; --format writes a program beside it")
     if axes and controller is None:
-        raise InputError("--axes", "", repr(axes), "with --format, or an --output that is a program")
-    name = check_name(controller, program) if controller else ""
-    check_places(table, program)
+        raise InputError("--axes", "", repr(axes), "with --format")
+    files = [output, *([output.with_suffix(controller.suffix)] if controller else [])]
+    name = check_name(controller, files[-1]) if controller else ""
+    check_places(*files)
     if not output.parent.is_dir():
         raise InputError(output, "", "no such folder", "a file in a folder that is there")
-    campaign = diagnosed_campaign(folder, accept_environment, physics_only)
+    campaign = diagnosed_campaign(folder, physics_only)
     calibrated = campaign.calibrated
     prismatic = calibrated.robot.chain.prismatic
     named = axes_of(controller, prismatic, axes) if controller else ()
     wanted = read_target_path_of(path, calibrated.robot)
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
     print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-        bar = progress.add_task("correcting", total=len(wanted))
-        found = find_joint_targets(
-            calibrated,
-            wanted.position,
-            wanted.rotation,
-            operating,
-            wanted.start,
-            lambda done: progress.update(bar, completed=done),
-        )
+    with console.status("correcting"):
+        found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
     good = found.status == OK
     if not good.all() and not partial:
         rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in (~good).nonzero()[0]], _NAMED)
@@ -125,45 +109,42 @@ def correct(
     status[good & heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
     errors = predict_errors(calibrated, found.joint_angles, operating)
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
-    files = [table, program] if controller else [table]
     with write_together(output.parent, [file.name for file in files]) as folder_of_all:
-        write_csv(folder_of_all / table.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
+        write_csv(folder_of_all / output.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
         if controller:
             targets = targets_of(found.joint_angles[good], prismatic, named)
-            notes = _notes(campaign, wrench[good], date.today())
-            write_text(folder_of_all / program.name, controller.program(name, targets, notes))
-    lines, stated, share = [], [], f"{grouped(good.sum())} of {counted(len(good), 'target')}"
+            write_text(folder_of_all / files[1].name, controller.program(name, targets, _notes(campaign, wrench[good])))
+    share = f"{grouped(good.sum())} of {counted(len(good), 'target')}"
+    stated, sentences = [], []
     if bounded.any():
         known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
         accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
         stated.append((accuracy, float(np.sqrt((before[bounded] ** 2).mean()))))
-        lines.append(accuracy_sentence(accuracy))
-    table_of_errors = error_rows(campaign.verdict, *stated)
-    lines = [*(f"{where}: {off} uncorrected, {after} corrected" for where, off, after in table_of_errors), *lines]
+        sentences.append(accuracy_sentence(accuracy))
+    table = error_rows(campaign.verdict, *stated)
+    lines = [*(f"{where}: {off} uncorrected, {after} corrected" for where, off, after in table), *sentences]
     if good.any():
         lines += [accuracy_sentence(campaign_accuracy(calibrated)), point_sentence(campaign.case.campaign)]
     if calibrated.remainder is not None:
         added = np.linalg.norm(regressed(calibrated, found.joint_angles[good], operating.part(good)), axis=1)
         size = f"{1e3 * np.sqrt((added[added > 0.0] ** 2).mean()):.3f} mm RMS" if added.any() else "nothing"
-        words = campaign.verdict["remainder"]["words"]
         acts = f"{grouped((added > 0.0).sum())} of {counted(len(added), 'target')}"
+        words = campaign.verdict["remainder"]["words"]
         lines.append(f"a {words} on what the model leaves corrects {acts} by {size}; --physics-only leaves it out")
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
-        lines.append(f"{program.name} goes to {share}: {controller.words}, {called}")
-    lines += [f"! {each['sentence']}" for each in campaign.verdict["misplaced"]]
-    lines += [f"! {line}" for line in swings[:_NAMED]]
+        lines.append(f"{files[1].name} goes to {share}: {controller.words}, {called}")
+    alarms = [*(each["sentence"] for each in campaign.verdict["misplaced"]), *swings[:_NAMED]]
     if len(swings) > _NAMED:
-        lines.append(f"! and {counted(len(swings) - _NAMED, 'more large step')}")
+        alarms.append(f"and {counted(len(swings) - _NAMED, 'more large step')}")
     if unbounded := int((good & ~bounded).sum()):
         what = f"{_LOADS_BOUNDED:g} times the measured loads or outside the fitted range of joints"
-        some = f"{grouped(unbounded)} of {counted(int(good.sum()), 'target')}"
-        lines.append(f"! no bound is stated for {some}: beyond {what}")
+        alarms.append(f"no bound is stated for {grouped(unbounded)} of {counted(int(good.sum()), 'target')}: beyond {what}")
     if beyond.any():
         some = f"{grouped(beyond.sum())} of {counted(len(beyond), 'target')}"
-        lines.append(f"! {some} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
-    following = f"elastocal certificate {folder} --tolerance 0.2mm"
-    print_answer(bool(good.all()), f"{share} corrected", [*lines, *map(str, files)], following, console)
+        alarms.append(f"{some} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
+    lines += [*(f"! {alarm}" for alarm in alarms), *map(str, files)]
+    print_answer(good.all(), f"{share} corrected", lines, f"elastocal certificate {folder} --tolerance 0.2mm", console)
 
 
 def _swings(wanted: TargetPath, found: Correction, good: np.ndarray, robot: Robot) -> list[str]:
@@ -179,34 +160,18 @@ def _swings(wanted: TargetPath, found: Correction, good: np.ndarray, robot: Robo
     ]
 
 
-def _places_of(output: Path, language: str) -> tuple[Controller | None, Path, Path]:
-    """The language of a program, if there shall be one, and where the CSV and the program go."""
-    from elastocal.exchange.controllers import controller_of
-
-    by_suffix = controller_of("", output.suffix)
-    controller = controller_of(language, "") if language else by_suffix
-    if controller is None:
-        return None, output, output
-    if by_suffix not in (None, controller):
-        allowed = f"{controller.suffix} | .csv"
-        raise InputError(output, "--output", f"a program in another language than {controller.words}", allowed)
-    return controller, output.with_suffix(".csv") if by_suffix else output, output.with_suffix(controller.suffix)
-
-
-def _notes(campaign: Diagnosed, wrench: np.ndarray, day: date) -> list[str]:
+def _notes(campaign: Diagnosed, wrench: np.ndarray) -> list[str]:
     """For what a program holds: robot, campaign, day, loads (N, 6) and tool, one line each."""
+    from datetime import date
+
     end = campaign.calibrated.robot.chain.end_effector
-    sizes = [math.sqrt((part**2).sum(axis=1).max()) for part in (wrench[:, :3], wrench[:, 3:])]
-    load = (
-        f"force up to {sizes[0]:.4g} N, moment up to {sizes[1]:.4g} N m"
-        if any(sizes)
-        else "none beside what the robot file states"
-    )
+    force, moment = (math.sqrt((part**2).sum(axis=1).max()) for part in (wrench[:, :3], wrench[:, 3:]))
+    load = f"force up to {force:.4g} N, moment up to {moment:.4g} N m"
     return [
         f"robot: {campaign.calibrated.robot.name}",
         f"campaign: {campaign.name}",
-        f"date: {day.isoformat()}",
-        f"load: {load}",
+        f"date: {date.today().isoformat()}",
+        f"load: {load if force or moment else 'none beside what the robot file states'}",
         f"tool: {end.name}, target offset {', '.join(f'{1e3 * value:.4g}' for value in end.offset_m)} mm",
     ]
 
@@ -232,7 +197,7 @@ def _joint_targets(
     from elastocal.mechanics.components import WRENCH_NAMES
 
     pose = np.column_stack([wanted.position, Rotation.from_matrix(wanted.rotation).as_rotvec()])
-    columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), pose.T, strict=True))
+    columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), pose.T, strict=True)) | dict(zip(WRENCH_NAMES, wrench.T, strict=True))
     angles = {f"q{joint}": column for joint, column in enumerate(found.joint_angles.T, 1)}
     nominal = {f"q{joint}_uncorrected": column for joint, column in enumerate(found.uncorrected.T, 1)}
     stated = {
@@ -245,5 +210,4 @@ def _joint_targets(
         "repeatability_m": errors.repeated_m,
         "outside_range": beyond,
     }
-    loads = dict(zip(WRENCH_NAMES, wrench.T, strict=True))
-    return pd.DataFrame(angles | stated | {"status": status} | columns | loads | nominal)
+    return pd.DataFrame(angles | stated | {"status": status} | columns | nominal)

@@ -1,18 +1,14 @@
 """`elastocal demo`: the whole way, from a plan to a certificate, on a simulated robot."""
 
-import os
 import shlex
-import sys
-import webbrowser
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer import Argument, Option
 
-from elastocal.command.pipeline import pipeline, workplace
-from elastocal.command.printed import print_answer, print_lines
-from elastocal.command.quantities import LARGEST_SEED
+from elastocal.command.pipeline import robots, workplace
+from elastocal.command.terminal import LARGEST_SEED, print_answer, print_lines
 from elastocal.counting import counted
 
 _ROBOT, _TARGETS, _PATH = "kuka", "targets.csv", "path.csv"
@@ -31,13 +27,11 @@ def demo(
     folder: Annotated[Path, Argument(help="New folder for the campaign.")] = Path("elastocal-demo"),
     effect: Annotated[list[str] | None, Option(help="Hidden effect, such as joint_tilt; may be repeated.")] = None,
     seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Seed of the robot's errors and of the noise.")] = 1,
-    show: Annotated[bool, Option("--open/--no-open", help="Open the report in a browser.")] = True,
 ) -> None:
     """Go the whole way on a simulated KUKA, in about a minute.
 
     A physical simulation with hidden defects stands in for the robot: it is planned for, measured, checked, diagnosed,
-    corrected and certified by the commands that a real robot needs, which are printed. The report opens in a browser where
-    there is one. Nothing but this package is needed.
+    corrected and certified by the commands that a real robot needs, which are printed. Nothing but this package is needed.
     """
     import numpy as np
     from rich.console import Console
@@ -46,8 +40,7 @@ def demo(
     from elastocal.campaigns.reading import read_descriptions, read_robot
     from elastocal_proof.blind.rehearsal import fill_sheet, hidden_robot, hidden_words, measured_errors, write_milling_path
 
-    robots, console = pipeline() / "config" / "robots", Console(stderr=True)
-    file = robots / f"{_ROBOT}.yaml"
+    console, file = Console(stderr=True), robots() / f"{_ROBOT}.yaml"
     robot, defects = hidden_robot(file, seed, effect or ["transmission_harmonic"])
     command = context.find_root().command
 
@@ -59,7 +52,7 @@ def demo(
             raise typer.Exit(code)
 
     run("plan", file, "--folder", folder, *_PLAN.split())
-    count = fill_sheet(folder / CSV, read_descriptions(folder, robots)[0], robot, seed)
+    count = fill_sheet(folder / CSV, read_descriptions(folder, robots())[0], robot, seed)
     print_lines(["", f"# The simulated robot is measured: {counted(count, 'measurement')} in {folder / CSV}"], console)
     run("check", folder)
     run("diagnose", folder)
@@ -84,10 +77,3 @@ def demo(
     print_answer(
         missed["corrected"] < missed["uncorrected"], answer, details, "the same with your robot: elastocal --help", console
     )
-    if show and _has_browser():
-        webbrowser.open(report.as_uri())
-
-
-def _has_browser() -> bool:
-    """Whether somebody sits at a desktop: elsewhere a browser would take over the terminal."""
-    return sys.stdout.isatty() and (sys.platform != "linux" or any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY")))

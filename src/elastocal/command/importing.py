@@ -9,25 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from typer import Argument, Option
 
-from elastocal.command.pipeline import pipeline
-from elastocal.command.printed import example
-from elastocal.command.quantities import LARGEST_RELATIVE_STD, MOST_ROWS
+from elastocal.command.pipeline import robots
+from elastocal.command.terminal import MOST_ROWS, example
 from elastocal.counting import counted
 from elastocal.errors import InputError, printable
-from elastocal.exchange import URDF_MASS_STD
 
 if TYPE_CHECKING:
     from elastocal.exchange.measurement_table import ImportedMeasurements
     from elastocal.exchange.robot_text import Imported
-    from elastocal.mechanics.robot import Robot
 
 importing = typer.Typer(name="import", no_args_is_help=True)
 _Output = Annotated[Path, Option("--output", "-o", help="The robot file to write.")]
 _Force = Annotated[bool, Option("--force", help="Replace the file that is there.")]
-_MassStd = Annotated[
-    float,
-    Option(min=0.001, max=LARGEST_RELATIVE_STD, help="How well the masses are known: standard deviation over the value."),
-]
 
 
 @importing.callback()
@@ -42,11 +35,7 @@ def urdf(
     tip: Annotated[str, Option(help="Link at the end; its frame is the last measuring point.")],
     output: _Output,
     point: Annotated[list[str] | None, Option(help="A link between them that targets may sit on; any number.")] = None,
-    limits: Annotated[
-        Literal["deg", "rad"] | None,
-        Option(help="Unit of the limits of joints that turn; asked for where they look like degrees."),
-    ] = None,
-    mass_std: _MassStd = URDF_MASS_STD,
+    limits: Annotated[Literal["deg", "rad"] | None, Option(help="Unit of the limits of joints that turn.")] = None,
     force: _Force = False,
 ) -> None:
     """Make a robot file of the chain between two links of a URDF.
@@ -57,7 +46,7 @@ def urdf(
     from elastocal.exchange.urdf import robot_from_urdf
 
     refuse_existing(output, force)
-    _write(robot_from_urdf(file, base, tip, point or (), mass_std, limits), output)
+    _write(robot_from_urdf(file, base, tip, point or (), limits_in=limits), output)
 
 
 @importing.command(epilog=example("elastocal import dh arm.csv -o robot.yaml"))
@@ -98,14 +87,10 @@ def csv(
     angles: Annotated[str | None, Option(help="Unit of angles whose header has none: deg, rad, mrad.")] = None,
     lengths: Annotated[str | None, Option(help="Unit of lengths whose header has none: m, mm, um, in.")] = None,
     rotation: Annotated[
-        str | None,
-        Option(help="Orientations: none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes), euler:xyz (fixed)."),
+        str | None, Option(help="none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes), euler:xyz (fixed).")
     ] = None,
     names: Annotated[
-        str | None,
-        Option(
-            "--columns", help="Of a table without a header: names of all columns in order, q1,q2,…; none for one to leave out."
-        ),
+        str | None, Option("--columns", help="Of a table without a header: names in order, q1,q2,…; none to leave one out.")
     ] = None,
     column: Annotated[list[str] | None, Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed.")] = None,
     ignore: Annotated[list[str] | None, Option(help="Header of a column to leave out; as often as needed.")] = None,
@@ -114,21 +99,12 @@ def csv(
         list[str] | None,
         Option(help="Name of the target where no column has it; of each of several in a row NAME=X,Y,Z, its columns."),
     ] = None,
-    wrench: Annotated[
-        Literal["on-robot", "by-robot"] | None, Option(help="Forces on the robot, or those that it exerts.")
-    ] = None,
+    wrench: Annotated[Literal["on-robot", "by-robot"] | None, Option(help="Forces on the robot, or by it.")] = None,
     skip_empty: Annotated[bool, Option("--skip-empty", help="Leave out rows without a position.")] = False,
-    separator: Annotated[
-        Literal["tab", "semicolon", "bar", "comma", "space"] | None, Option(help="Between columns. Default: found out.")
-    ] = None,
     decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of decimals. Default: found out.")] = None,
     encoding: Annotated[str | None, Option(help="Such as utf-8 or cp1252. Default: found out.")] = None,
-    header: Annotated[
-        int | None, Option(min=1, max=MOST_ROWS, help="Line with the names of the columns. Default: found out.")
-    ] = None,
-    robot: Annotated[
-        Path | None, Option(help="Robot file whose joint_names the columns have. Default: that of FOLDER/campaign.yaml.")
-    ] = None,
+    header: Annotated[int | None, Option(min=1, max=MOST_ROWS, help="Line with the names. Default: found out.")] = None,
+    robot: Annotated[Path | None, Option(help="Its joint_names are names of columns. Default: the campaign's robot.")] = None,
     options: Annotated[Path | None, Option(help="import.yaml of an earlier import, to repeat it.")] = None,
     force: Annotated[bool, Option("--force", help="Replace a measurements.csv that is filled in.")] = False,
 ) -> None:
@@ -139,7 +115,9 @@ def csv(
     ambiguous is asked for. Poses, loads and repeats are counted where no column numbers them. The end of the output states
     what was read, how, and what was left out; import.yaml has the options, and what was found out.
     """
+    from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
+    from elastocal.campaigns.reading import read_descriptions, read_robot
     from elastocal.exchange.measurement_table import (
         IMPORT,
         ImportOptions,
@@ -154,38 +132,37 @@ def csv(
         allowed = "another folder, or --force to replace measurements.csv"
         raise InputError(folder, "", "measurements that are there already", allowed)
     earlier = read_import_options(options) if options else ImportOptions()
-    units = _pairs("--unit", unit) | {
-        key: value for key, value in {"angles": angles, "lengths": lengths}.items() if value is not None
-    }
+    alone = target is not None and len(target) == 1 and "=" not in target[0]
     targets = {
-        name.strip(): [header.strip() for header in headers.split(",")]
-        for name, headers in _pairs("--target", target if target and (len(target) > 1 or "=" in target[0]) else None).items()
+        name: [header.strip() for header in headers.split(",")]
+        for name, headers in _pairs("--target", None if alone else target).items()
     }
     if wrong := next((name for name, headers in targets.items() if len({*headers}) != 3), None):
         raise InputError("--target", "", f"{wrong}={','.join(targets[wrong])}", "NAME=X,Y,Z, the columns of its position")
-    stated: dict[str, Any] = {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty, "separator": separator}
-    stated |= {"decimal": decimal, "header": header, "encoding": encoding}
-    stated |= {"names": [name.strip() for name in names.split(",")] if names else None}
+    units = _pairs("--unit", unit) | {kind: word for kind, word in (("angles", angles), ("lengths", lengths)) if word}
+    stated: dict[str, Any] = {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty, "decimal": decimal}
+    stated |= {"header": header, "encoding": encoding, "names": names and [name.strip() for name in names.split(",")]}
     chosen = replace(
         earlier,
         ignore=[*(earlier.ignore or ()), *(ignore or ())] or None,
         columns=dict(earlier.columns or {}) | _pairs("--column", column),
         units=dict(earlier.units or {}) | units,
-        target=(target[0] if target else earlier.target) if not targets else None,
-        targets=targets or (earlier.targets if not target else None),
+        target=target[0] if target and alone else None if targets else earlier.target,
+        targets=targets or (None if alone else earlier.targets),
         **{name: value for name, value in stated.items() if value},
     )
-    arm, known = _described(robot, folder)
-    found = read_measurement_table(file, chosen, arm)
+    known: set[str] = set()
+    if (folder / DOCUMENT).is_file():
+        document, there = read_descriptions(folder, robots())
+        robot, known = robot or there, {*document["targets"]}
+    found = read_measurement_table(file, chosen, None if robot is None else read_robot(robot))
     with write_together(folder, (CSV, IMPORT)) as partial:
         write_measurements(partial / CSV, found.table, found.joints)
         write_text(partial / IMPORT, import_options_text(found.options, file))
     lines = [*_summary(found), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"]
-    if known and (new := {*found.table["target"].tolist()} - known):
-        lines.append(
-            f"! campaign.yaml there has no target {', '.join(sorted(new))}: name it there, or in place of one of its own"
-        )
-    typer.echo("\n".join(map(printable, lines)))
+    if known and (new := ", ".join(sorted({*found.table["target"].tolist()} - known))):
+        lines.append(f"! campaign.yaml there has no target {new}: name it there, or in place of one of its own")
+    _tell(lines)
 
 
 def _write(result: Imported, output: Path) -> None:
@@ -193,43 +170,34 @@ def _write(result: Imported, output: Path) -> None:
     from elastocal.exchange.robot_text import summary, write_robot
 
     write_robot(result, output)
-    typer.echo("\n".join(map(printable, [*summary(result), f"written: {output.as_posix()}"])))
+    _tell([*summary(result), f"written: {output.as_posix()}"])
 
 
-def _described(path: Path | None, folder: Path) -> tuple[Robot | None, set[str]]:
-    """The robot of the file, or of the campaign that the folder holds already, and the targets of this campaign."""
-    from elastocal.campaigns.campaign import DOCUMENT
-    from elastocal.campaigns.reading import read_descriptions, read_robot
-
-    targets: set[str] = set()
-    if (folder / DOCUMENT).is_file():
-        document, there = read_descriptions(folder, pipeline() / "config" / "robots")
-        path, targets = path or there, {*document["targets"]}
-    return None if path is None else read_robot(path), targets
+def _tell(lines: list[str]) -> None:
+    typer.echo("\n".join(map(printable, lines)))
 
 
 def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:
-    found = {}
+    found: dict[str, str] = {}
     for text in texts or ():
-        name, equals, value = text.partition("=")
-        if not (name and equals and value):
-            raise InputError(option, "", repr(text), "NAME=VALUE")
-        found[name.strip()] = value.strip()
+        name, _, value = map(str.strip, text.partition("="))
+        if not (name and value) or name in found:
+            raise InputError(option, "", repr(text), "NAME=VALUE, each name once")
+        found[name] = value
     return found
 
 
 def _is_filled(path: Path) -> bool:
     """Whether a sheet holds a measurement: one of `init` or `plan`, without a position in any row, may be replaced."""
-    from csv import DictReader, Error
+    import pandas as pd
 
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-        rows = DictReader((line for line in file if line.strip() and not line.startswith("#")), skipinitialspace=True)
-        try:
-            places = [name for name in rows.fieldnames or () if name.strip() in ("x", "y", "z", "rx", "ry", "rz")]
-            # Rows of a file without such columns may hold anything.
-            return any(not places or any((row[name] or "").strip() for name in places) for row in rows)
-        except Error:
-            return True
+    try:
+        sheet = pd.read_csv(path, comment="#", dtype=str, skipinitialspace=True)
+    except ValueError:
+        return True
+    places = sheet.filter(regex=r"^r?[xyz] *$")
+    # Rows of a file without such columns may hold anything.
+    return len(sheet) > 0 and (places.empty or bool((places.fillna("").map(str.strip) != "").any(axis=None)))
 
 
 def _summary(found: ImportedMeasurements) -> list[str]:

@@ -9,28 +9,25 @@ from typer import Option
 from typer.core import TyperGroup
 
 import elastocal
-from elastocal.command.certificate import certificate
-from elastocal.command.check import check
+from elastocal.command.campaign import check, diagnose, init
 from elastocal.command.correct import correct
 from elastocal.command.demo import demo
-from elastocal.command.diagnose import diagnose
-from elastocal.command.export import export
 from elastocal.command.importing import importing
-from elastocal.command.init import init
 from elastocal.command.plan import plan
-from elastocal.command.printed import example
+from elastocal.command.results import certificate, export
+from elastocal.command.terminal import example
 from elastocal.errors import InputError, fault_of_machine
 
 # Each subcommand with an example, in the order in which a calibration needs them; `import` is a group of its own.
 COMMANDS: dict[Callable[..., None], str] = {
-    demo: "elastocal demo",
-    init: "elastocal init campaigns/cell --robot robot.yaml",
-    plan: "elastocal plan robot.yaml --folder campaigns/cell --force 200 --pull",
-    check: "elastocal check campaigns/cell",
-    diagnose: "elastocal diagnose campaigns/cell",
-    correct: "elastocal correct campaigns/cell path.csv --output targets.csv",
-    certificate: "elastocal certificate campaigns/cell --tolerance 0.2mm",
-    export: "elastocal export campaigns/cell --output calibrated",
+    demo: "",
+    init: "campaigns/cell --robot robot.yaml",
+    plan: "robot.yaml --folder campaigns/cell --force 200 --pull",
+    check: "campaigns/cell",
+    diagnose: "campaigns/cell",
+    correct: "campaigns/cell path.csv --output targets.csv",
+    certificate: "campaigns/cell --tolerance 0.2mm",
+    export: "campaigns/cell --output calibrated",
 }
 _ORDER = ("demo", "import", *(command.__name__ for command in COMMANDS))
 
@@ -54,7 +51,7 @@ app = typer.Typer(
     epilog=example("elastocal demo"),
 )
 for _command, _typed in COMMANDS.items():
-    app.command(epilog=example(_typed))(_command)
+    app.command(epilog=example(f"elastocal {_command.__name__} {_typed}".strip()))(_command)
 app.add_typer(importing)
 
 

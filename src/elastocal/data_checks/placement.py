@@ -16,8 +16,7 @@ from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states, single_observations
 from elastocal.fitting.prediction import measured_in_base
 from elastocal.fitting.registration import nominal_poses, registered_to
-from elastocal.mechanics.kinematics import poses_and_jacobians
-from elastocal.mechanics.pose_differences import rotation_vectors
+from elastocal.mechanics.kinematics import poses_and_jacobians, rotation_vectors
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.mechanics.elastostatics import generalized_forces
-from elastocal.mechanics.motion import Motion, motion
+from elastocal.mechanics.kinematics import Motion, motion
 from elastocal.mechanics.sites import Sites
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import g as standard_gravity
 
-from elastocal.mechanics.usual_values import usual_payload_kg
+from elastocal.mechanics.robot import usual_payload_kg
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -52,7 +52,7 @@ from elastocal.exchange.fixed_transforms import (
 from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, point_name
 from elastocal.io.documents import read_document
 from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
-from elastocal.mechanics.usual_values import UNLIMITED_DEG
+from elastocal.mechanics.robot import UNLIMITED_DEG
 
 _SCALES = {"deg": math.radians(1.0), "rad": 1.0, "m": 1.0, "mm": 1e-3}
 _ANGLE_UNITS, _LENGTH_UNITS = ("deg", "rad"), ("m", "mm")

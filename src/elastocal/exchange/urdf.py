@@ -36,8 +36,7 @@ from elastocal.exchange.fixed_transforms import (
 )
 from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, mass_entries, point_name
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
-from elastocal.mechanics.robot import STANDARD_GRAVITY
-from elastocal.mechanics.usual_values import UNLIMITED_DEG
+from elastocal.mechanics.robot import STANDARD_GRAVITY, UNLIMITED_DEG
 
 # The longest public descriptions, of humanoids with hands, have less than a megabyte.
 LARGEST_BYTES = 20_000_000

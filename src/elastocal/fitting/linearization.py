@@ -19,7 +19,7 @@ from elastocal.fitting.displacement import (
 )
 from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.prediction import differences, measured_in_base, target_points
-from elastocal.mechanics.motion import motion
+from elastocal.mechanics.kinematics import motion
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.fitting.displacement import displaced_coordinates
-from elastocal.mechanics.kinematics import poses_of_points
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import pose_differences, poses_of_points
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions

@@ -1,7 +1,8 @@
 """Tables on disk as pandas data frames, and data frames as the tables that people read."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -23,24 +24,25 @@ def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema])
     frames = [pd.DataFrame({"robot": [], "noise_um": [], "strategy": []})]
     for path in paths:
         origin = read_provenance(path)
-        joints = len(origin["configuration"]["robot"]["compliance_urad_per_Nm"])
-        heads = {
-            "robot": origin["robot"],
-            "noise_um": float(origin["noise"]),
-            "strategy": origin["configuration"]["strategy"]["name"],
-        }
-        frames.append(pd.DataFrame(heads | read_table(path, schema(joints))))
+        settings = origin["configuration"]
+        heads = {"robot": origin["robot"], "noise_um": float(origin["noise"]), "strategy": settings["strategy"]["name"]}
+        frames.append(_headed(heads, path, schema, settings["robot"]))
     return pd.concat(frames[1:] or frames, ignore_index=True)
 
 
 def read_studies(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
     """Tables of further studies, one at least, in one frame, headed by the robot that their provenance says."""
-    frames = []
-    for path in paths:
-        origin = read_provenance(path)
-        joints = len(origin["configuration"]["study"]["robot"]["compliance_urad_per_Nm"])
-        frames.append(pd.DataFrame({"robot": origin["robot"]} | read_table(path, schema(joints))))
+    origins = [(path, read_provenance(path)) for path in paths]
+    frames = [
+        _headed({"robot": origin["robot"]}, path, schema, origin["configuration"]["study"]["robot"]) for path, origin in origins
+    ]
     return pd.concat(frames, ignore_index=True)
+
+
+def _headed(
+    heads: Mapping[str, Any], path: str | Path, schema: Callable[[int], TableSchema], robot: Mapping[str, Any]
+) -> pd.DataFrame:
+    return pd.DataFrame({**heads, **read_table(path, schema(len(robot["compliance_urad_per_Nm"])))})
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, digits: int = 9) -> None:
@@ -56,12 +58,5 @@ def write_markdown(path: str | Path, frame: pd.DataFrame, origin: Origin | None 
 
 def write_latex(path: str | Path, frame: pd.DataFrame, origin: Origin | None = None) -> None:
     """Write a frame of strings as a LaTeX tabular, with its origin in a comment behind it."""
-    shown = frame.rename(columns=_latex).map(_latex)
     named = f"% {origin.words}\n" if origin else ""
-    write_text(path, shown.to_latex(index=False, column_format="l" * shown.shape[1]) + named)
-
-
-def _latex(text: str) -> str:
-    for plain, escaped in (("_", r"\_"), ("%", r"\%"), ("±", r"$\pm$"), ("µ", r"\textmu{}")):
-        text = str(text).replace(plain, escaped)
-    return text
+    write_text(path, frame.to_latex(index=False, escape=True, column_format="l" * frame.shape[1]) + named)

@@ -20,12 +20,12 @@ LARGEST_BYTES, MOST_VALUES, DEEPEST = 300_000, 100_000, 20
 # More digits are no number that anything here counts, and beyond 308 no floating-point number.
 _MOST_DIGITS = 18
 _DECIMAL = re.compile(
-    rf"[-+]?(0|[1-9]\d{{0,{_MOST_DIGITS - 1}}})|[-+]?(\d+\.\d*|\.\d+)([eE][-+]\d+)?|[-+]?\.(inf|nan)", re.ASCII | re.IGNORECASE
+    rf"[-+]?(0|[1-9]\d{{0,{_MOST_DIGITS - 1}}})|[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)|[-+]?(\d+\.\d*|\.\d+)|[-+]?\.(inf|nan)",
+    re.ASCII | re.IGNORECASE,
 )
-# What some programs write and YAML 1.1 takes for a text.
-_WITHOUT_POINT = re.compile(r"([-+]?\d+)(?:\.(\d*))?[eE]([-+]?)(\d+)", re.ASCII)
 # Faults of one document that are looked at: it may hold a fault in each of its entries.
 _MOST_FAULTS = 1000
+_NOT_XML = "YAML; a URDF becomes a robot file by `elastocal import urdf FILE --base LINK --tip LINK --output robot.yaml`"
 
 
 class _UnclearError(yaml.MarkedYAMLError):
@@ -66,6 +66,8 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
 
 for _kind in ("int", "float"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.construct_number)
+# A number without a point or a sign in its exponent, which YAML 1.1 takes for a text.
+_Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d+$", re.ASCII), "-+0123456789")
 
 
 @cache
@@ -95,9 +97,6 @@ def _validator(schema: str) -> Any:
     return validator(read_schema(schema), format_checker=jsonschema.FormatChecker(["date"]))
 
 
-_NOT_XML = "YAML; a URDF becomes a robot file by `elastocal import urdf FILE --base LINK --tip LINK --output robot.yaml`"
-
-
 def read_document(path: str | Path) -> Any:
     """Contents of a YAML file; one that is missing or `parsed` refuses is an InputError."""
     return parsed(read_text(path, LARGEST_BYTES), path)
@@ -110,51 +109,48 @@ def parsed(text: str, source: str | Path) -> Any:
     try:
         _check_events(text)
         return yaml.load(text, Loader=_Loader)
-    except yaml.YAMLError as error:
-        mark, allowed = getattr(error, "problem_mark", None), getattr(error, "allowed", "YAML")
-        line, found = getattr(mark, "line", None), (getattr(error, "problem", None) or str(error))
-        if isinstance(error, yaml.reader.ReaderError):
-            line, found = text.count("\n", 0, error.position), f"the control character {chr(error.character)!r}"
-        elif line is not None and mark and not isinstance(error, _UnclearError):
-            here = "".join(text.splitlines()[line:][:1])[mark.column :][:40].strip()
+    except yaml.reader.ReaderError as error:
+        line, found = text.count("\n", 0, error.position) + 1, f"the control character {chr(error.character)!r}"
+        raise InputError(source, f"line {line}", found, "YAML") from None
+    except yaml.MarkedYAMLError as error:
+        mark: Any = error.problem_mark or error.context_mark
+        found = str(error.problem)
+        if not isinstance(error, _UnclearError):
+            here = "".join(text.splitlines()[mark.line :][:1])[mark.column :][:40].strip()
             problem, _, wanted = found.partition("did not find expected ")
-            shown = repr(here) if here else "the end of the line" if text.splitlines()[line + 1 :] else "the end of the text"
-            found = shown if wanted else f"{problem.removeprefix('but ').removeprefix('found ')}: {shown}"
-            allowed = f"YAML with {wanted} here" if wanted else allowed
-        where = "" if line is None else f"line {line + 1}"
-        raise InputError(source, where, found, allowed) from None
+            found = f"{f'no {wanted}' if wanted else problem.removeprefix('found ')}: {here!r}"
+        raise InputError(source, f"line {mark.line + 1}", found, getattr(error, "allowed", "YAML")) from None
 
 
 def _check_events(text: str) -> None:
-    """Refuse what lets a small file grow beyond bounds or makes other objects than values, before anything is made of it."""
-    # Of each open list or mapping its anchor, how many values it holds with all aliases written out, and how deep they go.
-    sizes: dict[str, tuple[int, int]] = {}
-    frames: list[tuple[str | None, int, int]] = [(None, 0, 0)]
+    """Refuse what lets a small file grow beyond bounds or makes other objects than values, before anything is made of it.
+
+    An alias stands for as many values as its anchor has; none may stand within an anchor, and so for other aliases.
+    """
+    total, sizes = 0, dict[str | None, int]()
+    # Of each open list or mapping its anchor, and how many values stand before it.
+    opened: list[tuple[str | None, int]] = []
     for event in yaml.parse(text, Loader=_Loader):
-        if isinstance(event, yaml.CollectionStartEvent):
-            frames.append((event.anchor, 0, 0))
-        elif isinstance(event, yaml.CollectionEndEvent):
-            anchor, count, height = frames.pop()
-            sizes |= {} if anchor is None else {anchor: (count, height + 1)}
-            frames[-1] = _enlarged(frames[-1], count, height + 1)
-        elif isinstance(event, yaml.AliasEvent):
-            if event.anchor not in sizes:
-                raise _UnclearError(event.start_mark, f"the alias *{event.anchor} of what is not complete", "values")
-            frames[-1] = _enlarged(frames[-1], *sizes[event.anchor])
-        elif isinstance(event, yaml.ScalarEvent):
-            sizes |= {} if event.anchor is None else {event.anchor: (1, 0)}
-            frames[-1] = _enlarged(frames[-1], 1, 0)
-        if isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent) and event.tag is not None:
-            raise _UnclearError(event.start_mark, f"the tag {event.tag}", "values without tags")
-        if len(frames) + frames[-1][2] - 1 > DEEPEST:
+        if isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent):
+            if event.tag is not None:
+                raise _UnclearError(event.start_mark, f"the tag {event.tag}", "values without tags")
+            opened.append((event.anchor, total))
+            total += 1
+        if isinstance(event, yaml.AliasEvent):
+            if event.anchor not in sizes or any(anchor for anchor, _ in opened):
+                raise _UnclearError(
+                    event.start_mark, f"the alias *{event.anchor}", "one of what is complete, in no other anchor"
+                )
+            total += sizes[event.anchor]
+        if isinstance(event, yaml.ScalarEvent | yaml.CollectionEndEvent):
+            anchor, before = opened.pop()
+            sizes[anchor] = total - before
+        if len(opened) >= DEEPEST:
             raise _UnclearError(event.start_mark, "lists or keys in each other", f"at most {DEEPEST} deep")
-        if frames[-1][1] > MOST_VALUES:
-            allowed = f"at most {MOST_VALUES}, aliases written out"
-            raise _UnclearError(event.start_mark, "more values than a document has", allowed)
-
-
-def _enlarged(frame: tuple[str | None, int, int], count: int, height: int) -> tuple[str | None, int, int]:
-    return frame[0], frame[1] + count, max(frame[2], height)
+        if total > MOST_VALUES:
+            raise _UnclearError(
+                event.start_mark, "more values than a document has", f"at most {MOST_VALUES}, aliases written out"
+            )
 
 
 def one_line(value: Any) -> str:
@@ -218,83 +214,51 @@ def _line_of(source: str, path: Sequence[str | int]) -> str:
     return f"line {mark.line + 1}" if mark and path else ""
 
 
-_BOUNDS = {
-    "minimum": "{} or more",
-    "exclusiveMinimum": "more than {}",
-    "maximum": "{} or less",
-    "exclusiveMaximum": "less than {}",
-}
-
-
 def _key_of(path: Iterable[str | int]) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
 
 
 def _explained(error: Any) -> tuple[str, str, str]:
     """Key, what was found and what is allowed, of one violation."""
-    key = _key_of(error.absolute_path)
-    rule, value = error.validator, error.validator_value
-    if rule == "additionalProperties":
-        known = sorted(error.schema.get("properties", {}))
+    key, schema = _key_of(error.absolute_path), error.schema
+    if error.validator == "additionalProperties":
+        known = sorted(schema.get("properties", {}))
         unknown = next(name for name in error.instance if name not in known)
         return f"{key}.{unknown}".lstrip("."), "an unknown key", f"{closest(unknown, known)} ({', '.join(known)})".strip()
-    if rule == "required":
-        missing = next(name for name in value if name not in error.instance)
-        wanted = error.schema["properties"][missing]
-        kind, meaning = wanted.get("type"), wanted.get("description", "")
-        words = [_of_type(kind, None) if kind else "", *_bounds(wanted)]
-        return f"{key}.{missing}".lstrip("."), "nothing", _meant(" and ".join(filter(None, words)) or "a value", meaning)
-    meaning = error.schema.get("description", "")
-    allowed = {
-        "enum": lambda: " | ".join(map(str, value)),
-        "type": lambda: _of_type(value, error.instance),
-        "minLength": lambda: f"{value} or more characters",
-        "maxLength": lambda: f"{value} or fewer characters",
-        "minItems": lambda: _count(error.schema),
-        "maxItems": lambda: _count(error.schema),
-        "minProperties": lambda: f"{value} or more keys",
-        "uniqueItems": lambda: "each entry once",
-        "pattern": lambda: f"text that matches {value}",
-        "format": lambda: f"a {value} such as {error.schema['examples'][0]}",
-    }.get(rule, lambda: " and ".join(_bounds(error.schema)) if rule in _BOUNDS else error.message)()
-    found = "nothing" if error.instance is None else repr(error.instance)
-    return key, found, _meant(allowed, meaning)
+    if error.validator == "required":
+        missing = next(name for name in error.validator_value if name not in error.instance)
+        return f"{key}.{missing}".lstrip("."), "nothing", _admitted(schema["properties"][missing])
+    return key, "nothing" if error.instance is None else repr(error.instance), _admitted(schema) or error.message
 
 
-def _meant(allowed: str, meaning: str) -> str:
-    return f"{allowed} ({meaning})" if meaning else allowed
+_KINDS = {"number": "a finite number", "object": "keys with values, such as name: value", "null": "nothing"}
+_RANGES = (("minimum", "maximum", ""), ("minLength", "maxLength", " characters"), ("minItems", "maxItems", " entries"))
+_OTHERS = {
+    "exclusiveMinimum": "more than {}",
+    "exclusiveMaximum": "less than {}",
+    "minProperties": "{} or more keys",
+    "pattern": "text that matches {}",
+    "format": "a {} such as 2026-11-20",
+}
 
 
-def _bounds(schema: Mapping[str, Any]) -> list[str]:
-    """What a number may be: of two bounds on the same side the one that holds."""
-    if "minimum" in schema and "maximum" in schema:
-        return [f"{_number(schema['minimum'])} to {_number(schema['maximum'])}"]
-    inner = {"exclusiveMinimum": "minimum", "exclusiveMaximum": "maximum"}
-    return [
-        words.format(_number(schema[name]))
-        for name, words in _BOUNDS.items()
-        if name in schema and inner.get(name) not in schema
-    ]
-
-
-def _number(value: float) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _count(schema: Mapping[str, Any]) -> str:
-    least, most = schema.get("minItems", 0), schema.get("maxItems")
-    if least == most:
-        return f"{least} entries"
-    return f"{least} or more entries" if most is None else f"{least} to {most} entries"
-
-
-def _of_type(allowed: str | list[str], instance: Any) -> str:
-    """What of a type is allowed, with the way to write a number that YAML takes for a text."""
-    written = _WITHOUT_POINT.fullmatch(instance) if isinstance(instance, str) else None
-    if written and ("number" in allowed):
-        return f"number, which YAML has as {written[1]}.{written[2] or 0}e{written[3] or '+'}{written[4]}"
-    words = {"number": "a finite number", "object": "keys with values, such as name: value", "null": "nothing"}
-    return " or ".join(words.get(name, name) for name in ([allowed] if isinstance(allowed, str) else allowed))
+def _admitted(schema: Mapping[str, Any]) -> str:
+    """What a schema admits, in words, with what it means in brackets."""
+    kinds = [schema["type"]] if isinstance(schema.get("type"), str) else schema.get("type", [])
+    kind = " or ".join(_KINDS.get(each, each) for each in kinds)
+    parts = [" | ".join(map(str, schema["enum"])) if "enum" in schema else "" if "minItems" in schema else kind]
+    for low, high, unit in _RANGES:
+        least, most = schema.get(low, ""), schema.get(high, "")
+        if least == most:
+            parts.append(f"{least}{unit}" if low in schema else "")
+        elif high not in schema or low not in schema:
+            parts.append(f"{least}{most} or {'more' if low in schema else 'fewer'}{unit}")
+        else:
+            parts.append(f"{least} to {most}{unit}")
+    parts += [words.format(schema[rule]) for rule, words in _OTHERS.items() if rule in schema]
+    parts += ["each entry once"] if schema.get("uniqueItems") else []
+    meaning = f" ({schema['description']})" if "description" in schema else ""
+    return ", ".join(filter(None, parts)) + meaning
 
 
 def document_path(folder: str | Path, kind: str, name: str) -> str:
@@ -304,12 +268,12 @@ def document_path(folder: str | Path, kind: str, name: str) -> str:
 
 def named_document(folder: str | Path, kind: str, schema: str, name: str, source: str) -> dict[str, Any]:
     """Read and check a document that a configuration, `source`, names: that of `name` without its ending in ``folder/kind``."""
-    path = Path(document_path(folder, kind, name))
     known = sorted(file.stem for file in Path(folder, kind).glob("*.yaml") if file.is_file())
     # By its name alone: a path would lead out of the folder.
     if name not in known:
         allowed = f"a file of {Path(folder, kind).as_posix()}: {closest_first(name, known)}"
         raise InputError(source, kind, repr(name), allowed)
+    path = document_path(folder, kind, name)
     document = read_document(path)
-    check_document(document, schema, path.as_posix())
+    check_document(document, schema, path)
     return document

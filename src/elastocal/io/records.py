@@ -19,11 +19,9 @@ from elastocal.io.texts import check_file
 RECORDS = Path("results/records")
 # What the pipeline makes, the rest is the user's.
 _MADE = ("data", "results", "reports")
-_AS_WRITTEN = "the file as the pipeline wrote it (delete it and run the pipeline again)"
+_AS_WRITTEN = "the file as the pipeline wrote it (delete {} and run the pipeline again)"
 # Of one output, and of all else that its record says.
 _FILES, _DIGEST = "files", "sha256"
-# A module that looks up those beside it by itself: one that is new there counts, too.
-_CATALOGUE = "catalogue.py"
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ def write_records(job: JobRecord) -> None:
     for output in filter(_made, job.outputs):
         place = record_of(output)
         place.parent.mkdir(parents=True, exist_ok=True)
-        written = asdict(job) | {_FILES: {file: checksum(file) for file in files_of(output)}}
+        written = asdict(job) | {_FILES: _digests(output)}
         write_json(place, written | {_DIGEST: configuration_sha256(written)})
 
 
@@ -78,7 +76,8 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
     """
     place = record_of(path, within)
     if not place.is_file():
-        raise InputError(Path(within, path), "", f"no record of the job that made it, {place}", _AS_WRITTEN)
+        found = f"no record of the job that made it, {place}"
+        raise InputError(Path(within, path), "", found, _AS_WRITTEN.format("it"))
     try:
         kept = read_json(place)
         if kept.pop(_DIGEST) != configuration_sha256(kept):
@@ -87,13 +86,13 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
         names = {key: tuple(kept[key]) for key in ("own", "outputs")}
         return JobRecord(**kept | names | {"origin": Origin(**kept["origin"])}), files
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(place, "", f"no record of a job ({error})", f"of {path} {_AS_WRITTEN}") from None
+        raise InputError(place, "", f"no record of a job ({error})", f"of {path} {_AS_WRITTEN.format('it')}") from None
 
 
 def recorded(within: str | Path = "") -> dict[str, str]:
     """SHA-256 of every file that has a record, as `read_record`."""
-    places = sorted(Path(within, RECORDS).rglob("*.json"))
-    names = [place.relative_to(Path(within, RECORDS)).as_posix().removesuffix(".json") for place in places]
+    top = Path(within, RECORDS)
+    names = sorted(place.relative_to(top).as_posix().removesuffix(".json") for place in top.rglob("*.json"))
     return {file: digest for name in names for file, digest in read_record(name, within)[1].items()}
 
 
@@ -111,10 +110,7 @@ def input_digests(paths: Iterable[str], checked: Collection[str] | None = None) 
     digests, own = {}, []
     for path in map(str, paths):
         judged = checked is None or path in checked
-        if judged and _made(path):
-            digests[path] = _intact(path)[1]
-        else:
-            digests[path] = _joint({file: checksum(file) for file in files_of(path)})
+        digests[path] = _intact(path)[1] if judged and _made(path) else _joint(_digests(path))
         if not judged and not record_of(path).is_file():
             own.append(path)
     return digests, tuple(own)
@@ -139,20 +135,16 @@ def jobs_behind(targets: Iterable[str], within: str | Path = "") -> list[JobReco
     for job in found.values():
         for path, digest in job.made_inputs.items():
             if digests[path] != digest:
-                raise InputError(Path(within, path), "", f"not what {job.name} read", _AS_WRITTEN)
+                raise InputError(Path(within, path), "", f"not what {job.name} read", _AS_WRITTEN.format("it"))
     return [job for _, job in sorted(found.items())]
 
 
 def check_sources(jobs: Iterable[JobRecord], within: str | Path, allowed: str) -> None:
     """Refuse results that other modules, scripts or robots made than those that are here now: an InputError with `allowed`."""
     for job in jobs:
-        sources = {Path(within, file): digest for file, digest in job.sources.items()}
-        for path, digest in sources.items():
+        for path, digest in ((Path(within, file), digest) for file, digest in job.sources.items()):
             if not path.is_file() or checksum(path) != digest:
                 raise InputError(path, "", f"not what {job.name} was made with", allowed)
-        for catalogue in (path for path in sources if path.name == _CATALOGUE):
-            if new := set(catalogue.parent.glob("*.py")) - sources.keys():
-                raise InputError(min(new), "", f"a module that {job.name} was made without", allowed)
 
 
 def checksum(path: str | Path) -> str:
@@ -171,16 +163,18 @@ def files_of(path: str, within: str | Path = "") -> list[str]:
     return sorted(file.relative_to(within).as_posix() for file in files)
 
 
+def _digests(path: str, within: str | Path = "") -> dict[str, str]:
+    return {file: checksum(Path(within, file)) for file in files_of(path, within)}
+
+
 def _intact(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
     """The job that made a file or folder, and what it holds, which is what the job wrote."""
     job, written = read_record(path, within)
-    files = files_of(path, within)
-    found = {file: checksum(Path(within, file)) for file in files if Path(within, file).is_file()}
+    found = _digests(path, within) if Path(within, path).exists() else {}
     for file in sorted(written.keys() | found.keys()):
         if written.get(file) != found.get(file):
             what = "other contents than were written" if file in found else "nothing"
-            allowed = _AS_WRITTEN if file == path else _AS_WRITTEN.replace("delete it", f"delete {path}")
-            raise InputError(Path(within, file), "", what, allowed)
+            raise InputError(Path(within, file), "", what, _AS_WRITTEN.format("it" if file == path else path))
     return job, _joint(written)
 
 

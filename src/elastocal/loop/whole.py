@@ -32,7 +32,7 @@ from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import STEPS, residuals
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import pose_differences
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
 

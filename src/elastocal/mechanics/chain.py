@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 AXES = "xyz"
+# Kind and axis of all ways in which a frame can move.
+SIX = tuple((kind, axis) for kind in "TR" for axis in range(3))
 _TOKEN = re.compile(r"(?P<kind>[TR])(?P<axis>[xyz])\((?P<sign>-?)(?P<argument>[^()\s-]+)\)|\[(?P<point>[^\[\]\s]+)\]")
 _NUMBER = re.compile(r"\d+(\.\d*)?|\.\d+")
 _NOTATION = "Tx(length) Ty(..) Tz(..) Rx(joint) Ry(..) Rz(..) Rx(90deg) and [POINT], separated by blanks"
@@ -197,20 +199,3 @@ def _word(transform: Transform) -> str:
         number = np.format_float_positional(math.degrees(amount) if turns else amount, trim="-")
         argument = f"{number}deg" if turns else number
     return f"{transform.kind}{AXES[transform.axis]}({'-' if sign < 0 else ''}{argument})"
-
-
-def stretches(chain: Chain) -> tuple[tuple[int, tuple[float, ...]], ...]:
-    """Rigid stretches between the joints, as (transforms before the far end, vector in the frame of the chain there).
-
-    Rotations by a fixed angle inside a stretch are not supported here, as in any chain that turns at its joints only.
-    """
-    found, vector = [], np.zeros(3)
-    for index, transform in enumerate(chain.transforms):
-        if transform.kind == "T":
-            vector[transform.axis] += transform.constant
-        if transform.kind == "R" or index == len(chain.transforms) - 1:
-            end = index if transform.kind == "R" else index + 1
-            if np.linalg.norm(vector) > 0:
-                found.append((end, tuple(vector.tolist())))
-            vector = np.zeros(3)
-    return tuple(found)

@@ -1,20 +1,12 @@
 """Components of a displacement and of a wrench: name, unit and meaning, as every table and file has them."""
 
 COMPONENTS = (
-    ("dx", "m", "displacement along base x"),
-    ("dy", "m", "displacement along base y"),
-    ("dz", "m", "displacement along base z"),
-    ("rx", "rad", "rotation vector about base x"),
-    ("ry", "rad", "rotation vector about base y"),
-    ("rz", "rad", "rotation vector about base z"),
+    *((f"d{axis}", "m", f"displacement along base {axis}") for axis in "xyz"),
+    *((f"r{axis}", "rad", f"rotation vector about base {axis}") for axis in "xyz"),
 )
 WRENCH = (
-    ("fx", "N", "force along base x"),
-    ("fy", "N", "force along base y"),
-    ("fz", "N", "force along base z"),
-    ("mx", "N m", "moment about base x"),
-    ("my", "N m", "moment about base y"),
-    ("mz", "N m", "moment about base z"),
+    *((f"f{axis}", "N", f"force along base {axis}") for axis in "xyz"),
+    *((f"m{axis}", "N m", f"moment about base {axis}") for axis in "xyz"),
 )
 COMPONENT_NAMES = tuple(name for name, _, _ in COMPONENTS)
 WRENCH_NAMES = tuple(name for name, _, _ in WRENCH)

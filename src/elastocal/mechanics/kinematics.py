@@ -1,12 +1,15 @@
 """Equations 1-4: poses of any measuring point by elementary transforms, its geometric Jacobian by screws; batched.
 
 Arrays come and go with the batch in front, ``(..., 6, n)``, but lie in memory component first, so that every arithmetic step
-runs along the batch; slices such as ``jacobian[..., 0, 2]`` are contiguous.
+runs along the batch; slices such as ``jacobian[..., 0, 2]`` are contiguous. Those of a `Motion`, poses of points and twists
+from one walk along the chain, are component first, with the configurations behind.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,14 +26,10 @@ if TYPE_CHECKING:
 
 # So many configurations at a time keep all intermediate arrays in a second-level cache.
 BLOCK = 8192
+_BASE = np.zeros((3, 1))
 
 
-def blocks(size: int) -> list[slice]:
-    """Cut so many configurations into blocks of `BLOCK`."""
-    return [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
-
-
-def walk(chain: Chain, coordinates: np.ndarray, until: int) -> list[Frame]:
+def _walk(chain: Chain, coordinates: np.ndarray, until: int) -> list[Frame]:
     """Frames along a chain: before each of so many transforms, and behind the last of them.
 
     `coordinates` (C, S): rad and m. The forward recursion of the product of transforms; turns that follow one another about one
@@ -57,8 +56,8 @@ def walk(chain: Chain, coordinates: np.ndarray, until: int) -> list[Frame]:
     return frames
 
 
-def place_point(frames: Sequence[Frame], point: MeasuringPoint) -> Frame:
-    """The frame of a measuring point, by the frames of `walk` up to it at least."""
+def _place_point(frames: Sequence[Frame], point: MeasuringPoint) -> Frame:
+    """The frame of a measuring point, by the frames of `_walk` up to it at least."""
     axes, origin = frames[point.after]
     for axis, length in zip(axes, point.offset_m, strict=True):
         if length:
@@ -104,10 +103,10 @@ def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[Meas
     components, batch = _component_first(coordinates)
     size = components.shape[1]
     position, rotation = np.empty((len(points), 3, size)), np.empty((len(points), 3, 3, size))
-    for part in blocks(size):
-        frames = walk(chain, components[:, part], max(point.after for point in points))
+    for part in _blocks(size):
+        frames = _walk(chain, components[:, part], max(point.after for point in points))
         for number, point in enumerate(points):
-            store_pose(place_point(frames, point), position[number, :, part], rotation[number, :, :, part])
+            _store_pose(_place_point(frames, point), position[number, :, part], rotation[number, :, :, part])
     return _batch_first(position, batch, 1), _batch_first(rotation, batch, 1)
 
 
@@ -150,10 +149,10 @@ def poses_and_jacobians(
     components, batch = _component_first(coordinates)
     size = components.shape[1]
     position, rotation, jacobian = (np.empty((*shape, size)) for shape in ((3,), (3, 3), (6, chain.coordinates)))
-    for part in blocks(size):
-        frames = walk(chain, components[:, part], point.after)
-        placed = place_point(frames, point)
-        store_pose(placed, position[:, part], rotation[:, :, part])
+    for part in _blocks(size):
+        frames = _walk(chain, components[:, part], point.after)
+        placed = _place_point(frames, point)
+        _store_pose(placed, position[:, part], rotation[:, :, part])
         _store_twists(chain, frames, point, placed[1], jacobian[:, :, part])
     return _batch_first(position, batch), _batch_first(rotation, batch), _batch_first(jacobian, batch)
 
@@ -166,10 +165,135 @@ def jacobians(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> n
     """
     components, batch = _component_first(coordinates)
     jacobian = np.empty((6, chain.coordinates, components.shape[1]))
-    for part in blocks(components.shape[1]):
-        frames = walk(chain, components[:, part], point.after)
-        _store_twists(chain, frames, point, place_point(frames, point)[1], jacobian[:, :, part])
+    for part in _blocks(components.shape[1]):
+        frames = _walk(chain, components[:, part], point.after)
+        _store_twists(chain, frames, point, _place_point(frames, point)[1], jacobian[:, :, part])
     return _batch_first(jacobian, batch)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses of some points of a chain, and how each transform that moves would move everything behind it; component first.
+
+    `position` (T, 3, S): m, base frame. `rotation` (T, 3, 3, S). `twist` (6, K, S): for each moving transform, in the order of
+    their coordinates, the velocity of what lies behind it, per unit of the coordinate: of the body's point at the base's
+    origin, then the angular one (the spatial twist [1]). `place`, `coordinate` (K,) of int: how many transforms come before
+    each, and the coordinate that moves it.
+
+    [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, section 3.4, CRC Press,
+        1994.
+    """
+
+    position: np.ndarray
+    rotation: np.ndarray
+    twist: np.ndarray
+    place: np.ndarray
+    coordinate: np.ndarray
+
+    def jacobian(self, after: int, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)) -> np.ndarray:
+        """Geometric Jacobian of points behind so many transforms of the chain.
+
+        `position` (3, S'): where the points are, m. `rows`: linear velocities alone, or also angular ones. `chosen` (S',) of
+        int: configuration of each. Returns (rows, C, S').
+        """
+        twist = self.twist[..., chosen]
+        angular, moved = twist[3:], np.empty_like(twist[:rows])
+        _cross(angular, position, moved[:3])
+        moved[:3] += twist[:3]
+        moved[3:] = angular[: rows - 3]
+        return self._behind_none(moved, after)
+
+    def generalized_forces(self, after: int, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+        """Force or torque on each coordinate by a wrench on what lies behind so many transforms of the chain.
+
+        `force`, `moment` (3, S): the moment about the base's origin. Returns (C, S).
+        """
+        on_each = np.einsum("ik...,i...->k...", self.twist, np.concatenate([force, moment]))
+        return self._behind_none(on_each, after)
+
+    def by_coordinate(self, values: np.ndarray) -> np.ndarray:
+        """Values (..., K', S) of the transforms of the first coordinates, or of all, summed for each: (..., C', S)."""
+        if self._one_each:
+            return values
+        coordinate = self.coordinate[: values.shape[-2]]
+        out = np.zeros((*values.shape[:-2], coordinate[-1] + 1, values.shape[-1]))
+        np.add.at(out, (..., coordinate, slice(None)), values)  # type: ignore[arg-type]  # The stubs know no slices here.
+        return out
+
+    def _behind_none(self, values: np.ndarray, after: int) -> np.ndarray:
+        """By coordinate, without transforms behind a place of the chain."""
+        behind = self.place >= after
+        if behind.any():
+            values[..., behind, :] = 0.0
+        return self.by_coordinate(values)
+
+    @cached_property
+    def _one_each(self) -> bool:
+        return len(np.unique(self.coordinate)) == len(self.coordinate)
+
+
+def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]) -> Motion:
+    """Poses of several measuring points and the twist of every transform that moves, in one walk along the chain.
+
+    `coordinates` (S, C): rad and m.
+    """
+    components, _ = _component_first(coordinates)
+    size = components.shape[1]
+    moving = sorted((t.coordinate, place) for place, t in enumerate(chain.transforms) if t.coordinate is not None)
+    shapes = (len(points), 3), (len(points), 3, 3), (6, len(moving))
+    position, rotation, twist = (np.empty((*shape, size)) for shape in shapes)
+    for part in _blocks(size):
+        frames = _walk(chain, components[:, part], len(chain.transforms))
+        for number, point in enumerate(points):
+            _store_pose(_place_point(frames, point), position[number, :, part], rotation[number, :, :, part])
+        for column, (_, place) in enumerate(moving):
+            _store_twist(chain.transforms[place], frames[place], _BASE, twist[:, column, part])
+    coordinate, place = np.array(moving, int).T
+    return Motion(position, rotation, twist, place, coordinate)
+
+
+def pose_differences(position: np.ndarray, rotation: np.ndarray, position_0: np.ndarray, rotation_0: np.ndarray) -> np.ndarray:
+    """How far one pose is from another: displacement (m) and rotation vector (rad), both in base axes.
+
+    `position`, `position_0` (..., 3), `rotation`, `rotation_0` (..., 3, 3). Returns (..., 6): memory is component first.
+    """
+    relative = np.empty((3, 3, *position.shape[:-1]))
+    for i in range(3):
+        for j in range(3):
+            relative[i, j] = sum(rotation[..., i, k] * rotation_0[..., j, k] for k in range(3))
+    turn = rotation_vectors(np.moveaxis(relative, (0, 1), (-2, -1)))
+    difference = np.empty((6, *position.shape[:-1]))
+    difference[:3] = np.moveaxis(position - position_0, -1, 0)
+    difference[3:] = np.moveaxis(turn, -1, 0)
+    return np.moveaxis(difference, 0, -1)
+
+
+def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
+    """Rotation vectors of rotation matrices, for angles below pi.
+
+    The logarithm on SO(3) [1], by the arctangent of sine and cosine, so that small angles keep their digits.
+
+    `rotation` (..., 3, 3). Returns (..., 3): rad.
+
+    [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
+    """
+    skew = 0.5 * np.stack(
+        [
+            rotation[..., 2, 1] - rotation[..., 1, 2],
+            rotation[..., 0, 2] - rotation[..., 2, 0],
+            rotation[..., 1, 0] - rotation[..., 0, 1],
+        ]
+    )
+    sine = np.sqrt((skew**2).sum(axis=0))
+    cosine = 0.5 * (rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2] - 1.0)
+    angle = np.arctan2(sine, cosine)
+    scale = np.divide(angle, sine, out=np.ones_like(sine), where=sine > 0)
+    return np.moveaxis(skew * scale, 0, -1)
+
+
+def _blocks(size: int) -> list[slice]:
+    """Cut so many configurations into blocks of `BLOCK`."""
+    return [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
 
 
 def _component_first(coordinates: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
@@ -185,7 +309,7 @@ def _batch_first(components: np.ndarray, batch: tuple[int, ...], before: int = 0
     return np.moveaxis(components, range(before, len(shape)), range(before - len(shape), 0))
 
 
-def store_pose(frame: Frame, position: np.ndarray, rotation: np.ndarray) -> None:
+def _store_pose(frame: Frame, position: np.ndarray, rotation: np.ndarray) -> None:
     """Write a frame to arrays: `position` (3, S), and `rotation` (3, 3, S), whose columns are the axes."""
     axes, position[:] = frame
     for column, axis in enumerate(axes):
@@ -227,12 +351,12 @@ def _store_twist(transform: Transform, frame: Frame, target: np.ndarray | None, 
         linear[:], angular[:] = 0.0, axis
     else:
         angular[:] = axis
-        cross(axis, target - frame[1], linear)
+        _cross(axis, target - frame[1], linear)
     if transform.sign < 0:
         twist *= -1.0
 
 
-def cross(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
+def _cross(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
     """Vector products, component first: (3, ...)."""
     product = np.empty_like(out[0])
     for i in range(3):

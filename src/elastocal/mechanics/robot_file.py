@@ -30,9 +30,8 @@ import numpy as np
 
 from elastocal.counting import counted
 from elastocal.errors import InputError
-from elastocal.mechanics.chain import notation, parse_chain, stretches
-from elastocal.mechanics.robot import STANDING, Compensator, Link, Mass, Robot, Tube
-from elastocal.mechanics.usual_values import UNLIMITED_DEG, usual_compliance
+from elastocal.mechanics.chain import notation, parse_chain
+from elastocal.mechanics.robot import STANDING, UNLIMITED_DEG, Compensator, Link, Mass, Robot, Tube, usual_compliance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -54,7 +53,10 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
     or reaches farther than any machine, or a list has another length than there are joints.
     """
     chain = parse_chain(document["chain"], document.get("lengths_m", {}), source)
-    _check_reach(chain, "lengths_m" if document.get("lengths_m") else "chain", source)
+    reach = sum(abs(transform.constant) for transform in chain.transforms if transform.kind == "T")
+    if reach > LONGEST_REACH_M:
+        key, allowed = "lengths_m" if document.get("lengths_m") else "chain", "lengths in metres (not millimetres) that reach"
+        raise InputError(source, key, f"a chain that reaches {reach:.4g} m", f"{allowed} {LONGEST_REACH_M:g} m at most")
     n = chain.coordinates
     reported = document.get("reported_joints", {})
     matrix = reported.get("matrix", np.eye(n).tolist())
@@ -62,21 +64,29 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
     if [len(row) for row in matrix] != [n] * n or len(offset) != n:
         found = f"rows of {[len(row) for row in matrix]} and {counted(len(offset), 'offset')}"
         raise InputError(source, "reported_joints", found, f"{n} rows of {n} numbers and {n} offsets")
+    gravity = tuple(map(float, document.get("gravity_m_s2", STANDING)))
+    if math.hypot(*gravity) < _LEAST_GRAVITY:
+        allowed = f"a vector in base axes of {_LEAST_GRAVITY:g} m/s² or more"
+        raise InputError(source, "gravity_m_s2", str(document["gravity_m_s2"]), allowed)
+    beside = Compensator(**document["compensator"]) if document.get("compensator") else None
+    if beside and beside.joint > n:
+        raise InputError(source, "compensator.joint", str(beside.joint), f"a joint from 1 to {n}")
+    springs, payload_kg = _of_each_joint(document, "compliance_urad_per_Nm", n, source), document.get("payload_kg")
     return Robot(
         name=document["name"],
         chain=chain,
-        compliance=_compliance(document, chain, source),
+        compliance=usual_compliance(chain, payload_kg) if springs is None else 1e-6 * np.array(springs, float),
         joint_limits=joint_limits(document.get("joint_limits_deg"), chain, source),
         links=_links(chain, document.get("links"), source),
         reported_matrix=np.array(matrix, float),
         reported_offset=np.array(offset, float) * _per_degree(chain),
         masses=_masses(document.get("masses", ()), n, source),
-        gravity_m_s2=_gravity(document.get("gravity_m_s2", STANDING), source),
+        gravity_m_s2=gravity,
         gear_ratio=_of_each_joint(document, "gear_ratio", n, source, "one or null"),
-        compensator=_compensator(document.get("compensator"), n, source),
-        payload_kg=document.get("payload_kg"),
-        joint_names=_of_each_joint(document, "joint_names", n, source, "one"),
-        compliance_known="compliance_urad_per_Nm" in document,
+        compensator=beside,
+        payload_kg=payload_kg,
+        joint_names=_of_each_joint(document, "joint_names", n, source),
+        compliance_known=springs is not None,
     )
 
 
@@ -122,30 +132,15 @@ def joint_limits(limits_deg: Sequence[Sequence[float]] | None, chain: Chain, sou
     a turn either way. `chain`: whose joints they are. `source`: named in errors. Returns (n, 2). Raises `InputError` where
     there are too few or too many, a lower limit is not below the upper one, or those of a prismatic joint lack.
     """
-    joints = chain.coordinates
-    if limits_deg is None:
-        if any(chain.prismatic):
-            joint = chain.prismatic.index(True) + 1
-            raise InputError(source, "joint_limits_deg", f"nothing, but T.(q{joint})", "[lower, upper], for a track in metres")
-        limits_deg = [UNLIMITED_DEG] * joints
-    _require_each(limits_deg, joints, "joint_limits_deg", source)
-    for joint, (low, high) in enumerate(limits_deg):
+    if limits_deg is None and any(chain.prismatic):
+        joint = chain.prismatic.index(True) + 1
+        raise InputError(source, "joint_limits_deg", f"nothing, but T.(q{joint})", "[lower, upper], for a track in metres")
+    stated = {"joint_limits_deg": [UNLIMITED_DEG] * chain.coordinates if limits_deg is None else limits_deg}
+    limits = _of_each_joint(stated, "joint_limits_deg", chain.coordinates, source) or ()
+    for joint, (low, high) in enumerate(limits):
         if low >= high:
             raise InputError(source, f"joint_limits_deg[{joint}]", str([low, high]), "[lower, upper]")
-    return np.array(limits_deg, float) * _per_degree(chain)[:, None]
-
-
-def _compliance(document: Mapping[str, Any], chain: Chain, source: str) -> np.ndarray:
-    if "compliance_urad_per_Nm" not in document:
-        return usual_compliance(chain, document.get("payload_kg"))
-    _require_each(document["compliance_urad_per_Nm"], chain.coordinates, "compliance_urad_per_Nm", source)
-    return 1e-6 * np.array(document["compliance_urad_per_Nm"], float)
-
-
-def _require_each(entries: Sequence[Any], joints: int, key: str, source: str, one: str = "one") -> None:
-    if len(entries) != joints:
-        allowed = f"{one} for each of the {joints} joints"
-        raise InputError(source, key, counted(len(entries), "entry", "entries"), allowed)
+    return np.array(limits, float) * _per_degree(chain)[:, None]
 
 
 def _per_degree(chain: Chain) -> np.ndarray:
@@ -154,48 +149,27 @@ def _per_degree(chain: Chain) -> np.ndarray:
 
 
 def _masses(described: Sequence[dict[str, Any]], joints: int, source: str) -> tuple[Mass, ...]:
-    masses = [Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described]
-    masses.sort(key=attrgetter("link"))
     for index, entry in enumerate(described):
         if entry["link"] > joints:
-            raise InputError(
-                source, f"masses[{index}].link", str(entry["link"]), f"0 for the column, or a joint up to {joints}"
-            )
+            allowed = f"0 for the column, or a joint up to {joints}"
+            raise InputError(source, f"masses[{index}].link", str(entry["link"]), allowed)
+    masses = [Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described]
+    masses.sort(key=attrgetter("link"))
     for one, other in pairwise(masses):
         if one.link == other.link:
             raise InputError(source, "masses", f"link {one.link} twice", "each link once, with all that it carries")
     return tuple(masses)
 
 
-def _gravity(vector: Sequence[float], source: str) -> tuple[float, ...]:
-    if math.hypot(*vector) < _LEAST_GRAVITY:
-        raise InputError(source, "gravity_m_s2", str(list(vector)), f"a vector in base axes of {_LEAST_GRAVITY:g} m/s² or more")
-    return tuple(map(float, vector))
-
-
-def _of_each_joint(document: Mapping[str, Any], key: str, joints: int, source: str, one: str) -> tuple[Any, ...] | None:
-    if document.get(key) is None:
-        return None
-    _require_each(document[key], joints, key, source, one)
-    return tuple(document[key])
-
-
-def _compensator(described: Mapping[str, Any] | None, joints: int, source: str) -> Compensator | None:
-    if described is None:
-        return None
-    if described["joint"] > joints:
-        raise InputError(source, "compensator.joint", str(described["joint"]), f"a joint from 1 to {joints}")
-    return Compensator(**described)
-
-
-def _check_reach(chain: Chain, key: str, source: str) -> None:
-    reach = sum(abs(transform.constant) for transform in chain.transforms if transform.kind == "T")
-    if reach > LONGEST_REACH_M:
-        allowed = f"lengths in metres (not millimetres) that reach {LONGEST_REACH_M:g} m at most"
-        raise InputError(source, key, f"a chain that reaches {reach:.4g} m", allowed)
+def _of_each_joint(document: Mapping[str, Any], key: str, joints: int, source: str, one: str = "one") -> tuple[Any, ...] | None:
+    entries = document.get(key)
+    if entries is not None and len(entries) != joints:
+        raise InputError(source, key, counted(len(entries), "entry", "entries"), f"{one} for each of the {joints} joints")
+    return None if entries is None else tuple(entries)
 
 
 def _links(chain: Chain, described: Mapping[str, Any] | None, source: str) -> tuple[Link, ...]:
+    """The rigid stretches between joints, each as the tube that it is taken for."""
     if described is None:
         return ()
     odd = {
@@ -203,24 +177,25 @@ def _links(chain: Chain, described: Mapping[str, Any] | None, source: str) -> tu
         "prismatic joints": any(chain.prismatic),
         "passive joints": any(chain.is_passive(place) for place in range(len(chain.transforms))),
     }
-    for what in (what for what, there in odd.items() if there):
+    if what := next((what for what, there in odd.items() if there), ""):
         raise InputError(source, "links", f"a chain with {what}", "links on chains that turn at their joints only")
-    rigid = stretches(chain)
+    rigid, vector = [], np.zeros(3)
+    for index, transform in enumerate(chain.transforms, 1):
+        vector[transform.axis] += transform.constant
+        turns = transform.kind == "R"
+        if (turns or index == len(chain.transforms)) and vector.any():
+            rigid.append((index - turns, tuple(vector.tolist())))
+            vector[:] = 0.0
     tubes = described["tubes"]
     if len(tubes) not in (1, len(rigid)):
-        raise InputError(
-            source, "links.tubes", counted(len(tubes), "tube"), f"one for all links or one for each of the {len(rigid)}"
-        )
-    links = []
-    for number, (after, vector) in enumerate(rigid):
-        size = tubes[number if len(tubes) > 1 else 0]
+        allowed = f"one for all links or one for each of the {len(rigid)}"
+        raise InputError(source, "links.tubes", counted(len(tubes), "tube"), allowed)
+    moduli = [1e9 * described[f"{name}_modulus_GPa"] for name in ("youngs", "shear")]
+    for size in tubes:
         if 2 * size["wall_m"] > size["outer_diameter_m"]:
             raise InputError(source, "links.tubes", f"wall_m {size['wall_m']}", "at most half the outer_diameter_m")
-        tube = Tube(
-            size["outer_diameter_m"],
-            size["wall_m"],
-            1e9 * described["youngs_modulus_GPa"],
-            1e9 * described["shear_modulus_GPa"],
-        )
-        links.append(Link(after, vector, tube))
-    return tuple(links)
+    each = tubes if len(tubes) > 1 else tubes * len(rigid)
+    return tuple(
+        Link(*stretch, Tube(size["outer_diameter_m"], size["wall_m"], *moduli))
+        for stretch, size in zip(rigid, each, strict=True)
+    )

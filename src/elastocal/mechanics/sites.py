@@ -11,17 +11,16 @@ They are virtual joints of the virtual joint method [1], whether a spring yields
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections import defaultdict
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
-from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.motion import Motion, motion
-from elastocal.mechanics.robot import STANDING, Compensator, Mass, Robot
-from elastocal.mechanics.usual_values import usual_compliance, usual_payload_kg
+from elastocal.mechanics.chain import SIX, Chain, MeasuringPoint, Transform, with_inserted
+from elastocal.mechanics.kinematics import Motion, motion, poses
+from elastocal.mechanics.robot import STANDING, Compensator, Mass, Robot, usual_compliance, usual_payload_kg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -169,72 +168,49 @@ def sites_of(holder: Robot | Chain) -> Sites:
     `holder`: a robot gives what is known of its masses, gears and gravity as well; a chain alone is a weightless arm on a
     floor.
     """
-    if isinstance(holder, Robot):
-        usual = usual_compliance(holder.chain, holder.payload_kg)
-        compliance = tuple(np.where(holder.compliance > 0.0, holder.compliance, usual).tolist())
-        return _sites_of(
-            holder.chain,
-            masses=holder.masses,
-            gravity_m_s2=holder.gravity_m_s2,
-            gear_ratio=holder.gear_ratio,
-            compensator=holder.compensator,
-            payload_kg=holder.payload_kg,
-            compliance=compliance,
-        )
-    return replace(_sites_of_chain(holder), compliance=tuple(usual_compliance(holder).tolist()))
+    if not isinstance(holder, Robot):
+        return _sites_of(holder, compliance=tuple(usual_compliance(holder).tolist()))
+    usual = usual_compliance(holder.chain, holder.payload_kg)
+    known = {name: getattr(holder, name) for name in ("masses", "gravity_m_s2", "gear_ratio", "compensator", "payload_kg")}
+    return _sites_of(
+        holder.chain, compliance=tuple(np.where(holder.compliance > 0.0, holder.compliance, usual).tolist()), **known
+    )
 
 
 # Every part of a diagnosis asks for the sites of its robot; what a run has to do with are a few robots.
 @lru_cache(maxsize=64)
 def _sites_of(chain: Chain, **known: Any) -> Sites:
-    return replace(_sites_of_chain(chain), **known)
-
-
-def _sites_of_chain(chain: Chain) -> Sites:
-    springs = _Springs(chain.coordinates)
-    base = springs.add("TTTRRR")
-    tilt: list[tuple[int, ...]] = []
-    link_end: list[tuple[int, ...]] = []
-    axes: list[int] = []
-    signs: list[float] = []
-    links: list[tuple[np.ndarray, np.ndarray]] = []
-    moved: dict[int, int] = {}
-    start = 0
+    inserted: dict[int, list[tuple[str, int]]] = defaultdict(list)
     # A point at the end of a link is moved by the link's end; one inside a link is not.
+    inserted[0] += SIX
+    joints: list[Transform] = []
+    links: list[tuple[np.ndarray, np.ndarray]] = []
+    start = 0
     for index, transform in enumerate((*chain.transforms, None)):
-        passive = transform is not None and chain.is_passive(index)
-        if (transform is None or transform.coordinate is not None) and len(link_end) == len(axes):
-            link_end.append(springs.add("TTTRRR"))
+        if (transform is None or transform.coordinate is not None) and len(links) == len(joints):
+            inserted[index] += SIX
             links.append(_link(chain.transforms[start:index]))
-        moved[index] = len(springs.transforms)
-        if transform is None:
-            break
-        springs.transforms.append(transform)
-        if transform.coordinate is not None and not passive:
-            tilt.append(springs.add("RRR"))
-            axes.append(transform.axis)
-            signs.append(transform.sign)
+        if transform is not None and transform.coordinate is not None and not chain.is_passive(index):
+            inserted[index + 1] += SIX[3:]
+            joints.append(transform)
             start = index + 1
-    points = tuple(MeasuringPoint(p.name, moved[p.after], p.offset_m) for p in chain.points)
-    extended = Chain(tuple(springs.transforms), points, springs.count)
+    n = len(joints)
+    # Along the chain: six of the foot, six of the end of a link, three of the joint behind it, and so on.
+    ends = [range(n + 6 + 9 * link, n + 12 + 9 * link) for link in range(n + 1)]
     vectors, rotations = (np.array(part) for part in zip(*links, strict=True))
-    ways = tuple(axes), vectors, rotations, tuple(signs), chain.prismatic
-    return Sites(extended, chain.coordinates, base, tuple(tilt), tuple(link_end), *ways)
-
-
-class _Springs:
-    """Transforms so far, and the number of coordinates that they use."""
-
-    def __init__(self, count: int) -> None:
-        self.transforms: list[Transform] = []
-        self.count = count
-
-    def add(self, kinds: str) -> tuple[int, ...]:
-        first = self.count
-        for number, kind in enumerate(kinds):
-            self.transforms.append(Transform(kind, number % 3, 0.0, first + number))
-        self.count += len(kinds)
-        return tuple(range(first, self.count))
+    return Sites(
+        with_inserted(chain, inserted),
+        n,
+        tuple(range(n, n + 6)),
+        tuple(tuple(range(end.stop, end.stop + 3)) for end in ends[:-1]),
+        tuple(tuple(end) for end in ends),
+        tuple(joint.axis for joint in joints),
+        vectors,
+        rotations,
+        tuple(joint.sign for joint in joints),
+        chain.prismatic,
+        **known,
+    )
 
 
 def _link(fixed: Sequence[Transform]) -> tuple[np.ndarray, np.ndarray]:

@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.io.storage import Column
-from elastocal.mechanics.elastostatics import generalized_forces
+from elastocal.mechanics.elastostatics import beam_axes, extended_chain, generalized_forces
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.mechanics.links import beam_axes, extended_chain
 from elastocal.study.in_memory import ask
 from elastocal.study.jobs import LENGTH, MICRO, ON_TESTS, SET, real, rows_as_frame, table, tabulate, whole
 from elastocal.study.points import root_mean

@@ -14,9 +14,15 @@ from elastocal.io.provenance import provenance
 from elastocal.io.storage import TableSchema, read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.components import COMPONENT_NAMES, COMPONENTS, WRENCH, WRENCH_NAMES
-from elastocal.mechanics.elastostatics import exact_deflections, generalized_forces, loaded_point, wrench_of_offset_force
+from elastocal.mechanics.elastostatics import (
+    exact_deflections,
+    extended_chain,
+    generalized_forces,
+    loaded_point,
+    spring_compliance,
+    wrench_of_offset_force,
+)
 from elastocal.mechanics.kinematics import jacobians, poses
-from elastocal.mechanics.links import extended_chain, spring_compliance
 from elastocal.mechanics.robot_file import joint_limits
 from elastocal.random_streams import draw
 from elastocal.study.jobs import CONFIGURATION, SET, Job, group, origin, real, robot_of, table, whole

@@ -36,8 +36,7 @@ from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.whole import calibrated_by, cases_in
-from elastocal.mechanics.kinematics import jacobians
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.kinematics import jacobians, pose_differences
 from elastocal.random_streams import stream as analysis_stream
 from elastocal.validation.conformity import predicted_conformity
 from elastocal_proof.blind import schemas

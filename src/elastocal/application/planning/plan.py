@@ -5,13 +5,11 @@ loads are measured, the errors of declared masses, and where tracker and reflect
 the fit itself, at the robot file's values.
 
 Standard deviations of a sensor are half of what its maker permits as the largest error, which a tracker's manual calls typical
-[1]; the angles of its probe are from [2], those of cameras from [3].
+[1]; the angles of its probe are from [2].
 
 [1] Hexagon, Leica Absolute Tracker AT500 User Manual, section 2.8: transverse error at most 15 um + 6 um/m, typical results
     half of that.
 [2] Hexagon, data sheet of the Leica T-Mac: rotation angles to 0.01 deg, which is 18 um at 100 mm.
-[3] Krumpek, O., Kroeger, O. and Mohr, S., Reproducible Optical Tracking Precision: Evaluating a Static, Near-Parallel Support
-    Structure for OptiTrack PrimeX22 Cameras, arXiv:2502.21189, 2025: 0.12 mm across the line of sight.
 """
 
 from __future__ import annotations
@@ -60,8 +58,8 @@ if TYPE_CHECKING:
 GEOMETRY = ("joint_offset", "link_geometry")
 # States that are linearized at once: their Jacobians stay in the processor's cache.
 _AT_ONCE = 1000
-# Half of 15 um + 6 um/m at 7.5 m; across the line of sight of a camera, whose poses are of markers so far apart.
-_TRACKER_M, _CAMERA_M, _MARKERS_M = 30e-6, 0.12e-3, 0.2
+# Half of 15 um + 6 um/m at 7.5 m.
+_TRACKER_M = 30e-6
 # Configurations over which the accuracy is averaged, of those that the cell allows.
 _PLACES = 300
 # Random designs beside which the plan is shown.
@@ -72,8 +70,8 @@ _LEAST_SEEN = 1e-6
 _DRAWS = 4
 _FORBIDDEN = {
     "boxes": "the boxes leave the arm no room",
-    "floor": "forearm or target would be below the floor (--floor, --no-floor)",
-    "column": "forearm or hand would be in the robot's column (--column)",
+    "floor": "forearm or target would be below the floor (--floor)",
+    "column": "forearm or hand would be in the robot's own column",
     "sight": "the tracker sees the targets in none",
 }
 # From how many repeats of how many poses noise is estimated rather than declared: some sixty contrasts of positions.
@@ -84,26 +82,21 @@ REPEATED_POSES, REPEATS = 10, 4
 class Sensor:
     """Standard deviations of one component of a measurement; no orientation where positions are measured only.
 
-    `words`: which instrument it stands for. `measured`: what it reads, "position" or "pose", the usual first.
+    `words`: which instrument it stands for.
     """
 
     words: str
-    measured: tuple[str, ...]
     position_m: float
     orientation_rad: float | None
 
 
 _TRACKER = "half of MPE 15 µm + 6 µm/m"
-_CAMERA = "optical tracking, 0.12 mm across the line of sight (OptiTrack, arXiv:2502.21189), poses of markers 0.2 m apart"
+# By what is measured.
 SENSORS = {
-    "tracker": Sensor(f"laser tracker and reflector at 7.5 m, {_TRACKER} (Leica AT500)", ("position",), _TRACKER_M, None),
-    "t-mac": Sensor(
-        f"laser tracker and 6DoF probe, {_TRACKER} at 7.5 m and of 0.01° (Leica T-Mac)",
-        ("pose", "position"),
-        _TRACKER_M,
-        math.radians(0.01) / 2,
+    "position": Sensor(f"laser tracker and reflector at 7.5 m, {_TRACKER} (Leica AT500)", _TRACKER_M, None),
+    "pose": Sensor(
+        f"laser tracker and 6DoF probe, {_TRACKER} at 7.5 m and of 0.01° (Leica T-Mac)", _TRACKER_M, math.radians(0.01) / 2
     ),
-    "camera": Sensor(_CAMERA, ("position", "pose"), _CAMERA_M, math.sqrt(2.0) * _CAMERA_M / _MARKERS_M),
 }
 
 

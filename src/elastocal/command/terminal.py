@@ -1,4 +1,4 @@
-"""Options that state quantities: lengths and angles with their unit, and lists of numbers."""
+"""What subcommands take from the terminal, quantities with their unit and lists of numbers, and how they print an answer."""
 
 from __future__ import annotations
 
@@ -6,36 +6,33 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, escaped
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     import numpy as np
+    from rich.console import Console
 
 _METRES = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _RADIANS = {"deg": math.radians(1.0), "°": math.radians(1.0), "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6}
 _QUANTITY = re.compile(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-zµ°]+)")
 # No instrument repeats better than the least (`fitting.noise.FINEST`); no accuracy, noise or tolerance of a robot is larger.
-_LEAST_M, _LARGEST_M = 1e-8, 0.1
-_LEAST_RAD, _LARGEST_RAD = 1e-8, 0.2
-# Of a mass, over the mass, as in a robot file.
-LARGEST_RELATIVE_STD = 100.0
+_BOUNDS_M, _BOUNDS_RAD = (1e-8, 0.1), (1e-8, 0.2)
 # Trackers stand at up to a hundred metres, targets within an arm's reach of where they are fixed, as in a campaign.
 _FARTHEST_PLACE_M, FARTHEST_TARGET_M = 1e3, 10.0
-# Draws are numbered in 32 bits; more poses, rows, lines or jobs than these are slips of the keyboard.
-LARGEST_SEED, MOST_POSES, MOST_ROWS, MOST_JOBS = 2**32 - 1, 10_000, 10_000_000, 10_000
+# Draws are numbered in 32 bits; more poses, rows or lines than these are slips of the keyboard.
+LARGEST_SEED, MOST_POSES, MOST_ROWS = 2**32 - 1, 10_000, 10_000_000
 
 
 def length_m(option: str, text: str) -> float:
     """A length such as ``0.2mm`` in metres; refused without its unit, or of a size that no instrument or robot has."""
-    return _quantity(option, text, _METRES, (_LEAST_M, _LARGEST_M), "a length with its unit such as 0.2mm or 60um")
+    return _quantity(option, text, _METRES, _BOUNDS_M, "a length with its unit such as 0.2mm or 60um")
 
 
 def angle_rad(option: str, text: str) -> float:
     """An angle such as ``0.01deg`` in rad; refused without its unit, or of a size that no noise has."""
-    examples = "an angle with its unit such as 0.01deg, 0.1mrad or 60urad"
-    return _quantity(option, text, _RADIANS, (_LEAST_RAD, _LARGEST_RAD), examples)
+    return _quantity(option, text, _RADIANS, _BOUNDS_RAD, "an angle with its unit such as 0.01deg, 0.1mrad or 60urad")
 
 
 def _quantity(option: str, text: str, units: Mapping[str, float], bounds: tuple[float, float], examples: str) -> float:
@@ -61,3 +58,24 @@ def numbers(option: str, text: str, count: int, largest: float = _FARTHEST_PLACE
     if len(found) != count or not (np.abs(found) <= largest).all():
         raise InputError(option, "", repr(text), f"{count} numbers separated by commas, each up to {largest:g} m")
     return found
+
+
+def example(*commands: str) -> str:
+    """The end of a help text: commands to type, on lines that are not wrapped."""
+    # \b keeps click from joining the lines of a paragraph.
+    return "\n".join(["\b", "Example:" if len(commands) == 1 else "Examples:", *(f"  {command}" for command in commands)])
+
+
+def print_answer(passed: bool, answer: str, details: Iterable[str], following: str, console: Console) -> None:
+    """Print an answer with its mark, ✓ or !, then its details and the command that comes next, if any.
+
+    A detail that asks for attention begins with "! " already.
+    """
+    lines = [f"{'✓' if passed else '!'} {answer}", *(line if line.startswith("! ") else f"  {line}" for line in details)]
+    print_lines([*lines, *([f"next: {following}"] if following else [])], console)
+
+
+def print_lines(lines: Iterable[str], console: Console) -> None:
+    """Print lines as they are, with what would steer a terminal as escapes: they hold names and paths of other people."""
+    for line in lines:
+        console.print(escaped(line), markup=False, highlight=False, soft_wrap=True)
