@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 from certified import record_jobs
-from elastocal.application.forward_model import fold_effects
+from elastocal.application.exported import fold_effects
 from made_calibrated import made_calibrated
 from made_urdf import joint, link, written
 from scipy.spatial.transform import Rotation
