@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import LOADED_JOINTS, WAVES, Candidate, Parameter, effect, small_form, turning_joints
 from elastocal.effects.conditions import MASS_PARAMETERS
+from elastocal.effects.protocol import LOADED_JOINTS, WAVES, Candidate, Parameter, effect, small_form, turning_joints
 from elastocal.effects.sizes import RATED, SAG, TORQUE, Size
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def declared_masses(own: Effect, sites: Sites) -> Candidates:
     """Declared masses that are farther off than the robot file says: all by one factor, or each by its own.
 
     theta_i = c_i sum_k s_k m_k tau_ik(q), with theta_i in rad, c_i the compliance (rad/(N m)), m_k the declared mass of link k
-    (kg), tau_ik its torque on joint i (N m/kg) and s_k the share by which it is heavier, the same for all links or each its own.
+    (kg), tau_ik its torque on joint i (N m/kg) and s_k the share by which it is heavier, one for all links or each its own.
     A mass takes its declared centre with it. What the robot file says of its own tolerance is part of the declared model
     (`declared_weight`). Without a load the compliances are free, and no factor of all masses is distinguishable from them.
     """
