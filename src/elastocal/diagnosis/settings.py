@@ -86,8 +86,8 @@ class Settings:
     )
     smooth_tolerance: float = _setting(
         0.5,
-        "the same of the smooth error of unknown cause, which has few functions of few inputs: of what is twice as large as a"
-        " mechanism beside it, that mechanism is a part",
+        "of the displacements of a smooth error of unknown cause, root mean square, the part below which those of a mechanism"
+        " beside it are what its few functions lack, not its relative",
     )
     credible: float = _setting(0.95, "probability of the hypotheses between which a next experiment shall decide")
     gross_error_level: float = _setting(

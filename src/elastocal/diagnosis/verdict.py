@@ -157,7 +157,7 @@ def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[s
 
     Its mechanisms, and something unknown where it has a smooth error beside them. Neither a law nor the smooth error is quite
     what the machine does. So of the two that counts as a part of the other which makes displacements that the other cannot
-    make, but within the tolerance of laws.
+    make, but within the tolerance of laws. Nothing related to a mechanism acts where the smooth error is far larger.
     """
     found, of_laws, of_unknown = [], problem.settings.law_tolerance**2, problem.settings.smooth_tolerance**2
     for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
@@ -167,7 +167,7 @@ def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[s
             (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(problem, model, known)
             if beyond_laws < of_laws * by_laws:
                 names = known
-            elif beyond_unknown < of_unknown * by_unknown:
+            elif beyond_unknown < of_laws * by_unknown or by_laws < of_unknown * by_unknown:
                 names = {OTHER}
         found.append(tuple(sorted(names)))
     return found

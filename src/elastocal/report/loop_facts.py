@@ -60,9 +60,8 @@ _LONGEST, _SHOWN = 100, 4
 
 def title_of(verdict: Mapping[str, Any]) -> str:
     """Verdict in one line, with what remains without a name."""
-    repeatable = verdict.get("repeatable")
-    more = AND_MORE if repeatable and repeatable["remains"] and verdict["effects"] else ""
-    return TITLES[verdict["verdict"]] + more
+    remains = verdict["effects"] and (verdict.get("repeatable") or {}).get("remains")
+    return TITLES[verdict["verdict"]] + AND_MORE * bool(remains)
 
 
 def campaign_sentences(
