@@ -43,3 +43,11 @@ def test_each_line_is_what_the_robot_misses_without_that_effect(fanuc):
     assert names[0] == TOTAL and names[-2:] == [UNCERTAINTY, REPEATABILITY]
     middle = [found[name] for name in names[1:-2]]
     assert middle == sorted(middle, reverse=True)
+
+
+def test_springs_of_the_robot_file_cost_what_they_give_under_load(fanuc):
+    calibrated = made_calibrated(fanuc, "joint_offset@2", identified=False)
+    angles, operating = states(fanuc)
+    rigid = replace(calibrated, model=replace(calibrated.model, nominal_compliance=np.zeros(6)))
+    expected = rms(*(forward(each, angles, operating)[0] for each in (calibrated, rigid)))
+    assert budget(calibrated)["joint_compliance"] == pytest.approx(expected) and expected > 1e-5

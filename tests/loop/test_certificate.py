@@ -38,6 +38,13 @@ def test_a_certificate_passes_below_and_fails_above_what_is_predicted(found, che
         assert certificate(checkout / "made", ROBOTS, diagnosed, wanted)["conformity"]["decision"] == decision
 
 
+def test_a_robot_that_few_configurations_judge_does_not_pass(found, checkout, diagnosed):
+    few = replace(diagnosed, verdict=diagnosed.verdict | {"heldout": diagnosed.verdict["heldout"] | {"configurations": 3}})
+    wanted = replace(WANTED, tolerance_m=2.0 * found["accuracy"]["rms_m"])
+    conformity = certificate(checkout / "made", ROBOTS, few, wanted)["conformity"]
+    assert conformity["decision"] == "undecided" and conformity["shortfalls"][0].startswith("too few: 3 configurations")
+
+
 def test_the_worst_pose_is_the_one_of_the_largest_predicted_error(found):
     document = found
     # The largest of many random errors is larger than what any one pose is expected to have.

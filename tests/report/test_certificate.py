@@ -55,6 +55,8 @@ def test_a_correction_that_makes_validation_poses_worse_is_advised_against():
 def test_every_kind_of_certificate_is_typeset(tmp_path, decision):
     facts = certificate_facts(made_document(decision, misplaced=decision == "fail"))
     json.dumps(facts, allow_nan=False)
+    small = certificate_facts(made_document() | {"budget": [{"name": "payload", "rms_m": 5e-8}]})
+    assert small["budget"] == [["weight of an undeclared payload", "below 0.1\u00a0µm"]]
     assert facts["budget"][-1][1] == "hidden by the tracker's noise" and share_name("link_weight") == "gravity sag"
     path = tmp_path / "certificate.pdf"
     write_certificate(path, facts, empty_pictures(tmp_path, ["budget"]))

@@ -29,26 +29,6 @@ ALL_IN_SIGHT = """() => {
     return x >= 0 && x <= canvas.clientWidth && y >= 0 && y <= canvas.clientHeight;
   });
 }"""
-# By how many pixels the narrowest first cell of a table is narrower than its table; what is folded has no width.
-NARROWER = """() => Math.max(...[...document.querySelectorAll('tbody td:first-child')].filter((cell) => cell.clientWidth).map(
-  (cell) => cell.closest('table').clientWidth - cell.clientWidth))"""
-# Of all letters that are seen, the least contrast with what they stand on; WCAG 2.2 asks for 4.5.
-LEAST_CONTRAST = """() => {
-  const parts = (color) => color.match(/[\\d.]+/g).map(Number);
-  const light = (color) => parts(color).slice(0, 3).map((value) => value / 255).map(
-    (value) => (value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4)).reduce(
-    (sum, value, k) => sum + value * [0.2126, 0.7152, 0.0722][k], 0);
-  const behind = (element) => {
-    const color = getComputedStyle(element).backgroundColor;
-    return parts(color)[3] === 0 ? behind(element.parentElement) : color;
-  };
-  const seen = [...document.querySelectorAll('body *')].filter((element) => element.getClientRects().length
-    && [...element.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim()));
-  return Math.min(...seen.map((element) => {
-    const two = [light(getComputedStyle(element).color), light(behind(element))].sort((a, b) => b - a);
-    return (two[0] + 0.05) / (two[1] + 0.05);
-  }));
-}"""
 
 
 def page_of(kuka, name="named", **changed):
@@ -136,17 +116,6 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
         papers = [page.evaluate(script) for script in (PAPER_OF_PAGE, PAPER_OF_PLOT)]
         assert papers[0] == papers[1] and (min(papers[0]) > 200) == (scheme == "light")
         assert page.evaluate(ALL_IN_SIGHT)
-        # Names in tables have the width of a phone.
-        assert width > 600 or page.evaluate(NARROWER) < 1
-
-        # What a reader of the screen needs: letters that are seen, names, headings without a gap.
-        assert page.evaluate(LEAST_CONTRAST) >= 4.5
-        unlabelled = "[...document.querySelectorAll('select, input')].filter(e => !e.labels.length).length"
-        unnamed = "[...document.querySelectorAll('[role=img]')].filter(e => !e.getAttribute('aria-label')).length"
-        assert page.evaluate(unlabelled) == page.evaluate(unnamed) == 0
-        levels = page.evaluate("[...document.querySelectorAll('h1, h2, h3')].map(e => Number(e.tagName[1]))")
-        assert levels[0] == 1 and levels.count(1) == 1 and max(np.diff(levels)) <= 1
-        assert page.evaluate("document.documentElement.lang") == "en"
 
         # What is fitted and what validates are not thrown together.
         table = residual_table()

@@ -5,7 +5,8 @@ opposite one, or under given shares of it. Loads are as large as the campaign's,
 any direction where the campaign has loads in all of them.
 
 The experiment that leaves the least entropy between the models of the posterior ([1], `alternatives`) is chosen greedily from
-random entries, then by one round of Fedorov's exchange [2]. What is promised of it is simulated, by the same models.
+random entries, then by one round of Fedorov's exchange [2] and random search in the angles nearby. What is promised of it is
+simulated, by the same models.
 
 [1] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
 [2] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
@@ -65,6 +66,8 @@ _FREE_DIRECTIONS, _OPPOSITE = 0.02, -0.5
 # Entries that the search chooses from, and multiplications that it may take; numbers in memory at once, and entries whose
 # sensitivities are.
 _STATES, _WORK, _MEMORY, _BLOCK = 600, 4e9, 5e5, 250
+# Standard deviations of the steps in the joint angles, rad, and neighbours tried with each.
+_RADII, _NEIGHBOURS = (0.5, 0.2, 0.08), 24
 # Models that stand for the hypotheses; the others hold a few per cent.
 _MODELS, _HYPOTHESES = 12, 8
 
@@ -316,7 +319,7 @@ def _ambiguous(evidence: Evidence, settings: Settings) -> tuple[dict[_Name, list
 def _searched(
     models: Sequence[Alternative], instrument: Instrument, robot: Robot, poses: int, stream: np.random.Generator
 ) -> Entries:
-    """The experiment that leaves least entropy: greedily, then each pose in turn against all others."""
+    """The experiment that leaves least entropy: greedily, then each pose in turn against all others and its neighbours."""
     criterion = Criterion(models, stream)
     # Hypotheses of a hundred units each leave time for few entries.
     looked_at = int(_WORK / (criterion.work * 2 * poses))
@@ -325,7 +328,18 @@ def _searched(
     chosen = _greedy(criterion, information, poses)
     for place in range(poses if looked_at >= _STATES else 0):
         chosen[place] = _best_beside(criterion, information, chosen[:place] + chosen[place + 1 :])
-    return entries.at(chosen)
+    entries, information = entries.at(chosen), information[chosen]
+    limits = np.clip(robot.joint_limits, -np.pi, np.pi)
+    for radius in _RADII:
+        for place in range(poses):
+            # The entry itself stays among its neighbours.
+            tried = entries.at(np.full(_NEIGHBOURS, place))
+            angles = tried.joint_angles + radius * stream.standard_normal(tried.joint_angles.shape)
+            angles = np.clip(np.vstack([entries.joint_angles[place], angles[1:]]), *limits.T)
+            known = instrument.information(replace(tried, joint_angles=angles))
+            best = int(np.argmin(criterion.left(np.delete(information, place, axis=0).sum(axis=0) + known)))
+            entries.joint_angles[place], information[place] = angles[best], known[best]
+    return entries
 
 
 def _greedy(criterion: Criterion, information: np.ndarray, count: int) -> list[int]:

@@ -53,6 +53,13 @@ def test_a_plan_is_better_than_random_designs(survey, some, kind):
     assert (np.diff(plan.accuracy_m) <= 1e-12).all()
 
 
+def test_no_pose_judges_that_is_fitted(survey, some):
+    few = some.at(np.arange(21))
+    plan = choose_plan(survey, few, 16, 5, "D", 1)
+    both = np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles])
+    assert len(np.unique(both, axis=0)) == 21
+
+
 def test_candidates_lie_within_the_limits_and_the_loads_pull_or_hang(survey, some):
     robot = survey.robot
     low, high = robot.joint_limits.T
