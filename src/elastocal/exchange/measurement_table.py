@@ -272,6 +272,8 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
             raise InputError("--column", "", repr(name), closest_first(name, [*file_columns(6), "qw", "e1", "r11", "t11"]))
 
     def is_header(cells: Sequence[str]) -> bool:
+        if options.targets and {header for headers in options.targets.values() for header in headers} <= {*cells}:
+            return True
         names = {recognize_column(cell)[0] for cell in cells} | {name for name, header in mapped.items() if header in cells}
         # Joints without a position are a header too, of which is said what it lacks.
         only_joints = any(name and find_joints([name]) for name in names) and len(cells) > 1
