@@ -133,3 +133,10 @@ def places(tmp_path):
 def test_a_file_is_where_its_links_lead(places, path, inside):
     assert is_file_in(places / path, places / "cell") is inside
     assert is_file_in(places / path, places / "linked", places / "alias") is inside
+
+
+def test_thirty_poses_of_one_configuration_are_refused(cell):
+    for name in [name for name in cell.table if name.startswith("q")]:
+        cell.table[name] = [cell.table[name][0]] * len(cell.table[name])
+    with refused(cell.source, "holdout", "1 configuration to fit and 0 held out", "at least 5 to fit"):
+        cell.read()

@@ -10,7 +10,7 @@ from made_cells import assert_same
 from support import refused
 
 from elastocal.campaigns import measurements as module
-from elastocal.campaigns.measurements import BOUNDS
+from elastocal.campaigns.measurements import BOUNDS, CSV, read_measurements
 from elastocal.campaigns.reading import read_campaign
 
 
@@ -193,3 +193,10 @@ def test_what_a_small_file_of_parquet_would_grow_to_is_refused_before_it_is_read
     pq.write_table(table, path, row_group_size=10)
     with refused(path.as_posix(), "", "8 row groups", "at most 7"):
         read_campaign(cell.folder, cell.robots)
+
+
+@pytest.mark.parametrize("character", ["\x1b", "\x0c", "\u202e", "\x85"])
+def test_a_character_that_would_steer_a_terminal_is_refused_with_its_line(tmp_path, character):
+    (tmp_path / CSV).write_text(f"pose,target\n1,a\n2,a{character}b\n", encoding="utf-8")
+    with refused(tmp_path / CSV, "", "character"):
+        read_measurements(tmp_path, 6, "position")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from durations import growth
 from imported_tables import PLAIN, table
-from support import refused
+from support import refused, robot_of
 
 from elastocal.exchange.measurement_table import SAME_POSE, ImportOptions, import_options_text, read_import_options
 
@@ -104,6 +104,8 @@ def test_several_targets_of_a_row_are_read_by_the_columns_that_are_stated(tmp_pa
     assert found.table["y"].tolist() == [0.005, 0.002] * 2 and found.table["fz"].tolist() == [-5, -5, 0, 0]
     again = table(tmp_path, text, found.options)
     assert again.options == found.options and (again.table["x"] == found.table["x"]).all()
+    arm = replace(robot_of("Rz(q1) Tx(1) [A]"), joint_names=("turntable",))
+    assert table(tmp_path, text.replace("q1", "turntable"), options, arm).table["y"].tolist() == [0.005, 0.002] * 2
     with refused(tmp_path / "t.csv", "header", "no column 'C'", "z of B"):
         table(tmp_path, text, replace(options, targets={"B": ["B_x", "B_y", "C"]}))
     with refused(tmp_path / "t.csv", "header", "several units"):

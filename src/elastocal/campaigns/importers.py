@@ -112,7 +112,7 @@ def fetch(name: str, files: Mapping[str, PublicFile], folder: str | Path, box: s
 
 
 @dataclass(frozen=True)
-class Readings:
+class PublicMeasurements:
     """N measurements: `angles` (N, n) as the controller reports them, rad; `positions` (N, 3) by target, m; `others` (N,)."""
 
     angles: np.ndarray
@@ -136,7 +136,7 @@ class TextFormat:
     temperature: str = ""
     angles_in: str = "deg"
 
-    def read(self, path: str | Path) -> Readings:
+    def read(self, path: str | Path) -> PublicMeasurements:
         """An `InputError` names a column that is missing, or row and column of what is no number."""
         cells = self._cells(path)
 
@@ -156,7 +156,7 @@ class TextFormat:
             others["temperature_c"] = self._numbers(path, self.temperature, cells[self.temperature])
         if (times := _times(cells.get(self.time, ()))) is not None:
             others["time_s"] = times
-        return Readings(angles if self.angles_in == "rad" else np.radians(angles), positions, others)
+        return PublicMeasurements(angles if self.angles_in == "rad" else np.radians(angles), positions, others)
 
     def _cells(self, path: str | Path) -> dict[str, tuple[str, ...]]:
         text = read_text(path, LARGEST_BYTES)
@@ -218,12 +218,12 @@ def read_mat(path: str | Path, **shapes: int) -> dict[str, np.ndarray]:
     return {name: found[name] for name in shapes}
 
 
-def _read_fanuc_static(path: str | Path) -> Readings:
+def _read_fanuc_static(path: str | Path) -> PublicMeasurements:
     found = read_mat(path, q=6, mA=3, mB=3, mC=3)
-    return Readings(found["q"], {target: found[f"m{target}"] for target in "ABC"}, {})
+    return PublicMeasurements(found["q"], {target: found[f"m{target}"] for target in "ABC"}, {})
 
 
-def _read_motoman(path: str | Path) -> Readings:
+def _read_motoman(path: str | Path) -> PublicMeasurements:
     """A row for each camera image that was taken of a pose; rows of one pose repeat its joint angles and its reflector.
 
     Poses whose reflector the tracker did not see are left out, and so is the 13th of the larger file's 587, which the source's
@@ -238,7 +238,7 @@ def _read_motoman(path: str | Path) -> Readings:
         raise InputError(path, "dataset", "no pose with angles and a position", "poses of the right arm with a reflector")
     if (turned := np.abs(rows[:, turntable]).max()) > 1e-3:
         raise InputError(path, f"dataset column {turntable + 1}", f"a turntable at {turned:g} rad", "one that stands at 0")
-    return Readings(rows[:, angles], {"reflector": rows[:, position]}, {})
+    return PublicMeasurements(rows[:, angles], {"reflector": rows[:, position]}, {})
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ class Importer:
     """
 
     files: Mapping[str, PublicFile]
-    read: Callable[[str | Path], Readings]
+    read: Callable[[str | Path], PublicMeasurements]
     robots: tuple[str, ...]
     noise: Mapping[str, float] | None = None
     same_pose_rad: float = 0.0
@@ -274,13 +274,13 @@ class Importer:
         """Write one file, or one of each part, as a campaign's folder; `holdout` is as in ``campaign.yaml``."""
         found = [(part, part.read(path)) for part, path in zip(self.parts or (self,), paths, strict=True)]
         tables = []
-        for session, (part, readings) in enumerate(found):
-            pose, repeat = pose_and_repeat(readings.angles, part.same_pose_rad)
-            angles = readings.angles
+        for session, (part, measured) in enumerate(found):
+            pose, repeat = pose_and_repeat(measured.angles, part.same_pose_rad)
+            angles = measured.angles
             if self.parts:
                 angles = read_robot(Path(robots_folder) / f"{part.robots[0]}.yaml").model_angles(angles)
-            table = _table(pose, repeat, angles, readings.positions, session if self.parts else None)
-            tables.append(table | dict(readings.others))
+            table = _table(pose, repeat, angles, measured.positions, session if self.parts else None)
+            tables.append(table | dict(measured.others))
         joints = found[0][1].angles.shape[1]
         document: dict[str, Any] = {
             "campaign": name,
@@ -289,8 +289,8 @@ class Importer:
             "frame": "tracker",
             "targets": {
                 target: {"point": f"{joints}DoF", "offset_m": "unknown"}
-                for _, readings in found
-                for target in readings.positions
+                for _, measured in found
+                for target in measured.positions
             },
             "compliance": "nominal",
             # What such data can be fitted with at all before any physics is looked for.
@@ -332,7 +332,10 @@ def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tup
     return pose.to_numpy(), pose.groupby(pose).cumcount().to_numpy(np.int32)
 
 
-_MAT_FILES: dict[str, Callable[[str | Path], Readings]] = {"fanuc_static": _read_fanuc_static, "motoman": _read_motoman}
+_MAT_FILES: dict[str, Callable[[str | Path], PublicMeasurements]] = {
+    "fanuc_static": _read_fanuc_static,
+    "motoman": _read_motoman,
+}
 
 
 @cache
@@ -351,7 +354,7 @@ def read_importers(path: Path) -> dict[str, Importer]:
     return found
 
 
-def _no_file(path: str | Path) -> Readings:
+def _no_file(path: str | Path) -> PublicMeasurements:
     raise InputError(path, "", "no format", "an importer with a table, or parts that have one")
 
 

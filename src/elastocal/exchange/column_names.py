@@ -55,6 +55,8 @@ UNIT_LENGTH = 2e-3
 _OTHER_ANGLES = (("A", "B", "C"), ("W", "P", "R"), ("O", "A", "T"))
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _INDEX = re.compile(r"([^\[(]*?)\s*[\[(]\s*([0-9]+)\s*[\])](.*)", re.ASCII)
+# Of what has a usual unit; angles and lengths have two each and must be stated.
+_USUAL = {FORCE: "N", MOMENT: "Nm", TIME: "s", TEMPERATURE: "C"}
 # What has no unit, as people write it.
 _NO_UNIT = ("", "-", "1", "#", "–", "none")
 _BEHIND = re.compile(r"(.+?)[_/ ]([A-Za-zµ°]+)")
@@ -243,6 +245,39 @@ def find_columns(
         if unit is not None:
             stated[meant] = unit
     return found, stated, notes
+
+
+def find_units(
+    text: TextTable,
+    columns: Mapping[str, str],
+    wanted: Sequence[str],
+    stated: Mapping[str, str],
+    given: Mapping[str, str],
+    robot: Robot | None = None,
+) -> dict[str, str]:
+    """Units of wanted columns by their names: by options, by headers, or of what has a usual unit that one.
+
+    `stated`: by headers. `given`: by options, ``angles`` and ``lengths`` for all that have no other. Raises `InputError`: no
+    unit, or one of another kind.
+    """
+    found: dict[str, str] = {}
+    for name in wanted:
+        kinds = kind_of(name)
+        if robot and len(kinds) > 1:
+            kinds = (LENGTH if robot.chain.prismatic[int(name[1:]) - 1] else ANGLE,)
+        if kinds == (NONE,):
+            continue
+        for_all = given.get("lengths" if kinds[0] == LENGTH else "angles")
+        # Options go before headers, those for one column before those for all.
+        unit = given.get(name) or stated.get(name) or _USUAL.get(kinds[0]) or for_all
+        if unit is None:
+            option = "--lengths mm" if kinds[0] == LENGTH else "--angles deg"
+            raise InputError(text.path, "header", f"no unit of {columns[name]!r}", f"{option} or such, or --unit {name}=UNIT")
+        if unit_scale(unit, kinds) is None:
+            allowed = f"{', '.join(unit for kind in kinds for unit in UNITS[kind])}, by --unit {name}=UNIT"
+            raise InputError(text.path, f"unit of {columns[name]!r}", repr(unit), allowed)
+        found[name] = unit
+    return found
 
 
 def _find_counted_joints(text: TextTable, headers: Sequence[str], mapped: set[str]) -> tuple[dict[str, str], list[str]]:

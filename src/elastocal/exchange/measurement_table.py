@@ -31,14 +31,9 @@ from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, text_fault
 from elastocal.exchange.column_names import (
     ANGLE,
-    FORCE,
     HOMOGENEOUS_MATRICES,
-    LENGTH,
-    MOMENT,
-    NONE,
     POSITION,
     QUATERNIONS,
-    TEMPERATURE,
     TIME,
     TRANSLATION,
     UNITS,
@@ -47,6 +42,7 @@ from elastocal.exchange.column_names import (
     find_columns,
     find_joints,
     find_rotation,
+    find_units,
     has_position,
     is_name,
     kind_of,
@@ -67,8 +63,6 @@ IMPORT = "import.yaml"
 SAME_POSE = 1e-3
 # Rows of one pose whose joints stand farther apart (rad or m) are not of one pose: a label says something else.
 _ONE_POSE = 0.1
-# Of what has a usual unit; angles and lengths have two each and must be stated.
-_USUAL = {FORCE: "N", MOMENT: "Nm", TIME: "s", TEMPERATURE: "C"}
 # Nanoseconds since 1970 are 2e18.
 _LARGEST_TIME = 1e19
 # Of a pose, load, repeat or session; as in measurements.csv.
@@ -161,39 +155,6 @@ def rows_with_position(text: TextTable, columns: Mapping[str, str], position: Se
     if not filled.any():
         raise InputError(text.path, "", "no position in any row", "at least one measurement")
     return np.flatnonzero(filled)
-
-
-def find_units(
-    text: TextTable,
-    columns: Mapping[str, str],
-    wanted: Sequence[str],
-    stated: Mapping[str, str],
-    given: Mapping[str, str],
-    robot: Robot | None = None,
-) -> dict[str, str]:
-    """Units of wanted columns by their names: by options, by headers, or of what has a usual unit that one.
-
-    `stated`: by headers. `given`: by options, ``angles`` and ``lengths`` for all that have no other. Raises `InputError`: no
-    unit, or one of another kind.
-    """
-    found: dict[str, str] = {}
-    for name in wanted:
-        kinds = kind_of(name)
-        if robot and len(kinds) > 1:
-            kinds = (LENGTH if robot.chain.prismatic[int(name[1:]) - 1] else ANGLE,)
-        if kinds == (NONE,):
-            continue
-        for_all = given.get("lengths" if kinds[0] == LENGTH else "angles")
-        # Options go before headers, those for one column before those for all.
-        unit = given.get(name) or stated.get(name) or _USUAL.get(kinds[0]) or for_all
-        if unit is None:
-            option = "--lengths mm" if kinds[0] == LENGTH else "--angles deg"
-            raise InputError(text.path, "header", f"no unit of {columns[name]!r}", f"{option} or such, or --unit {name}=UNIT")
-        if unit_scale(unit, kinds) is None:
-            allowed = f"{', '.join(unit for kind in kinds for unit in UNITS[kind])}, by --unit {name}=UNIT"
-            raise InputError(text.path, f"unit of {columns[name]!r}", repr(unit), allowed)
-        found[name] = unit
-    return found
 
 
 class CellReader:
@@ -311,6 +272,8 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
             raise InputError("--column", "", repr(name), closest_first(name, [*file_columns(6), "qw", "e1", "r11", "t11"]))
 
     def is_header(cells: Sequence[str]) -> bool:
+        if options.targets and {header for headers in options.targets.values() for header in headers} <= {*cells}:
+            return True
         names = {recognize_column(cell)[0] for cell in cells} | {name for name, header in mapped.items() if header in cells}
         # Joints without a position are a header too, of which is said what it lacks.
         only_joints = any(name and find_joints([name]) for name in names) and len(cells) > 1
