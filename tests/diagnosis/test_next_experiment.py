@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from open_alternatives import ELASTIC, LADDER, SETTINGS, diagnosed, keys_like, limits, pieces
 from planted import planted, two_loads_a_pose
 
 from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis import next_experiment, verdict
-from elastocal.diagnosis.alternatives import Promise
+from elastocal.diagnosis.alarm import Alarm
+from elastocal.diagnosis.alternatives import Promise, alternatives_of
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.next_experiment import (
     DATA_AT_FAULT,
@@ -26,8 +26,60 @@ from elastocal.diagnosis.next_experiment import (
     shares_of,
     table_of,
 )
+from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import rows_alike
-from elastocal.diagnosis.verdict import mechanisms_of_models
+from elastocal.diagnosis.verdict import concluded, mechanisms_of_models
+
+SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
+RAISED = Alarm(0.002, 10.0, True)
+ELASTIC = ("link_elasticity", "base_compliance", "joint_tilt")
+LADDER = (0.0, 1.0, -1.0)
+
+
+def diagnosed(campaign, robot, keys, declared=None):
+    """A diagnosis in which only some candidates compete."""
+    declared = declared or campaign.declared
+    line = linearized(declared, campaign.observations, [campaign.candidates[key] for key in keys], SETTINGS)
+    found = posterior(line.problem)
+    conclusion = concluded(line.problem, found, RAISED)
+    evidence = SimpleNamespace(linearized=line, posterior=found, alarm=RAISED, conclusion=conclusion)
+    case = SimpleNamespace(observations=campaign.observations, campaign=SimpleNamespace(robot=robot))
+    return SimpleNamespace(case=case, evidence=evidence, final=declared)
+
+
+def limits(robot):
+    return np.clip(robot.joint_limits, -2.0, 2.0)
+
+
+def pieces(diagnosis):
+    """Models and instrument as `propose` makes them, without the error of a pose."""
+    evidence = diagnosis.evidence
+    kept, reason = next_experiment._ambiguous(evidence, SETTINGS)
+    assert not reason, reason
+    numbers = sorted({n for models in kept.values() for model in models for n in model.units})
+    lead = kept[evidence.conclusion.best.mechanisms][0]
+    noise = replace(evidence.linearized.about.noise, pose_rad=lead.pose_error_rad)
+    states = diagnosis.case.observations.states
+    made = instrument_of(evidence.linearized, diagnosis.final, numbers, noise, states, LADDER)
+    return alternatives_of(evidence, kept, made, lead, 1.0), made
+
+
+def keys_like(campaign, *starts):
+    return [key for key in campaign.candidates if key.startswith(starts)]
+
+
+@pytest.fixture(scope="module")
+def ambiguous(kuka):
+    """A nonlinear link in eight poses, which the tilt of a joint explains as well."""
+    states = two_loads_a_pose(6, 8, (5, 3), 1500.0)
+    campaign = planted(kuka, {"link_elasticity@2": (3.9e-8, 5.2e-8)}, seed=3, poses=8, states=states)
+    return diagnosed(campaign, kuka, keys_like(campaign, *ELASTIC)), campaign
+
+
+@pytest.fixture(scope="module")
+def proposal(ambiguous, kuka):
+    return propose(ambiguous[0], limits(kuka), SETTINGS, np.random.default_rng(0), 10, LADDER)
 
 
 def test_proposal_separates_more_than_random_poses_and_resolves_more(ambiguous, proposal, kuka):
