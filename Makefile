@@ -5,14 +5,18 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper study audit test test-slow test-slurm fuzz soak mutants lint bench pictures site supply dist installed lock clean
+.PHONY: paper study proof audit test test-slow test-slurm fuzz soak mutants lint bench pictures site supply dist installed lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
 
-# Extended questions, repeated studies, designs and claims, with the report of the study.
+# Further questions, repeated studies and designs, with the report of the study.
 study: .venv/ready
 	$(BIN)/snakemake -j$(CORES) study
+
+# The registered blind proof: docs/blind_proof.md.
+proof: .venv/ready
+	OMP_NUM_THREADS=1 $(BIN)/snakemake -j$(CORES) -k blind --config blind=full seed=20261128
 
 # Samples of every file worked out again, by pinocchio among others, which nothing else of a run needs.
 audit: .venv/ready-for-audit
@@ -35,7 +39,7 @@ test-slurm: .venv/ready-for-tests
 fuzz: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q tests/fuzz --hypothesis-profile=long
 
-# Forty kills at random moments, full disks, read-only folders, wrong clocks, two runs at once.
+# Forty kills at random moments, full disks, two runs at once.
 soak: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python tests/faults/soak.py $(SOAK)
 

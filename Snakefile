@@ -1,5 +1,5 @@
 """`snakemake -j2` makes the paper's tables and figures from seeds and closes the loop on a simulated and a measured robot; the
-target `study` makes the rest of the study: extended questions, repeated studies, designs and claims."""
+target `study` makes the rest of the study: further questions, repeated studies and designs."""
 
 
 include: "workflow/rules/begin.smk"
@@ -24,7 +24,6 @@ include: "workflow/rules/loop.smk"
 include: "workflow/rules/loop_report.smk"
 include: "workflow/rules/blind.smk"
 include: "workflow/rules/closed_loop.smk"
-include: "workflow/rules/bad_rows.smk"
 include: "workflow/rules/league_files.smk"
 include: "workflow/rules/league.smk"
 include: "workflow/rules/signatures.smk"
@@ -64,24 +63,16 @@ rule study:
     input:
         rules.paper.input,
         rules.compile_report.output.report,
-        expand("reports/tables/{table}.csv", table=["comparison", "expectations", "extended", "per_dataset", "solvers"]),
-        rules.tabulate_budget.output,
-        rules.tabulate_assumptions.output,
         expand(
             "reports/tables/{table}.csv",
-            table=["ladder", "designs", "observability", "claims", "strategies_over_studies", "joint_test"],
+            table=["comparison", "joint_test", "extended", "strategies_over_studies", "costs", "break_even"],
         ),
-        expand("reports/tables/{table}.csv", table=["costs", "break_even", "simulated_designs_few"]),
-        expand("reports/tables/{table}.csv", table=["few_configurations", "measurement_kinds", "stiffness", "starts"]),
+        expand("reports/tables/{table}.csv", table=["ladder", "designs", "simulated_designs"]),
+        rules.tabulate_budget.output,
+        # Scores of every strategy at every noise level.
+        cells("metrics", config["robots"], NOISE),
         expand("reports/figures/{figure}.{format}", figure=FIGURES, format=["pdf", "png"]),
         lambda wildcards: files_behind(rules.study.input),
-
-
-# The study under other interpretations of the paper.
-rule extended_study:
-    input:
-        "reports/tables/interpretations.csv",
-        "reports/tables/simulated_designs_every.csv",
 
 
 # All simulated campaigns.

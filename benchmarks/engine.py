@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from common import ROOT, Row, beside_yardstick, interleaved
 
-from elastocal.campaigns.importers import ur10_ipa
-from elastocal.campaigns.public_data import FOLDER_VARIABLE
+from elastocal.campaigns.importers import FOLDER_VARIABLE, importer
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.registration import registered
@@ -29,7 +28,7 @@ from elastocal.loop.whole import cases_in
 from elastocal_proof.blind.cases import cases_of, make_case
 from elastocal_proof.blind.folders import write_dynamic_campaign
 from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.defects import Defect, with_defects
+from elastocal_proof.plant.kinds import Defect, with_defects
 from elastocal_proof.plant.physical_robot import specimen
 from elastocal_proof.plant.weights import declared_masses
 
@@ -88,11 +87,12 @@ def rows(work: Path, setting: Setting) -> Iterator[Row]:
     how = f"exponent of the CPU time in the rows: {many['measurements']} against {few['measurements']}, from file to verdict"
     yield Row("engine growth", large, small, exponent, f"<= {GROWTH_TARGET}", exponent <= GROWTH_TARGET, how)
     if os.environ.get(FOLDER_VARIABLE):
-        source = Path(os.environ[FOLDER_VARIABLE], ur10_ipa.FILES["ur10_ipa_a"].local)
+        series = importer("ur10_ipa", "config", "the benchmark")
+        source = Path(os.environ[FOLDER_VARIABLE], series.files["ur10_ipa_a"].local)
         header, *lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
         kept = lines[: setting.series_a]
         (work / "series_a.csv").write_text("".join([header, *kept]), encoding="utf-8")
-        ur10_ipa.write_campaign(work / "series_a.csv", work / "series_a", "ur10_series_a")
+        series.write_campaign([work / "series_a.csv"], work / "series_a", "config/robots", "ur10_series_a")
         how = f"UR10 Series A, {len(kept):,} poses, from its folder to its verdict, one thread as in a job of the workflow"
         yield from _limits("engine ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how)
     how = f"{setting.million:,} measurements of a tracker's dynamic mode, from file to verdict, one thread as in a job"

@@ -8,8 +8,7 @@ import numpy as np
 from common import Row, interleaved, load_robot, load_strategy
 
 from elastocal.mechanics.robot import Robot
-from elastocal.study.equation_11 import Measurements, estimate_compliance, identify
-from elastocal.study.identify import Situation
+from elastocal.study.equation_11 import Measurements, estimate_compliance, measurements_of
 from elastocal.study.simulation import (
     Loading,
     blocks_of_sets,
@@ -41,7 +40,7 @@ FULL, SMALL = Setting(1000, 100, 3), Setting(4, 10, 1)
 
 
 def rows(work: Path, setting: Setting) -> list[Row]:
-    """Rows of the report, for the estimates alone and with what the study stores beside them; `work` is not used."""
+    """The row of the report; `work` is not used."""
     sets, configurations, repetitions = setting.sets, setting.configurations, setting.repetitions
     robot, strategy = load_robot("kuka"), load_strategy("6DoF")
     joints = robot.joints
@@ -63,21 +62,11 @@ def rows(work: Path, setting: Setting) -> list[Row]:
                 number += 1
         return found
 
-    def with_covariance() -> list[tuple[np.ndarray, ...]]:
-        return [identify(strategy, measurements, joints) for measurements in blocks]
-
     _assert_equal(np.concatenate(ours(), axis=2).transpose(2, 0, 1)[..., order], loop())
-    functions = {"elastocal": ours, "with covariance": with_covariance, "numpy.linalg.lstsq": loop}
-    alone, full, theirs = map(min, interleaved(functions, repetitions))
+    alone, theirs = map(min, interleaved({"elastocal": ours, "numpy.linalg.lstsq": loop}, repetitions))
     against = f"a loop of numpy.linalg.lstsq over {sets} data sets and {configurations} prefixes, 6DoF on kuka"
     how = f"estimate_compliance against {against}, minimum of {repetitions}, equal to {TOLERANCE:g}"
-    more = (
-        f"identify, which adds covariances and condition numbers, against {against}, which does not; minimum of {repetitions}"
-    )
-    return [
-        Row("identification", alone, theirs, theirs / alone, f">= {TARGET}", theirs / alone >= TARGET, how),
-        Row("identification with covariance", full, theirs, theirs / full, "", None, more),
-    ]
+    return [Row("identification", alone, theirs, theirs / alone, f">= {TARGET}", theirs / alone >= TARGET, how)]
 
 
 def _measurements(robot: Robot, strategy: Strategy, sets: Sequence[int], configurations: int) -> dict[str, Measurements]:
@@ -88,7 +77,7 @@ def _measurements(robot: Robot, strategy: Strategy, sets: Sequence[int], configu
     noise = NOISE * measurement_noise(1, "kuka", point.name, sets, configurations)
     measured = true_deflections(robot, experiments, point, "end_effector") + noise
     columns = {point.name: deflection_columns(point.name, sets, measured)}
-    return Situation(experiment_columns(sets, experiments), columns, robot.chain, strategy, ROWS, "end_effector").measurements
+    return measurements_of(experiment_columns(sets, experiments), columns, robot.chain, strategy, ROWS, "end_effector")
 
 
 def _systems(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:

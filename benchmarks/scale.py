@@ -17,7 +17,6 @@ STEPS = {
     "measure": (f"data/simulated/{CELL}/measured.parquet", CELL),
     "identify": (f"results/identified/{CELL}/{STRATEGY}.parquet", f"{CELL}/{STRATEGY}"),
     "draw_weights": ("results/weights/kuka.parquet", "kuka"),
-    "bound": ("results/bounds/kuka.parquet", "kuka"),
 }
 TIME_TARGET, MEMORY_TARGET, MEMORY_LIMIT_GB = 11, 1.15, 1.5
 # Snakemake samples memory twice a second and misses peaks: each job notes its own when it ends (Linux).

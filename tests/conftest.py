@@ -20,11 +20,7 @@ CONFIG = Path(__file__).resolve().parents[1] / "config"
 
 # The same examples in every run: a test that fails must fail again. A machine that is too slow to draw them is no fault.
 hypothesis.settings.register_profile(
-    "repeatable",
-    deadline=None,
-    max_examples=40,
-    derandomize=True,
-    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+    "repeatable", deadline=None, max_examples=40, derandomize=True, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
 hypothesis.settings.load_profile("repeatable")
 
@@ -88,8 +84,7 @@ def strategies():
     for path in sorted((CONFIG / "strategies").glob("*.yaml")):
         document = read_document(path)
         check_document(document, "strategy", path)
-        if "prior_std" not in document:
-            found[path.stem] = strategy_from_document(document)
+        found[path.stem] = strategy_from_document(document)
     return found
 
 

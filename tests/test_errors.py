@@ -8,24 +8,22 @@ import pytest
 from elastocal.errors import LONGEST_MESSAGE, InputError, closest_first, escaped, fault_of_machine, steering
 
 
-def test_the_message_is_place_then_what_was_found_then_what_is_allowed():
-    error = InputError("robot.yaml", "masses[2]", "-3 kg", "a positive mass")
-    assert str(error) == "robot.yaml: masses[2]: found -3 kg; allowed: a positive mass"
-
-
-def test_the_message_stays_one_line_whatever_was_found():
-    error = InputError("a.csv", "q1\n", "two\r\nlines,\ta tab\n\n", "one\nline")
-    assert str(error) == "a.csv: q1: found two lines, a tab; allowed: one line"
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        (("robot.yaml", "masses[2]", "-3 kg", "a mass"), "robot.yaml: masses[2]: found -3 kg; allowed: a mass"),
+        ((Path("a.csv"), "q1\n", "two\r\nlines,\ta tab\n\n", "1\nline"), "a.csv: q1: found two lines, a tab; allowed: 1 line"),
+    ],
+)
+def test_the_message_is_one_line_of_place_what_was_found_and_what_is_allowed_and_keeps_its_parts(parts, message):
+    error = InputError(*parts)
+    assert str(error) == message
+    assert (error.source, error.key, error.found, error.allowed) == (str(parts[0]), *parts[1:])
 
 
 def test_the_closest_of_the_names_that_are_allowed_comes_first_whatever_its_case():
     assert closest_first("KUKE", ["abb", "kuka"]) == "'kuka'? (abb, kuka)"
     assert closest_first("joint", ["abb", "kuka"]) == "abb, kuka"
-
-
-def test_the_parts_can_be_read_one_by_one_as_they_were_given():
-    error = InputError(Path("cells") / "a.csv", "q1", "two\nlines", "one")
-    assert (error.source, error.key, error.found, error.allowed) == ("cells/a.csv", "q1", "two\nlines", "one")
 
 
 @pytest.mark.parametrize("part", range(4))

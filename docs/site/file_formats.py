@@ -20,6 +20,7 @@ DOCUMENTS = {
     "strategy": "A file of `config/strategies`.",
     "config": "`config.yaml` at the top of the repository.",
     "campaign_source": "A file of `config/campaigns`: where a campaign of this project comes from.",
+    "public_data": "`config/public_data.yaml`: importers of public data.",
     "measurement_import": "`import.yaml`, by which an import of measurements can be repeated.",
 }
 # Each module of table schemas with where its tables lie.
@@ -27,7 +28,7 @@ TABLES = {
     "elastocal.study": "The study: `data/simulated`, `results`.",
     "elastocal.loop.schemas": "The loop: `results/loop`, `reports/loop`.",
     "elastocal_proof.league.schemas": "The league of methods: `results/league`, `reports/league`.",
-    "elastocal_proof.blind.schemas": "The closed loop and bad rows: `results/closed_loop`, `results/bad_rows`.",
+    "elastocal_proof.blind.schemas": "The closed loop: `results/closed_loop`.",
 }
 # Robots have different numbers of joints; tables are shown for this one.
 JOINTS = 6

@@ -20,8 +20,7 @@ INTERFACE = {
     },
     "Simulate a campaign": {"elastocal.campaigns.simulation": ("Plan", "draw_measurements")},
     "Plan measurements": {
-        "elastocal.application.planning.survey": ("Survey",),
-        "elastocal.application.planning.plan": ("find_allowed_candidates", "choose_plan"),
+        "elastocal.application.planning.plan": ("Survey", "find_allowed_candidates", "choose_plan"),
     },
     "Diagnose": {
         "elastocal.diagnosis.diagnose": ("diagnose",),
@@ -29,13 +28,12 @@ INTERFACE = {
         "elastocal.effects.catalogue": ("effects",),
     },
     "Use a calibrated robot": {
-        "elastocal.application.forward_model": ("ForwardModel", "read_calibrated"),
         "elastocal.application.calibrated": ("calibrate_by_fit", "forward", "pose_sensitivities"),
         "elastocal.application.accuracy": ("predict_errors",),
         "elastocal.application.compensation": ("find_joint_targets",),
     },
     "Judge predictions": {"elastocal.validation.held_out": ("position_errors", "intervals")},
-    "Identify compliances as in the study": {"elastocal.study.equation_11": ("identify", "covariance")},
+    "Identify compliances as in the study": {"elastocal.study.equation_11": ("estimate_compliance", "undetermined")},
 }
 
 

@@ -13,9 +13,8 @@ TABLE = Path(__file__).resolve().parents[2] / "config" / "paper" / "interpretati
 HEAD = """# Interpretations of the paper
 
 The paper leaves some points open. How each is interpreted, as in the table of the report, and by which key of
-`interpretations` in `config.yaml` another interpretation is chosen. What each of them moves, and how well it predicts
-the printed figures, is in [the study](../docs/study.md); `snakemake -j2 extended_study` makes those figures. Where
-there is no switch another one is not possible, or both are given.
+`interpretations` in `config.yaml` another interpretation is chosen. Where there is no switch another one is not possible,
+or both are given.
 
 | point | open | interpretation | switch |
 |---|---|---|---|

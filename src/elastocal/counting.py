@@ -13,12 +13,6 @@ def counted(number: int, one: str, many: str | None = None) -> str:
     return f"{grouped(number)} {plural(one, number, many)}"
 
 
-def spell_count(number: int, one: str) -> str:
-    """A number with its noun, up to three as words: one row, three rows, 4 rows."""
-    words = {1: "one", 2: "two", 3: "three"}
-    return f"{words.get(number, number)} {plural(one, number)}"
-
-
 def first_names(names: Sequence[str], most: int) -> str:
     """The first of some names, and how many more there are: a, b and 3 more."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

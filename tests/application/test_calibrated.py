@@ -6,24 +6,18 @@ import numpy as np
 import pytest
 from made_calibrated import USUAL, made_calibrated, plain_estimate, plain_model
 from scipy.spatial.transform import Rotation
-from support import PinocchioPoint, random_angles, robot_of
-from synthetic import NOISE, made_estimate, made_states, seen_exactly
+from support import random_angles, robot_of
+from synthetic import NOISE, made_states
 
 from elastocal.application.calibrated import (
     OperatingConditions,
     assumptions,
-    calibrate_by_fit,
     calibrate_by_model,
     forward,
     pose_sensitivities,
 )
-from elastocal.campaigns.campaign import Target
-from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import Model
 from elastocal.fitting.parameters import stepped
 from elastocal.mechanics.robot import Mass
-from elastocal.mechanics.sites import sites_of
 
 ONE_JOINT = "Tz(0.5) Ry(q1) Tx(0.8) [hand]"
 
@@ -42,25 +36,6 @@ def test_what_belongs_to_the_instruments_and_the_set_up_is_left_out_with_its_cov
     starts = np.concatenate([[0], np.cumsum(counts)])
     rows = np.concatenate([np.arange(starts[n], starts[n + 1]) for n in (0, 2, 5)])
     np.testing.assert_array_equal(found.covariance, (root @ root.T)[np.ix_(rows, rows)])
-
-
-def test_a_fit_with_unknown_frames_and_targets_gives_the_robot_in_its_base(fanuc):
-    """Tracker anywhere, target anywhere: neither is part of the robot."""
-    sites = sites_of(fanuc)
-    effects = tuple(candidates_on(sites)[key] for key in ("joint_offset@2", "joint_offset@3"))
-    model = Model(sites, (Target("A", "6DoF", None),), True, 6, fanuc.compliance, effects)
-    true = made_estimate(model)
-    found = calibrate_by_fit(fit(model, seen_exactly(model, true, made_states(6, 40)), NOISE), fanuc)
-    angles = random_angles(np.random.default_rng(0), fanuc.chain, 5)
-    position, rotation = forward(found, angles)
-    moved = angles.copy()
-    moved[:, 1] += true.coefficients[0][0]
-    moved[:, 2] += true.coefficients[1][0]
-    expected = PinocchioPoint(fanuc.chain, fanuc.chain.end_effector)
-    for number, q in enumerate(moved):
-        at = expected.pose_and_jacobian(q)
-        np.testing.assert_allclose(position[number], at[0], atol=1e-8)
-        np.testing.assert_allclose(rotation[number], at[1], atol=1e-8)
 
 
 def test_spring_and_weight_of_one_joint_are_in_equilibrium():

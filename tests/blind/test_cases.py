@@ -15,17 +15,13 @@ from elastocal_proof.blind.cases import (
     NAMED,
     PROOF,
     Case,
-    angle_to_alternative,
     block_of,
     cases_of,
     defects_of,
     make_case,
     yardstick_of,
 )
-from elastocal_proof.plant.campaigns import schedule_of
-from elastocal_proof.plant.defects import Defect, with_defects
 from elastocal_proof.plant.kinds import KINDS
-from elastocal_proof.plant.physical_robot import seen_poses
 
 SETTINGS = PLAN["settings"]
 # Of names and seeds of the quick cases of seed 1, before the plan stood in a file of its own.
@@ -52,21 +48,22 @@ def sized(case):
 def test_the_full_size_has_the_nulls_effects_levels_and_robots_that_the_protocol_asks_for():
     cases = cases_of(PLAN, "full", 1)
     proof = [case for case in cases if case.robots == PROOF]
-    assert {case.robot for case in proof} == {"panda", "m900ib700"} and sum(case.group == "none" for case in proof) == 1000
+    assert {case.robot for case in proof} == {"gen3", "irb7600"} and len(proof) == len(cases) <= 2000
+    assert sum(case.group == "none" for case in proof) == 520
     for setting in (name for name, changes in SETTINGS.items() if changes.get("hard")):
-        assert sum(not case.effects and case.setting == setting for case in proof) == 200
+        assert sum(not case.effects and case.setting == setting for case in proof) == 50
     for effect in NAMED:
         # An arm without a gravity compensator has none that is wrong.
         for level in (25.0, 50.0, 200.0):
             found = sum(c.group == "single" and c.effects == (effect,) and c.levels == (level,) for c in proof)
-            assert found == (8 if effect.startswith("compensator") else 16)
+            assert found == (2 if effect.startswith("compensator") else 4)
     for effect in FOREIGN:
-        assert sum(c.group == "outside" and c.effects == (effect,) and c.levels == (200.0,) for c in proof) == 20
+        assert sum(c.group == "outside" and c.effects == (effect,) and c.levels == (200.0,) for c in proof) == 10
     for level in (50.0, 200.0):
-        assert sum(c.group == "pair" and c.levels == (level, level) for c in proof) == 200
-    for group in ("several_joints", "gear_gravity"):
-        assert sum(c.group == group for c in proof) >= 200
-    assert {case.setting for case in cases if case.group != "sweep"} == set(SETTINGS)
+        assert sum(c.group == "pair" and c.levels == (level, level) for c in proof) == 60
+    for group, count in (("several_joints", 52), ("gear_gravity", 64), ("remains", 40)):
+        assert sum(c.group == group for c in proof) == count
+    assert {case.setting for case in cases} == set(SETTINGS)
     assert len({case.name for case in cases}) == len(cases)
 
 
@@ -79,37 +76,14 @@ def test_only_the_full_size_shows_the_robots_of_the_proof_and_cases_to_develop_o
 
 def test_names_and_seeds_follow_from_seed_and_key_and_blocks_share_all_cases():
     cases = cases_of(PLAN, "quick", 1)
-    assert len(cases) == 143 and cases == cases_of(PLAN, "quick", 1) == sorted(cases, key=lambda case: case.name)
+    assert cases == cases_of(PLAN, "quick", 1) == sorted(cases, key=lambda case: case.name)
     # Pinned: sealed documents of earlier runs hold what follows from these.
-    digest = hashlib.sha256(" ".join(f"{case.name} {case.seed}" for case in cases).encode()).hexdigest()
+    of_old = [case for case in cases if case.setting != "many_poses" and "two_angles" not in case.key]
+    digest = hashlib.sha256(" ".join(f"{case.name} {case.seed}" for case in of_old).encode()).hexdigest()
     assert digest[:12] == NAMES
     assert not {case.name for case in cases} & {case.name for case in cases_of(PLAN, "quick", 2)}
     blocks = [block_of(cases, number, 10) for number in range(1, 11)]
     assert sorted((case for block in blocks for case in block), key=lambda case: case.name) == cases
-
-
-def test_a_sweep_has_each_effect_of_each_pair_under_each_design_and_moves_no_other_case():
-    parts = [{"robots": ["kuka"], "none": 2}]
-    plans = [PLAN | {"sizes": {"some": {"parts": [parts[0] | more]}}} for more in ({"sweep": 1}, {})]
-    with_sweep, without = (cases_of(plan, "some", 1) for plan in plans)
-    mine = [case for case in with_sweep if case.group == "sweep"]
-    pairs = [tuple(pair[::sense]) for pair in PLAN["sweep"]["pairs"] for sense in (1, -1)]
-    assert {((c.effects[0], c.alternative), c.setting) for c in mine} == {
-        (p, d) for p in pairs for d in PLAN["sweep"]["designs"]
-    }
-    assert {case.name for case in without} == {case.name for case in with_sweep if case.group != "sweep"}
-
-
-@pytest.mark.slow
-def test_the_angle_is_that_to_all_that_the_alternative_can_make():
-    """A stiffness that depends on the angle by a phase of its own: of two phases all others are made."""
-    case = a_case(("compensator_stiffness",), (50.0,), robot="kuka", alternative="joint_dependent_stiffness", group="sweep")
-    robot = case.specimen(ROBOTS)
-    yardstick = yardstick_of(case, robot)
-    same = with_defects(robot, [Defect("joint_dependent_stiffness", (2,), 0.1, 1)])
-    assert angle_to_alternative(case, robot, yardstick, same) < 3
-    play = with_defects(robot, [Defect("lost_motion", (4,), 1e-4, 1)])
-    assert angle_to_alternative(case, robot, yardstick, play) > 60
 
 
 def test_a_single_case_has_its_effect_at_its_non_centrality(tmp_path):
@@ -144,13 +118,6 @@ def test_each_setting_makes_a_campaign_that_can_be_read(tmp_path, setting):
     assert bool(campaign.robot.masses) == (setting != "weight_compensated")
 
 
-def test_weight_is_hidden_where_it_is_the_effect_and_declared_elsewhere(tmp_path):
-    hidden, truth = made(a_case(("link_weight",), (50.0,)), tmp_path)
-    assert not hidden.robot.masses and len(truth["masses"]) in (1, 5)
-    told, truth = made(a_case(("payload",), (50.0,)), tmp_path)
-    assert len(told.robot.masses) == len(truth["masses"]) == 7
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_groups_put_their_defects_where_they_belong(seed):
     _, ((defect, _),) = sized(a_case(("stiffening",), (200.0,), seed=seed, group="gear_gravity"))
@@ -159,26 +126,6 @@ def test_groups_put_their_defects_where_they_belong(seed):
     assert 3 <= len({defect.joints for defect, _ in several}) == len(several) <= 6
     _, ((everything, _),) = sized(a_case(("link_weight",), (1e6,), seed=seed, group="undeclared"))
     assert everything.joints == (2, 3, 4, 5)
-
-
-@pytest.mark.parametrize("setting", ["usual", "without_time_and_temperature"])
-def test_a_stand_that_is_knocked_moves_all_measurements_after_one_row_among_the_training_poses(setting):
-    case = a_case(("setup_step",), (200.0,), setting=setting, group="moved")
-    robot, defects = sized(case)
-    schedule = schedule_of(robot.arm, case.design, case.seed)
-    bad = with_defects(robot, [defect for defect, _ in defects])
-    change = np.abs(seen_poses(bad, schedule)[0] - seen_poses(robot, schedule)[0]).max(axis=(1, 2))
-    first = int(np.argmax(change > 1e-9))
-    assert (change[:first] < 1e-12).all() and (change[first:] > 1e-6).all()
-    poses = np.unique(schedule.pose[schedule.training & (np.arange(len(change)) < first)]).size
-    assert 2 <= poses <= 12
-
-
-def test_chance_of_the_drives_is_the_settings():
-    by_approach = a_case(setting="repeatability").specimen(ROBOTS).repeatability_rad
-    assert 1e-5 <= min(by_approach) <= max(by_approach) <= 3e-5
-    assert a_case(setting="pose_common_15urad").specimen(ROBOTS).pose_rad == (1.5e-5,) * 6
-    assert not any((*a_case().specimen(ROBOTS).repeatability_rad, *a_case().specimen(ROBOTS).pose_rad))
 
 
 def test_a_case_is_made_the_same_again_and_nothing_of_its_truth_lies_in_the_blind_folder(tmp_path):

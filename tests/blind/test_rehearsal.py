@@ -60,37 +60,6 @@ def test_a_sheet_is_filled_near_where_the_declared_robot_is(robot, angles):
     assert turn.magnitude().max() < 0.05
 
 
-def test_the_same_seed_fills_in_the_same_and_another_one_other_noise(robot, angles):
-    one, again, other = (filled_sheet(sheet_of(angles), document(), robot, seed) for seed in (1, 1, 2))
-    pd.testing.assert_frame_equal(one, again)
-    assert 1e-6 < np.abs(one["x"] - other["x"]).max() < 1e-3
-
-
-def test_a_reflector_of_unknown_offset_sits_at_one_place_within_a_decimetre(robot, angles):
-    known, unknown = (filled_sheet(sheet_of(angles), document(offset=o), robot, 1) for o in ([0, 0, 0], "unknown"))
-    turn = Rotation.from_rotvec(known[["rx", "ry", "rz"]].to_numpy())
-    apart = turn.inv().apply((unknown[["x", "y", "z"]] - known[["x", "y", "z"]]).to_numpy())
-    np.testing.assert_allclose(apart, np.broadcast_to(apart[0], apart.shape), atol=5e-4)
-    assert 0.01 < np.abs(apart[0]).max() < 0.1
-
-
-def test_a_mount_is_turned_as_stated_and_anywhere_where_it_is_unknown(robot, angles):
-    stated = {"point": FLANGE, "offset_m": [0, 0, 0]}
-    targets = {"A": stated, "B": stated | {"rotation": [0, 0, 1.2]}, "C": stated | {"rotation": "unknown"}}
-    described = {"targets": targets, "frame": "base", "measured": "pose"}
-    filled = filled_sheet(sheet_of(angles, tuple(targets)), described, robot, 1)
-    turns = [Rotation.from_rotvec(filled.loc[filled["target"] == name, ["rx", "ry", "rz"]]) for name in "ABC"]
-    mounts = [(turns[0].inv() * turn).as_rotvec() for turn in turns[1:]]
-    np.testing.assert_allclose(mounts[0], np.broadcast_to([0, 0, 1.2], mounts[0].shape), atol=1e-3)
-    assert np.ptp(mounts[1], axis=0).max() < 1e-3 and np.linalg.norm(mounts[1][0]) > 0.1
-
-
-def test_a_load_deflects_the_arm_along_it(robot, angles):
-    filled = filled_sheet(sheet_of(angles, forces=[(0, 0, 0), (0, 0, -100)]), document(), robot, 1)
-    z = filled.pivot(index="pose", columns="load", values="z")
-    assert (z[1] - z[0]).mean() < -1e-4
-
-
 def test_commands_reach_what_a_sheet_reads_but_for_noise(robot, angles):
     filled = filled_sheet(sheet_of(angles), document(), robot, 1)
     position, _ = reached(robot, angles, np.zeros((5, 6)), 9)
@@ -104,15 +73,6 @@ def test_the_hidden_effect_follows_from_the_seed_or_is_named(tmp_path):
     assert hidden_robot(UR10, 3)[1] == hidden_robot(UR10, 3)[1]
     with pytest.raises(InputError, match="rust"):
         hidden_robot(UR10, 3, ["rust"])
-
-
-def test_a_sheet_is_filled_in_place(robot, tmp_path):
-    state = {"pose": 1, "load": 0, "repeat": 0, "target": "T"} | dict.fromkeys(["fx", "fy", "fz", "mx", "my", "mz"], 0.0)
-    path = tmp_path / "measurements.csv"
-    pd.DataFrame([state | {f"q{j}": 0.1 * j for j in range(1, 7)}]).to_csv(path, index=False)
-    document = {"targets": {"T": {"point": "6DoF", "offset_m": [0, 0, 0]}}, "frame": "base", "measured": "position"}
-    assert fill_sheet(path, document, robot, 1) == 1
-    assert np.isfinite(pd.read_csv(path)[["x", "y", "z"]].to_numpy()).all()
 
 
 def test_uncorrected_and_corrected_targets_are_judged_at_the_wanted_poses(robot, tmp_path):

@@ -2,23 +2,9 @@
 
 import numpy as np
 import pytest
-from made_folders import made_folder, made_table
 
 from elastocal.campaigns.campaign import Measurements
 from elastocal.campaigns.columns import columns_of, measurements_from, residual_columns
-from elastocal.campaigns.reading import read_campaign
-from elastocal.io.storage import read_table, write_table
-from elastocal.loop.schemas import measurements
-
-COVARIATES = {
-    "none": {},
-    "all": {"approach3": [1.0, -1.0], "time_s": [0.0, 5.0], "temperature_c": [20.0, 21.5]},
-}
-
-
-def write_and_read(path, columns):
-    write_table(path, measurements(6), [columns], {})
-    return read_table(path, measurements(6))
 
 
 def two_measurements(**others):
@@ -69,27 +55,6 @@ def test_what_was_not_measured_is_an_empty_column_and_is_absent_again(name):
     assert {column for column, values in columns.items() if np.isnan(values).any()} == set(ABSENT[name])
     back = measurements_from(columns)
     assert [part for part, values in vars(back).items() if values is None] == [name]
-
-
-@pytest.mark.parametrize("measured", ["position", "pose"])
-@pytest.mark.parametrize("covariates", COVARIATES)
-def test_measurements_come_back_as_they_were(measured, covariates, kuka, config_folder, tmp_path):
-    table = made_table(kuka, "c")
-    count = len(table["pose"])
-    table |= {name: np.resize(values, count) for name, values in COVARIATES[covariates].items()}
-    table |= {f"approach{joint}": np.zeros(count) for joint in range(1, 7) if joint != 3 and covariates == "all"}
-    table["session"] = table["pose"] % 2
-    folder = made_folder(tmp_path / "c", kuka, table=table, measured=measured)
-    before = read_campaign(folder, config_folder / "robots").measurements
-    assert (before.rotation_vector is None) == (measured == "position")
-    assert (before.approach is None) == (before.time_s is None) == (covariates == "none")
-    after = measurements_from(write_and_read(tmp_path / "r.parquet", columns_of(before)))
-    for name, values in vars(before).items():
-        if values is None:
-            assert getattr(after, name) is None, name
-        else:
-            np.testing.assert_array_equal(getattr(after, name), values)
-            assert getattr(after, name).dtype == values.dtype, name
 
 
 def residuals_of(rows, held_out=False, **others):

@@ -24,14 +24,6 @@ def parts(cell, **holdout):
     return fitted, held_out
 
 
-def test_split_parts_no_pose_of_any_session(cell):
-    cell.repeat_as_session_7()
-    fitted, held_out = parts(cell)
-    assert fitted | held_out == {(session, pose) for session in (0, 7) for pose in range(POSES)} and len(held_out) == 6
-    campaign = cell.read()
-    assert sorted(row for part in split(campaign) for row in part.row) == campaign.measurements.row.tolist()
-
-
 @settings(max_examples=8)
 @given(st.randoms(use_true_random=False))
 def test_split_is_the_same_whatever_the_order_of_the_rows(tmp_path_factory, random):
@@ -55,14 +47,10 @@ def test_a_block_of_neighbours_is_held_out_by_its_seed(cell):
     ("holdout", "fitted", "held_out"),
     [
         ({"poses": [0, 2, 4, 6, 8]}, 5, 5),
-        ({"poses": [3, 9]}, 8, 2),
         ({"fraction": 0.5}, 5, 5),
-        ({"fraction": 0.2}, 8, 2),
         # Rounded to whole poses.
         ({"fraction": 0.16}, 8, 2),
-        ({"fraction": 0.54}, 5, 5),
         ({"blocks": 2}, 5, 5),
-        ({"blocks": 5}, 8, 2),
     ],
 )
 def test_five_poses_to_fit_and_two_held_out_are_enough(cell, holdout, fitted, held_out):
@@ -86,17 +74,6 @@ def test_a_session_is_held_out_where_five_poses_of_others_are_left(cell, poses, 
             cell.read()
 
 
-def test_a_block_goes_by_where_a_pose_stands_and_not_by_how_often_it_was_measured(cell):
-    before = parts(cell, blocks=3, seed=2)
-    again = {name: list(column) for name, column in cell.table.items()}
-    for number in range(20):
-        more = [n for n, pose in enumerate(cell.table["pose"]) if pose == 3 and cell.table["repeat"][n] == 0]
-        for name, column in cell.table.items():
-            again[name] += [column[n] if name != "repeat" else 2 + number for n in more]
-    cell.table = again
-    assert parts(cell) == before
-
-
 @pytest.mark.parametrize(
     ("holdout", "key", "words"),
     [
@@ -104,31 +81,12 @@ def test_a_block_goes_by_where_a_pose_stands_and_not_by_how_often_it_was_measure
         ({"fraction": 0.3, "poses": [1, 2]}, "holdout", ["fraction, poses together", "one of"]),
         ({"poses": [1, 2], "seed": 1}, "holdout", ["poses, seed together", "one of"]),
         ({"seed": 1}, "holdout", ["seed alone", "{fraction, seed}"]),
-        ({"fraction": 1.0}, "holdout.fraction", ["1.0", "between 0 and 1"]),
-        ({"fraction": 0.3, "seed": 1.5}, "holdout.seed", ["1.5", "integer"]),
-        ({"poses": ["1"]}, "holdout.poses[0]", ["'1'", "integer"]),
-        ({"poses": [[0, 1, 2]]}, "holdout.poses[0]", ["allowed: 2 entries"]),
         ({"poses": [3, 12]}, "holdout.poses", ["found 12", "0..9"]),
         ({"poses": [3, [1, 4]]}, "holdout.poses", ["[1, 4]", "0..9"]),
-        ({"poses": [3]}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
-        (
-            {"poses": [1, 2, 3, 4, 5, 6]},
-            "holdout",
-            ["4 configurations to fit and 6 held out", "at least 5 to fit"],
-        ),
-        ({"fraction": 0.6}, "holdout", ["4 configurations to fit and 6 held out", "at least 5 to fit"]),
-        ({"fraction": 0.3, "blocks": 3}, "holdout", ["fraction, blocks together", "{blocks, seed}"]),
-        ({"session": 0, "seed": 1}, "holdout", ["session, seed together", "{session}"]),
-        ({"blocks": 1}, "holdout.blocks", ["found 1", "2 or more"]),
-        ({"blocks": 2.5}, "holdout.blocks", ["2.5", "integer"]),
         ({"blocks": 11}, "holdout.blocks", ["11", "at most as many as configurations, 10"]),
         *(({"blocks": count}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]) for count in (9, 10)),
         ({"campaign": "../nowhere"}, "holdout.campaign", ["'../nowhere'", "campaign.yaml"]),
         ({"session": 3}, "holdout.session", ["found 3", "sessions that were measured: 0"]),
-        ({"session": [0, "x"]}, "holdout.session[1]", ["'x'", "integer"]),
-        ({"session": []}, "holdout.session", ["session"]),
-        ({"session": 0}, "holdout", ["0 configurations to fit and 10 held out"]),
-        ({"fraction": 0.1}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
     ],
 )
 def test_faulty_holdout_is_refused_in_one_line(cell, holdout, key, words):
@@ -145,13 +103,6 @@ def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell, holdou
     again["pose"] = [pose + POSES for pose in again["pose"]]
     cell.table = {name: [*column, *again[name]] for name, column in cell.table.items()}
     assert parts(cell)[1] == once | {(session, pose + POSES) for session, pose in once}
-
-
-def test_thirty_poses_of_one_configuration_are_refused(cell):
-    for name in [name for name in cell.table if name.startswith("q")]:
-        cell.table[name] = [cell.table[name][0]] * len(cell.table[name])
-    with refused(cell.source, "holdout", "1 configuration to fit and 0 held out", "at least 5 to fit"):
-        cell.read()
 
 
 @pytest.fixture
@@ -173,16 +124,10 @@ def places(tmp_path):
         ("cell/deep/a", True),
         ("cell/inside", True),
         ("alias/deep/a", True),
-        ("cell/../cell/deep/a", True),
         ("cell/out", False),
-        ("cell/../elsewhere/a", False),
         ("elsewhere/a", False),
-        ("cell/none", False),
-        ("cell/loop", False),
         ("cell/pipe", False),
-        ("cell/deep", False),
         ("cell/" + "x" * 5000, False),
-        ("cell/\0", False),
     ],
 )
 def test_a_file_is_where_its_links_lead(places, path, inside):

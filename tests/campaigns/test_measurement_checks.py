@@ -47,37 +47,6 @@ def test_a_clock_that_runs_backwards_is_refused(cell):
         cell.read()
 
 
-@pytest.mark.parametrize(("back", "row"), [(3600, 12), (3600, 9), (86400, 30)])
-def test_a_clock_that_is_set_back_in_a_pose_or_between_poses_is_refused(cell, back, row):
-    count = len(cell.table["pose"])
-    cell.table["time_s"] = [60.0 * number - back * (number >= row) for number in range(count)]
-    with refused(cell.measurements, f"row {row + 1}, column time_s", f"in row {row}", "set back"):
-        cell.read()
-
-
-def test_a_clock_that_is_set_back_inside_of_a_pose_is_found_in_poses_of_any_order(cell):
-    pose = np.array(cell.table["pose"])
-    order = np.random.default_rng(1).permutation(pose.max() + 1)
-    time = 900.0 * order[pose] + 30.0 * np.arange(len(pose))
-    cell.table["time_s"] = time.tolist()
-    assert len(cell.read().measurements) == len(pose)
-    cell.table["time_s"] = np.where((pose == 4) & (np.arange(len(pose)) % 8 > 3), time - 3600.0, time).tolist()
-    with refused(cell.measurements, "column time_s", "set back"):
-        cell.read()
-
-
-def test_rows_measured_anew_an_hour_later_and_targets_one_after_the_other_stay(cell):
-    time = 60.0 * np.arange(len(cell.table["pose"]))
-    time[12] += 3550.0
-    cell.table["time_s"] = time.tolist()
-    assert len(cell.read().measurements) == len(time)
-    pose = np.array(cell.table["pose"])
-    by_target = np.argsort([f"{target}{number:06}" for number, target in enumerate(cell.table["target"])])
-    cell.table["time_s"] = (3500.0 * pose / pose.max()).tolist()
-    cell.table = {name: [values[place] for place in by_target] for name, values in cell.table.items()}
-    assert len(cell.read().measurements) == len(time)
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_poses_may_be_measured_in_any_order_and_stand_in_any_order(cell, seed):
     """Backwards in the file, or backwards by their numbers; loads and targets of a pose in any order; the clock of any zero."""

@@ -108,22 +108,6 @@ def test_other_campaign_is_the_test_of_all_measurements(cell, tmp_path):
     assert len(other.measurements) == len(campaign.measurements)
 
 
-def test_campaign_that_holds_out_its_own_poses_has_no_other(cell):
-    assert held_out_campaign(cell.read(), cell.folder, cell.robots) is None
-
-
-@pytest.mark.parametrize("poses", [4, 5])
-def test_five_poses_are_the_fewest_that_another_campaign_may_test(cell, tmp_path, poses):
-    other_campaign(cell, tmp_path)
-    cell.keep(np.flatnonzero(np.less(cell.table["pose"], poses)))
-    if poses < 5:
-        with refused(cell.source, "holdout", "4 configurations to fit", "at least 5 to fit"):
-            cell.read()
-    else:
-        training, held_out = split(cell.read())
-        assert set(training.pose.tolist()) == set(range(5)) and len(held_out) == 0
-
-
 def add_session(cell):
     """The same poses again in session 7, and pose 3 of session 0 alone is not there."""
     cell.repeat_as_session_7()
@@ -154,15 +138,8 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
     ("changes", "key", "words"),
     [
         ({"robbot": "arm.yaml"}, "robbot", ["unknown key", "'robot'?"]),
-        ({"campaign": "../cell"}, "campaign", ["letters"]),
-        ({"measured": "poses"}, "measured", ["'poses'", "position | pose"]),
-        ({"frame": "world"}, "frame", ["tracker | base"]),
-        ({"compliance": "free"}, "compliance", ["nominal | identify"]),
-        ({"targets": {}}, "targets", ["what is tracked"]),
         ({"targets": {"A": {"point": "elbow"}}}, "targets.A.offset_m", ["nothing", "unknown: fitted"]),
         ({"targets": {"A": {"point": "elbow", "offset_m": "unkown"}}}, "targets.A.offset_m", ["'unkown'", "allowed: unknown"]),
-        ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0]}}}, "targets.A.offset_m", ["allowed: 3 entries"]),
-        ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0, "1"]}}}, "targets.A.offset_m[2]", ["'1'", "number"]),
         ({"targets": {"A": {"point": "elbw", "offset_m": "unknown"}}}, "targets.A.point", ["'elbw'", "'elbow'? (elbow, hand)"]),
         ({"targets": {1: {"point": "elbow", "offset_m": "unknown"}}}, "targets", ["the name 1", "in quotes"]),
         (
@@ -171,20 +148,14 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
             ["no measurement", "measurements.csv"],
         ),
         ({"robot": "planer"}, "robot", ["'planer'", "'planar'? (planar)"]),
-        ({"robot": "../arm.yaml"}, "robot", ["'../arm.yaml'", "relative to this folder", "planar"]),
         ({"declared": ["joint_ofset"]}, "declared[0]", ["'joint_ofset'", "'joint_offset'? (joint_offset, payload)"]),
-        ({"declared": ["payload", "payload"]}, "declared", ["each entry once"]),
-        ({"noise": {"position_m": 0}}, "noise.position_m", ["more than 0"]),
         ({"noise": {"orientation_rad": 1e-4}}, "noise", ["no position_m", "u95_m"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": [1e-5]}}, "noise.joint_rad", ["1 number", "or 3"]),
-        ({"noise": {"position_m": 1e-4, "joint_rad": -1.0}}, "noise.joint_rad", ["-1"]),
-        ({"noise": {"position_m": 1e-4, "joint_rad": 2.0}}, "noise.joint_rad", ["2.0", "0 to 0.1"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": [0, 2.0, 0]}}, "noise.joint_rad[1]", ["2.0", "0 to 0.1"]),
         *(
             ({"noise": {"position_m": value}}, "noise.position_m", ["laser", "0.1"])
             for value in (60, 0.2, 6e-12, 1e-300, -1e-4)
         ),
-        *(({"noise": {"position_m": value}}, "noise.position_m", ["number"]) for value in (float("inf"), float("nan"))),
         *(
             ({"noise": {"position_m": 1e-4, "orientation_rad": value}}, "noise.orientation_rad", ["resolves"])
             for value in (60, 6e-12, 1e-300, -1.0)

@@ -44,24 +44,21 @@ SIMULATED = {
     "noise_rad": 0,
 }
 FAULTY_SOURCES = {
-    "wrong key": ({"pose": 9}, "pose", ["unknown key", "'poses'?"]),
-    "missing key": ({"poses": None}, "poses", ["nothing", "joint limits"]),
     "value out of range": ({"poses": 3}, "poses", ["found 3", "8 or more"]),
-    "unknown robot": ({"robot": "kukka"}, "robots", ["'kukka'", "'kuka'?"]),
     "unknown declared robot": ({"declared_robot": "fanuk"}, "robots", ["'fanuk'", "'fanuc'?"]),
     "unknown importer": (
         {**dict.fromkeys(SIMULATED), "source": "public", "importer": "mine", "files": ["a"]},
         "importer",
-        ["'mine'", "fanuc_cpa, fanuc_joint, fanuc_static, jacobi, motoman, ur10_ipa"],
+        ["'mine'", "fanuc_static, fanuc_cpa, fanuc_joint, jacobi, motoman, ur10_ipa"],
     ),
-    "unknown source": ({"source": "made up"}, "source", ["'made up'", "simulated"]),
 }
 
 
 @pytest.fixture
 def campaigns_folder(config_folder, tmp_path):
     """The repository's robots and one campaign."""
-    (tmp_path / "robots").symlink_to(config_folder / "robots")
+    for name in ("robots", "public_data.yaml"):
+        (tmp_path / name).symlink_to(config_folder / name)
     (tmp_path / "campaigns").mkdir()
     (tmp_path / "campaigns" / "mine.yaml").write_text(yaml.safe_dump(SIMULATED))
     return tmp_path
@@ -124,23 +121,16 @@ def test_a_users_own_campaign_has_one_spelling_however_its_folder_is_given(confi
 
 OWN_FAULTS = {
     "name with a slash": ({"campaign": "cell/7"}, "campaign", ["'cell/7'", "letters, digits"]),
-    "name that leads upwards": ({"campaign": "../cell"}, "campaign", ["'../cell'", "letters, digits"]),
     "name of a simulated campaign": (
         {"campaign": "kuka_nothing_missing"},
         "campaign",
         ["kuka_nothing_missing", "no campaign of"],
     ),
-    "name of a measured campaign": ({"campaign": "ur10_series_a"}, "campaign", ["ur10_series_a", "no campaign of"]),
-    "no name": ({"campaign": ""}, "campaign", ["''"]),
-    "name that no file can have": ({"campaign": "x" * 81}, "campaign", ["80 or fewer"]),
     "name that looks endless": ({"campaign": "ab" * 20}, "campaign", ["repetition"]),
     "another campaign that is not there": ({"holdout": {"campaign": "../other"}}, "holdout.campaign", ["'../other'", "beside"]),
     "itself for the test": ({"holdout": {"campaign": "."}}, "holdout.campaign", ["'.', the campaign itself"]),
-    "itself by a detour": ({"holdout": {"campaign": "../cell"}}, "holdout.campaign", ["the campaign itself"]),
     "robot from elsewhere": ({"robot": "/etc/passwd"}, "robot", ["'/etc/passwd'", "a file in this folder"]),
     "robot through a link": ({"robot": "link.yaml"}, "robot", ["'link.yaml'", "a file in this folder"]),
-    "unknown robot": ({"robot": "kukka"}, "robot", ["'kukka'", "'kuka'?"]),
-    "wrong key": ({"target": {}}, "target", ["unknown key", "'targets'?"]),
 }
 
 

@@ -1,12 +1,10 @@
 """Campaigns written to a folder: they are those read, and one that cannot be written leaves what was there."""
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from made_cells import assert_same
 from support import refused
 
-from elastocal.campaigns.measurements import file_columns
 from elastocal.campaigns.reading import read_campaign
 from elastocal.campaigns.writing import write_campaign
 
@@ -20,14 +18,6 @@ def test_written_campaign_is_the_one_read(cell, tmp_path, kind):
     assert_same(first.measurements, second.measurements)
     assert second.targets == first.targets
     assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["campaign.yaml", f"measurements.{kind}"]
-
-
-def test_parquet_of_a_written_campaign_carries_units_and_meanings(cell, tmp_path):
-    write_campaign(tmp_path / "again", cell.document, cell.table, 3)
-    schema = pq.read_schema(tmp_path / "again" / "measurements.parquet")
-    for name, column in file_columns(3).items():
-        if name in cell.table:
-            assert schema.field(name).metadata == {b"unit": column.unit.encode(), b"meaning": column.meaning.encode()}
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])

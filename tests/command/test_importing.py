@@ -26,7 +26,7 @@ def of_urdf(output, *more, parts=ARM):
 
 def test_a_table_becomes_a_robot_file_in_the_units_and_the_notation_asked_for(elastocal, output):
     units = "--angles", "rad", "--lengths", "mm", "--modified", "--name", "arm 1"
-    result = elastocal(*of_table(output, "d,a,alpha\n100,400,pi/2\n", *units))
+    result = elastocal(*of_table(output, "d,a,alpha\n100,400,1.5707963267948966\n", *units))
     assert result.exit_code == 0 and "arm 1: 1 joint," in result.output and "written:" in result.output
     text = output.read_text()
     assert "Tx(0.4) Rx(90deg) Rz(q1) Tz(0.1) [flange]" in text and "modified" in text.splitlines()[0]

@@ -10,13 +10,13 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 from certified import record_jobs
+from elastocal.application.exported import fold_effects
 from made_calibrated import made_calibrated
 from made_urdf import joint, link, written
 from scipy.spatial.transform import Rotation
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence, error_rows
 from elastocal.application.calibrated import nominal_forward
-from elastocal.application.forward_model import fold_effects
 from elastocal.campaigns.reading import campaign_files, read_robot
 from elastocal.command.results import _drop_in
 from elastocal.exchange.dh import robot_from_dh

@@ -9,10 +9,8 @@ from support import PinocchioPoint
 
 from elastocal.data_checks.loads import (
     Deflections,
-    StateDeflections,
     deflections,
     find,
-    state_deflections,
     unit_of_loads,
 )
 
@@ -171,89 +169,6 @@ def test_of_two_units_within_reach_the_one_by_which_compliances_are_nearest_nomi
     found = unit_of_loads(made_deflections(force=POUND, moment=POUND, ratios=1.55))
     assert [found.unit.force, found.less_likely.force] == [KILOGRAM, pytest.approx(POUND)]
     assert unit_of_loads(made_deflections(force=KILOGRAM, moment=KILOGRAM)).less_likely is None
-
-
-def made_states(states=9, targets=3, seed=1, compliance=None):
-    """Deflections that are just what the load of each state makes of the compliances."""
-    rng = np.random.default_rng(seed)
-    wrench, end = 300.0 * rng.standard_normal((states, 6)), rng.standard_normal((states, 6, JOINTS))
-    jacobian = rng.standard_normal((states, targets, 3, JOINTS))
-    read = np.ones((states, targets), bool)
-    read[2, 1:] = False
-    jacobian *= read[..., None, None]
-    seen = np.einsum("stcj,j,saj,sa->stc", jacobian, compliance, end, wrench)
-    return StateDeflections(wrench, seen, jacobian, end, read.sum(axis=1), tuple((s,) for s in range(states)))
-
-
-NOMINAL = 1e-6 * np.arange(1.0, 7.0)
-
-
-def test_misfits_are_the_root_mean_squares_written_out():
-    states = made_states(compliance=1.4 * NOMINAL)
-    other = states.seen + 1e-4 * np.random.default_rng(2).standard_normal(states.seen.shape) * (states.seen != 0)
-    for seen, found in ((states.seen, states.misfits(NOMINAL)), (other, states.misfits(NOMINAL, other))):
-        for row in range(9):
-            for column in range(9):
-                left = seen[row].copy()
-                torques = states.end_jacobian[row].T @ states.wrench[column]
-                for target in range(3):
-                    left[target] -= states.jacobian[row, target] @ (NOMINAL * torques)
-                expected = np.sqrt((left**2).sum() / states.targets[row])
-                assert found[row, column] == pytest.approx(expected, rel=1e-6, abs=1e-9)
-    np.testing.assert_allclose(np.diag(states.misfits(1.4 * NOMINAL)), 0.0, atol=1e-9)
-
-
-def test_compliances_are_those_that_made_the_deflections_within_the_range_of_robots():
-    factors = np.array([1.0, 0.5, 2.5, 0.1, 8.0, 1.5])
-    found = made_states(compliance=factors * NOMINAL)
-    every = np.arange(9)
-    np.testing.assert_allclose(found.compliance(every, every, NOMINAL) / NOMINAL, [1.0, 0.5, 2.5, 0.3, 3.0, 1.5], rtol=1e-9)
-
-
-@pytest.fixture(scope="module")
-def repeated(fanuc):
-    """Of a robot whose joints stand off their zeros, so that unloaded measurements do not lie where it is predicted."""
-    return made(fanuc, 1, Plan(poses=6, loads=2, repeats=2, noise=0.0), true_offset=1e-3)
-
-
-def test_states_are_the_loaded_ones_less_the_unloaded_one_of_their_pose(fanuc, repeated):
-    seen = repeated.measurements
-    found = state_deflections(repeated, seen)
-    assert len(found.wrench) == 12 and (found.targets == 4).all()
-    for state, (pose, load) in enumerate((pose, load) for pose in range(6) for load in (1, 2)):
-        here = (seen.pose == pose) & (seen.load == load)
-        np.testing.assert_array_equal(found.wrench[state], seen.wrench[here][0])
-        assert found.rows[state] == tuple(seen.row[here].tolist())
-        for target in range(4):
-            of_target = seen.target == target
-            unloaded = seen.position[(seen.pose == pose) & (seen.load == 0) & of_target].mean(axis=0)
-            expected = seen.position[here & of_target].mean(axis=0) - unloaded
-            np.testing.assert_allclose(found.seen[state, target], expected, rtol=0, atol=1e-12)
-            point = PinocchioPoint(fanuc.chain, fanuc.chain.point(POINTS[target]))
-            jacobian = point.pose_and_jacobian(seen.joint_angles[here][0])[2][:3]
-            np.testing.assert_allclose(found.jacobian[state, target], jacobian, rtol=0, atol=1e-12)
-    # Second order in turns of some milliradians.
-    assert (np.diag(found.misfits(fanuc.compliance)) < 0.03 * np.diag(found.misfits(0.0 * fanuc.compliance))).all()
-
-
-def test_a_target_that_one_of_the_two_states_lacks_counts_for_nothing(repeated):
-    seen = repeated.measurements
-    lacking = np.zeros(len(seen), bool)
-    for pose, load, target in ((2, 1, 3), (4, 0, 0)):
-        lacking |= (seen.pose == pose) & (seen.load == load) & (seen.target == target)
-    found = state_deflections(repeated, seen.select(~lacking))
-    targets = dict.fromkeys(((p, load) for p in range(6) for load in (1, 2)), 4) | {(2, 1): 3, (4, 1): 3, (4, 2): 3}
-    assert found.targets.tolist() == list(targets.values())
-    for state, target in ((4, 3), (8, 0), (9, 0)):
-        assert not found.seen[state, target].any() and not found.jacobian[state, target].any()
-
-
-def test_poses_without_an_unloaded_state_are_left_out(repeated):
-    seen = repeated.measurements
-    found = state_deflections(repeated, seen.select((seen.load > 0) | (seen.pose > 1)))
-    assert len(found.wrench) == 8 and min(min(rows) for rows in found.rows) > seen.row[seen.pose == 1].max()
-    for kept in (seen.load == 0, seen.load > 0):
-        assert state_deflections(repeated, seen.select(kept)) is None
 
 
 @pytest.fixture(scope="module", params=["base", "tracker"])

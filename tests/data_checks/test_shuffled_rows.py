@@ -1,4 +1,4 @@
-"""Rows are named where other rows' measurements or loads belong to them, beyond what chance can do."""
+"""Rows are named where other rows' measurements belong to them, beyond what chance can do."""
 
 from dataclasses import replace
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made, with_other_compliances
 
-from elastocal.data_checks import loads
 from elastocal.data_checks.protocol import faults
 from elastocal.data_checks.shuffled_rows import find
 
@@ -51,21 +50,6 @@ def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
     (fault,) = faults(campaign, with_measured(campaign.measurements, source))
     assert words in fault.detail
     assert fault.parameters[0].value == -steps
-
-
-@pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
-def test_loads_beside_the_deflections_of_others_are_named(campaign, share):
-    measurements, rng = campaign.measurements, np.random.default_rng(2)
-    loaded = np.array([(pose, load) for pose in range(30) for load in (1, 2, 3)])
-    some = rng.choice(len(loaded), round(share * len(loaded)), replace=False)
-    wrench = measurements.wrench.copy()
-    for mine, other in zip(loaded[some], loaded[rng.permutation(some)], strict=True):
-        theirs = measurements.wrench[(measurements.pose == other[0]) & (measurements.load == other[1])][0]
-        wrench[(measurements.pose == mine[0]) & (measurements.load == mine[1])] = theirs
-    (fault,) = loads.find(campaign, replace(measurements, wrench=wrench))
-    assert "load" in fault.detail
-    assert fault.evidence[1] < fault.evidence[0] / 5
-    assert 0.6 * share < fault.parameters[0].value <= share
 
 
 def test_measurements_that_belong_nowhere_are_not_shuffled(campaign):

@@ -6,7 +6,9 @@ from made_folders import made_folder, made_table
 from open_alternatives import ELASTIC, LADDER, SETTINGS, diagnosed, keys_like, limits
 from planted import planted, two_loads_a_pose
 
+from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.next_experiment import propose
+from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in
 
 
@@ -16,6 +18,12 @@ def cases(kuka, config_folder, tmp_path_factory):
     folder = tmp_path_factory.mktemp("cases") / "made"
     made_folder(folder, kuka, table=made_table(kuka, "made", offset_of_joint_3=1e-3))
     return cases_in(folder, config_folder / "robots")
+
+
+@pytest.fixture(scope="session")
+def diagnosis(cases):
+    """Of its training part."""
+    return diagnose(cases[0], Settings(), 1)
 
 
 @pytest.fixture(scope="session")

@@ -46,31 +46,6 @@ def test_alarms_come_as_often_as_the_level_says(tau):
     assert FEWEST <= (found <= LEVEL).sum() <= MOST, (found <= LEVEL).mean()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("size", [0.03, 3.0])
-def test_what_is_declared_raises_no_alarm(size):
-    """Declared geometry as its prior has it, tight or wide, is no evidence for candidates that look like it."""
-    rows = made_rows(2, poses=10, candidates=8)
-    candidates = rows.candidates.copy()
-    candidates[:, 0] += rows.declared[:, 0]
-    rows = replace(rows, candidates=candidates, prior_std=np.full(4, size), present=np.zeros(4))
-
-    def drawn(rng):
-        made = rows.drawn(rng)
-        return replace(made, residual=made.residual + rows.declared @ (size * rng.standard_normal(4)))
-
-    found = p_values(drawn)
-    assert FEWEST <= (found <= LEVEL).sum() <= MOST, (found <= LEVEL).mean()
-
-
-def test_p_value_is_the_rank_of_the_measurements_among_the_draws():
-    problem, products = made_problem(made_rows(3, candidates=8), UNITS)
-    found = alarm_of(problem, products, 0.0, np.random.default_rng(4))
-    assert found.p_value * (problem.settings.alarm_draws + 1) == pytest.approx(round(found.p_value * 500))
-    assert 1 / 500 <= found.p_value <= 1.0
-    assert found.raised == (found.p_value <= problem.settings.alarm_level)
-
-
 def signalled(size):
     rows = made_rows(5, candidates=8)
     return made_problem(replace(rows, residual=rows.residual + size * rows.candidates[:, 2:4] @ [1.0, 1.0]), UNITS)
@@ -128,29 +103,3 @@ def test_a_mechanism_counts_at_all_its_locations_at_once_too():
         for unit, members in tested
     ]
     assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)
-
-
-def test_weak_defects_of_every_joint_together_raise_an_alarm_that_none_of_them_raises_alone():
-    units = [made_unit("stiffening", (n + 1,), n, candidate=SimpleNamespace(detail="")) for n in range(8)]
-    rows = made_rows(5, poses=12, candidates=8)
-    signal = 0.35 * rows.candidates @ np.ones(8)
-    found = []
-    for number in range(10):
-        made = rows.drawn(np.random.default_rng((3, number)))
-        problem, products = made_problem(replace(made, residual=made.residual + signal), units)
-        found.append(alarm_of(problem, products, 0.0, np.random.default_rng(number)).p_value)
-    assert np.median(found) <= 0.01
-
-
-def test_no_draw_is_made_where_none_could_reach_the_statistic_and_the_p_value_is_that_of_draws(monkeypatch):
-    from elastocal.diagnosis import alarm
-
-    made, draw = [], alarm.null_draws
-    monkeypatch.setattr(alarm, "null_draws", lambda *parts: made.append(parts) or draw(*parts))
-    (small, large), seen = (signalled(size) for size in (0.6, 20.0)), []
-    for problem, products in (small, large):
-        seen.append(alarm_of(problem, products, 0.0, np.random.default_rng(1)))
-    assert len(made) == 1 and seen[0].statistic < seen[1].statistic
-    monkeypatch.setattr(alarm, "_BEYOND_DRAWS", np.inf)
-    again = alarm_of(*large, 0.0, np.random.default_rng(1))
-    assert len(made) == 2 and again == seen[1] and again.p_value == 1 / 500

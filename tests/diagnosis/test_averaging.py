@@ -10,7 +10,6 @@ from scipy.optimize import minimize
 
 from elastocal.diagnosis.averaging import averaged, expected_to_help, other_predictions, squares_beyond, squares_explained
 from elastocal.diagnosis.evidence import Joint
-from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.search import Model, Posterior
 
 TAU = np.array([0.0, 0.3, 0.9])
@@ -162,32 +161,6 @@ def test_a_model_is_expected_to_help_where_the_expected_square_of_the_error_fall
         best * (mine - kept) @ gram @ (mine - kept) + (1 - best) * (other - kept) @ gram @ (other - kept) for kept in (mine, 0)
     ]
     assert expected_to_help(problem, found, found.models[0]) == (squares[0] < squares[1])
-
-
-@pytest.mark.parametrize(("times", "helps"), [(1.05, True), (0.95, False)])
-def test_a_gain_helps_where_its_interval_excludes_nothing(made, times, helps):
-    """Of a model that is certain the gain is what it explains, d'd, and its standard error at most twice the root of that."""
-    _, line = made
-    found = posterior_of(((0,), [0.3], 0.0, 1.0))
-    explained = squares_explained(line.problem, found.models[0])["a"]
-    limit = np.sqrt(explained / max(mean_square_left(line.problem, found.models[0]), 1.0)) / 2.0
-    problem = replace(line.problem, settings=replace(line.problem.settings, useful=limit / times))
-    assert expected_to_help(problem, found, found.models[0]) == helps
-
-
-def test_squares_explained_are_those_of_the_displacements_that_each_mechanism_makes(made):
-    """Of its units together: of a mechanism at two locations their columns add up before they are squared."""
-    rows, _ = made
-    units = (UNITS[0], made_unit("a", (2,), 2), UNITS[2])
-    problem, _ = made_problem(rows, units, tau=TAU)
-    model = Model((0, 1, 2), 0.0, np.array([0.3, 1.0, 0.1]), 0.0)
-    coefficients, gram = most_probable(rows, problem, model), projected_gram(rows)
-    expected = {}
-    for mechanism, columns in (("a", [0, 1, 2]), ("other", [3, 4])):
-        some = np.zeros(len(coefficients))
-        some[columns] = coefficients[columns]
-        expected[mechanism] = some @ gram @ some
-    assert squares_explained(problem, model) == pytest.approx(expected, rel=1e-6)
 
 
 def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_with_their_priors(made):

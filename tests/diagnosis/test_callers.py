@@ -1,39 +1,22 @@
-"""Everyone who diagnoses a campaign comes to the same verdict on it: rules, blind proof, benchmarks, notebooks."""
+"""Who diagnoses a campaign, and that the rules come to the verdict of the one call."""
 
 import ast
 import json
-import shutil
-import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
-from loop_scripts import ANALYSIS, Files, _Job, _Named, run_loop
+from loop_scripts import ANALYSIS, Files, run_loop
 from made_folders import PLAN, made_folder, made_table
 
-from elastocal.diagnosis import judge as judging
-from elastocal.diagnosis.judge import judge
-from elastocal.diagnosis.next_experiment import NOTHING_AMBIGUOUS, Proposal
-from elastocal.diagnosis.settings import Settings
-from elastocal.loop.whole import cases_in, diagnosed
-from elastocal_proof.blind import follow_up, verdicts
-from elastocal_proof.blind.verdicts import ARMS, POSES, folder_of
+from elastocal.loop.whole import diagnosed
 
 ROOT = Path(__file__).resolve().parents[2]
-ROBOTS, BENCHMARKS = ROOT / "config" / "robots", ROOT / "benchmarks"
+ROBOTS = ROOT / "config" / "robots"
 SEED = 1
-# Where a campaign is diagnosed, and the test below that has its verdict.
-CALLERS = {
-    "src/elastocal/loop/whole.py": "the one call",
-    "src/elastocal_proof/blind/follow_up.py": "the next experiment",
-    "src/elastocal_proof/blind/verdicts.py": "blind proof and follow-ups",
-    "src/elastocal_proof/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
-    "src/elastocal_proof/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",
-    "src/elastocal/loop/diagnosis_tables.py": "rules",
-    "src/elastocal_proof/league/methods.py": "makes the call on the training poses of each fold of the league",
-    "benchmarks/engine.py": "benchmark of the engine",
-    "benchmarks/remainder_loop.py": "closes the loop on the one call's regression",
-}
+# Where a campaign is diagnosed: who is new here has to come to the verdict of the one call.
+CALLERS = {f"src/elastocal/loop/{name}.py" for name in ("whole", "diagnosis_tables")}
+CALLERS |= {f"src/elastocal_proof/blind/{name}.py" for name in ("verdicts", "closed_loop")}
+CALLERS |= {"src/elastocal_proof/league/methods.py", "benchmarks/engine.py", "benchmarks/remainder_loop.py"}
 
 
 def trees_in(text):
@@ -45,7 +28,7 @@ def trees_in(text):
             yield ast.parse(node.value)
 
 
-def test_every_caller_of_the_diagnosis_is_compared_here():
+def test_every_caller_of_the_diagnosis_is_known():
     found = set()
     for folder in ("src", "workflow", "benchmarks"):
         for path in (ROOT / folder).rglob("*.py"):
@@ -54,9 +37,9 @@ def test_every_caller_of_the_diagnosis_is_compared_here():
                 (n for tree in trees_in(text) for n in ast.walk(tree) if isinstance(n, ast.Call)) if "diagnose" in text else ()
             )
             names = {getattr(call.func, "id", getattr(call.func, "attr", "")) for call in calls}
-            if names & {"diagnose", "diagnosed", "diagnosed_anew"}:
+            if names & {"diagnose", "diagnosed"}:
                 found.add(path.relative_to(ROOT).as_posix())
-    assert found == set(CALLERS)
+    assert found == CALLERS
 
 
 @pytest.fixture(scope="module")
@@ -72,17 +55,6 @@ def both(kuka, tmp_path_factory):
     assert [effect["name"] for effect in found["named"][1]["effects"]] == ["joint_offset"]
     assert 0.02 < found["adequate"][1]["probabilities"]["alarm_p_value"] < 0.98
     return found
-
-
-@pytest.fixture
-def folder(both):
-    return both["named"][0]
-
-
-@pytest.fixture
-def expected(both):
-    """The verdict of the one call."""
-    return both["named"][1]
 
 
 def as_json(document):
@@ -106,44 +78,6 @@ def same(one, other, path="verdict"):
         assert one == other, path
 
 
-def same_case(one, other):
-    """Equal in all that a diagnosis looks at; laws by their names."""
-    for mine, theirs in ((one.campaign.measurements, other.campaign.measurements), (one.observations, other.observations)):
-        for name, values in vars(mine).items():
-            if name != "states":
-                np.testing.assert_array_equal(values, getattr(theirs, name), err_msg=name)
-    for name, values in vars(one.observations.states).items():
-        np.testing.assert_array_equal(values, getattr(other.observations.states, name), err_msg=name)
-    for name in ("name", "measured", "frame", "targets", "compliance", "declared", "noise", "holdout"):
-        assert getattr(one.campaign, name) == getattr(other.campaign, name), name
-    assert one.campaign.robot.chain == other.campaign.robot.chain
-    assert list(one.candidates) == list(other.candidates)
-    assert [effect.key for effect in one.model.effects] == [effect.key for effect in other.model.effects]
-    np.testing.assert_array_equal(one.model.nominal_compliance, other.model.nominal_compliance)
-    for name in ("fitted_frames", "rows", "targets", "time_zero_s", "row_span"):
-        assert getattr(one.model, name) == getattr(other.model, name), name
-
-
-class OneCall:
-    """In the place of the one call: notes what it is asked and gives the verdict that is there already."""
-
-    def __init__(self, verdict):
-        self.verdict, self.asked = verdict, []
-
-    def __call__(self, folder, robots, seed, settings=None):
-        self.asked.append((folder, (ROOT / robots).resolve(), seed, settings or Settings()))
-        return self.verdict
-
-
-def run_of(step, tmp_path, monkeypatch, verdict, **parts):
-    """Result of one step of the blind proof, and what it asked of the one call."""
-    path, one_call = tmp_path / "verdicts.json", OneCall(verdict)
-    monkeypatch.setattr(verdicts, "diagnosed", one_call)
-    params = _Named(seed=SEED, robots=ROBOTS.as_posix())
-    step(_Job(output=_Named(verdicts=path.as_posix()), params=params, wildcards=_Named(block="block"), **parts))
-    return json.loads(path.read_text(encoding="utf-8")), one_call.asked
-
-
 @pytest.mark.parametrize("kind", ["named", "adequate"])
 def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(kind, both, tmp_path):
     folder, expected = both[kind]
@@ -152,71 +86,3 @@ def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(kind
     # What to measure next is proposed by the rules alone, beside the verdict.
     del by_rules["next_experiment"]
     same(by_rules, expected)
-
-
-def test_blind_proof_writes_the_verdict_of_the_one_call(folder, expected, tmp_path, monkeypatch):
-    blind = _Named(blind=folder.parent.as_posix())
-    found, asked = run_of(verdicts.diagnose_cases, tmp_path, monkeypatch, expected, input=blind)
-    assert found == [expected]
-    assert asked == [(folder.as_posix(), ROBOTS, SEED, Settings())]
-
-
-def test_follow_ups_write_the_verdict_of_the_one_call(folder, expected, tmp_path, monkeypatch):
-    """On the fewest further poses of each arm, for there a single name is the verdict."""
-    folders = []
-    for arm in ARMS:
-        folders.append(Path(folder_of(tmp_path / "campaigns", arm, POSES[0], "made")))
-        shutil.copytree(folder, folders[-1])
-    campaigns = _Named(campaigns=(tmp_path / "campaigns").as_posix())
-    anew, asked = run_of(verdicts.diagnose_follow_ups, tmp_path, monkeypatch, expected, input=campaigns)
-    assert asked == [(path.as_posix(), ROBOTS, SEED, Settings()) for path in folders]
-    assert anew == [{"campaign": "made", "arm": arm, "poses": POSES[0], "verdict": expected} for arm in ARMS]
-
-
-def test_next_experiment_is_proposed_for_the_same_diagnosis(folder, monkeypatch):
-    asked = []
-    none = Proposal((), reason=NOTHING_AMBIGUOUS)
-    monkeypatch.setattr(follow_up, "diagnose", lambda *parts: asked.append(parts) or "the diagnosis")
-    monkeypatch.setattr(follow_up, "propose", lambda diagnosis, *rest: asked.append(diagnosis) or none)
-    follow_up.proposed(folder, ROBOTS, SEED)
-    (case, *rest), diagnosis = asked
-    assert rest == [Settings(), SEED] and diagnosis == "the diagnosis"
-    same_case(case, cases_in(folder, ROBOTS)[0])
-
-
-@pytest.mark.parametrize("kind", ["named", "adequate"])
-def test_benchmark_of_the_engine_times_the_same_verdict(kind, both, monkeypatch, capsys):
-    """The script that it gives to a process of its own, in this one: the two calls by hand."""
-    folder, expected = both[kind]
-    tree = ast.parse((BENCHMARKS / "engine.py").read_text(encoding="utf-8"))
-    assigned = (node for node in tree.body if isinstance(node, ast.Assign))
-    (script,) = (ast.literal_eval(n.value) for n in assigned if getattr(n.targets[0], "id", "") == "SCRIPT")
-    seen = []
-
-    def judged(*parts):
-        seen.append(judge(*parts))
-        return seen[-1]
-
-    monkeypatch.setattr(judging, "judge", judged)
-    monkeypatch.setattr(sys, "argv", ["script", ROBOTS.as_posix(), folder.as_posix()])
-    exec(compile(script, "SCRIPT", "exec"), {})
-    assert json.loads(capsys.readouterr().out)["measurements"] == len(cases_in(folder, ROBOTS)[0].observations)
-    (verdict,) = seen
-    # A benchmark of the engine states no accuracy of a corrected robot, nor what each cause costs, nor what is misplaced.
-    wanted = {
-        name: value for name, value in expected.items() if name not in ("accuracy", "uncorrected_m", "misplaced", "physics")
-    }
-    wanted["effects"] = [{name: v for name, v in effect.items() if name != "cost_m"} for effect in expected["effects"]]
-    same(as_json(verdict.document), wanted)
-
-
-def test_oracle_that_knows_the_effect_which_is_found_has_the_same_errors_on_held_out_poses(folder, expected):
-    pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
-    from elastocal_proof.blind.oracle import oracle
-
-    known = oracle({"defects": [{"effect": "joint_offset", "joints": [3]}]}, expected, folder, ROBOTS, SEED)
-    assert known["candidates"] == ["joint_offset@3"] and known["p_value"] < 1e-6
-    # The engine has a prior on the size and may have a pose error: both cost next to nothing here.
-    assert known["heldout"] == pytest.approx(expected["heldout"]["after"], rel=1e-2)
-    without = oracle({"defects": []}, expected, folder, ROBOTS, SEED)
-    assert without["heldout"] == expected["heldout"]["before"]

@@ -1,21 +1,16 @@
 """What training poses say of a campaign: noise, faults, effects one at a time, and the figures of the verdict."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from made_folders import PLAN, made_folder, made_table
-from planted import planted
 
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import diagnose as module
-from elastocal.diagnosis import kept_rows
-from elastocal.diagnosis.diagnose import _effect_steps, diagnose
+from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
-from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.refit import fit_with_sizes, selected
-from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.loop.whole import cases_in
@@ -36,12 +31,6 @@ def diagnosed(kuka, config_folder, tmp_path_factory):
         case, _ = cases_in(made_folder(folder, kuka, table=table, **changes), config_folder / "robots")
         found[declared_m] = diagnose(case, Settings(), 1)
     return found
-
-
-def test_the_problem_is_whitened_by_the_noise_that_is_there(diagnosed):
-    rows = [diagnosed[level].evidence.linearized for level in (6e-5, 1e-6)]
-    assert rows[0].about.noise.position_m == pytest.approx(6e-5, rel=0.3)
-    assert rows[1].about.noise.position_m == pytest.approx(6e-5, rel=0.3)
 
 
 def test_a_model_that_is_kept_without_what_was_found_has_the_noise_that_it_leaves(kuka, config_folder, tmp_path):
@@ -89,43 +78,13 @@ def test_an_error_that_all_measurements_of_a_pose_share_is_noise_of_the_model_an
     assert found.document["noise"]["pose_rad"] == found.final.noise.pose_rad
 
 
-@pytest.mark.slow
-def test_what_is_a_function_of_the_joints_is_no_error_of_poses_and_no_declared_model_covers_it(kuka, config_folder, tmp_path):
-    """A deviation of joint 2 by two others at once: without candidates all measurements of a pose seem to err together."""
-    table = made_table(kuka, "made", plan=replace(PLAN, poses=150, ladder=(0,), repeats=1, repeated_poses=0))
-    table |= {"q2": table["q2"] + 3e-4 * np.sin(table["q1"]) * np.cos(table["q3"])}
-    case, _ = cases_in(made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots")
-    found = diagnose(replace(case, candidates={}), Settings(), 1)
-    assert found.document["repeatable"]["remains"] and found.document["verdict"] == "unexplained"
-    assert found.final.noise.pose_rad == pytest.approx(Settings().pose_repeatability_rad, rel=0.3)
-    assert "function of the joint angles" in found.document["contradictions"][0]
-    assert not any("err together" in line for line in found.document["warnings"])
-
-
 @pytest.fixture(scope="module")
 def case(cases):
     return cases[0]
 
 
-@pytest.fixture(scope="module")
-def found(case):
-    """Its diagnosis with every seventh candidate and that of the offset, and what was reported on the way."""
-    few = dict(list(case.candidates.items())[::7]) | {"joint_offset@3": case.candidates["joint_offset@3"]}
-    lines = []
-    return diagnose(replace(case, candidates=few), Settings(), 1, lines.append), lines
-
-
-def test_progress_has_the_measurements_first_and_then_what_leads_in_each_search_but_no_verdict(found, case):
-    _, lines = found
-    assert lines[0] == f"declared model fitted to {len(case.observations)} measurements"
-    most = Settings().linearizations
-    assert lines[1:] == [f"search {number} of at most {most}: leading so far, zero offset" for number in range(1, len(lines))]
-    assert 2 <= len(lines) <= 1 + most
-
-
-def test_steps_go_from_the_frames_alone_to_the_springs_to_the_effect(found):
+def test_steps_go_from_the_frames_alone_to_the_springs_to_the_effect(diagnosis):
     """Springs are declared as to be identified; the frame is the base, so that the first step has nothing to fit."""
-    diagnosis, _ = found
     effects = [[effect.key for effect in step.fitted.model.effects] for step in diagnosis.steps]
     springs = [key for key in effects[1] if key.startswith("joint_compliance")]
     assert effects == [[], springs, [*springs, "joint_offset@3"]] and len(springs) == 1
@@ -134,17 +93,7 @@ def test_steps_go_from_the_frames_alone_to_the_springs_to_the_effect(found):
     assert size == pytest.approx(OFFSET, abs=4 * np.sqrt(diagnosis.final.covariance[-1, -1]))
 
 
-def test_every_candidate_is_tested_or_has_a_reason(found):
-    diagnosis, _ = found
-    document, evidence = diagnosis.document, diagnosis.evidence.linearized
-    tested = {unit.candidate.key for unit in evidence.problem.units if unit.candidate}
-    assert document["candidates_tested"] == len(tested)
-    assert tested | set(document["untestable"]) == set(diagnosis.case.candidates)
-    assert not tested & set(document["untestable"]) and all(document["untestable"].values())
-
-
-def test_compliances_before_and_after_are_those_of_the_fits_in_microradians(found):
-    diagnosis, _ = found
+def test_compliances_before_and_after_are_those_of_the_fits_in_microradians(diagnosis):
     facts = diagnosis.document["compliance_urad_per_Nm"]
     declared, final = diagnosis.declared, diagnosis.final
     np.testing.assert_allclose(facts["before"], 1e6 * joint_compliances(declared.model, declared.estimate))
@@ -178,50 +127,6 @@ def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(decisive,
     assert minor == [f"fault_{n}: as measured" for n, is_decisive in enumerate(decisive) if not is_decisive]
 
 
-def test_a_fit_that_does_not_converge_is_a_warning(case, monkeypatch):
-    monkeypatch.setattr(module, "faults", lambda campaign, measurements: faults(True))
-    fitted = kept_rows.fit_declared
-    monkeypatch.setattr(kept_rows, "fit_declared", lambda *args, **options: replace(fitted(*args, **options), converged=False))
-    document = diagnose(case, Settings(), 1).document
-    assert document["converged"] == {"declared": False, "final": False}
-    assert [line.split(" did")[0] for line in document["warnings"] if "did not converge" in line] == [
-        "the fit of the declared model",
-        "the fit of the final model",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("most", "steps"),
-    [
-        (4, ["transmission_harmonic", "joint_offset", "payload"]),
-        (3, ["transmission_harmonic", "joint_offset", "payload"]),
-        (2, ["transmission_harmonic", "2 further effects"]),
-    ],
-)
-def test_effects_are_added_one_at_a_time_that_which_explains_most_first_or_of_many_the_rest_together(kuka, most, steps):
-    """A wave, a smaller offset and a still smaller payload; the last step is the final model, and each has those before it."""
-    sizes = {"payload": [5.0, 0, 0, 0], "transmission_harmonic@2[orders 1-2]": [0, 0, 1e-3, 0], "joint_offset@3": [6e-4]}
-    campaign = planted(kuka, sizes, seed=1, poses=40)
-    candidates = [campaign.candidates[key] for key in sizes]
-    line = linearized(campaign.declared, campaign.observations, candidates, Settings())
-    names, met = {key.split("@")[0] for key in sizes}, posterior(line.problem)
-    mechanisms = [{line.problem.units[number].mechanism for number in model.units} for model in met.models]
-    best = SimpleNamespace(named=tuple(sorted(names)), model=mechanisms.index(names))
-    found = SimpleNamespace(linearized=line, posterior=met, conclusion=SimpleNamespace(best=best))
-    chosen = selected(line, met.models[best.model])
-    final = fit_with_sizes(campaign.declared, campaign.observations, campaign.declared.noise, chosen)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("elastocal.diagnosis.diagnose._MOST_STEPS", most)
-        case = SimpleNamespace(observations=campaign.observations)
-        made = _effect_steps(case, campaign.declared, final, found)
-    assert [step.name for step in made] == [f"with {name}" for name in steps] and made[-1].fitted is final
-    known = len(campaign.declared.model.effects)
-    counts = [len(step.fitted.model.effects) - known for step in made]
-    assert counts == ([1, 2, 3] if len(steps) == 3 else [1, 3])
-    misfit = [(step.fitted.whitened(step.fitted.residual) ** 2).sum() for step in made]
-    assert misfit == sorted(misfit, reverse=True)
-
-
 def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(kuka, config_folder, tmp_path, monkeypatch):
     table = made_table(kuka, "made", offset_of_joint_3=OFFSET)
     folder = made_folder(tmp_path / "made", kuka, table=table, declared=["link_geometry"])
@@ -237,3 +142,22 @@ def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(kuka, co
     heldout = judge(found, held_out, 1).document["heldout"]
     assert heldout["after"]["rms_m"] == pytest.approx(heldout["uncalibrated"]["rms_m"], rel=1e-3)
     assert diagnose(case, replace(settings, numbers_a_parameter=0.0), 1).document["kept"] != "frames"
+
+
+def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_declared(cases, kuka, monkeypatch):
+    monkeypatch.setattr(module, "expected_to_help", lambda problem, posterior, model: False)
+    diagnosis, held_out = diagnose(cases[0], Settings(), 1), cases[1]
+    (entry,) = diagnosis.document["effects"]
+    assert diagnosis.document["verdict"] == "named" and entry["name"] == "joint_offset" and not entry["adopted"]
+    # What it would be is said all the same.
+    assert abs(entry["parameters"][0]["value"] - 1e-3) < 1e-4
+    assert [step.kind for step in diagnosis.steps] == ["frames", "declared"] and diagnosis.final is diagnosis.declared
+    assert any("stays as declared" in warning for warning in diagnosis.document["warnings"])
+    # Noise and convergence are those of the model that stays.
+    noise = diagnosis.document["noise"]
+    assert noise["factor"] == diagnosis.declared.noise.position_m / noise["position_m"]
+    assert diagnosis.document["converged"]["final"] == diagnosis.declared.converged
+    verdict = judge(diagnosis, held_out, 1).document
+    assert verdict["heldout"]["before"] == verdict["heldout"]["after"] and verdict["effects"][0]["heldout_gain"] is None
+    # And the next experiment can be planned.
+    assert propose(diagnosis, kuka.joint_limits, Settings(), np.random.default_rng(0)).best == ("joint_offset",)

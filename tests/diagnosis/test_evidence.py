@@ -116,19 +116,6 @@ def test_evidence_without_each_unit_is_that_of_the_smaller_model(signal):
     np.testing.assert_allclose(found, smaller, atol=0.1)
 
 
-def test_weights_of_the_pose_error_are_its_posterior():
-    rows = made_rows(5, poses=12).drawn(np.random.default_rng(6), tau=1.8)
-    rows = replace(rows, residual=rows.expected + QUIET * (rows.residual - rows.expected))
-    statistics = statistics_of(rows.products, TAU)
-    found = evaluated(rows, ())
-    expected = LOG_POSE + [log_density(rows, tau, np.zeros(6)) for tau in TAU]
-    # Where white noise must account for the error of the pose as well, its size is above the floor.
-    floor = statistics.squares <= statistics.freedom
-    assert floor[2]
-    np.testing.assert_allclose(np.diff(found.log_pose[floor]), np.diff((expected - logsumexp(expected))[floor]), atol=1e-8)
-    assert np.argmax(found.log_pose) == 2 and np.exp(found.log_pose).sum() == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize("squares", [10.0, 49.9, 50.1, 80.0, 400.0])
 def test_the_size_of_the_noise_is_the_most_likely_one_of_at_least_one(squares):
     def negative(log_variance):
@@ -191,15 +178,6 @@ def test_weights_of_sizes_are_log_normal_about_the_center_and_sum_to_one():
     assert weights[0] / weights[1] == pytest.approx(np.exp(-0.5 * (ratio / 3.0) ** 2))
     assert weights[2] / weights[1] == pytest.approx(np.exp(-0.5 * (ratio / 0.7) ** 2))
     assert np.exp(GRID.log_weights).sum() == pytest.approx(1.0) and GRID.scales[np.argmax(GRID.log_weights)] == 0.1
-
-
-@pytest.mark.parametrize(
-    ("bounds", "kept"), [({}, slice(0, 6)), ({"smallest": 2}, slice(2, 6)), ({"smallest": 1, "largest": 4}, slice(1, 5))]
-)
-def test_sizes_beyond_those_of_a_unit_weigh_nothing_and_the_others_as_before(bounds, kept):
-    some = np.exp(GRID.of(replace(UNITS[0], **bounds)))
-    assert some.sum() == pytest.approx(1.0) and not np.delete(some, np.arange(6)[kept]).any()
-    np.testing.assert_allclose(some[kept], np.exp(part_of_grid(kept).log_weights))
 
 
 def test_the_prior_of_a_coefficient_over_all_sizes_has_the_deviation_of_its_draws():

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_folders import made_folder, made_table
-from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
@@ -13,31 +11,11 @@ from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
-from elastocal.loop.whole import cases_in
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.validation.held_out import METRICS
 
 NOISE = Noise("declared", 6e-5, 6e-5, np.zeros(6))
-OFFSET = 1e-3
-
-
-def with_effects(case, declared, *keys):
-    members = [case.candidates[key] for key in keys]
-    return fit(case.model.with_effects(members), case.observations, NOISE, declared.estimate.with_effects(members))
-
-
-def steps_of(case, *keys):
-    """From frames to an effect of some candidates, which is found or not."""
-    bare = fit(replace(case.model, effects=()), case.observations, NOISE)
-    declared = fit(case.model, case.observations, NOISE)
-    final = with_effects(case, declared, *keys)
-    name = case.candidates[keys[0]].effect
-    return (
-        Step("frames and targets", "frames", bare),
-        Step("declared model", "declared", declared),
-        Step(f"with {name}", "effect", final),
-    )
 
 
 def diagnosis_of(case, steps):
@@ -51,8 +29,12 @@ def diagnosis_of(case, steps):
 
 @pytest.fixture(scope="module")
 def made(cases):
-    """Those cases, and the steps of the first."""
-    return *cases, steps_of(cases[0], "joint_offset@3")
+    """Those cases, and the steps of the first, from frames to an offset."""
+    case, members = cases[0], [cases[0].candidates["joint_offset@3"]]
+    bare, declared = (fit(model, case.observations, NOISE) for model in (replace(case.model, effects=()), case.model))
+    final = fit(case.model.with_effects(members), case.observations, NOISE, declared.estimate.with_effects(members))
+    steps = ("frames and targets", "frames", bare), ("declared model", "declared", declared)
+    return *cases, tuple(Step(*each) for each in (*steps, ("with joint_offset", "effect", final)))
 
 
 def judged(steps, case, held_out):
@@ -132,45 +114,19 @@ def test_a_step_that_makes_predictions_worse_is_a_warning(made):
     assert said[-1] == "the step 'with joint_offset' raised the RMS error of the validation poses"
 
 
-def with_first_pose_turned(case, held_out, turn):
-    """The first held-out pose, with its third joint said to stand elsewhere, and its number."""
-    first = held_out.observations.states.pose.min()
-
-    def turned(states):
-        away = np.zeros(case.campaign.robot.joints)
-        away[2] = turn
-        return replace(states, joint_angles=states.joint_angles + (states.pose == first)[:, None] * away)
-
-    observations, measurements = held_out.observations, held_out.campaign.measurements
-    return first, replace(
-        held_out,
-        observations=replace(observations, states=turned(observations.states)),
-        campaign=replace(held_out.campaign, measurements=turned(measurements)),
-    )
-
-
-@pytest.mark.parametrize(("off_m", "named"), [(5e-4, False), (1.0, True)])
-def test_a_row_far_off_outside_the_fitted_range_is_a_gross_error_too(made, off_m, named):
-    """Within three times the limit it may be the model that errs there."""
-    case, held_out, steps = made
-    first, away = with_first_pose_turned(case, held_out, 2.0 * np.pi)
-    measurements = away.campaign.measurements
-    row = int(np.argmax(measurements.pose == first))
-    position = measurements.position + off_m * (np.arange(len(measurements)) == row)[:, None] * np.array([1.0, 0.0, 0.0])
-    away = replace(away, campaign=replace(away.campaign, measurements=replace(measurements, position=position)))
-    found = judged(steps, case, away)
-    assert [error["rows"] for error in found.document["gross_errors"]] == ([[measurements.row[row]]] if named else [])
-    assert found.document["heldout"]["after"]["rms_m"] < 1e-3
-    if named:
-        whole = found.document["heldout"]["with_gross_errors"]
-        of_all = [row["heldout_rms_all_rows_m"] for row in found.rows]
-        assert [whole["before"]["rms_m"], whole["after"]["rms_m"]] == of_all[1:]
-
-
 def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
     """A whole turn brings the joint out of its range and the target nowhere else."""
     case, held_out, steps = made
-    first, away = with_first_pose_turned(case, held_out, 2.0 * np.pi)
+    observations, measurements = held_out.observations, held_out.campaign.measurements
+    first = observations.states.pose.min()
+
+    def turned(states):
+        away = 2.0 * np.pi * (states.pose == first)[:, None] * (np.arange(case.campaign.robot.joints) == 2)
+        return replace(states, joint_angles=states.joint_angles + away)
+
+    moved = replace(observations, states=turned(observations.states))
+    campaign = replace(held_out.campaign, measurements=turned(measurements))
+    away = replace(held_out, observations=moved, campaign=campaign)
     found = judged(steps, case, away)
     beyond, poses = found.document["heldout"]["outside_range"], found.document["heldout"]["poses"]
     assert 1 <= beyond["poses"] < poses
@@ -195,47 +151,6 @@ def test_splits_stand_beside_the_held_out_errors(made):
     spoiled = replace(held_out, observations=replace(observations, position=observations.position + 0.01))
     again = split_table(diagnosis_of(case, steps), spoiled, 1)
     assert [one["after_rms_m"] == other["after_rms_m"] for one, other in zip(rows, again, strict=True)] == [False, *5 * [True]]
-
-
-def seen_from_elsewhere(table, which=True):
-    """Positions, or those of some rows, by a tracker that stands elsewhere."""
-    position = np.column_stack([table[axis] for axis in "xyz"])
-    there = Rotation.from_rotvec([0.3, -0.2, 1.0]).apply(position) + np.array([2.0, -1.0, 0.5])
-    return table | dict(zip("xyz", np.where(np.reshape(which, (-1, 1)), there, position).T, strict=True))
-
-
-def assert_reaches_noise(case, held_out, factor):
-    """With the offset in the model the held-out poses are off by so many times the noise at most, less than without it."""
-    steps = steps_of(case, "joint_offset@3")
-    found = judged(steps, case, held_out).document["heldout"]
-    assert found["after"]["rms_m"] < min(factor * found["noise_floor_rms_m"], found["before"]["rms_m"])
-    off = np.column_stack([blocks_of(diagnosis_of(case, steps), held_out)[1][f"after_d{axis}"] for axis in "xyz"])
-    assert np.sqrt((off**2).sum(axis=1).mean()) < 2e-4
-
-
-def test_a_session_held_out_is_placed_and_judged(kuka, config_folder, tmp_path):
-    table = made_table(kuka, "made", offset_of_joint_3=OFFSET)
-    table["session"] = np.where(np.asarray(table["pose"]) % 3 == 0, 2, 1)
-    table = seen_from_elsewhere(table, table["session"] == 2)
-    made_folder(tmp_path / "made", kuka, table=table, frame="tracker", holdout={"session": 2})
-    case, held_out = cases_in(tmp_path / "made", config_folder / "robots")
-    assert set(case.campaign.measurements.session) == {1} and set(held_out.campaign.measurements.session) == {2}
-    assert_reaches_noise(case, held_out, 1.5)
-
-
-def test_another_campaign_as_test_has_frames_and_targets_of_its_own(kuka, config_folder, tmp_path):
-    """Training in base axes; the test from a tracker that stands elsewhere."""
-    table = seen_from_elsewhere(made_table(kuka, "other", seed=2, offset_of_joint_3=OFFSET))
-    targets = {"of the other": {"point": "6DoF", "offset_m": "unknown"}}
-    kept = table["target"] == "6DoF"
-    table = {name: values[kept] for name, values in table.items()} | {"target": np.full(kept.sum(), "of the other")}
-    made_folder(tmp_path / "other", kuka, "other", table=table, frame="tracker", targets=targets)
-    own = made_table(kuka, "made", offset_of_joint_3=OFFSET)
-    made_folder(tmp_path / "made", kuka, table=own, holdout={"campaign": "../other"})
-    case, held_out = cases_in(tmp_path / "made", config_folder / "robots")
-    assert case.campaign.name == "made" and held_out.campaign.name == "other"
-    assert len(case.campaign.measurements) == len(own["pose"])
-    assert_reaches_noise(case, held_out, 1.3)
 
 
 def test_a_remainder_is_judged_where_the_campaign_asks_for_one_and_the_data_are_sound(made):

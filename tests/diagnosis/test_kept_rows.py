@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bad_rows import damaged
-from scipy.stats import multivariate_normal
 
-from elastocal.diagnosis.kept_rows import _log_likelihood, _precision, _without, first_kept, fitted_to
+from elastocal.diagnosis.kept_rows import first_kept
 from elastocal.diagnosis.settings import Settings
 
 SETTINGS, BAD = Settings(), 11
@@ -23,14 +22,6 @@ def test_rows_are_found_beside_an_effect_that_the_model_lacks(case, shifts):
     kept = first_kept(damaged(case, shifts), SETTINGS).kept
     # A bad repeat takes the others of its state along, until a model says which it is.
     assert not kept[list(shifts)].any() and (~kept).sum() <= 2 * len(shifts)
-
-
-def test_the_same_rows_are_fitted_once(case):
-    every = np.ones(len(case.campaign.measurements), bool)
-    part = fitted_to(case, every, SETTINGS)
-    assert fitted_to(case, every.copy(), SETTINGS, part) is part
-    fewer = np.arange(len(every)) != 3
-    assert len(fitted_to(case, fewer, SETTINGS, part).case.campaign.measurements) == len(every) - 1
 
 
 @pytest.mark.parametrize("times", [-4.0, 30.0, 300.0])
@@ -49,18 +40,3 @@ def test_a_repeat_that_is_in_no_average_stays_out(case):
     state = list(zip(measurements.pose, measurements.load, measurements.target, strict=True))
     repeated = [place for place, key in enumerate(state) if state.count(key) > 2][:1]
     assert not first_kept(damaged(case, dict.fromkeys(repeated, 2.0)), SETTINGS).kept[repeated].any()
-
-
-def test_the_inverse_covariance_is_that_of_the_sum_and_of_its_part():
-    draws = np.random.default_rng(2)
-    loads, declared = draws.standard_normal((12, 5)), draws.standard_normal((12, 2))
-    covariance = np.eye(12) + loads @ loads.T
-    whole = covariance + declared @ declared.T
-    precision, residual = _precision(covariance, declared), draws.standard_normal(12)
-    np.testing.assert_allclose(precision, np.linalg.inv(whole), atol=1e-12)
-    expected = multivariate_normal(cov=whole).logpdf(residual) + 6 * np.log(2 * np.pi)
-    assert _log_likelihood(covariance, declared, residual) == pytest.approx(expected)
-    part = _without(precision, np.array([3, 4]))
-    kept = np.delete(np.arange(12), [3, 4])
-    np.testing.assert_allclose(part[np.ix_(kept, kept)], np.linalg.inv(whole[np.ix_(kept, kept)]), atol=1e-12)
-    assert not part[3].any() and not part[:, 4].any()

@@ -110,41 +110,6 @@ def test_a_law_goes_by_its_own_cause_alone(joint, law, what):
     assert (np.abs(one - other).max() > 0.02 * min(JOINT_RAD, BASE_M)) == (what in DEPENDS[joint, law])
 
 
-@pytest.mark.parametrize("motion", ["shift", "turn"])
-def test_each_coordinate_of_the_base_goes_by_the_load_along_it(motion):
-    """The force of the pull and of the weight along each axis, and the moment about it: of the first half of the features."""
-    states = around()
-    for changed in states.sites.base[:3] if motion == "shift" else states.sites.base[3:]:
-        total = states.total.copy()
-        total[:, changed] = total[::-1, changed]
-        moved = replace(states)
-        vars(moved)["total"] = total
-        pairs = zip(*(displacements(each, ((), f"{FORCE} {motion}"), states) for each in (states, moved)), strict=True)
-        differ = {at for one, other in pairs for at in one if np.abs(one[at] - other[at]).max() > 0.02 * BASE_M}
-        assert differ == {changed}
-
-
-def test_a_coordinate_without_an_input_is_not_displaced():
-    """Of a load that always pulls down the foot feels a force along one axis alone."""
-    wrench = np.zeros((60, 6))
-    wrench[:, 2] = -np.linspace(0, 500, 60)
-    found = displacements(around(wrench=wrench), ((), f"{FORCE} shift"))
-    moved = {coordinate for law in found for coordinate, values in law.items() if values.any()}
-    # As many columns as others have, of which units are numbered by those of one state.
-    assert moved == {around().sites.base[2]} and len(found) == 18
-
-
-def test_own_law_and_neighbours_go_by_the_torque_and_the_place_by_where_the_end_is():
-    """Of the same function, by the inputs of the campaign: doubled loads, and an end elsewhere."""
-    states = around()
-    loaded = replace(states, wrench=2.0 * states.wrench)
-    turned = states.joint_angles + 0.3 * np.eye(7)[1]
-    moved = conditions_on(robot_of(SEVEN_JOINTS), replace(made_states(7, 60, seed=1), joint_angles=turned))
-    for law, changed in ((((4,), OWN), loaded), (((4,), NEIGHBOURS), loaded), (((), f"{PLACE} turn"), moved)):
-        one, other = (waves(displacements(each, law, states)) for each in (states, changed))
-        assert np.abs(one - other).max() > 0.02 * BASE_RAD
-
-
 @EVERY
 def test_it_is_the_same_function_of_some_of_the_states(law):
     """Normalised by the campaign: what is made in parts is what is made at once."""

@@ -10,7 +10,7 @@ from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 
 SETTINGS = Settings()
@@ -61,33 +61,6 @@ def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurem
     chosen = [selected(line, replace(best, scales=np.array([size])))[0][0] for size in sizes]
     deviations = [candidate.parameters[0].prior_std / unit.sizes[0] for candidate in chosen]
     np.testing.assert_allclose(deviations, [0.5 * before, before, before], rtol=1e-12)
-
-
-def test_the_fit_finds_what_was_planted_and_converges(found):
-    campaign, declared, line, models = found
-    final = fit_with_sizes(declared, campaign.observations, declared.noise, selected(line, models.models[0]))
-    assert final.converged
-    for key, true in (("joint_offset@2", 3e-4), ("offset@3", 5e-4)):
-        number = [owner for owner, _ in final.parameters].index(key)
-        assert final.values_of(key)[0][0] == pytest.approx(true, abs=4 * np.sqrt(final.covariance[number, number]))
-
-
-@pytest.mark.parametrize("with_it", [True, False])
-def test_a_fit_that_starts_near_another_one_ends_where_it_ends_without(found, with_it):
-    """Of a fit with the same effect and one more, or with another one alone: what both have begins with its values there."""
-    campaign, declared, line, models = found
-    chosen = selected(line, models.models[0])
-    expected = fit_with_sizes(declared, campaign.observations, declared.noise, chosen)
-    more = tuple((campaign.candidates[key], np.zeros(0)) for key in ("joint_tilt@2", "payload"))
-    others = (*more, *chosen) if with_it else more
-    near = fit_with_sizes(declared, campaign.observations, declared.noise, others)
-    for settled in (1e-3, ON_THE_WAY):
-        final = fit_with_sizes(declared, campaign.observations, declared.noise, chosen, near, settled=settled)
-        assert [effect.key for effect in final.model.effects] == [effect.key for effect in expected.model.effects]
-        moved = np.concatenate(final.estimate.coefficients) - np.concatenate(expected.estimate.coefficients)
-        deviation = np.sqrt(np.diag(expected.covariance))[-len(moved) :]
-        # Robust weights follow the estimate, so that what remains is some times the last step.
-        assert final.converged and (np.abs(moved) <= (10e-3 + settled) * deviation).all()
 
 
 def test_mean_square_left_is_that_of_the_penalised_fit(found):

@@ -11,7 +11,7 @@ from made_problems import made_problem, made_rows, made_unit
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.other import NEIGHBOURS
-from elastocal.diagnosis.search import _Searcher, initial_screening, posterior
+from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.settings import Settings
 
 TAU = [0.0, 0.3, 0.9]
@@ -81,24 +81,6 @@ def test_posterior_is_that_of_all_models(signal, seed):
     assert set(mine) <= set(expected)
 
 
-@pytest.mark.parametrize(("signal", "best"), [("nothing", ()), ("one", (0,)), ("one mechanism everywhere", (0, 1, 2))])
-def test_the_most_probable_model_is_the_one_that_made_the_measurements(signal, best):
-    found = posterior(problem_of(signal))
-    assert found.models[0].units == best
-    assert (np.diff(found.probabilities) <= 0).all()
-    assert [model.log_odds for model in found.models] == sorted((m.log_odds for m in found.models), reverse=True)
-
-
-def test_nothing_is_always_among_the_models_however_improbable():
-    problem = problem_of("two mechanisms")
-    found, (nothing, _) = posterior(problem), initial_screening(problem)
-    (empty,) = [model for model in found.models if not model.units]
-    assert found.nothing is empty
-    assert empty.log_odds == nothing.log_odds == pytest.approx(0.0, abs=1e-9)
-    assert empty.pose_error_rad == nothing.pose_error_rad
-    assert len(nothing.scales) == 0
-
-
 def test_laws_of_the_competitor_at_one_location_join_in_one_model():
     rows, laws = made_rows(poses=14), (made_unit(OTHER, (1,), [0, 1]), made_unit(OTHER, (1,), [2, 3], law=NEIGHBOURS))
     rows = replace(rows, residual=rows.residual + 0.8 * rows.candidates[:, :4].sum(axis=1))
@@ -138,18 +120,6 @@ def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
     # What is known and not tested is no matter.
     found = posterior(problem, {"a", "b", "c", "gone"})
     assert found.models[0].units == (0, 1, 2) and found.models[0].log_odds > best + 5
-
-
-def test_what_is_known_starts_a_search_with_the_better_of_its_shapes():
-    rows = made_rows(3, poses=14, candidates=6)
-    rows = replace(rows, residual=rows.residual + 1.5 * rows.candidates[:, 2])
-    bent = SimpleNamespace(key="bent")
-    units = [made_unit("bent", (1,), column, candidate=bent, shapes=(float(column),)) for column in (1, 2, 3)]
-    searcher = _Searcher(made_problem(rows, units, tau=TAU)[0])
-    searcher.start_from({"bent"})
-    assert set(searcher.measured) == {(), (1,)}
-    searcher.start_from(())
-    assert set(searcher.measured) == {(), (1,)}
 
 
 def test_no_unit_of_a_model_is_smaller_than_measurements_can_show():

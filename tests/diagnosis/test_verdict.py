@@ -63,66 +63,30 @@ def conclusion(*pairs, alarm=RAISED):
     return concluded(PROBLEM, made_posterior(*pairs), alarm)
 
 
-# Verdict, best hypothesis, what is meant instead, probability of what is left open; models with theirs.
+# Verdict, best hypothesis, what is meant instead, probability of what is left open; models by the numbers of their units, with
+# theirs.
+SURE, BOTH = {"offset": ()}, ("offset", "payload")
 VERDICTS = {
-    "adequate without an alarm, whatever the posterior prefers": (ADEQUATE, (), {}, 0.1, [((OFFSET_2,), 0.9)]),
-    "named with enough of the probability": (
-        NAMED,
-        ("offset",),
-        {"offset": ()},
-        0.85,
-        [((OFFSET_2,), 0.6), ((OFFSET_3,), 0.25), ((PAYLOAD,), 0.1)],
-    ),
+    "adequate without an alarm, whatever the posterior prefers": (ADEQUATE, (), {}, 0.1, {"0": 0.9}),
+    "named with enough of the probability": (NAMED, ("offset",), SURE, 0.85, {"0": 0.6, "1": 0.25, "2": 0.1}),
     # A name needs the probability that is asked for, of which "nothing" has its part, too.
-    "the alarm decides that something is missing": (
-        CLASS,
-        ("offset",),
-        {"offset": ()},
-        0.12,
-        [((OFFSET_2,), 0.12), ((PAYLOAD,), 0.02)],
-    ),
+    "the alarm decides that something is missing": (CLASS, ("offset",), SURE, 0.12, {"0": 0.12, "2": 0.02}),
     "a class of those worth a line": (
-        CLASS,
-        ("offset",),
-        {"offset": ("payload", "tilt")},
-        0.99,
-        [((OFFSET_2,), 0.5), ((PAYLOAD,), 0.3), ((TILT,), 0.19), ((TILT, PAYLOAD), 0.001)],
+        *(CLASS, ("offset",), {"offset": ("payload", "tilt")}, 0.99),
+        {"0": 0.5, "2": 0.3, "3": 0.19, "32": 0.001},
     ),
-    "a related mechanism beside it": (
-        CLASS,
-        ("offset", OTHER),
-        {"offset": (OTHER,)},
-        1.0,
-        [((OFFSET_3, OTHER_2), 0.9), ((OFFSET_3,), 0.1)],
-    ),
-    "a related mechanism instead of it alone": (
-        CLASS,
-        ("offset",),
-        {"offset": (OTHER,)},
-        1.0,
-        [((OFFSET_3,), 0.55), ((OFFSET_3, OTHER_2), 0.45)],
-    ),
-    "several, each with what is meant instead": (
-        SEVERAL,
-        ("offset", "payload"),
-        {"offset": (), "payload": ("tilt",)},
-        0.99,
-        [((OFFSET_2, PAYLOAD), 0.7), ((OFFSET_2, TILT), 0.29)],
-    ),
-    "unexplained by the competitor alone": (
-        UNEXPLAINED,
-        (OTHER,),
-        {},
-        0.7,
-        [((OTHER_1,), 0.4), ((OTHER_1, OTHER_2), 0.3), ((OFFSET_2,), 0.3)],
-    ),
-    "unexplained where nothing is better": (UNEXPLAINED, (), {}, 0.99, [((OFFSET_2,), 0.01)]),
+    "a related mechanism beside it": (CLASS, ("offset", OTHER), {"offset": (OTHER,)}, 1.0, {"15": 0.9, "1": 0.1}),
+    "a related mechanism instead of it alone": (CLASS, ("offset",), {"offset": (OTHER,)}, 1.0, {"1": 0.55, "15": 0.45}),
+    "several, each with what is meant instead": (SEVERAL, BOTH, SURE | {"payload": ("tilt",)}, 0.99, {"02": 0.7, "03": 0.29}),
+    "unexplained by the competitor alone": (UNEXPLAINED, (OTHER,), {}, 0.7, {"4": 0.4, "45": 0.3, "0": 0.3}),
+    "unexplained where nothing is better": (UNEXPLAINED, (), {}, 0.99, {"0": 0.01}),
 }
 
 
 @pytest.mark.parametrize("case", VERDICTS)
 def test_the_verdict_is_that_of_least_loss_once_an_alarm_is_raised(case):
-    verdict, best, alternatives, probability, models = VERDICTS[case]
+    verdict, best, alternatives, probability, named = VERDICTS[case]
+    models = [(tuple(map(int, units)), share) for units, share in named.items()]
     found = conclusion(*models, alarm=SILENT if verdict == ADEQUATE else RAISED)
     assert (found.verdict, found.best.mechanisms) == (verdict, best)
     assert {name: tuple(there) for name, there in found.alternatives.items()} == alternatives
@@ -166,11 +130,7 @@ def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
 def test_hypotheses_gather_locations_laws_and_sum_to_one():
     posterior = made_posterior(((OFFSET_2,), 0.3), ((OFFSET_3,), 0.3), ((OFFSET_2, OFFSET_3), 0.1), ((OTHER_1, OTHER_2), 0.1))
     found = hypotheses_of(PROBLEM, posterior)
-    assert [(h.mechanisms, pytest.approx(h.probability)) for h in found] == [
-        (("offset",), 0.7),
-        ((), 0.2),
-        ((OTHER,), 0.1),
-    ]
+    assert [(h.mechanisms, pytest.approx(h.probability)) for h in found] == [(("offset",), 0.7), ((), 0.2), ((OTHER,), 0.1)]
     # The most probable of its models stands for each.
     assert [h.model for h in found] == [0, 2, 4]
     where = location_probabilities(PROBLEM, posterior, "offset")

@@ -30,7 +30,7 @@ from elastocal.mechanics.kinematics import poses
 # The table of the design, without the data family: that is no physics.
 TABLE = {
     "geometry": "joint_offset, link_geometry, base_placement, nest_eccentricity, tracker_scale",
-    "gravity": "link_weight, payload, compensator_torque",
+    "gravity": "link_weight, payload, compensator_torque, declared_masses",
     "transmission": "transmission_harmonic, transmission_ratio, transmission_order, motor_eccentricity, bearing_runout",
     "elastic": "link_elasticity, joint_tilt, base_compliance, cross_compliance, "
     "joint_dependent_stiffness, compensator_stiffness, flange_flexibility",

@@ -167,9 +167,11 @@ def test_priors_are_those_of_the_robot_file(fanuc):
     # A centre is off by its relative error times its distance from the joint, and lies anywhere in the girth of its link.
     width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
-    first, second = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5), np.hypot(10.0 * 0.01, 50.0 * width / 12**0.5)
+    first, second = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5), np.hypot(10.0 * 0.1, 50.0 * width / 12**0.5)
     assert [p.prior_std for p in found] == pytest.approx([20.0, *[first] * 3, 10.0, *[second] * 3])
     assert [p.name for p in found[:2]] == ["mass_error_of_link_2", "moment_error_x_of_link_2"]
+    # As the file states it, a centre on its axis as if it were 0.1 m from there.
+    assert [p.plausible for p in found] == pytest.approx([20.0, *[20.0 * 0.5] * 3, 10.0, *[10.0 * 0.1] * 3])
 
 
 def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(fanuc):
@@ -226,6 +228,23 @@ def test_weights_hang_along_the_gravity_of_the_robot_file(key, fanuc):
     )
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
     assert found.any()
+
+
+def test_masses_beyond_what_is_declared_turn_the_joints_as_heavier_ones_do(fanuc):
+    """Central differences of the turns by the weight of all declared masses, and of each but the column's."""
+    robot = weighed(fanuc)
+    around = conditions_on(robot, made_states(6, 8, seed=11))
+    alike, each = (candidates_on(sites_of(robot))[f"declared_masses[{way}]"] for way in ("all alike", "each"))
+    turns = displacements(each, around)[..., :6]
+
+    def sag(share):
+        heavier = tuple(replace(mass, mass_kg=mass.mass_kg * (1.0 + share)) for mass in robot.masses)
+        other = conditions_on(replace(robot, masses=heavier), made_states(6, 8, seed=11))
+        return other.gravity[:, :6] * other.compliance
+
+    np.testing.assert_allclose(displacements(alike, around)[0][..., :6], sag(0.5) - sag(-0.5), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(turns.sum(axis=0), displacements(alike, around)[0][..., :6], rtol=0, atol=1e-12)
+    assert len(turns) == 6 and "declared_masses[each]" not in candidates_on(sites_of(fanuc))
 
 
 def test_wrong_masses_are_borne_by_their_priors_and_gears_still_seen(fanuc):

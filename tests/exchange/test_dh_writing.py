@@ -8,7 +8,7 @@ from analysed_robots import ROBOTS, analysed
 from made_calibrated import USUAL, made_calibrated
 from support import refused, robot_of
 
-from elastocal.application.forward_model import fold_effects
+from elastocal.application.exported import fold_effects
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.dh_writing import PARAMETERS, dh_deltas, dh_frames, dh_rows, dh_table
 from elastocal.mechanics.kinematics import poses

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pinocchio as pin
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,7 +9,6 @@ from elastocal.exchange.fixed_transforms import (
     axis_rotation,
     displacement_words,
     express_axis,
-    rotation_about,
 )
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import poses
@@ -37,9 +35,3 @@ def test_a_turn_about_any_axis_is_between_a_rotation_and_its_inverse(axis, turn)
     np.testing.assert_allclose(rotation, pin.exp3(turn * unit), rtol=0, atol=1e-11)
     if before:
         np.testing.assert_allclose(axis_rotation(np.array(axis))[:, 2], unit, rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("letter", "xyz")
-def test_a_rotation_about_an_axis_is_pinocchios(letter):
-    vector = 0.7 * np.eye(3)["xyz".index(letter)]
-    np.testing.assert_allclose(rotation_about(letter, 0.7), pin.exp3(vector), rtol=0, atol=1e-15)

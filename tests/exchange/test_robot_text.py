@@ -4,7 +4,7 @@ import pytest
 import yaml
 from support import refused
 
-from elastocal.exchange.robot_text import check_imported, refuse_existing, robot_text, summary, write_robot
+from elastocal.exchange.robot_text import check_imported, refuse_existing, robot_text, write_robot
 
 DOCUMENT = {
     "masses": [{"link": 1, "mass_kg": 2.0, "centre_m": [1e-5, 0.0, 0.5], "relative_std": 0.2}],
@@ -36,13 +36,6 @@ def test_the_head_says_where_it_came_from_and_what_it_lacks(result):
     assert all(len(line) <= 128 for line in lines)
     keys = [line.partition(":")[0] for line in lines if line[0].isalpha()]
     assert keys == ["name", "joint_names", "chain", "joint_limits_deg", "masses"]
-
-
-def test_what_was_read_is_told_in_a_few_lines(result):
-    told = summary(result)
-    assert told[0] == result.origin and "by hand" in told[0]
-    assert told[1] == "arm #1: 'heavy': 2 joints, 1 of them prismatic, 2.5 m stretched out, 2 kg"
-    assert told[2] == "measuring points: flange" and told[3] == "note: masses are guessed"
 
 
 def test_what_a_robot_file_may_not_say_is_refused_by_the_other_file(tmp_path):

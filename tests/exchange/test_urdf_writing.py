@@ -1,23 +1,21 @@
 """A robot as URDF, and the user's own URDF with joint origins changed and nothing else, as MuJoCo and pinocchio have them."""
 
-import re
 import struct
-from dataclasses import replace
+from xml.etree import ElementTree as Xml
 
 import mujoco
 import numpy as np
 import pytest
-from analysed_robots import analysed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_calibrated import made_calibrated
-from made_urdf import Pinocchio, assert_same_poses, joint, link, segments, written
+from made_urdf import assert_same_poses, joint, link, segments, written
 from support import refused
 
-from elastocal.application.forward_model import fold_effects
+from elastocal.application.exported import fold_effects
 from elastocal.effects.catalogue import candidates_on
 from elastocal.exchange.urdf import read_urdf, robot_from_urdf
-from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
+from elastocal.exchange.urdf_writing import write_calibrated_origins
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.sites import sites_of
 
@@ -97,19 +95,18 @@ def export_arm(cell):
     return output, found
 
 
-def strip_origins(content):
-    """Joint origins of the model are taken out, the others stay."""
-    return re.sub(rb"(</?(joint|link)[^>]*>(?:<!--.*?-->)?)\s*<origin[^>]*>(</origin>)?\s*", rb"\1", content)
-
-
-def test_every_byte_but_those_of_joint_origins_is_as_it_was(cell):
+def test_all_but_joint_origins_is_as_it_was(cell):
     output, found = export_arm(cell)
-    before, after = cell[0].read_bytes(), output.read_bytes()
-    assert before != after and found.changed == 9 and (found.base, found.tip) == ("world_mount", "tool0")
-    assert strip_origins(after) == strip_origins(before)
-    bolts = b'<origin xyz="0.15 0 0" rpy="0.2 0 0"/>'
-    for kept in (b"9 9 9", b"5 5 5", "geprüft".encode(), b'xyz="0 0 0.05" rpy="0 0 0.1"', bolts):
-        assert after.count(kept) == before.count(kept)
+    assert found.changed == 9 and (found.base, found.tip) == ("world_mount", "tool0")
+
+    def elements(path):
+        root = Xml.fromstring(path.read_bytes(), Xml.XMLParser(target=Xml.TreeBuilder(insert_comments=True)))
+        origins = {joint.find("origin") for joint in root.findall("joint")}
+        return [
+            (str(each.tag)[:9], dict(each.attrib), (each.text or "").strip()) for each in root.iter() if each not in origins
+        ]
+
+    assert elements(output) == elements(cell[0])
 
 
 def test_it_moves_as_the_calibrated_robot_in_pinocchio_and_mujoco(cell):
@@ -133,46 +130,21 @@ def test_it_moves_as_the_calibrated_robot_in_pinocchio_and_mujoco(cell):
         np.testing.assert_allclose(own @ last[:3, :3], axes, atol=1e-9)
 
 
-def test_a_controller_that_counts_otherwise_keeps_the_joint_values_of_the_urdf(cell):
-    path, robot, calibrated = cell
-    sense = np.diag([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
-    turned = [replace(r, reported_matrix=sense, reported_offset=r.reported_offset + 0.2) for r in (robot, calibrated)]
-    expected = write_calibrated_origins(path, robot, calibrated).content
-    assert write_calibrated_origins(path, *turned).content == expected
-
-
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('xyz="0.5 0 0"', 'xyz="0.5004 0 0"', ("joint 'a3'", "0.4 mm")),
-        ('xyz="0.1 0 0" rpy="0 1.5707963267948966 0"', 'xyz="0.1 0 0"', ("the tip", "90 deg")),
-        ('name="a6"', 'name="axis_6"', ("no chain to 'tool0'", "a6")),
-        ('"tool0"', '"tcp"', ("no link 'tool0'",)),
-        ('xyz="0.6 0 0.8"', 'xyz="-0.6 0 -0.8"', ("joint 'a3'",)),
-        ("utf-8", "utf-16", ("found UTF-16", "allowed: a URDF in UTF-8")),
+        ('xyz="0.5 0 0"', 'xyz="0.5004 0 0"', "that is not the robot file's"),
+        ('name="a6"', 'name="axis_6"', "no chain to 'tool0'"),
+        ('"tool0"', '"tcp"', "no link 'tool0'"),
+        ('xyz="0.6 0 0.8"', 'xyz="-0.6 0 -0.8"', "that is not the robot file's"),
     ],
 )
-def test_another_robots_file_is_refused_by_the_joint_that_differs(cell, old, new, words):
+def test_another_robots_file_is_refused(cell, old, new, words):
     path, robot, calibrated = cell
     other = path.with_name("other.urdf")
-    other.write_bytes(text().replace(old, new).encode(new if new == "utf-16" else "utf-8"))
-    with refused(other, *words, "imported" if new != "utf-16" else ""):
+    other.write_text(text().replace(old, new), encoding="utf-8")
+    with refused(other, words, "imported"):
         write_calibrated_origins(other, robot, calibrated)
-
-
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "iso-8859-1"])
-def test_other_encodings_stay_what_they_are(cell, encoding):
-    path, robot, calibrated = cell
-    other = path.with_name("other.urdf")
-    other.write_bytes(text().replace('encoding="utf-8"', f'encoding="{encoding.removesuffix("-sig")}"').encode(encoding))
-    found = write_calibrated_origins(other, robot, calibrated)
-    assert strip_origins(found.content) == strip_origins(other.read_bytes())
-    assert "geprüft".encode(encoding)[-7:] in found.content
-    usual = path.with_name("usual.urdf")
-    usual.write_bytes(found.content)
-    both = [read_urdf(p).joints for p in (usual, export_arm(cell)[0])]
-    for mine, theirs in zip(*both, strict=True):
-        np.testing.assert_array_equal(mine.origin, theirs.origin)
 
 
 @settings(max_examples=10, deadline=None)
@@ -190,40 +162,3 @@ def test_any_chain_moves_as_its_calibrated_robot(tmp_path_factory, parts, seed):
     made = made_calibrated(robot, *(key for key in keys if key in known), identified=False, seed=seed)
     calibrated = fold_effects(made).robot
     assert_same_poses(calibrated, export_arm((path, robot, calibrated))[0], "l0", "tip", count=3, within=1e-8)
-
-
-ROBOTS = ("gp180", "iiwa14", "ur10", "fanuc_static", "abb", "wam", "kuka")
-
-
-def write_urdf(folder, robot):
-    path = folder / "arm.urdf"
-    path.write_text(urdf_of(robot, "made for a test"))
-    return path
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_read_back_it_is_the_robot_that_the_controller_moves(tmp_path, name):
-    robot = analysed(name)
-    end = robot.chain.end_effector
-    others = [point.name for point in robot.chain.points[:-1]]
-    back = robot_from_urdf(write_urdf(tmp_path, robot), "base", end.name, others).robot
-    low, high = robot.joint_limits.T
-    angles = low + (high - low) * np.random.default_rng(2).random((12, robot.joints))
-    own = np.abs(robot.reported_matrix).tolist() == np.eye(robot.joints).tolist()
-    values = robot.reported_angles(angles) if own else angles
-    for point in robot.chain.points:
-        mine, theirs = (poses(r.chain, q, r.chain.point(point.name)) for r, q in ((robot, angles), (back, values)))
-        np.testing.assert_allclose(theirs[0], mine[0], atol=1e-9)
-        np.testing.assert_allclose(theirs[1], mine[1], atol=1e-9)
-    assert [mass.mass_kg for mass in back.masses] == [m.mass_kg for m in robot.masses]
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_mujoco_loads_it_and_no_joint_is_without_effort_or_speed(tmp_path, name):
-    robot = analysed(name)
-    path = write_urdf(tmp_path, robot)
-    model, by_pinocchio = mujoco.MjModel.from_xml_path(str(path)), Pinocchio(path).model
-    assert model.nv >= robot.joints and (model.body_inertia[1:] > 0).all()
-    assert (by_pinocchio.effortLimit > 0).all() and (by_pinocchio.velocityLimit > 0).all()
-    heavy = sum(mass.mass_kg for mass in robot.masses if mass.link)
-    assert model.body_mass[1:].sum() == pytest.approx(heavy, abs=1e-4)

@@ -1,4 +1,4 @@
-"""Kills, full disks, read-only folders, wrong clocks and two runs at once: a plain `snakemake -j2` has to get over each.
+"""Kills, full disks and two runs at once: a plain `snakemake -j2` has to get over each.
 
 `make soak` runs it with forty kills; tests/workflow/test_soak.py with one. After each fault a plain run has to finish, and
 every file that the pipeline makes has to be, byte for byte, that of a run that nothing disturbed. No moment is a time, by which
@@ -154,46 +154,6 @@ def full_disk(reference, expected):
         subprocess.run(["umount", "-l", study.folder], check=True)
 
 
-def read_only(reference, expected):
-    """Refused in a line while results cannot be written, and finished once they can."""
-    study = on_a_small_disk(reference, 60)
-    try:
-        said = []
-        for name in ("results", "."):
-            folder = study.path(name)
-            folder.mkdir(exist_ok=True)
-            subprocess.run(["mount", "--bind", folder, folder], check=True)
-            subprocess.run(["mount", "-o", "remount,ro,bind", folder], check=True)
-            try:
-                said.append(refused_in_one_line(study))
-            finally:
-                subprocess.run(["umount", "-l", folder], check=True)
-        ended_by_itself(study)
-        assert contents(study) == expected
-        return said
-    finally:
-        subprocess.run(["umount", "-l", study.folder], check=True)
-
-
-def clock_set_back(study, expected):
-    """An edit that is older than what was made from it reruns what depends on it; dates alone rerun nothing."""
-    ended_by_itself(study)
-    for shift in (-1e6, 1e6):
-        for name in contents(study):
-            os.utime(study.path(name), (time.time() + shift,) * 2)
-        ended_by_itself(study)
-        assert contents(study) == expected
-    source = study.path("src/elastocal/study/metrics.py")
-    before = source.read_text(encoding="utf-8")
-    study.edit("src/elastocal/study/metrics.py")
-    os.utime(source, (1e9, 1e9))
-    assert ("identify", "kuka", "200", "6DoF") in study.planned()
-    source.write_text(before, encoding="utf-8")
-    os.utime(source, (1e9, 1e9))
-    ended_by_itself(study)
-    assert contents(study) == expected
-
-
 def two_at_once(study, expected, files):
     """The second starts when the first has made so many files. One of them may be refused; what they leave is that of one."""
     cleared(study)
@@ -223,12 +183,10 @@ def soak(folder, kills, seed):
         print(f"{number + 1}: {victim} killed at {at} files, finished, identical", flush=True)
     for apart in (0, 1, files // 2):
         print(f"two runs {apart} files apart: exit codes {two_at_once(study, expected, apart)}, identical", flush=True)
-    clock_set_back(study, expected)
-    print("clock set back: identical", flush=True)
     if os.geteuid() == 0:
-        for line in [*full_disk(study, expected), *read_only(study, expected)]:
+        for line in full_disk(study, expected):
             print(line)
-        print("full disk, read-only folders: one line each, finished later, identical", flush=True)
+        print("full disk: one line each, finished later, identical", flush=True)
     print(f"kills survived: {counts}")
 
 

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from drawn_figures import assert_nothing_cut_off, legend_entries, texts_in_axes
-from made_study_tables import TITLES, places
+from drawn_figures import legend_entries
 from made_surveys import OPEN, made_candidates, made_survey
 
 from elastocal.application.planning.cell import Cell
 from elastocal.application.planning.plan import choose_plan
-from elastocal.figures.arms import arm_map, arm_with_errors, draw_arm, plan_picture, pose_pictures, project_view
+from elastocal.figures.arms import arm_with_errors, draw_arm, plan_picture, pose_pictures, project_view
 from elastocal.figures.style import panels
 
 
@@ -31,22 +30,6 @@ def test_an_arm_stands_on_its_base_and_has_a_shadow_on_its_plane():
     np.testing.assert_allclose(arm[0], 0.0)
     np.testing.assert_allclose(edge, arm)
     np.testing.assert_allclose(shadow[-1], project_view(np.array([1.0, 0.0, 0.0])))
-
-
-OUTLINES = {name: np.array([[0, 0, 0], [0, 0, 1.0], [1.0, 0, 1.0], [2.0, 0, 1.0]]) for name in TITLES}
-
-
-def test_places_lie_along_the_arm_with_the_mean_over_the_sides_and_the_best_view():
-    figure = arm_map(places(), OUTLINES, TITLES)
-    kuka = figure.axes[0]
-    assert kuka.get_title() == "Kuka"
-    first, second = kuka.collections
-    # 1.5 m along the chain: half a metre out on the level link.
-    np.testing.assert_allclose(first.get_offsets(), [[0.5, 1.0]])
-    np.testing.assert_allclose(second.get_offsets(), [[2.0, 1.0]])
-    assert first.get_array().tolist() == pytest.approx([1.41])
-    assert texts_in_axes(figure)[:2] == ["1.41, seen 50 %", "1.06, seen 30 %"]
-    assert_nothing_cut_off(figure)
 
 
 @pytest.fixture

@@ -1,21 +1,13 @@
-"""Hypotheses, candidates one by one, and which of them contribute alike: what is drawn is what the tables hold."""
-
-from itertools import pairwise
+"""Hypotheses, and candidates one by one: what is drawn is what the tables hold."""
 
 import numpy as np
 import pytest
-from drawn_figures import row_labels, texts
+from drawn_figures import texts
 from made_loop_facts import plainly
-from made_loop_tables import candidate_table, confounding_table
+from made_loop_tables import candidate_table
 from made_loop_tables import probabilities as stated
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from elastocal.figures.candidates import (
-    angle_matrix,
-    confounding,
-    probabilities,
-    rank_candidates,
-)
+from elastocal.figures.candidates import probabilities, rank_candidates
 
 
 def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
@@ -56,40 +48,6 @@ def test_each_candidate_stands_once_at_its_best_shape():
     assert rank_candidates(table)[0] == 0
 
 
-def test_confounding_annotates_every_pair_and_marks_what_was_found():
-    table = candidate_table(count=12)
-    figure = confounding(table, confounding_table(table))
-    numbers = [artist for artist in figure.axes[0].texts if artist.get_text().isdigit()]
-    assert len(numbers) == 12 * 11
-    bold = [label.get_text() for label in figure.axes[0].get_yticklabels() if label.get_fontweight() == "bold"]
-    assert bold == ["Effect 0 of joint 1  1"]
-    # What was found is shown whatever its place.
-    late = candidate_table(count=20) | {"chosen": np.arange(25) == 18}
-    labels = row_labels(confounding(late, confounding_table(late)).axes[0])
-    assert len(labels) == 16 and labels[-1] == "Effect 18 of joint 1  16"
-    assert figure.axes[1].get_ylabel() == "angle between the contributions (°)"
-
-
-@pytest.mark.parametrize("which", [0, 1])
-def test_labels_of_two_lines_have_room_of_their_own(which):
-    table = candidate_table(count=6)
-    table["candidate"][1:4] = [f"transmission_harmonic@{k}[non-integer order between {k} and {k + 1}]" for k in range(1, 4)]
-    sets = [({"link_elasticity": [f"links 1 and 2 and {k} one section"], "payload": []}, 0.3) for k in (3, 4, 5)]
-    figure = probabilities(stated(sets), table)
-    renderer = FigureCanvasAgg(figure).get_renderer()
-    figure.draw(renderer)
-    boxes = [label.get_window_extent(renderer) for label in figure.axes[which].get_yticklabels()]
-    assert any("\n" in label for label in row_labels(figure.axes[which]))
-    assert all(above.y0 >= below.y1 - 1 for above, below in pairwise(boxes))
-
-
-def test_where_nothing_can_be_tested_the_figures_say_so():
-    table = candidate_table(count=0, chosen=0)
-    for figure in (probabilities(stated([({}, 1.0)]), table), confounding(table, confounding_table(table))):
-        assert texts(figure) == ["None of 5 candidate causes can be tested with these measurements."]
-
-
-def test_angles_between_candidates_are_symmetric_and_unknown_where_a_pair_is_missing():
-    pairs = {"one": ["b", "c", "x"], "other": ["a", "b", "a"], "angle_deg": [30.0, 80.0, 5.0]}
-    expected = [[0, 30, np.nan], [30, 0, 80], [np.nan, 80, 0]]
-    np.testing.assert_array_equal(angle_matrix(["a", "b", "c"], pairs), expected)
+def test_where_nothing_can_be_tested_the_figure_says_so():
+    figure = probabilities(stated([({}, 1.0)]), candidate_table(count=0, chosen=0))
+    assert texts(figure) == ["None of 5 candidate causes can be tested with these measurements."]

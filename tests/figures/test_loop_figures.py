@@ -2,12 +2,12 @@
 
 import pytest
 from drawn_figures import assert_nothing_cut_off
-from made_loop_tables import candidate_table, confounding_table, residual_table, step_rows
+from made_loop_tables import candidate_table, residual_table, step_rows
 from made_loop_tables import probabilities as stated
 from selected import slow_but
 
-from elastocal.figures.candidates import confounding, probabilities
-from elastocal.figures.residuals import arrows, before_after, residuals
+from elastocal.figures.candidates import probabilities
+from elastocal.figures.residuals import arrows, before_after
 from elastocal.figures.style import save
 
 LONG = ("link_elasticity@1+2+3+6[one section]", "force_misalignment[flange axes]", "transmission_harmonic@1[orders 31-36]")
@@ -26,10 +26,8 @@ def of_the_catalogue():
 
 
 FIGURES = {
-    "residuals": lambda: residuals(residual_table()),
     "arrows": lambda: arrows(residual_table()),
     "candidates": lambda: probabilities(stated(LONG_SETS), of_the_catalogue()),
-    "confounding": lambda: confounding(of_the_catalogue(), confounding_table(of_the_catalogue())),
     "before_after": lambda: before_after(
         step_rows(effects=("transmission_harmonic@1[orders 31-36], transmission_ratio@2",)), 5e-6
     ),

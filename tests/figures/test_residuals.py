@@ -1,57 +1,17 @@
-"""Errors of campaigns, as clouds, arrows and bars: what is drawn is what the table holds."""
+"""Errors of campaigns, as arrows and bars: what is drawn is what the table holds."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from drawn_figures import row_labels, texts
 from made_loop_tables import residual_table, step_rows
-from matplotlib.collections import PathCollection
 from matplotlib.quiver import Quiver, QuiverKey
-from statsmodels.api import OLS
 
-from elastocal.figures.residuals import (
-    METRICS,
-    arrows,
-    before_after,
-    bins_of,
-    campaign_errors,
-    components,
-    quantities,
-    residuals,
-    running_quartiles,
-    share_explained,
-)
+from elastocal.figures.residuals import METRICS, arrows, before_after, campaign_errors
 
 
 def quivers(axis):
     return [artist for artist in axis.get_children() if isinstance(artist, Quiver)]
-
-
-def test_residuals_have_a_panel_for_each_quantity_that_varies_with_held_out_measurements_marked_apart():
-    table = residual_table()
-    figure = residuals(table)
-    labels = [axis.get_xlabel() for axis in figure.axes if axis.get_xlabel()]
-    assert labels == [f"angle of joint {joint} (°)" for joint in range(1, 7)] + ["force (N)", "time (min)"]
-    assert figure.axes[0].get_ylabel() == "residual (µm)"
-    clouds = [artist for artist in figure.axes[0].collections if isinstance(artist, PathCollection)]
-    assert [len(cloud.get_offsets()) for cloud in clouds] == 2 * [(~table["held_out"]).sum(), table["held_out"].sum()]
-
-
-def test_components_are_those_about_the_vertical_and_along_the_force():
-    table = {"x": np.array([0.0, 1.0]), "y": np.array([2.0, 0.0])}
-    table |= {"before_dx": np.array([1.0, 1.0]), "before_dy": np.array([2.0, 2.0]), "before_dz": np.array([3.0, 3.0])}
-    table |= {"fx": np.array([0.0, 0.0]), "fy": np.array([0.0, -5.0]), "fz": np.array([0.0, 0.0])}
-    expected = [[2.0, -1.0, 3.0, np.nan], [1.0, 2.0, 3.0, -2.0]]
-    np.testing.assert_allclose(components(table, "before"), expected, atol=1e-12)
-
-
-def test_no_line_crosses_a_gap():
-    values = np.concatenate([np.linspace(0, 10, 200), np.linspace(50, 60, 200)])
-    middle, quartiles = running_quartiles(values, np.sin(values), bins_of(values))
-    assert np.isnan(quartiles).all(axis=1).sum() == 1
-    assert middle[~np.isnan(quartiles[:, 1])].max() > 50
-    levels = np.repeat([0.0, 1000.0], 50)
-    assert not np.isnan(running_quartiles(levels, levels, bins_of(levels))[1]).any()
 
 
 def test_large_campaigns_draw_one_state_of_each_cell():
@@ -81,38 +41,6 @@ def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_a
         np.testing.assert_allclose(quiver.XY, place[:, axes])
         drawn = np.column_stack([quiver.U, quiver.V])
         np.testing.assert_allclose(drawn, off[:, axes] * key.U / 200e-6, rtol=1e-9, atol=1e-12)
-
-
-def test_the_share_explained_is_the_adjusted_coefficient_of_determination_about_zero():
-    rng = np.random.default_rng(3)
-    bins = rng.integers(0, 5, 60)
-    values = rng.normal(size=60) + 0.6 * bins
-    fit = OLS(values, np.eye(5)[bins], hasconst=False).fit()
-    assert share_explained(bins, values) == pytest.approx(fit.rsquared_adj)
-    # What is not known and what is in no bin do not count.
-    padded = np.append(values, [np.nan, 1e6]), np.append(bins, [0, -1])
-    assert share_explained(padded[1], padded[0]) == pytest.approx(fit.rsquared_adj)
-
-
-def test_bins_are_the_levels_of_few_values_and_equal_counts_of_many():
-    np.testing.assert_array_equal(bins_of(np.array([5.0, 1.0, np.nan, 1.0004, 3.0])), [2, 0, -1, 0, 1])
-    counts = np.bincount(bins_of(np.random.default_rng(0).gamma(1.0, size=4000)))
-    assert len(counts) == 50 and counts.min() == counts.max() == 80
-
-
-def test_quartiles_of_a_bin_are_those_of_its_residuals_and_few_measurements_have_none():
-    values, residual = np.repeat([1.0, 2.0, 3.0], [5, 3, 9]), np.arange(17.0)
-    middle, quartiles = running_quartiles(values, residual, bins_of(values))
-    np.testing.assert_array_equal(middle, [1.0, 3.0])
-    np.testing.assert_array_equal(quartiles, [[1, 2, 3], [10, 12, 14]])
-
-
-@pytest.mark.parametrize("last_s, label, end", [(7200.0, "time (min)", 120.0), (7260.0, "time (h)", 7260 / 3600)])
-def test_time_begins_at_zero_and_is_in_hours_beyond_two(last_s, label, end):
-    table = residual_table()
-    table["time_s"] = np.linspace(500.0, 500.0 + last_s, len(table["pose"]))
-    found = quantities(table)[label]
-    assert (found.min(), found.max()) == (0.0, pytest.approx(end))
 
 
 def lines_of(axis, gid):

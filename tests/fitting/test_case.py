@@ -96,9 +96,3 @@ def test_noise_comes_back_from_its_document():
     back = noise_from({"noise": noise_facts(noise), "warnings": []})
     np.testing.assert_array_equal(back.joint_rad, noise.joint_rad)
     assert replace(back, joint_rad=None) == replace(noise, joint_rad=None)
-
-
-def test_a_verdict_that_has_more_of_the_noise_gives_the_same_noise():
-    noise = Noise("repeats", 1e-5, 2e-5, np.array([1e-6, 0.0]), 40, 3e-6)
-    verdict = {"noise": noise_facts(noise) | {"factor": 1.7, "note": "x"}, "verdict": "nothing missing"}
-    assert noise_facts(noise_from(verdict)) == noise_facts(noise)

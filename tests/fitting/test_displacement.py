@@ -46,21 +46,6 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
     assert np.abs(bent).max() > 1e-4
 
 
-def test_load_is_taken_at_the_deflected_pose_as_a_solver_of_the_equilibrium_finds_it(fanuc):
-    model = made_model(fanuc.chain, fitted_frames=False, compliance=fanuc.compliance)
-    estimate, states = made_estimate(model), made_states(6, 40, seed=12)
-    states.wrench[:] *= (3000.0 / np.linalg.norm(states.wrench[:, :3], axis=1))[:, None]
-    found = displaced_coordinates(model, estimate, conditions(model, estimate, states))[:, :6]
-    turned = equilibrium(fanuc.chain, fanuc.compliance, states)
-    end = fanuc.chain.end_effector
-    ends = [poses(fanuc.chain, q, end)[0] for q in (found, states.joint_angles + turned)]
-    assert np.linalg.norm(ends[0] - ends[1], axis=1).max() < 1e-8
-    # At the commanded pose the load would be off by far more than a tracker's noise.
-    torques = joint_torques(fanuc.chain, states.joint_angles, states.wrench, end)
-    there = poses(fanuc.chain, states.joint_angles + fanuc.compliance * torques, end)[0]
-    assert np.linalg.norm(there - ends[1], axis=1).max() > 5e-5
-
-
 def test_effects_add_up_on_the_coordinates_of_the_sites(fanuc):
     known = candidates_on(made_model(fanuc.chain).sites)
     offset, growth, frame = (known[key] for key in ("joint_offset@2", "stiffening@2", "base_compliance"))

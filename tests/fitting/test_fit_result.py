@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from fitted_models import TARGETS, model_of
 from planted import two_loads_a_pose
-from synthetic import made_estimate, seen_exactly, slopes, small_steps, with_noise
+from synthetic import made_estimate, seen_exactly, with_noise
 
 from elastocal.fitting import fit_result
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
 
@@ -44,17 +43,6 @@ def test_values_are_those_of_the_effect_asked_for(fitted):
         made.values_of("hysteresis@1")
 
 
-def test_sensitivities_are_central_differences_of_the_prediction(fitted):
-    found, seen = fitted
-    # Without residuals, of which frames and targets turn a part with them.
-    seen = seen_exactly(found.model, found.estimate, seen.states)
-    plain, _, _ = gathered(found, seen)
-    around = conditions(found.model, found.estimate, seen.states)
-    steps = small_steps(found.model, found.estimate)
-    expected = slopes(found.model, found.estimate, seen, around, np.diag(steps))
-    np.testing.assert_allclose(plain * steps, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
-
-
 def test_whitened_sensitivities_are_the_plain_ones_weighted_and_whitened_as_in_the_fit(fitted):
     found, seen = fitted
     plain, white, _ = gathered(found, seen)
@@ -87,11 +75,3 @@ def test_parts_are_whole_poses_and_hold_each_observation_once(fitted, monkeypatc
     assert sum(map(len, poses)) == len(set().union(*poses)) == 12
     np.testing.assert_allclose(plain, whole[0], rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(white, whole[1], rtol=1e-9, atol=1e-9 * np.abs(white).max())
-
-
-def test_a_fit_that_keeps_neither_conditions_nor_jacobian_finds_the_same_again(fitted):
-    found, seen = fitted
-    forgotten = replace(found, conditions=None, joint_jacobian=None)
-    for one, other in zip(gathered(forgotten, seen)[:2], gathered(found, seen)[:2], strict=True):
-        # What was kept is that of the last step, which ended a thousandth of a standard error away.
-        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(other).max())

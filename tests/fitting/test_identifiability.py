@@ -1,7 +1,5 @@
 """What cannot be told is held and named, and what can be told is the solution of numpy."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from fitted_models import model_of, names_held
@@ -17,15 +15,6 @@ def solved(left, right, plausible, *given):
     return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, *given)
 
 
-def test_solution_is_that_of_numpy_where_all_can_be_told():
-    rng = np.random.default_rng(41)
-    left, right = 100 * rng.standard_normal((50, 6)), rng.standard_normal(50)
-    step, covariance, held = solved(left, right, np.full(6, 0.5))
-    np.testing.assert_allclose(step, np.linalg.lstsq(left, right)[0], rtol=1e-10)
-    np.testing.assert_allclose(covariance, np.linalg.inv(left.T @ left), rtol=1e-10)
-    assert not held.any()
-
-
 def test_solution_with_a_prior_is_that_of_numpy_with_a_row_for_each_prior():
     rng = np.random.default_rng(45)
     left, right, present = 10 * rng.standard_normal((8, 6)), rng.standard_normal(8), rng.standard_normal(6)
@@ -38,27 +27,10 @@ def test_solution_with_a_prior_is_that_of_numpy_with_a_row_for_each_prior():
     assert not held.any()
 
 
-def test_parameter_is_held_where_its_standard_error_would_exceed_its_plausible_size():
-    left = np.diag([1.0, 1.0, 1.0])
-    # Unit variance rows: each standard error is one.
-    held = solved(left, np.ones(3), np.array([1.1, 0.9, 5.0]))[2]
-    np.testing.assert_array_equal(held, [False, True, False])
-
-
 def test_parameters_are_held_given_those_before_them():
     gram = 1e4 * np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_array_equal(identifiable(gram, np.zeros(3, bool), np.zeros(3, bool)), [True, False, True])
     np.testing.assert_array_equal(identifiable(gram, np.array([True, False, False]), np.zeros(3, bool)), [False, True, True])
-
-
-# Both can be told, one after the other; together the first is told worse than the other, to which it is bound.
-BOUND = np.linalg.inv(np.array([[4.0, 1.9], [1.9, 0.95]]))
-
-
-def test_a_shape_is_given_up_before_the_parameter_that_it_is_bound_to():
-    nobody = np.zeros(2, bool)
-    np.testing.assert_array_equal(identifiable(BOUND, nobody, np.array([False, True])), [True, False])
-    np.testing.assert_array_equal(identifiable(BOUND, nobody, nobody), [False, True])
 
 
 def informed(*covariance):
@@ -95,17 +67,6 @@ def test_what_is_told_worst_beside_all_others_goes_and_those_that_are_told_witho
     np.testing.assert_array_equal(identifiable(gram, np.zeros(3, bool), np.zeros(3, bool)), kept)
 
 
-def test_a_step_from_a_present_value_ends_where_the_prior_and_the_data_balance():
-    """Of one parameter: the mean of data and prior by their information, wherever the step begins."""
-    information, prior, data = 4.0e4, 5e-3, 2e-2
-    for present in (0.0, 1e-2, -3e-2):
-        for plausible in (0.1, 1.0):
-            gram, along = np.array([[information * plausible**2]]), np.array([information * plausible * (data - present)])
-            step, covariance, held = solve_normal(gram, along, np.array([plausible]), False, prior**-2, present)
-            assert present + step[0] == pytest.approx(data * information / (information + prior**-2), rel=1e-12)
-            assert covariance[0, 0] == pytest.approx(1 / (information + prior**-2), rel=1e-12) and not held.any()
-
-
 @pytest.mark.parametrize(
     ("key", "held"),
     [
@@ -129,39 +90,11 @@ def test_what_the_frame_or_the_target_makes_as_well_is_held_and_named(fanuc, key
     np.testing.assert_allclose(found.covariance[~found.held][:, ~found.held], without.covariance, rtol=1e-6, atol=1e-22)
 
 
-def test_what_the_data_can_tell_is_not_shrunk(fanuc):
-    """A hundred times its plausible size, an offset still comes back whole."""
-    model = model_of(fanuc, "joint_offset@3")
-    true = replace(made_estimate(model, seed=16), coefficients=(np.array([0.1]),))
-    found = fit(model, seen_exactly(model, true, made_states(6, 30, seed=17)), NOISE)
-    np.testing.assert_allclose(found.estimate.coefficients[0], 0.1, rtol=1e-8)
-
-
 def test_identified_compliance_and_force_scale_cannot_both_be_told(fanuc):
     model = model_of(fanuc, "force_scale", identified=True)
     true = made_estimate(model, seed=18)
     seen = with_noise(seen_exactly(model, true, made_states(6, 30, seed=19)), np.random.default_rng(20))
     assert names_held(fit(model, seen, NOISE)) == ["force_scale scale"]
-
-
-@pytest.mark.parametrize("half_play", [1e-4, 3e-4, 1e-3])
-def test_a_law_that_is_nearly_a_straight_line_keeps_its_coefficient_and_not_its_shape(fanuc, half_play):
-    """Play that the load never crosses but a little: half the play over the torque is all that shows."""
-    model = model_of(fanuc, "lost_motion@2")
-    (play,) = model.effects
-    taken_up = 0.98 * play.shapes[0].highest
-    true = made_estimate(model, seed=46)
-    true = replace(true, coefficients=(np.array([half_play]),), shapes=(np.array([taken_up]),))
-    states = made_states(6, 60, seed=47, force=taken_up / 8.0)
-    seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(48))
-    found = fit(model, seen, NOISE)
-    assert names_held(found) == ["lost_motion@2 torque"]
-    (value,), (torque,) = found.estimate.coefficients[0], found.estimate.shapes[0]
-    number = [owner for owner, _ in found.parameters].index("lost_motion@2")
-    deviation = np.sqrt(found.covariance[number, number])
-    # Given the torque; of the straight line within four standard errors.
-    assert value > 5 * deviation
-    assert abs(value / torque - half_play / taken_up) < 4 * deviation / torque
 
 
 @pytest.mark.parametrize("off", [-2.0, 0.0, 2.0])

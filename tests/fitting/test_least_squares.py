@@ -17,18 +17,10 @@ from fitted_models import (
     seen_off,
     waves,
 )
-from planted import two_loads_a_pose
 from scipy.linalg import block_diag
-from scipy.stats import chi2, kstest
-from synthetic import NOISE, made_estimate, made_states, seen_exactly, with_noise
+from synthetic import NOISE, made_estimate, made_states, seen_exactly
 
-from elastocal.fitting.displacement import conditions
-from elastocal.fitting.least_squares import ON_THE_WAY, fit, fit_frames
-from elastocal.fitting.linearization import linearize
-from elastocal.fitting.noise import Noise, measurement_covariances
-from elastocal.fitting.normal_equations import Parts
-from elastocal.fitting.parameters import parameters
-from elastocal.fitting.robust import robustly
+from elastocal.fitting.least_squares import fit, fit_frames
 
 
 def assert_covariance(found, expected, atol):
@@ -71,103 +63,6 @@ def test_noiseless_measurements_give_back_every_parameter(fanuc, keys, rows):
     # The last step is a thousandth of a standard error at most; the next one would be its square.
     assert (np.abs(values[0] - values[1]) <= 1e-4 * deviation[order] + 1e-12 * np.abs(values[1])).all()
     assert (found.weights == 1.0).all()
-
-
-@pytest.mark.parametrize("taper", [0.05, 0.3, 0.5])
-def test_the_taper_of_a_link_comes_back_where_the_measurements_show_it(fanuc, taper):
-    """Turns and shifts of its far end go with it differently; close to its end, too."""
-    model = model_of(fanuc, "link_elasticity@2", targets=TARGETS, rows=6)
-    true = made_estimate(model, seed=1)
-    true = replace(true, coefficients=(np.array([3e-7, 3e-7]),), shapes=(np.array([taper]),))
-    found = fit(model, seen_exactly(model, true, made_states(6, 40, seed=2, force=2000.0)), NOISE)
-    assert names_held(found) == []
-    np.testing.assert_allclose(found.estimate.shapes[0], taper, rtol=1e-4)
-    np.testing.assert_allclose(found.estimate.coefficients[0], 3e-7, rtol=1e-4)
-
-
-def test_spread_over_data_sets_is_the_standard_error(fanuc):
-    """Of a model with springs, an offset and two targets; measurements with joint noise, repeats and two sessions."""
-    model = model_of(fanuc, "joint_offset@3", targets=TARGETS, identified=True)
-    true = made_estimate(model, (0, 1), seed=7)
-    states = made_states(6, 40, seed=8, sessions=2)
-    states.repeats[:] = np.random.default_rng(9).integers(1, 4, 40)
-    noise = Noise("repeats", 60e-6, 60e-6, 1e-6 * np.array([20.0, 20, 20, 30, 30, 30]))
-    seen = seen_exactly(model, true, states)
-    line = linearize(model, true, seen, conditions(model, true, states))
-    covariance = measurement_covariances(noise, line.coordinate_jacobian[..., :6].reshape(40, 2, 3, 6), 3)
-    covariance /= states.repeats[:, None, None]
-    # In base axes; the measurements are in those of their session.
-    factor = np.linalg.cholesky(covariance)
-
-    def drawn(rng):
-        errors = (factor @ rng.standard_normal((40, 6, 1))).reshape(80, 3)
-        frames = true.frame_rotation[states.session[seen.state]]
-        return replace(seen, position=seen.position + (frames @ errors[..., None])[..., 0])
-
-    sets = 80
-    listed = parameters(model, true)
-    own = [i for i, (owner, _) in enumerate(listed) if not owner.startswith(("frame ", "target "))]
-    deviations, squares = np.empty((sets, len(own))), np.empty(sets)
-    for number in range(sets):
-        found = fit(model, drawn(np.random.default_rng((11, number))), noise, start=true)
-        error = np.concatenate(found.estimate.coefficients) - np.concatenate(true.coefficients)
-        covariance = found.covariance[np.ix_(own, own)]
-        deviations[number] = error / np.sqrt(np.diag(covariance))
-        squares[number] = error @ np.linalg.solve(covariance, error)
-    low, high = np.sqrt(chi2.ppf([1e-4, 1 - 1e-4], sets) / sets)
-    spread = np.sqrt((deviations**2).mean(axis=0))
-    # 80 sets: standard errors that are off by 40 % are seen with a power of 0.8, by Kolmogorov-Smirnov at 0.1 % a distribution
-    # that is off by 0.3 anywhere. Huber's weights cost some per mille of what an unweighted fit would tell.
-    assert ((low < spread) & (spread < 1.02 * high)).all(), spread
-    assert (np.abs(deviations.mean(axis=0)) < 4 / np.sqrt(sets)).all()
-    assert kstest(squares, chi2(len(own)).cdf).pvalue > 1e-3
-
-
-def test_a_fit_on_the_way_stops_within_a_tenth_of_a_standard_error_of_where_it_would_end(fanuc, monkeypatch):
-    """After fewer linearisations."""
-    model = model_of(fanuc, "joint_offset@3", "link_weight@2", "stiffening@2")
-    true = made_estimate(model, seed=61, size=3.0)
-    seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=62)), np.random.default_rng(63))
-    linearized, count = Parts.linearize, []
-
-    def counted(measurements, estimate):
-        count.append(1)
-        return linearized(measurements, estimate)
-
-    monkeypatch.setattr(Parts, "linearize", counted)
-    whole = fit(model, seen, NOISE)
-    needed = len(count)
-    count.clear()
-    some = fit(model, seen, NOISE, settled=ON_THE_WAY)
-    assert some.converged and len(count) < needed
-    moved = np.concatenate(some.estimate.coefficients) - np.concatenate(whole.estimate.coefficients)
-    deviation = np.sqrt(np.diag(whole.covariance))[-len(moved) :]
-    assert (np.abs(moved) <= ON_THE_WAY * deviation).all() and moved.any()
-
-
-def test_an_error_of_the_pose_counts_once_for_all_its_measurements(fanuc):
-    """Two loads and two targets a pose, repeated: estimate and covariance are those of statsmodels with it written out."""
-    model = model_of(fanuc, "joint_offset@3", targets=TARGETS, identified=True)
-    states = two_loads_a_pose(6, 15, seed=60)
-    states.repeats[:] = np.random.default_rng(9).integers(1, 4, 30)
-    seen = seen_exactly(model, made_estimate(model, seed=61), states)
-    noise = replace(NOISE, joint_rad=1e-6 * np.array([20.0, 20, 20, 30, 30, 30]), pose_rad=1e-4)
-    found = fit(model, with_noise(seen, np.random.default_rng(62)), noise)
-    line = linearize(model, found.estimate, seen, found.conditions)
-    jacobian = line.coordinate_jacobian[..., :6].reshape(-1, 6)
-    state, pose = np.repeat(seen.state, 3), np.repeat(seen.cluster, 3)
-    sigma = (jacobian * noise.joint_rad**2) @ jacobian.T * (state[:, None] == state)
-    sigma = (sigma + noise.position_m**2 * np.eye(len(sigma))) / states.repeats[state]
-    sigma += noise.pose_rad**2 * (jacobian @ jacobian.T) * (pose[:, None] == pose)
-    root = np.repeat(1 / np.sqrt(found.weights), 3)
-    scale = np.array([p.plausible for _, p in found.parameters])
-    left = line.sensitivities.reshape(len(sigma), -1) * scale
-    reference = sm.GLS(found.residual.ravel(), left, sigma=root[:, None] * sigma * root).fit()
-    deviation = assert_covariance(found, reference.normalized_cov_params * np.outer(scale, scale), 5e-3)
-    assert found.converged and (np.abs(reference.params * scale) / deviation).max() < 5e-3
-    # The offset is known by the poses alone, so much worse than their many measurements would tell.
-    without = fit(model, replace(seen), replace(noise, pose_rad=0.0))
-    assert found.covariance[-1, -1] > 2 * without.covariance[-1, -1]
 
 
 PRIORS = [None, None, 2e-5, 1e-3, 5e-6]
@@ -248,22 +143,6 @@ def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(monkeypatch):
     deviation = np.sqrt(np.diag(covariance))
     assert found.converged and len(found.residual) == 60
     np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, expected / deviation, rtol=0, atol=1e-5)
-
-
-def test_a_fit_settles_roughly_on_some_measurements_and_then_exactly_on_all(monkeypatch):
-    noise, calls = GANTRY_NOISES["joints"], []
-    model, seen, *_ = linear_problem(noise, 60)
-
-    def watched(model, observations, *rest, **options):
-        calls.append((len(observations), options["reweighted"], options["settled"]))
-        return robustly(model, observations, *rest, **options)
-
-    monkeypatch.setattr("elastocal.fitting.least_squares.robustly", watched)
-    monkeypatch.setattr("elastocal.fitting.least_squares.STARTED_FROM", 20)
-    fit(model, seen, noise, settled=1e-4)
-    (few, *first), (every, *last) = calls
-    assert few <= 24 and first == [False, ON_THE_WAY]
-    assert every == 60 and last == [True, 1e-4]
 
 
 @pytest.mark.parametrize("rows", [3, 6])

@@ -3,16 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from synthetic import (
-    NOISE,
-    candidate_on,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
-    slopes,
-    small_steps,
-)
+from synthetic import NOISE, candidate_on, made_estimate, made_model, made_states, seen_exactly, slopes, small_steps
 
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.displacement import conditions
@@ -43,16 +34,6 @@ def test_a_mount_of_unknown_turn_and_a_known_one_at_an_unknown_place_have_their_
     expected = slopes(model, estimate, seen, around, steps)
     assert found.shape == expected.shape == (16, 6, 12) and (np.abs(expected).max(axis=(0, 1)) > 0).all()
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
-
-
-def test_coordinate_jacobian_is_that_of_each_target(full_case):
-    model, estimate, seen = full_case
-    around = conditions(model, estimate, seen.states)
-    line = linearize(model, estimate, seen, around)
-    assert line.coordinate_jacobian.shape == (24, model.rows, model.sites.chain.coordinates)
-    # Target B sits behind joint 3: what lies further out does not move it.
-    assert not line.coordinate_jacobian[seen.target == 1][..., 3:6].any()
-    assert line.coordinate_jacobian[seen.target != 1][..., 3:6].any()
 
 
 def test_the_place_of_a_jump_has_no_slope_where_a_row_is_within_a_step_of_it(fanuc):

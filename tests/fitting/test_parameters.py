@@ -101,11 +101,3 @@ def test_values_are_zero_for_frames_and_targets_and_those_of_coefficients_before
     )
     before = np.array([play, taken_up, *geometry, beyond, meeting])
     np.testing.assert_allclose(found[9:], before + whole[9:], rtol=1e-12, atol=0)
-
-
-def test_the_plausible_size_of_a_shape_is_the_width_of_its_range(two_laws):
-    model, estimate = two_laws
-    for effect in (model.effects[0], model.effects[2]):
-        (place,) = owned(model, estimate, effect.key, "torque")
-        (shape,) = effect.shapes
-        assert parameters(model, estimate)[place][1].plausible == shape.highest - shape.lowest

@@ -11,7 +11,7 @@ from synthetic import made_estimate, made_model, made_states, seen_exactly
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.prediction import measured_in_base, predict, residuals
+from elastocal.fitting.prediction import residuals
 
 
 def test_residual_is_what_was_added_to_the_measurements_seen_in_base_axes(full_case):
@@ -39,14 +39,3 @@ def test_effects_at_zero_leave_the_declared_model(name):
     more, same = model.with_effects(effects), estimate.with_effects(effects)
     seen = seen_exactly(model, estimate, states)
     np.testing.assert_allclose(residuals(more, same, seen, conditions(more, same, states)), 0.0, atol=1e-14)
-
-
-def test_measurements_are_taken_into_base_axes_by_the_frame_of_their_session(full_case):
-    model, estimate, seen = full_case
-    position, rotation = measured_in_base(estimate, seen)
-    known = predict(model, estimate, seen, conditions(model, estimate, seen.states))
-    np.testing.assert_allclose(position, known[0], rtol=0, atol=1e-14)
-    if model.rows == 6:
-        np.testing.assert_allclose(rotation, known[1], rtol=0, atol=1e-14)
-    else:
-        assert rotation is None

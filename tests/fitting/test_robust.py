@@ -5,20 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import statsmodels.api as sm
-from fitted_models import bent, gantry_model, gantry_states, linear_law, model_of, seen_off, waves
-from planted import planted
+from fitted_models import bent, gantry_model, gantry_states, linear_law, seen_off, waves
 from scipy.optimize import minimize
 from scipy.stats import chi2
-from synthetic import NOISE, candidate_on, made_estimate, made_model, made_states, seen_exactly, with_noise
+from synthetic import NOISE, made_estimate
 
-from elastocal.campaigns.campaign import Target
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.prediction import residuals
 from elastocal.fitting.robust import robustly
-from elastocal.mechanics.robot import Mass
 
 
 def robust_objective(found):
@@ -39,38 +35,6 @@ def test_steps_that_do_not_help_are_halved_until_the_fit_converges(fanuc, seed, 
     assert robust_objective(found) < robust_objective(whole) - 0.01
 
 
-# Heavy links whose masses are known to a tenth: errors of the masses and links that bend under them explain much alike, and
-# both at once enter as a product.
-MASSES = (Mass(1, 250.0, (0.1, 0, 0), 0.1), Mass(2, 310.0, (0.5, 0, 0), 0.1), Mass(3, 155.0, (0.1, 0, 0.1), 0.1))
-SHARP = replace(NOISE, position_m=6e-6)
-
-
-@pytest.mark.parametrize(("count", "seed"), [(60, 4), (120, 3), (120, 4)])
-def test_steps_follow_the_bent_valley_of_a_product_of_parameters(fanuc, count, seed, monkeypatch):
-    robot = replace(fanuc, masses=(*MASSES, Mass(4, 78.0, (0.3, 0, 0), 0.1)))
-    target = Target("A", "6DoF", (0.0, 0.0, 0.0))
-    offsets = [candidate_on(robot, f"joint_offset@{joint}") for joint in (2, 3)]
-    bare = made_model(robot, (target,), fitted_frames=False, compliance=fanuc.compliance, effects=offsets)
-    bends = candidate_on(robot, "link_elasticity@1+2+3+6[one section]")
-    bends = replace(bends, parameters=tuple(replace(parameter, prior_std=3e-8) for parameter in bends.parameters))
-    model = bare.with_effects([bends])
-    true = made_estimate(model, seed=seed)
-    true = replace(true, coefficients=(*true.coefficients[:-1], np.array([3e-8, 3e-8])))
-    states = made_states(6, count, seed, force=0.0, span=1.5)
-    seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(seed), SHARP.position_m)
-    # Where the masses have taken what the links do.
-    start = fit(bare, seen, SHARP).estimate.with_effects([bends])
-    expected = fit(model, seen, SHARP, start)
-    monkeypatch.setattr("elastocal.fitting.robust._STEPS", 3)
-    found = fit(model, seen, SHARP, start)
-    assert expected.converged
-    number = [parameter.name for _, parameter in expected.parameters].index("bending_1_over_EI")
-    bending, after = expected.estimate.coefficients[-1][0], found.estimate.coefficients[-1][0]
-    deviation = np.sqrt(expected.covariance[number, number])
-    assert bending > 10 * deviation
-    assert abs(after - bending) < 0.2 * deviation
-
-
 @pytest.mark.parametrize(("seed", "lag", "end"), [(4, 8000.0, 36000.0), (8, 3000.0, 900.0)])
 def test_fit_converges_at_the_end_of_the_range_of_a_shape(fanuc, seed, lag, end):
     model, seen = bent(fanuc, seed, lag)
@@ -83,46 +47,6 @@ def test_fit_converges_at_the_end_of_the_range_of_a_shape(fanuc, seed, lag, end)
     again = fit(without, seen, NOISE, start)
     deviation = np.sqrt(again.covariance[-1, -1])
     assert abs(again.estimate.coefficients[0][0] - found.estimate.coefficients[0][0]) < 2e-3 * deviation
-
-
-def test_outliers_lose_weight_from_the_first_step_of_a_fit_that_starts_from_another_one(fanuc):
-    """One that starts where it ends stays there, in one step."""
-    model = model_of(fanuc, "joint_offset@3")
-    clean = with_noise(
-        seen_exactly(model, made_estimate(model, seed=24), made_states(6, 60, seed=25)), np.random.default_rng(26)
-    )
-    moved = clean.position.copy()
-    moved[[3, 20, 41]] += 0.02
-    seen = replace(clean, position=moved)
-    found = fit(model, seen, NOISE)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("elastocal.fitting.robust._STEPS", 1)
-        again = fit(model, seen, NOISE, found.estimate, reweighted=True)
-        anew = fit(model, seen, NOISE, found.estimate)
-    deviation = np.sqrt(found.covariance[-1, -1])
-    off = [abs(each.estimate.coefficients[0][0] - found.estimate.coefficients[0][0]) / deviation for each in (again, anew)]
-    assert again.converged and off[0] < 2e-3
-    assert not anew.converged and off[1] > 0.1
-
-
-@pytest.mark.parametrize(("rows", "seed"), [(3, 0), (3, 1), (6, 2), (6, 3)])
-def test_fit_converges_where_measurements_share_an_error_and_the_model_misses_far_more_than_the_noise(fanuc, seed, rows):
-    """As on a real robot with a good tracker: three reflectors, joints that repeat badly, a law of gravity that is left out."""
-    targets = tuple(Target(name, "6DoF", None) for name in "ABC")
-    true = model_of(fanuc, "joint_offset@2", "joint_offset@3", "link_geometry@3", "link_weight@2", targets=targets, rows=rows)
-    states = replace(made_states(6, 24, seed=(70, seed)), repeats=np.full(24, 10))
-    estimate = made_estimate(true, seed=seed, size=1.0)
-    seen = with_noise(seen_exactly(true, estimate, states), np.random.default_rng((71, seed)), 20e-6, 20e-6)
-    model = replace(true, effects=true.effects[:-1])
-    noise = Noise("declared", 6e-6, 6e-6, 1e-6 * np.array([40.0, 15, 15, 1, 45, 220]))
-    found = fit(model, seen, noise)
-    # In standard deviations.
-    assert np.sqrt((found.whitener.apply(found.residual) ** 2).mean()) > 5.0
-    assert found.converged
-    again = fit(model, seen, noise, found.estimate)
-    moved = np.concatenate(again.estimate.coefficients) - np.concatenate(found.estimate.coefficients)
-    deviation = np.sqrt(np.diag(again.covariance))[-len(moved) :]
-    assert (np.abs(moved) <= 0.1 * deviation).all()
 
 
 PRIORS = [None, 3e-5, None]
@@ -218,24 +142,6 @@ def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_err
     assert not fit(model, seen, SENSOR, start, **options).converged
 
 
-@pytest.mark.parametrize("moving", [0, 1, 2])
-def test_a_fit_has_not_converged_while_one_of_its_parameters_still_moves(moving, monkeypatch):
-    """The others are where they belong, and it moves by ten standard errors."""
-    left = waves(gantry_states(40).joint_angles, 3).reshape(120, 3)
-    # What measurements are off is nothing that the law could make: its best values are zero.
-    off = 1e-4 * np.random.default_rng(100).choice([-1.0, 1.0], 120)
-    off -= left @ np.linalg.lstsq(left, off)[0]
-    states = replace(gantry_states(40), repeats=np.ones(40, int))
-    deviation = 3e-4 * np.sqrt(np.diag(np.linalg.inv(left.T @ left)))
-    start = 10 * deviation * (np.arange(3) == moving)
-    model = gantry_model(linear_law(3))
-    begin = replace(made_estimate(model, size=0.0), coefficients=(start,))
-    monkeypatch.setattr("elastocal.fitting.robust._STEPS", 1)
-    assert not fit(model, seen_off(states, off.reshape(40, 3)), SENSOR.scaled(3.0), begin, reweighted=True).converged
-    nothing = replace(begin, coefficients=(np.zeros(3),))
-    assert fit(model, seen_off(states, off.reshape(40, 3)), SENSOR.scaled(3.0), nothing, reweighted=True).converged
-
-
 @pytest.mark.parametrize("frozen", [[True, False, False], [False, True, True]])
 def test_frozen_parameters_stay_and_the_others_are_best_beside_them(frozen):
     model, seen, left, off, _ = with_outliers(3)
@@ -288,30 +194,3 @@ def test_a_shape_within_its_range_is_that_of_a_general_minimiser(knee):
     assert found.converged and (found.weights == 1.0).all()
     np.testing.assert_allclose(values / deviation, expected * [1e-4, 1e-4, 1.0] / deviation, rtol=0, atol=2e-3)
     assert SATURATION.lowest < found.estimate.shapes[0][0] < SATURATION.highest
-
-
-@pytest.mark.parametrize("begin", [0.2, 0.25, 1.5, 2.0])
-def test_no_step_of_a_fit_raises_its_objective(begin, monkeypatch):
-    """Step by step from a knee far off, by measurements of which none loses weight: squares fall to the least there is."""
-    model, seen, _, _ = saturated(0.6)
-    start = replace(made_estimate(model, size=0.0), coefficients=(np.array([5e-3, -3e-4]),), shapes=(np.array([begin]),))
-    squares = [(residuals(model, start, seen, conditions(model, start, seen.states)) ** 2).sum()]
-    for steps in range(1, 9):
-        monkeypatch.setattr("elastocal.fitting.robust._STEPS", steps)
-        found = fit(model, seen, SENSOR.scaled(10.0), start)
-        squares.append((found.residual**2).sum())
-    assert found.converged and (found.weights == 1.0).all()
-    assert (np.diff(squares) <= 1e-9 * squares[0]).all()
-    # Errors are half the noise in each of 180 numbers, of which three parameters take up a little.
-    assert 0.9 * 180 * 25e-10 < squares[-1] < 180 * 25e-10 < 0.2 * squares[0]
-
-
-def test_a_fit_has_settled_where_it_ends_whatever_loads_had_to_follow(kuka):
-    """From springs five hundredths off: what goes on from there finds nothing left to do."""
-    campaign = planted(kuka, {}, poses=25)
-    start = replace(campaign.declared.estimate, coefficients=(0.95 * kuka.compliance,))
-    model, seen, noise = campaign.declared.model, campaign.observations, campaign.declared.noise
-    found = fit(model, seen, noise, start)
-    again = fit(model, seen, noise, found.estimate, reweighted=True)
-    left = (again.estimate.coefficients[0] - found.estimate.coefficients[0]) / np.sqrt(np.diag(found.covariance))
-    assert found.converged and np.abs(left).max() < 1e-3

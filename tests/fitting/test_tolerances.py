@@ -3,7 +3,6 @@
 Noise of a campaign that neither repeats nor declares: what the declared model leaves of positions and of orientations.
 """
 
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -93,13 +92,6 @@ def test_effective_parameters_are_the_trace_of_the_hat_matrix(kuka):
     assert effective_parameters(fitted) < (~fitted.held).sum() - 0.5
 
 
-def test_a_model_without_geometry_is_fitted_as_it_is(kuka):
-    campaign, _ = campaign_of(kuka, 1e-4)
-    model = campaign.declared.model
-    one, other = (call(model, campaign.observations, campaign.declared.noise) for call in (fit, fit_declared))
-    np.testing.assert_array_equal(one.estimate.coefficients[0], other.estimate.coefficients[0])
-
-
 def case_of(robot, off=0.0, turned=0.0, noise=None, oriented=True, repeats=1):
     """A known robot whose measurements are off by so much and turned by so much: nothing is left to fit."""
     plan = Plan(poses=8, loads=1, repeats=repeats, noise=0.0, force=0.0, oriented=oriented)
@@ -136,34 +128,3 @@ def test_a_residual_finer_than_any_sensor_is_taken_as_what_a_sensor_resolves(fan
     noise, _ = estimated_noise(case_of(fanuc, off, turned))
     for found, part in ((noise.position_m, off), (noise.orientation_rad, turned)):
         assert found == pytest.approx(max(np.sqrt((part**2).mean()), FINEST), rel=1e-6)
-
-
-def test_repeats_come_before_the_residual(fanuc):
-    """Measurements a millimetre off the model and repeated to some hundredths."""
-    noise, warnings = estimated_noise(case_of(fanuc, 1e-3 + errors(1, 30e-6, 2), 1e-3 + errors(2, 15e-6, 2), repeats=2))
-    assert noise.source == "repeats" and warnings == []
-    # Within four standard errors of what 192 contrasts tell.
-    assert noise.position_m == pytest.approx(30e-6, rel=4 / np.sqrt(2 * 192))
-    assert noise.orientation_rad == pytest.approx(15e-6, rel=4 / np.sqrt(2 * 192))
-
-
-def peak_bytes(robot, poses):
-    """Most memory that the noise of a campaign takes which has 12 measurements a pose and neither repeats nor a declaration."""
-    plan = Plan(poses=poses, loads=2, repeats=1, noise=1e-5)
-    campaign = replace(made(robot, 3, plan), compliance="identify", noise=None)
-    case = Case(campaign, averaged(campaign.measurements), declared_model(campaign), {})
-    assert len(campaign.measurements) == 12 * poses
-    tracemalloc.start()
-    estimated_noise(case)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return peak
-
-
-def test_a_measurement_more_takes_no_more_than_its_residual(fanuc, monkeypatch):
-    """A million measurements took 19.8 GB here once; held at once, each takes 13 kB."""
-    monkeypatch.setattr("elastocal.fitting.displacement._MOST_STATES", 40)
-    monkeypatch.setattr("elastocal.fitting.displacement._MOST_AT_ONCE", 40)
-    monkeypatch.setattr("elastocal.fitting.displacement._MOST_HELD", 40 * 6 * 60)
-    few, more = peak_bytes(fanuc, 24), peak_bytes(fanuc, 96)
-    assert more - few < 400 * 12 * (96 - 24)

@@ -67,25 +67,6 @@ def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad, stat
     np.testing.assert_allclose(factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7)
 
 
-def test_the_error_of_a_pose_is_not_averaged_by_repeats(case):
-    """All of a pose moves together: as many times as it is read, its whitened size is that of one measurement."""
-    seen, jacobian = case
-    tiny = replace(NOISE, position_m=1e-9, orientation_rad=1e-9, joint_rad=np.zeros(6), pose_rad=1e-4)
-    moved = jacobian @ np.array([1e-4, 0, 0, 0, 0, 0])
-    squares = (whitening(seen, jacobian, tiny).apply(moved) ** 2).sum(axis=1)
-    # Rows of a pose tell one joint's share of a common error of six, however many repeats stand behind them.
-    by_pose = np.bincount(seen.cluster, squares)
-    assert (by_pose <= 1.0 + 1e-6).all() and by_pose.max() > 0.5
-
-
-def test_sensitivities_to_what_displaces_a_state_are_whitened_through_the_jacobian(case):
-    """As the engine whitens its candidates: what errs together is of one state."""
-    seen, jacobian = case
-    displaced = np.random.default_rng(6).standard_normal((seen.state.max() + 1, jacobian.shape[-1], 4))[seen.state]
-    by = whitening(seen, jacobian, replace(NOISE, pose_rad=1e-4).of_measurements)
-    np.testing.assert_allclose(by.apply(jacobian) @ displaced, by.apply(jacobian @ displaced), rtol=1e-9, atol=1e-6)
-
-
 @pytest.mark.parametrize("noise", [NOISE, replace(NOISE, joint_rad=np.zeros(6)), replace(NOISE, pose_rad=1e-4)])
 def test_a_whitening_after_matrices_is_that_of_what_these_make(case, noise):
     seen, jacobian = case

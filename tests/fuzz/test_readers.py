@@ -20,9 +20,10 @@ from elastocal.study.configuration import check_study, override
 from elastocal.study.strategies import check_strategy, strategy_from_document
 
 CONFIG = REPOSITORY / "config"
-STUDY = yaml.safe_load((REPOSITORY / "config.yaml").read_text(encoding="utf-8"))
-STRATEGY = yaml.safe_load((CONFIG / "strategies/3-6DoF-after-2DoF.yaml").read_text(encoding="utf-8"))
-KUKA = yaml.safe_load((CONFIG / "robots/kuka_extended.yaml").read_text(encoding="utf-8"))
+STUDY, STRATEGY, KUKA = (
+    yaml.safe_load((REPOSITORY / name).read_text(encoding="utf-8"))
+    for name in ("config.yaml", "config/strategies/3-6DoF-after-2DoF.yaml", "config/robots/kuka_extended.yaml")
+)
 FULL = DOCUMENT | {
     "compliance": "identify",
     "noise": {"position_m": 6e-5, "joint_rad": [1e-5, 2e-5, 1e-5]},
@@ -30,6 +31,46 @@ FULL = DOCUMENT | {
     "serial_number": "7",
     "measured_on": "2026-11-20",
 }
+PIECES = [*"TR", *"xyz", "(", ")", "q1", "q2", "-", "90deg", "l", "0.5", " ", "[E]", "1e999", "pas"]
+
+
+def read_strategy(path):
+    document = read_document(path)
+    check_document(document, "strategy", path)
+    check_strategy(strategy_from_document(document), read_robot(CONFIG / "robots/kuka.yaml").chain, path)
+
+
+def read_study(path):
+    config = read_document(path)
+    check_study(config, CONFIG, path)
+    campaign_sources(config, CONFIG, path)
+
+
+# What a file of the cell is altered from, its name, and its readers.
+READERS = {
+    "campaign": (FULL, "campaign.yaml", lambda path: read_campaign(path.parent, path.parents[1] / "robots", ["joint_offset"])),
+    "files of a campaign": (FULL, "campaign.yaml", lambda path: campaign_files(path.parent, path.parents[1] / "robots")),
+    "robot": (ARM, "arm.yaml", lambda path: read_campaign(path.parent, path.parents[1] / "robots")),
+    "robot with links": (KUKA, "arm.yaml", read_robot),
+    "strategy": (STRATEGY, "strategy.yaml", read_strategy),
+    "configuration": (STUDY, "config.yaml", read_study),
+}
+ARRAYS = st.sampled_from(
+    [
+        lambda n: pa.nulls(n),
+        lambda n: pa.array([True] * n),
+        lambda n: pa.array([b"\xff"] * n),
+        lambda n: pa.array([[1.0]] * n),
+        lambda n: pa.array([{"a": 1}] * n),
+        lambda n: pa.array(["A"] * n).dictionary_encode(),
+        lambda n: pa.array([2**63] * n, pa.uint64()),
+        lambda n: pa.array([float("nan")] * n),
+        lambda n: pa.array([0] * n, pa.timestamp("us")),
+        lambda n: pa.array([None, *[1.0] * (n - 1)]),
+        lambda n: pa.array(["\ud7ff" * 50] * n),
+        lambda n: pa.array([1] * n, pa.decimal128(20, 2)),
+    ]
+)
 
 
 @pytest.fixture(scope="module")
@@ -41,57 +82,18 @@ def place(tmp_path_factory):
     return cell
 
 
-@given(any_document(FULL))
-def test_descriptions_of_campaigns(place, content):
-    over(place.folder / "campaign.yaml", content, lambda: read_campaign(place.folder, place.robots, ["joint_offset"]))
-    over(place.folder / "campaign.yaml", content, lambda: campaign_files(place.folder, place.robots))
+@pytest.mark.parametrize("kind", READERS)
+@given(st.data())
+def test_documents(place, kind, data):
+    document, name, read = READERS[kind]
+    path = place.folder / name
+    path.touch()
+    over(path, data.draw(any_document(document)), lambda: read(path))
 
 
-@given(any_document(ARM))
-def test_robots_of_campaigns(place, content):
-    over(place.folder / "arm.yaml", content, lambda: read_campaign(place.folder, place.robots))
-
-
-@given(any_document(KUKA))
-def test_robots_with_links(place, content):
-    over(place.folder / "arm.yaml", content, lambda: read_robot(place.folder / "arm.yaml"))
-
-
-@given(
-    st.lists(
-        st.sampled_from([*"TR", *"xyz", "(", ")", "q1", "q2", "-", "90deg", "l", "0.5", " ", "[E]", "1e999", "pas"]),
-        max_size=30,
-    ).map("".join)
-    | st.text(max_size=30)
-)
+@given(st.lists(st.sampled_from(PIECES), max_size=30).map("".join) | st.text(max_size=30))
 def test_chains(text):
     holds(lambda: parse_chain(text, {"l": 0.5}, "arm.yaml"))
-
-
-@given(any_document(STRATEGY))
-def test_strategies(place, kuka, content):
-    path = place.folder / "strategy.yaml"
-    path.touch()
-
-    def read():
-        document = read_document(path)
-        check_document(document, "strategy", "strategy.yaml")
-        check_strategy(strategy_from_document(document), kuka.chain, "strategy.yaml")
-
-    over(path, content, read)
-
-
-@given(any_document(STUDY))
-def test_configurations(place, content):
-    path = place.folder / "config.yaml"
-    path.touch()
-
-    def read():
-        config = read_document(path)
-        check_study(config, CONFIG, "config.yaml")
-        campaign_sources(config, CONFIG, "config.yaml")
-
-    over(path, content, read)
 
 
 @given(
@@ -106,29 +108,8 @@ def test_changes_on_the_command_line(key, text):
 def test_measurements_as_text(place, data):
     path = place.folder / "measurements.csv"
     content = path.read_bytes()
-    drawn = data.draw(st.one_of(BYTES, damaged(content), tables(content)))
+    drawn = data.draw(BYTES | damaged(content) | tables(content))
     over(path, drawn, lambda: read_campaign(place.folder, place.robots))
-
-
-ARRAYS = st.sampled_from(
-    [
-        lambda n: pa.nulls(n),
-        lambda n: pa.array([True] * n),
-        lambda n: pa.array([b"\xff"] * n),
-        lambda n: pa.array([[1.0]] * n),
-        lambda n: pa.array([{"a": 1}] * n),
-        lambda n: pa.array(["A"] * n),
-        lambda n: pa.array(["A"] * n).dictionary_encode(),
-        lambda n: pa.array([2**63] * n, pa.uint64()),
-        lambda n: pa.array([float("nan")] * n),
-        lambda n: pa.array([1e300] * n),
-        lambda n: pa.array([0] * n, pa.timestamp("us")),
-        lambda n: pa.array([None, *[1.0] * (n - 1)]),
-        lambda n: pa.array(["\ud7ff" * 50] * n),
-        lambda n: pa.array([1] * n, pa.decimal128(20, 2)),
-        lambda n: pa.array([1.0] * n, pa.float16()),
-    ]
-)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from elastocal_proof.plant.arm import arm_from_document
-from elastocal_proof.plant.machine import Loading, Structure, equilibrium, machine_of
+from elastocal_proof.plant.machine import Structure, equilibrium, machine_of
 
 STATES = 40
 
@@ -35,8 +35,8 @@ def angles_and_wrenches(arm, force=1000.0, seed=0):
 def at_rest(arm, angles, wrench, structure=None, compliance=None):
     compliance = arm.compliance if compliance is None else compliance
     machine = machine_of(arm, structure or Structure())
-    loading = Loading(angles, wrench, np.zeros((len(angles), arm.joints + 1)))
-    return machine, equilibrium(machine, loading, lambda torque, unloaded: compliance * torque)
+    growth = np.zeros((len(angles), arm.joints + 1))
+    return machine, equilibrium(machine, angles, wrench, growth, lambda torque, unloaded: compliance * torque)
 
 
 def forces_at(machine, angles):

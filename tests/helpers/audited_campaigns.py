@@ -19,7 +19,7 @@ from elastocal_proof.audit.whole import checks_of
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.defects import drawn_defect, with_defects
+from elastocal_proof.plant.kinds import drawn_defect, with_defects
 from elastocal_proof.plant.physical_robot import specimen
 
 USUAL = {"poses": 12, "held_out": 4, "ladder": (0.0, 1.0, -1.0), "repeats": 3, "repeated_poses": 4, "points": ("flange",)}

@@ -7,7 +7,7 @@ from pathlib import Path
 SCRIPTS = Path(__file__).resolve().parents[2] / "workflow" / "scripts"
 CONFIG = {"origin": {"commit": "c0ffee", "configuration_sha256": "d16e57", "seed": 1}}
 ANALYSIS = ("loop.loading.read_campaign", "loop.diagnosis_tables.diagnose_campaign", "loop.whole.judge_campaign")
-FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
+FIGURES = ("before_after", "arrows", "candidates")
 PARAMS = {"seed": 1, "states": 4, "figures": FIGURES}
 STEPS = (*ANALYSIS, "draw_campaign", "compile_loop_report")
 # Names of the rules' files by which others know them; what is not listed is a Parquet table.

@@ -31,7 +31,6 @@ CONFIGURATION = {
         **{"joint_range": "full_turn", "offset_frame": "base", "measured": "pose", "tool_offset_m": [0, 0, 0]},
         "wrench_at": "end_effector",
     },
-    "identification": {"solver": "equation_11"},
 }
 
 

@@ -11,7 +11,7 @@ PLAN = read_document(ROBOTS.parent / "blind.yaml")
 JOINTS = 6
 
 
-def truth(*places, group=None, level=50.0, robot="m900ib700", setting="usual", **changes):
+def truth(*places, group=None, level=50.0, robot="irb7600", setting="usual", **changes):
     """A sealed document; a place is an effect with its joints, such as ("joint_offset", 3)."""
     group = group or ("single" if places else "none")
     defects = [

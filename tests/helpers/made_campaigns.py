@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from synthetic import measurements_of
 
-from elastocal.campaigns.campaign import Campaign, Measurements, Target
+from elastocal.campaigns.campaign import Campaign, Target
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 
@@ -64,20 +65,13 @@ def made(robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, mo
         position, rotation = position @ frame.T + rng.uniform(-3, 3, 3), frame @ rotation
     position = position + plan.noise * rng.standard_normal(position.shape)
     turned = Rotation.from_rotvec(plan.noise * rng.standard_normal(position.shape)) * Rotation.from_matrix(rotation)
-    measurements = Measurements(
-        session=np.zeros(len(pose), np.int32),
-        pose=pose.astype(np.int32),
-        load=load.astype(np.int32),
-        repeat=repeat.astype(np.int32),
-        target=target.astype(np.int32),
+    places = {"pose": pose, "load": load, "repeat": repeat, "target": target}
+    measurements = measurements_of(
+        **{name: index.astype(np.int32) for name, index in places.items()},
         joint_angles=q,
         wrench=wrench,
         position=position,
         rotation_vector=turned.as_rotvec() if plan.oriented else None,
-        approach=None,
-        time_s=None,
-        temperature_c=None,
-        row=np.arange(1, len(pose) + 1, dtype=np.int32),
     )
     return Campaign(
         name="made",

@@ -33,7 +33,7 @@ def made_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
     return {column: np.asarray(values)[order] for column, values in table.items()}
 
 
-def made_folder(folder, robot, name="made", kind="csv", table=None, **changes):
+def made_folder(folder, robot, /, name="made", kind="csv", table=None, **changes):
     """A campaign's folder."""
     table = made_table(robot, name) if table is None else table
     write_campaign(folder, made_document(name, **changes), table, robot.joints, kind)

@@ -1,7 +1,5 @@
 """Facts of the loop report made up for its tests: one campaign of every verdict, and what its report states."""
 
-import re
-
 from made_loop_tables import (
     campaign_descriptions,
     effect_entry,
@@ -37,12 +35,6 @@ CAMPAIGNS = {
     "with a remainder": verdict_document(NAMED, [effect_entry()], outside=3, remainder=remainder_facts(outside=3)),
     "poses outside the range": verdict_document(NAMED, [effect_entry()], outside=3),
 }
-# The private dialect of earlier versions, and words of the table in the design.
-DIALECT = re.compile(
-    r"\b(akin|rivals?|stands? out|looks?|doubts?|cannot tell|told from|tell it from|tell them|family-wise|weigh(ed|s)?|wild|"
-    r"tame|class|readings?|test poses|explainable|makes? a residual)\b",
-    re.IGNORECASE,
-)
 
 
 def facts_of(verdict, **changed):

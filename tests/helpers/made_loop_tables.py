@@ -1,11 +1,16 @@
 """Tables of the loop made up for figures and reports: their columns, no robot behind them."""
 
+from copy import deepcopy
+from pathlib import Path
+
 import numpy as np
+import yaml
 
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.settings import Settings
-from elastocal.effects.protocol import at_shapes
 
+# What of verdict.json is always the same.
+DATA = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
 FAMILIES = ("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift")
 
 
@@ -60,23 +65,8 @@ def candidate_table(count=30, untestable=5, chosen=1, note="no time in the data"
         "parameters": np.ones(total, int),
         "log_bayes_factor": where_tested(100.0 - 7 * rank),
         "probability": where_tested(np.where(rank < chosen, 0.94, 0.01)),
-        "noncentrality": where_tested(200.0),
-        "angle_deg": where_tested(50.0),
         "chosen": rank < chosen,
         "note": np.where(tested, "", note).astype(object),
-    }
-
-
-def confounding_table(candidates):
-    """Angles of all pairs of the tested candidates of a table."""
-    shapes = [[shape] if np.isfinite(shape) else [] for shape in candidates["shape"]]
-    named = np.array(list(map(at_shapes, candidates["candidate"], shapes)), object)
-    names = named[np.isfinite(candidates["log_bayes_factor"])]
-    pairs = [(one, other) for number, one in enumerate(names) for other in names[:number]]
-    return {
-        "one": np.array([one for one, _ in pairs], object),
-        "other": np.array([other for _, other in pairs], object),
-        "angle_deg": np.linspace(0, 90, len(pairs)),
     }
 
 
@@ -131,7 +121,7 @@ def experiment_rows(effect="link_elasticity", count=10):
         row = {"effect": effect, "pose": number, "load": 1, "point": "6DoF"}
         row |= {f"q{joint}": -0.1 * joint for joint in range(1, 7)}
         row |= {"fx": 910.1, "fy": -0.2, "fz": -411.8, "mx": -205.9, "my": 0.0, "mz": 455.1}
-        rows.append(row | {"separation": 10.0 + number, "separation_without": 6.0})
+        rows.append(row | {"separation": 10.0 + number, "resolved": 0.5 + 0.04 * number})
     return rows
 
 
@@ -146,63 +136,24 @@ def effect_entry(
     cost_m=8.5e-5,
 ):
     """An entry of the effects of verdict.json."""
-    known = {"std_error": 3e-6, "unit": "rad", "prior_std": 1e-5, "held": False}
     names = [f"{member} {parameter}" for member in members for parameter in parameters]
-    named = [{"name": each, "value": 1.2e-4 * (1 + number)} | known for number, each in enumerate(names)]
     locations = locations or [(f"joint {joint}", 1.0) for joint in joints] or [("", 1.0)]
-    return {
-        "name": name,
-        "family": "gearbox",
-        "joints": list(joints),
-        "members": list(members),
-        "probability": 0.94,
-        "locations": [{"location": where, "probability": value} for where, value in locations],
-        "parameters": named,
-        "p_value": 0.002,
-        "heldout_gain": 0.24 if adopted else None,
-        "adopted": adopted,
-        "cost_m": cost_m if adopted else None,
-        "alternatives": list(alternatives),
-        "angle_to_nearest_deg": None,
-    }
+    given = {"name": name, "joints": list(joints), "members": list(members), "alternatives": list(alternatives)}
+    given |= {"parameters": [DATA["parameter"] | {"name": each, "value": 1.2e-4 * (1 + n)} for n, each in enumerate(names)]}
+    given |= {"locations": [{"location": where, "probability": value} for where, value in locations]}
+    judged = {"adopted": True} if adopted else {"adopted": False, "heldout_gain": None}
+    return DATA["effect"] | given | judged | {"cost_m": cost_m if adopted else None}
 
 
 def fault_entry():
     """A fault of the data among the effects of verdict.json."""
-    return effect_entry("wrong_unit", (), (), alternatives=["a load that is 1000 times larger"], adopted=False) | {
-        "family": "data",
-        "detail": "the loads fit as if they were written in kilonewtons",
-        "probability": None,
-        "locations": [],
-        "parameters": [
-            {"name": "newtons for each unit of force written", "value": 1000.0, "std_error": None, "unit": "N"},
-            {"name": "poses compared", "value": 12.0, "std_error": None, "unit": "–"},
-        ],
-        "p_value": None,
-        "evidence": [0.5, 1e-4],
-    }
+    return effect_entry(adopted=False) | DATA["fault"]
 
 
 def remainder_facts(outside=0):
     """What verdict.json says of a regression on the remainder."""
-    return {
-        "regression": "gaussian_process",
-        "words": "Gaussian process",
-        "seed": 1,
-        "setting": {},
-        "spread": {"times": 1.1, "otherwise_m": 3.0e-5, "typical": 0.95},
-        "left_out": {"factor": 0.9, "statistic": 4.0, "p_value": 1e-4, "rms_m": 6e-5, "rms_std_error_m": 1e-5, "level": 0.05},
-        "errors": {"mean_m": 5.5e-5, "rms_m": 6.0e-5, "p95_m": 1.0e-4, "max_m": 1.5e-4},
-        "rms_ci95_m": [5.0e-5, 7.2e-5],
-        "reduction_ci95": [-0.05, 0.31],
-        "physics": 0.51,
-        "regression_share": 0.24,
-        "left": 0.25,
-        "outside": outside,
-        "confidence": 0.95,
-        "covered": 0.952,
-        "half_width_m": {"within": 1.0e-4, "outside": 4.0e-4 if outside else None},
-    }
+    widths = {"within": 1.0e-4, "outside": 4.0e-4 if outside else None}
+    return DATA["remainder"] | {"outside": outside, "half_width_m": widths}
 
 
 def verdict_document(
@@ -219,60 +170,23 @@ def verdict_document(
     remainder=None,
 ):
     """Contents of verdict.json."""
-    known, faulty = noise != "residual", data_at_fault({"effects": effects})
-    adopted = any(effect["adopted"] for effect in effects)
-    errors = {"mean_m": 1.1e-4, "rms_m": 1.2e-4, "p95_m": 2.0e-4, "max_m": 3.0e-4}
-    after = {name: (0.7 if adopted else 1.0) * value for name, value in errors.items()}
-    return {
-        "campaign": campaign,
-        "verdict": word,
-        "effects": list(effects),
-        "probabilities": None if faulty else probabilities(sets),
-        "noise": {
-            "source": noise,
-            "position_m": 6e-5,
-            "orientation_rad": 6e-5,
-            "joint_rad": [0.0] * 5 + [2e-5],
-            "degrees_of_freedom": 1008 if noise == "repeats" else 0,
-            "pose_rad": 1.5e-5,
-            "usual_m": 0.0,
-            "factor": 1.0,
-        },
-        "misfit": None if faulty else {"before": 5.2, "after": 1.02},
-        "remainder": remainder,
-        "misplaced": [],
-        "contradictions": [],
-        "kept": "effect" if adopted else "declared",
-        "heldout": {
-            "uncalibrated": {name: value / 0.7 for name, value in errors.items()} | {"reduction_ci95": [0.55, 0.75]},
-            "before": errors,
-            "after": after,
-            "delivered": remainder["errors"] if remainder else after,
-            "noise_floor_rms_m": 5e-5 if known else None,
-            "reduction_ci95": list(reduction) if adopted else [0.0, 0.0],
-            "reduction_std_error": 0.04 if adopted else 0.0,
-            "poses": 10,
-            "configurations": 9,
-            "joint_ranges": [{"low": -85.0, "high": 60.4, "unit": "deg"}, {"low": 0.0, "high": 1.5, "unit": "m"}],
-            "share_below_max": 0.74,
-            "outside_range": {
-                "poses": outside,
-                "inside": {"before": errors, "after": after},
-                "outside": {"before": errors, "after": after} if outside else None,
-            },
-        },
-        "uncorrected_m": 7e-4,
-        "compliance_urad_per_Nm": {"before": [0.5] * 6, "after": [0.48] * 6, "std_error": [0.01] * 5 + [0.0]},
-        "held": list(held),
-        "candidates_tested": 0 if faulty else 30,
-        "untestable": {
-            "frame_drift": "no time in the data",
-            **{f"hysteresis@{k}": "no approach in the data" for k in (1, 2, 3)},
-        },
-        "converged": {"declared": True, "final": True},
-        "warnings": list(warnings),
-        "settings": Settings().document(),
-    } | ({"next_experiment": next_experiment} if next_experiment else {})
+    faulty, adopted = data_at_fault({"effects": effects}), any(effect["adopted"] for effect in effects)
+    before = DATA["errors"]
+    after = {name: (0.7 if adopted else 1.0) * value for name, value in before.items()}
+    both = {"before": before, "after": after}
+    found = deepcopy(DATA["verdict"]) | {"campaign": campaign, "verdict": word, "effects": list(effects)}
+    found |= {"warnings": list(warnings), "held": list(held), "remainder": remainder, "settings": Settings().document()}
+    found |= {"kept": "effect" if adopted else "declared", "probabilities": None if faulty else probabilities(sets)}
+    found |= {"misfit": None, "candidates_tested": 0} if faulty else {}
+    found |= {"next_experiment": next_experiment} if next_experiment else {}
+    found["noise"] |= {"source": noise, "degrees_of_freedom": 1008 if noise == "repeats" else 0}
+    heldout = found["heldout"]
+    heldout |= both | {"delivered": remainder["errors"] if remainder else after}
+    heldout["uncalibrated"] |= {name: value / 0.7 for name, value in before.items()}
+    heldout |= {"reduction_ci95": list(reduction) if adopted else [0.0, 0.0], "reduction_std_error": 0.04 if adopted else 0.0}
+    heldout["noise_floor_rms_m"] = None if noise == "residual" else 5e-5
+    heldout["outside_range"] = {"poses": outside, "inside": both, "outside": both if outside else None}
+    return found
 
 
 def parameter_table(declared=("joint_offset@2 offset",), held=(), by_prior=()):

@@ -15,9 +15,7 @@ from elastocal.io.data_frames import write_csv
 from elastocal.io.storage import write_table
 from elastocal.random_streams import stream
 from elastocal_proof.blind import schemas as of_blind
-from elastocal_proof.blind.bad_rows import judge_cases, summarize
-from elastocal_proof.blind.closed_loop import MODELS, PARTS
-from elastocal_proof.blind.closed_loop_summary import case_errors, goals, summary
+from elastocal_proof.blind.closed_loop import MODELS, PARTS, case_errors, goals, summary
 from elastocal_proof.blind.scores import intervals_of
 from elastocal_proof.blind.summary import rates, reliability
 from elastocal_proof.blind.summary import summarize as summarize_cases
@@ -41,13 +39,12 @@ _ORIGIN = {
 
 def made_proofs(folder):
     """Write all of it, with the checksums that jobs would have kept."""
-    beside = [f"{part}/{name}" for part in ("results", "reports") for name in ("closed_loop", "bad_rows")]
+    beside = ["results/closed_loop", "reports/closed_loop"]
     of_league = ["results/league/one/random", "reports/league/small"]
     for name in ("data/sealed/some_1", "results/blind/oracle", "reports/blind", *beside, *of_league):
         (folder / name).mkdir(parents=True)
     _blind(folder)
     _closed_loop(folder)
-    _bad_rows(folder)
     _league(folder)
     files = [path for part in ("data", "results", "reports") for path in sorted((folder / part).rglob("*")) if path.is_file()]
     for path in files:
@@ -68,7 +65,7 @@ def _cases():
             *places,
             group=group,
             level=level,
-            robot="kuka" if number % 5 == 0 else "m900ib700",
+            robot="kuka" if number % 5 == 0 else "irb7600",
             setting="force_3kN" if group == "setting" else "usual",
             campaign=f"case_{number:03}",
         )
@@ -135,38 +132,6 @@ def _closed_loop(folder):
     write_csv(folder / "reports/closed_loop/cases.csv", errors)
     write_csv(folder / "reports/closed_loop/closed_loop.csv", summary(errors, SEED))
     write_csv(folder / "reports/closed_loop/goals.csv", goals(errors))
-
-
-def made_slips(cases=40, seed=4):
-    """Slips of some cases, of which some change the verdict and some are not named."""
-    draws = np.random.default_rng(seed)
-    rows = []
-    for case in range(cases):
-        changed, lost = draws.random() < 0.2, int(draws.random() < 0.1)
-        count = int(draws.integers(1, 4))
-        head = {"seed": case, "poses": 20, "rows": 40, "loads": 1, "targets": 2, "measured": "pose", "frame": "base"}
-        head |= {"noise": "declared", "covariates": False, "mixture": "nothing", "truth": "none"}
-        head |= {"clean_rows_lost": lost, "wrongly_named": int(draws.integers(2))}
-        for version in ("clean", "damaged", "fewer"):
-            name = "payload" if changed and version == "damaged" else "none"
-            head |= {f"{version}_verdict": "adequate" if name == "none" else "named", f"{version}_found": name}
-            head |= {f"{version}_found_at": name, f"{version}_heldout_rms_m": 1e-4 * (1 + changed * (version == "damaged"))}
-        for slip in range(count):
-            rows.append(
-                head
-                | {"kind": ("zeros", "position")[case % 2], "bad_rows": str(slip + 1), "held_out": bool(draws.integers(2))}
-                | {"size": 10.0 ** draws.uniform(0.7, 5.0), "named": bool(draws.random() < 0.8)}
-            )
-    return pd.DataFrame(rows)
-
-
-def _bad_rows(folder):
-    slips = made_slips()
-    blocks = [{name: column.to_numpy() for name, column in slips.items()}]
-    write_table(folder / "results/bad_rows/kuka.parquet", of_blind.BAD_ROWS, blocks, _ORIGIN)
-    cases = judge_cases({"kuka": slips})
-    write_csv(folder / "reports/bad_rows/cases.csv", cases)
-    write_csv(folder / "reports/bad_rows/summary.csv", summarize(cases))
 
 
 class _Measured:

@@ -3,8 +3,8 @@
 import numpy as np
 from support import PinocchioPoint, without_tool
 
+from elastocal.study.equation_11 import identified_blocks, paired_blocks
 from elastocal.study.evaluation import evaluate_strategy, judge_from
-from elastocal.study.identify import identified_blocks, paired_blocks
 from elastocal.study.simulation import (
     Loading,
     blocks_of_sets,
@@ -45,9 +45,9 @@ def deflections_of(robot, experiments, noise=0.0, at="end_effector", key="kuka")
     return found
 
 
-def identified(robot, strategy, experiments, deflections, rows=6, at="end_effector", start=None):
+def identified(robot, strategy, experiments, deflections, rows=6, at="end_effector"):
     needed = {name: deflections[name] for name in strategy.points}
-    blocks = identified_blocks(paired_blocks(experiments, needed), robot.chain, strategy, rows, at, start)
+    blocks = identified_blocks(paired_blocks(experiments, needed), robot.chain, strategy, rows, at)
     return joined(list(blocks))
 
 
@@ -65,10 +65,10 @@ def judge(robot, at="end_effector"):
     return judge_from(robot, experiments[0], deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name][0], at)
 
 
-def evaluated_in_one_block(table, scores, fixed_joints, method, replicates, lengths):
+def evaluated_in_one_block(table, scores, fixed_joints, method, replicates):
     sets = int(table["data_set"].max()) + 1
     *counts, tests = weight_blocks("kuka", 1, sets, CONFIGURATIONS_OF_THE_TEST, replicates)
-    return evaluate_strategy([table], counts, tests, scores, fixed_joints, method, "averaged_model", lengths)
+    return evaluate_strategy([table], counts, tests, scores, fixed_joints, method)
 
 
 def pinocchio_regressors(chain, block, name, at="end_effector", rows=6):

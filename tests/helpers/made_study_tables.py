@@ -5,12 +5,12 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from elastocal.report.study import METRIC_NAMES, study_facts
+from elastocal.report.study import study_facts
 from elastocal.study.strategies import Stage, Strategy
+from elastocal.study.uses import METRICS
 
 TITLES = {"kuka": "Kuka", "fanuc": "Fanuc"}
-STATED = {"force_N": 1000, "offset_m": 0.5, "tracker_m": [4.0, 0.0, 1.5], "edge_m": 1.0, "weight_N": 1000, "path_m": 0.5}
-STATED |= {"cutting_N": 500, "bar_m": 0.5, "acceptance_deg": 30}
+STATED = {"force_N": 1000, "offset_m": 0.5, "edge_m": 1.0, "weight_N": 1000, "path_m": 0.5, "cutting_N": 500}
 STRATEGIES = ("6DoF", "2DoF+6DoF")
 
 
@@ -37,16 +37,6 @@ def comparison():
         ("4", "fanuc", "6DoF", "n_dev_2_um", 30.0, np.inf, np.nan, np.nan, "R8", 110.0, 40.0, 0.06, 0.18),
         ("text", "kuka", np.nan, "deviation_ratio", 4.0, 3.9, 0.1, -1.0, "R8", np.nan, np.nan, np.nan, np.nan),
         ("text", "kuka", np.nan, "share_with_links", 92.0, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan),
-    ]
-    return pd.DataFrame(rows, columns=names)
-
-
-def expectations():
-    names = ["robot", "strategy", "quantity", "expected", "studies", "studies_mean", "studies_std", "paper", "p_value"]
-    rows = [
-        ("kuka", "6DoF", "k_sigma_20_percent", 1.8, 16, 1.75, 0.1, np.nan, np.nan),
-        ("kuka", "6DoF", "k_sigma_20_percent_fixed_joints", 1.8, 16, 1.75, 0.1, 1.5, 0.0004),
-        ("kuka", "6DoF", "dev_20_um", 1.22, 16, 1.2, 0.08, 1.0, 0.04),
     ]
     return pd.DataFrame(rows, columns=names)
 
@@ -82,23 +72,9 @@ def designs():
     return frame.assign(rms_um=rms, low_um=rms, high_um=rms)
 
 
-def places():
-    """Two places of each arm: a link seen on one side, and the flange."""
-    rows = [(1, 1.5, "+y", 1.40, 50.0, 15.0), (1, 1.5, "-y", 1.42, 0.0, 0.0), (6, 3.0, "flange", 1.06, 30.0, 4.0)]
-    rows += [(6, 3.0, "bar +y", 1.05, 40.0, 5.0)]
-    frame = pd.DataFrame(rows, columns=["joints", "along_m", "side", "ratio", "seen_turned_percent", "seen_fixed_percent"])
-    return for_each_robot(frame.assign(ratio_low=frame.ratio - 0.02, ratio_high=frame.ratio + 0.02))
-
-
-def tubes():
-    row = {"robot": "bending", "diameter_mm": 248.4, "mean_mm": 1.75, "mean_mm_between": 0.12, "std_mm": 1.19}
-    row |= {"std_mm_between": 0.1, "max_mm": 5.73, "max_mm_between": 0.83, "left_um": 459.7, "left_um_std_error": 1.1}
-    return pd.DataFrame([row])
-
-
 def strategy_scores():
     """A staged strategy that is worse by every metric but the sum over the joints that its last stage fixes."""
-    frame = rows_of(robot=TITLES, metric=METRIC_NAMES, strategy=["6DoF", "staged"])
+    frame = rows_of(robot=TITLES, metric=METRICS, strategy=["6DoF", "staged"])
     better, staged = frame.metric.str.endswith("fixed_joints"), frame.strategy == "staged"
     ratio = np.where(staged, np.where(better, 0.5, 1.2), 1.0)
     frame = frame.assign(value=75.0 * ratio, value_std_error=0.5, ratio=ratio)
@@ -107,47 +83,22 @@ def strategy_scores():
 
 
 def score_pairs():
-    frame = rows_of(robot=TITLES, metric=METRIC_NAMES, strategy=["6DoF"], other=["staged"])
+    frame = rows_of(robot=TITLES, metric=METRICS, strategy=["6DoF"], other=["staged"])
     turned = frame.metric.str.endswith("fixed_joints") & (frame.robot == "kuka")
     for name, usual, other in (("ratio", 0.83, 2.0), ("ratio_low", 0.80, 1.5), ("ratio_high", 0.86, 2.5)):
         frame[name], frame[f"rms_{name}"] = np.where(turned, other, usual), usual
     return frame.assign(reversed=turned)
 
 
-def observability():
-    values = {"O1": -0.8, "O2": 0.3, "O3": -0.1, "O4": 0.1, "O5": -0.7, "bound": 1.0}
-    frame = pd.DataFrame([(robot, *pair) for robot in TITLES for pair in values.items()])
-    frame.columns = ["robot", "index", "rank_correlation_with_bound"]
-    frame["rank_correlation_with_error"] = 0.3 * frame.rank_correlation_with_bound
-    for name in ("bound", "error"):
-        frame[f"rank_correlation_with_{name}_std_error"] = 0.03
-    return frame
-
-
-def geometry():
-    row = {"robot": "kuka", "estimator": "at once", "rms_um": 500.0, "noise_um": 300.0, "leak_um": 400.0}
-    row |= {"compliance_noise_percent": 8.2, "compliance_leak_percent": 70.3, "zero_noise_urad": 31.6, "zero_leak_urad": 0.0}
-    return pd.DataFrame([row])
-
-
-def weighting():
-    return pd.DataFrame(
-        [("kuka", 3.0, 50.0, 150.0, 100.0, 1.5)],
-        columns=["robot", "orientation_ratio", "per_metre_um", "equal_um", "weighted_um", "ratio"],
-    )
-
-
 def measured():
-    """Table 4 over studies: the second strategy has a quarter of dev; averages of compliances and reflectors round figures."""
-    factors = {"pose": 1.0, "one reflector": 10.0, "three reflectors": 0.5}
-    frame = rows_of(robot=TITLES, measured=factors, average=["stiffness", "compliance"], strategy=STRATEGIES)
-    factor, part = frame.measured.map(factors), np.where(frame.average == "stiffness", 1.0, 0.25)
-    share = np.where(frame.strategy == STRATEGIES[0], 1.0, 0.25)
+    """Table 4 over studies: the second strategy has a quarter of dev; averages of compliances round figures."""
+    frame = rows_of(robot=TITLES, average=["stiffness", "compliance"], strategy=STRATEGIES)
+    part, share = np.where(frame.average == "stiffness", 1.0, 0.25), np.where(frame.strategy == STRATEGIES[0], 1.0, 0.25)
     for name, size in (("k_sigma", 4.0), ("k_sigma_fixed_joints", 2.0)):
-        frame[f"{name}_20_percent"], frame[f"{name}_20_percent_std"] = size * factor * part, 0.4
-        frame[f"n_{name}_1_percent"], frame[f"n_{name}_1_percent_std"] = 80.0 * factor, 20.0
-    frame = frame.assign(dev_20_um=8.0 * factor * part * share, dev_20_um_std=0.8, n_dev_2_um=90.0, n_dev_2_um_std=9.0)
-    return frame.assign(rms_20_um=80.0 * factor, rms_20_um_std=1.0)
+        frame[f"{name}_20_percent"], frame[f"{name}_20_percent_std"] = size * part, 0.4
+        frame[f"n_{name}_1_percent"], frame[f"n_{name}_1_percent_std"] = 80.0, 20.0
+    frame = frame.assign(dev_20_um=8.0 * part * share, dev_20_um_std=0.8, n_dev_2_um=90.0, n_dev_2_um_std=9.0)
+    return frame.assign(rms_20_um=80.0, rms_20_um_std=1.0)
 
 
 def joint():
@@ -155,14 +106,6 @@ def joint():
     row |= {"below_studies_largest": 7.0, "below_p": 1 / 17, "statistic": 171.0, "statistic_studies_median": 120.0}
     row |= {"statistic_studies_largest": 218.0, "statistic_p": 2 / 17}
     return pd.DataFrame([row, row | {"joints": "all joints", "differ": 10}])
-
-
-def claims():
-    rows = [
-        (1, "5", "one is better", "kuka in 0 of 16 studies", "in 16 of 16 studies", 1.0, "holds in part"),
-        (2, "5", "they are the same", "equal", "equal", np.nan, "holds"),
-    ]
-    return pd.DataFrame(rows, columns=["number", "place", "claim", "literal", "ours", "p", "verdict"])
 
 
 def break_even():
@@ -184,44 +127,17 @@ def simulated():
     return frame.assign(rms_um=there * 6 / frame.configurations + 20, rms_um_std_error=0.8, gain=140 / there)
 
 
-def few():
-    frame = rows_of(
-        robot=TITLES, strategy=["6DoF", "6DoF shrunk"], nominal_error_percent=[10.0, 100.0], configurations=[2, 3, 10]
-    )
-    shrunk = np.where(frame.strategy == "6DoF shrunk", frame.nominal_error_percent / 100, 1.0)
-    rms = 1000.0 / frame.configurations * shrunk
-    return frame.assign(rms_um=rms, rms_um_std_error=1.0, median_um=rms)
-
-
-def kinds():
-    rows = [("pose", 6, 20), ("one reflector", 3, 20), ("one reflector", 3, 40)]
-    frame = pd.DataFrame(rows, columns=["kind", "scalars_per_configuration", "configurations"])
-    frame = frame.assign(scalars=frame.scalars_per_configuration * frame.configurations, rms_um=1600.0 / frame.configurations)
-    return for_each_robot(frame.assign(rms_um_std_error=0.5))
-
-
-def stiffness():
-    row = {"force_N": 1000.0, "softest_N_per_um": 0.79, "first_order_percent": 0.05, "loaded_percent": 0.055}
-    row |= {"by_k_c_percent": 0.06, "bias_percent": 0.02, "k_sigma_percent": 0.02, "offset_rank": 5, "rank": 6}
-    return for_each_robot(pd.DataFrame([row]))
-
-
 def tables():
     """All tables of the report."""
     everything = {f"{name}_mm{end}": 1.0 for name in ("mean", "std", "max") for end in ("", "_one_set")}
     extended = {"strategy": "6DoF", "robot": "bending", "initial_mean_mm": 1.234, "initial_mean_mm_std_error": 0.011}
     extended |= {"residual_mean_um": 366.0, "residual_mean_um_std_error": np.nan}
     extended |= {"share_compensated_percent": 70.0, "share_compensated_percent_std_error": 0.5}
-    solvers = {"robot": "kuka", "strategy": "6DoF", "closest_strategy": "2DoF+6DoF"}
-    solvers |= {"equation_11_difference": 2.4e-3, "gauss_newton_difference": 0.0, "between_solvers": 1.6e-4}
     table2 = {"robot": "kuka", "mean_mm_one_set_std": 0.05} | everything | {"mean_mm_one_set": 1.05}
     return {
-        **{"claims": claims(), "joint": joint(), "studies": measured(), "break_even": break_even(), "costs": costs()},
-        **{"simulated": simulated(), "few": few(), "kinds": kinds(), "stiffness": stiffness(), "ladder": ladder()},
-        **{"budget": budget(), "pairs": pairs(), "needed": needed(), "places": places(), "scores": strategy_scores()},
-        **{"score_pairs": score_pairs(), "tubes": tubes(), "observability": observability(), "geometry": geometry()},
-        **{"weighting": weighting(), "comparison": comparison(), "expectations": expectations()},
-        **{name: pd.DataFrame([row]) for name, row in (("table2", table2), ("extended", extended), ("solvers", solvers))},
+        **{"joint": joint(), "studies": measured(), "break_even": break_even(), "simulated": simulated(), "ladder": ladder()},
+        **{"budget": budget(), "pairs": pairs(), "needed": needed(), "scores": strategy_scores(), "score_pairs": score_pairs()},
+        **{"comparison": comparison(), "table2": pd.DataFrame([table2]), "extended": pd.DataFrame([extended])},
     }
 
 

@@ -4,8 +4,7 @@ import numpy as np
 from analysed_robots import analysed
 
 from elastocal.application.planning.cell import Cell
-from elastocal.application.planning.plan import Loads, find_allowed_candidates
-from elastocal.application.planning.survey import Survey
+from elastocal.application.planning.plan import Loads, Survey, find_allowed_candidates
 from elastocal.campaigns.campaign import Target
 
 OPEN = Cell((), None, 0.1)

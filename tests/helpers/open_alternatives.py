@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from elastocal.diagnosis import new_states, next_experiment
+from elastocal.diagnosis import next_experiment
 from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.alternatives import alternatives_of
 from elastocal.diagnosis.linearize import linearized
@@ -34,19 +34,17 @@ def limits(robot):
     return np.clip(robot.joint_limits, -2.0, 2.0)
 
 
-def pieces(diagnosis, robot, ladder=None):
-    """Models, instrument and reach as `propose` makes them."""
+def pieces(diagnosis):
+    """Models and instrument as `propose` makes them, without the error of a pose."""
     evidence = diagnosis.evidence
     kept, reason = next_experiment._ambiguous(evidence, SETTINGS)
     assert not reason, reason
     numbers = sorted({n for models in kept.values() for model in models for n in model.units})
-    states = diagnosis.case.observations.states
-    reach = new_states.reach_of(states, robot, limits(robot), ladder, False)
     lead = kept[evidence.conclusion.best.mechanisms][0]
     noise = replace(evidence.linearized.about.noise, pose_rad=lead.pose_error_rad)
-    made = evidence.linearized, diagnosis.final, numbers, noise, states, reach, ladder is None
-    instrument = new_states.instrument_of(*made)
-    return alternatives_of(evidence, kept, instrument, lead, 1.0), instrument, reach
+    states = diagnosis.case.observations.states
+    made = next_experiment.instrument_of(evidence.linearized, diagnosis.final, numbers, noise, states, LADDER)
+    return alternatives_of(evidence, kept, made, lead, 1.0), made
 
 
 def keys_like(campaign, *starts):

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import yaml
+from made_folders import made_folder
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
-from elastocal.campaigns.writing import write_campaign
 from elastocal.mechanics.robot_file import robot_from_document
 
 SERVICE_ARM = {
@@ -31,18 +31,8 @@ def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
     zeros = 0.2 * _PLAY * draws.standard_normal(8)
     for joint in range(8):
         table[f"q{joint + 1}"] = table[f"q{joint + 1}"] + zeros[joint] + _PLAY[joint] * draws.standard_normal(poses)
-    document = {
-        "campaign": "service",
-        "robot": "robot.yaml",
-        "measured": "position",
-        "frame": "tracker",
-        "targets": {"8DoF": {"point": "8DoF", "offset_m": "unknown"}},
-        "compliance": "identify",
-        "declared": ["joint_offset", "link_geometry"],
-        "noise": {"position_m": noise_m},
-        "holdout": {"fraction": 0.3, "seed": 1},
-        "remainder": "none",
-    }
-    write_campaign(folder, document, table, 8, "csv")
+    changes = {"robot": "robot.yaml", "frame": "tracker", "targets": {"8DoF": {"point": "8DoF", "offset_m": "unknown"}}}
+    changes |= {"declared": ["joint_offset", "link_geometry"], "noise": {"position_m": noise_m}}
+    made_folder(folder, true, "service", table=table, **changes)
     (folder / "robot.yaml").write_text(yaml.safe_dump(SERVICE_ARM), encoding="utf-8")
     return folder

@@ -10,35 +10,10 @@ import yaml
 from snakemake_starts import started
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SOURCES = (
-    "Snakefile",
-    "requirements",
-    "config.yaml",
-    "config",
-    "workflow",
-    "profiles",
-    "src",
-    "README.md",
-    "paper",
-    "CITATION.cff",
-)
-ROBOTS = ("kuka", "kuka_extended")
-NOISE = ("0", "200")
-STRATEGIES = ("6DoF", "4-6DoF-after-3DoF", "3+6DoF-comb")
-SMALL = {
-    "robots": list(ROBOTS),
-    "strategies": list(STRATEGIES),
-    "noise_um": [0, 200],
-    "data_sets": 12,
-    "configurations": 20,
-    "test_configurations": 20,
-    "evaluation": {"bootstrap_replicates": 10, "lengths": [5, 10, 20]},
-    "tables": {"noise_um": 200, "length": 20, "classical_strategy": "6DoF"},
-    # So many configurations reach them.
-    "questions": {"accuracies_um": [120, 90]},
-    # The loop has tests of its own.
-    "loop": {"proposed_states": 2, "main": [], "campaigns": [], "measured": []},
-}
+SOURCES = ("Snakefile", "requirements", "config.yaml", "config", "workflow", "profiles", "src", "README.md")
+SOURCES += ("paper", "CITATION.cff")
+# Changes of config.yaml that make a study of minutes.
+SMALL = yaml.safe_load(Path(__file__).with_name("small_study.yaml").read_text(encoding="utf-8"))
 # What most tests need of it: the paper's tables and figures of one robot.
 ROBOT, LEVEL = "kuka", "200"
 PAPER = "paper"

@@ -104,6 +104,15 @@ def with_noise(observations, rng, position_m=60e-6, orientation_rad=60e-6):
     return replace(observations, position=position, rotation=rotation)
 
 
+def measurements_of(pose, joint_angles, position, **others):
+    """Measurements without loads and repeats, of one target, and with nothing that is optional, but for what is given."""
+    none, count = np.zeros(len(pose), np.int32), len(pose)
+    usual = {"session": none, "load": none, "repeat": none, "target": none, "wrench": np.zeros((count, 6))}
+    usual |= dict.fromkeys(("rotation_vector", "approach", "time_s", "temperature_c"))
+    given = usual | {"row": np.arange(1, count + 1, dtype=np.int32)} | others
+    return Measurements(pose=pose, joint_angles=joint_angles, position=position, **given)
+
+
 def made_measurements(model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_rad=0.0):
     """Repeats of poses in base axes: the joints come to rest anew at each approach, the sensor errs at each measurement."""
     joints, targets = model.sites.joints, len(model.targets)
@@ -120,20 +129,13 @@ def made_measurements(model, rng, poses_count, repeats, sensor_m, joint_rad, sen
         mask = target == index
         position[mask], rotation[mask] = poses(model.sites.chain, coordinates[mask], point)
     turned = Rotation.from_rotvec(sensor_rad * rng.standard_normal((len(pose), 3))) * Rotation.from_matrix(rotation)
-    return Measurements(
-        session=np.zeros(len(pose), int),
+    return measurements_of(
         pose=pose,
-        load=np.zeros(len(pose), int),
         repeat=repeat,
         target=target,
         joint_angles=commanded,
-        wrench=np.zeros((len(pose), 6)),
         position=position + sensor_m * rng.standard_normal(position.shape),
         rotation_vector=turned.as_rotvec() if model.rows == 6 else None,
-        approach=None,
-        time_s=None,
-        temperature_c=None,
-        row=np.arange(1, len(pose) + 1),
     )
 
 

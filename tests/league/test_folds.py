@@ -20,12 +20,6 @@ def test_every_pose_is_held_out_once_and_folds_are_of_one_size(data):
         assert counts[0] == 0 and len(counts) == 6 and np.ptp(counts[1:]) <= 1
 
 
-def test_a_seed_repeats_itself_and_another_deals_otherwise(data):
-    seen = measurements_from(data.columns)
-    first, again, other = (dealt(seen, 5, np.random.default_rng(seed))["random"] for seed in (2, 2, 3))
-    assert (first == again).all() and (first != other).any()
-
-
 def test_blocks_are_neighbours(data):
     """Two poses of one block are closer than two of different ones, on average."""
     seen = measurements_from(data.columns)

@@ -10,8 +10,6 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.whole import cases_in
-from elastocal.validation.held_out import position_errors
-from elastocal.validation.placing import placed
 from elastocal_proof.league.folds import rounds
 from elastocal_proof.league.methods import (
     FRAMES,
@@ -43,15 +41,6 @@ def test_frames_alone_have_no_parameters_of_the_robot_and_geometry_has(fold):
     owners = [{owner for owner, _ in fitted_physics(physics, training).parameters} for physics in (FRAMES, GEOMETRY)]
     assert all(owner.startswith(("frame ", "target ")) for owner in owners[0])
     assert {owner.partition("@")[0] for owner in owners[1] - owners[0]} == {"joint_offset"}
-
-
-def test_without_a_regression_the_errors_are_those_of_the_fit(fold):
-    training, held_out = fold
-    fitted = fitted_physics(GEOMETRY, training)
-    entry = entered(Method(GEOMETRY), fitted, training, held_out, "random", 1)
-    plain = position_errors(*placed(fitted, training, held_out), held_out.observations).distance
-    np.testing.assert_array_equal(np.linalg.norm(entry.residual, axis=1), plain)
-    assert np.isnan(entry.std).all() and entry.setting is None
 
 
 def test_a_regression_lowers_what_geometry_leaves_of_something_smooth(fold):

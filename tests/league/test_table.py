@@ -1,11 +1,12 @@
-"""Figures of the league: errors with intervals, ratios on the same poses, coverage, cost, mechanisms."""
+"""Figures of the league: errors with intervals, ratios on the same poses; the page has each in words that a stranger knows."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from made_leagues import made_entries, made_results
 
 from elastocal_proof.league.methods import Method
-from elastocal_proof.league.table import cost_table, league_table
+from elastocal_proof.league.table import league_page, league_table
 
 ROBOTS = {"A robot": ["one"], "Another": ["two"]}
 
@@ -39,10 +40,54 @@ def test_ratios_count_from_the_reference_and_from_the_best_on_the_same_poses(tab
     assert process["ratio_to_best"] == pytest.approx(1.2) == process["ratio_to_best_low"]
 
 
-def test_a_method_that_builds_on_a_diagnosis_bears_its_cost():
-    timings = {("one", "random", name): {"cpu_time": 10.0, "max_rss": 300.0} for name in ("geometry", "found")}
-    timings["one", "random"] = {"cpu_time": 40.0, "max_rss": 700.0}
-    methods = {"geometry": Method("geometry"), "found": Method("diagnosis")}
-    found = cost_table(timings, {("one", "random"): 5}, methods).set_index("method")
-    assert found.loc["geometry", ["seconds_per_fold", "memory_MB"]].tolist() == [2.0, 300.0]
-    assert found.loc["found", ["seconds_per_fold", "memory_MB"]].tolist() == [10.0, 700.0]
+METHODS = {
+    "geometry": Method("geometry", words="geometry"),
+    "half": Method("diagnosis", words="ours"),
+    "process": Method("geometry", words="GP"),
+}
+MECHANISMS = pd.DataFrame(
+    [
+        {"robot": "A robot", "data": "one", "mechanism": name, "probability": p, "probability_low": p, "probability_high": p}
+        | {"share": s, "share_low": s, "share_high": s}
+        for name, p, s in (("link_weight", 0.9, 0.4), ("payload", 0.01, 0.2))
+    ]
+)
+FIGURE = {"rms_mm": 0.5, "what": "RMS", "source": "somebody", "why": "fitted poses"}
+PUBLISHED = pd.DataFrame([{"data": name} | FIGURE for name in ("one", "three")])
+
+
+def written(table):
+    return league_page(table, MECHANISMS, PUBLISHED, METHODS, {"four": "folder/four.csv"})
+
+
+@pytest.fixture(scope="module")
+def page():
+    return written(league_table(made_results(), ROBOTS, "geometry", 1))
+
+
+def test_each_split_has_a_table_in_which_the_best_is_bold(page):
+    assert page.count("## ") == 6
+    for line in (line for line in page.splitlines() if line.startswith("| one ") and "(" in line and "**" in line):
+        assert line.count("**") == 2
+    assert page.count("**") == 2 * 6
+
+
+def test_a_split_that_no_data_set_has_is_left_out():
+    page = written(league_table(made_results(splits=("random", "session")), ROBOTS, "geometry", 1))
+    assert "Random poses" in page and "another session" in page and "Blocks of joint space" not in page
+
+
+def test_improbable_mechanisms_and_figures_of_other_data_are_left_out(page):
+    assert "link weight" in page and "payload" not in page
+    assert "somebody" in page and "three" not in page
+
+
+def test_the_page_says_first_how_often_a_diagnosis_leads_and_how_surely(page):
+    results = made_results()
+    assert "has the smallest RMS error in 6 of 6 rows, in 6 with 95 % confidence" in page
+    assert "; another has it in 0, in 0 with that confidence." in page
+    # The same entries under two names: one of them is smallest, and neither is ahead for certain.
+    twins = {(*key[:2], name): part for key, part in results.items() if key[2] == "geometry" for name in ("geometry", "half")}
+    table = league_table(twins, ROBOTS, "geometry", 1)
+    assert "has the smallest RMS error in 0 of 6 rows, in 0 with" in written(table)
+    assert "; another has it in 6, in 0 with that confidence." in written(table)

@@ -79,11 +79,6 @@ def test_it_says_what_code_data_and_environment_made_it(checkout):
     }
 
 
-def test_the_folder_may_have_moved(checkout, tmp_path):
-    shutil.copytree(checkout / "made", tmp_path / "elsewhere")
-    assert load_diagnosed(tmp_path / "elsewhere", ROBOTS, checkout).name == "made"
-
-
 def another_seed(folder):
     path = folder / "campaign.yaml"
     path.write_text(path.read_text().replace("seed: 1", "seed: 2"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from made_folders import made_folder
-from support import chain_of, changed, refused
+from support import chain_of, changed
 from synthetic import NOISE, made_estimate, made_model
 
 from elastocal.campaigns.campaign import Target
@@ -67,13 +67,6 @@ def test_a_test_has_the_description_of_another_campaign_where_it_is_one(files, l
     assert [tables.load_case(*files, part).campaign.name for part in (None, "held_out")] == ["made", "other"]
 
 
-def test_measurements_of_a_robot_with_other_joints_are_refused_by_their_file(files, loaded):
-    robot = loaded[0]["robot"]
-    write_json(files[0], loaded[0] | {"robot": robot | {"chain": robot["chain"] + " Rz(q7) [more]"}})
-    with refused(files[1], ""):
-        tables.load_case(*files)
-
-
 def there_and_back(path, schema, columns):
     write_table(path, schema, [columns], {})
     return read_table(path, schema)
@@ -107,9 +100,3 @@ def test_estimates_and_covariances_come_back_from_their_tables(kind, tmp_path):
     # What is held is in no pair, and every other pair is there once.
     assert len(pairs["one"]) == (~held).sum() * ((~held).sum() - 1) // 2 and (np.abs(pairs["correlation"]) <= 1).all()
     np.testing.assert_allclose(tables.covariance_from(columns, pairs), covariance, rtol=1e-12, atol=1e-15)
-
-
-def test_the_last_step_is_the_final_model():
-    facts = {"steps": [{"kind": kind} for kind in ("frames", "declared", "effect", "effect")]}
-    columns = {"step": np.repeat(np.arange(4), 2), "value": np.arange(8.0)}
-    assert tables.final_parameters(facts, columns)["value"].tolist() == [6.0, 7.0]

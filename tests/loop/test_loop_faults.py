@@ -16,7 +16,6 @@ from elastocal.loop.whole import diagnosed
 PLACE, TURN = np.array([2.0, 0.6, -0.2]), np.array([0.3, -0.5, 1.2])
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 POSE = {"measured": "pose", "noise": {"position_m": 6e-5, "orientation_rad": 6e-5}}
-OFFSET = [0.0, 0.0, 0.008]
 ELSEWHERE = "the robot would stand 2.1 m away"
 
 
@@ -110,37 +109,6 @@ def test_a_decisive_fault_ends_in_a_verdict_and_in_a_report(fault, kuka, tmp_pat
 
 
 @pytest.mark.slow
-def test_data_that_are_right_end_in_a_verdict_and_in_a_report(kuka, tmp_path):
-    verdict = reported(made_folder(tmp_path / "made", kuka), tmp_path / "out")
-    assert verdict["probabilities"] is not None and not any(effect["family"] == "data" for effect in verdict["effects"])
-
-
-def test_the_transform_that_fits_is_told_with_a_wrong_frame(kuka, tmp_path):
-    """Translation to the 60 µm of the measurements over their root, and deflections; rotation likewise."""
-    verdict = verdict_of(folder_of(tmp_path / "made", kuka, in_tracker_frame, POSE))
-    told = {value["name"]: (value["value"], value["unit"]) for value in verdict["effects"][0]["parameters"]}
-    for prefix, expected, unit in (("", PLACE, "m"), ("rotation vector ", TURN, "rad")):
-        for axis, value in zip("xyz", expected, strict=True):
-            found = told[f"{prefix}{axis} of the base in the frame of the measurements"]
-            assert found == (pytest.approx(value, abs=5e-4), unit)
-
-
-def test_a_target_offset_in_millimetres_is_named(kuka, tmp_path):
-    """Offsets of 8 mm along z in the file of the measurements, 8 where metres are asked for: more is refused at the door."""
-    table = made_table(kuka, "made")
-    vectors = np.column_stack([table[f"r{axis}"] for axis in "xyz"])
-    moved = Rotation.from_rotvec(vectors).apply(OFFSET)
-    table |= {axis: table[axis] + moved[:, number] for number, axis in enumerate("xyz")}
-    for factor, name, words in ((1000.0, "wrong_unit", "look like millimetres"), (1.0, None, "")):
-        offset = [factor * value for value in OFFSET]
-        targets = {point: {"point": point, "offset_m": offset} for point in ("3DoF", "6DoF")}
-        verdict = verdict_of(made_folder(tmp_path / f"made{factor:g}", kuka, table=table, targets=targets, **POSE))
-        faults = [effect for effect in verdict["effects"] if effect["family"] == "data"]
-        assert [effect["name"] for effect in faults] == ([name] if name else [])
-        assert all(words in effect["detail"] for effect in faults)
-
-
-@pytest.mark.slow
 def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, tmp_path):
     """Unloaded, each target once in a pose, beside a noise of a decimetre: there is no fault, and nothing shows."""
     table = made_table(kuka, "made")
@@ -154,16 +122,6 @@ def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, tmp_path):
     folder = made_folder(tmp_path / "made", kuka, table=kept, **unknown)
     verdict = reported(folder, tmp_path / "out")
     assert verdict["verdict"] == "not_testable" and verdict["effects"] == []
-
-
-@pytest.mark.parametrize(
-    ("factor", "words"), [(-1.0, "negative"), pytest.param(1 / 9.80665, "times nominal", marks=pytest.mark.slow)]
-)
-def test_compliances_that_no_robot_has_are_a_warning(factor, words, kuka_extended, tmp_path):
-    """Of a robot whose links bend too, which the declared one lacks: no single unit explains its deflections."""
-    verdict = verdict_of(folder_of(tmp_path / "made", kuka_extended, lambda t: scaled(t, WRENCH, factor), POSE))
-    (warning,) = (text for text in verdict["warnings"] if "joint compliances" in text)
-    assert words in warning and "±" in warning
 
 
 def test_a_robot_in_millimetres_is_refused_in_one_line(kuka, tmp_path):

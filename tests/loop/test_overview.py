@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 from made_folders import made_folder, made_table
-from scipy.spatial.transform import Rotation
 from small_data import service_arm_folder
 
 from elastocal.loop.overview import overview
@@ -51,15 +50,6 @@ def test_of_a_compliance_that_comes_out_negative_no_number_is_stated(kuka, tmp_p
     assert any("the compliance of joint 3 comes out negative" in sentence for sentence in facts["suspicious"])
 
 
-def test_what_a_joint_that_stood_still_forbids_is_one_reason(kuka, tmp_path):
-    limits = kuka.joint_limits.copy()
-    limits[[0, 3]] = 0.3
-    table = made_table(replace(kuka, joint_limits=limits), "made")
-    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table))
-    assert facts["untestable"]["joint 4 stood still"] > 5 and facts["untestable"]["joint 1 stood still"] > 5
-    assert not any("where" in reason for reason in facts["untestable"])
-
-
 def test_a_decisive_fault_is_said_and_the_campaign_is_not_diagnosable(kuka, tmp_path):
     table = made_table(kuka, "made")
     table["q3"] = -table["q3"]
@@ -91,26 +81,6 @@ def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_t
     assert found["numbers"] == 72 and least > 48
     assert 9 < found["effective_parameters"] < found["parameters"]
     assert not any("poses are few" in sentence for sentence in facts["suspicious"])
-
-
-def test_a_fitted_mount_is_listed_and_a_known_one_is_not(kuka, tmp_path):
-    turn = Rotation.from_rotvec([0.0, 0.3, 1.5])
-    table = made_table(kuka, "made")
-    mine = np.array(table["target"]) == "6DoF"
-    vectors = np.column_stack([table[name] for name in ("rx", "ry", "rz")])
-    turned = (Rotation.from_rotvec(vectors) * turn).as_rotvec()
-    table |= {name: np.where(mine, turned[:, k], vectors[:, k]) for k, name in enumerate(("rx", "ry", "rz"))}
-    for rotation, mounts in (("unknown", ["6DoF"]), (turn.as_rotvec().tolist(), []), (None, [])):
-        targets = {"3DoF": {"point": "3DoF", "offset_m": [0, 0, 0]}, "6DoF": {"point": "6DoF", "offset_m": [0, 0, 0]}}
-        targets["6DoF"] |= {} if rotation is None else {"rotation": rotation}
-        folder = tmp_path / f"made{len(list(tmp_path.iterdir()))}"
-        found = overview_of(made_folder(folder, kuka, table=table, measured="pose", targets=targets))
-        assert [mount["target"] for mount in found["mounts"]] == mounts
-        assert found["diagnosable"] == (rotation is not None)
-        if mounts:
-            np.testing.assert_allclose(found["mounts"][0]["rotation_rad"], turn.as_rotvec(), atol=5e-3)
-        if rotation is None:
-            assert any("rotation: unknown" in fault["sentence"] for fault in found["faults"])
 
 
 def test_positions_that_a_controller_worked_out_are_said_to_be_no_measurements(kuka, tmp_path):

@@ -12,22 +12,11 @@ FIXED = [value for value in vars(schemas).values() if isinstance(value, TableSch
 OF_JOINTS = (schemas.measurements, schemas.residuals)
 
 
-def units(schema):
-    return {column.name: column.unit for column in schema.columns}
-
-
 @pytest.mark.parametrize("schema", [*FIXED, *(of(7) for of in OF_JOINTS)], ids=lambda schema: schema.name)
 def test_no_table_has_two_columns_of_one_name_and_each_says_what_it_holds(schema):
     names = [column.name for column in schema.columns]
     assert len(set(names)) == len(names)
     assert all(column.meaning.strip() for column in schema.columns)
-
-
-@pytest.mark.parametrize("of", OF_JOINTS)
-@pytest.mark.parametrize("joints", [3, 7])
-def test_every_joint_has_its_angle_in_radians_and_no_other_joint_is_there(of, joints):
-    angles = {name: unit for name, unit in units(of(joints)).items() if name.startswith("q")}
-    assert angles == {f"q{joint}": "rad" for joint in range(1, joints + 1)}
 
 
 def test_a_made_table_of_residuals_fits_its_schema_and_a_position_that_is_missing_is_refused(tmp_path):

@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_loop_tables import residual_table
 from scipy.stats import t as student
 
 from elastocal.loop.summary import campaign_rows
@@ -61,11 +60,6 @@ def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verd
     assert (table.verdict["alone"], table.effects["alone"]) == ("adequate", "none")
 
 
-def test_an_effect_of_several_joints_names_them_all():
-    verdicts = {"one": verdict("named", ("cross_compliance", (2, 3)))}
-    assert campaign_rows(verdicts, {"one": errors([1.0, 1.0])}, {}, 1).effects[0] == "cross_compliance (joint 2, 3)"
-
-
 def test_with_three_poses_the_interval_of_the_rms_is_students_on_the_logarithm():
     # Mean squares 1, 4, 9 of the poses; the error of the logarithm of their mean by leaving out one pose.
     row = rows_of(one=errors([1.0, 2.0, 3.0])).iloc[0]
@@ -74,15 +68,3 @@ def test_with_three_poses_the_interval_of_the_rms_is_students_on_the_logarithm()
     reach = np.exp(0.5 * student.ppf(0.975, 2) * error)
     rms = np.sqrt(14 / 3)
     assert (row.before_rms_low_mm, row.before_rms_high_mm) == pytest.approx((rms / reach, rms * reach))
-
-
-def test_intervals_follow_from_the_seed_and_hold_the_figures():
-    held_out = pd.DataFrame(residual_table(poses=30))
-    held_out = held_out[held_out.held_out]
-    one, again, other = (campaign_rows({"a": verdict("named")}, {"a": held_out}, {}, seed) for seed in (1, 1, 2))
-    pd.testing.assert_frame_equal(one, again)
-    assert one.before_rms_low_mm[0] != other.before_rms_low_mm[0]
-    row = one.iloc[0]
-    for stage in ("before", "after"):
-        assert row[f"{stage}_rms_low_mm"] < row[f"{stage}_rms_mm"] < row[f"{stage}_rms_high_mm"]
-    assert row.rms_reduction_low < 1 - row.after_rms_mm / row.before_rms_mm < row.rms_reduction_high

@@ -1,8 +1,6 @@
 """The whole loop in one call: every kind of verdict, and a wall before the held-out poses."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +15,6 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in, diagnosed
-from elastocal.report.loop_facts import campaign_sentences
 
 # Loads in both senses, for what comes with the load and is in no catalogue.
 BOTH_SENSES = replace(PLAN, poses=40, ladder=(0, 1, -1))
@@ -64,9 +61,6 @@ KINDS = {
     "unexplained": (foreign, BOTH_SENSES, {}),
     "not_testable": (hidden, PLAN, NOTHING_KNOWN),
 }
-# Of this one the engine of aab002d7 gave "unexplained" at odds of 51 to 49; in four draws it came to "unexplained" twice. Now
-# all four are a class: a zero error of the force sensor with something related, which is wrong.
-MISSED = pytest.mark.xfail(reason="a cause outside the catalogue is given a class beside something unknown", strict=True)
 NAMES = {"named": ["joint_offset"], "several": ["joint_offset", "transmission_harmonic"], "class": ["joint_offset"]}
 
 
@@ -86,13 +80,7 @@ def verdict_of(path, robot, kind):
     return diagnosed(folder_of(path, robot, kind), ROBOTS, 1)
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        *slow_but(["several"], [kind for kind in KINDS if kind != "unexplained"]),
-        pytest.param("unexplained", marks=[pytest.mark.slow, MISSED]),
-    ],
-)
+@pytest.mark.parametrize("kind", slow_but(["several"], KINDS))
 def test_verdict_is(kind, kuka, tmp_path):
     verdict = verdict_of(tmp_path, kuka, kind)
     json.dumps(verdict, allow_nan=False)
@@ -112,13 +100,6 @@ def test_verdict_is(kind, kuka, tmp_path):
             assert parameter["value"] == pytest.approx(5e-4, abs=4 * parameter["std_error"])
     else:
         assert heldout["after"] == heldout["before"]
-
-
-@pytest.mark.slow
-def test_the_verdict_is_the_same_for_one_seed(kuka, tmp_path):
-    folder = folder_of(tmp_path, kuka, "adequate")
-    one, again, other = (diagnosed(folder, ROBOTS, seed) for seed in (7, 7, 9))
-    assert one == again and one["probabilities"]["alarm_p_value"] != other["probabilities"]["alarm_p_value"]
 
 
 def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp_path):
@@ -156,19 +137,6 @@ print("\\n".join(opened))
 
 
 @pytest.mark.slow
-def test_diagnosing_process_opens_no_sealed_file(kuka, tmp_path):
-    folder = made_folder(tmp_path / "blind" / "case_1", kuka, name="case_1")
-    sealed = tmp_path / "sealed" / "case_1.json"
-    sealed.parent.mkdir()
-    sealed.write_text("{}", encoding="utf-8")
-    done = subprocess.run([sys.executable, "-c", WATCHED, folder, ROBOTS], capture_output=True, text=True)
-    assert not done.returncode, done.stderr
-    opened = done.stdout.splitlines()
-    assert any(path.endswith("campaign.yaml") for path in opened)
-    assert not [path for path in opened if "sealed" in path]
-
-
-@pytest.mark.slow
 def test_a_calibration_by_few_poses_is_no_worse_than_none(tmp_path):
     """Without priors these end at 1.12 times the error of frames alone."""
     ratios = []
@@ -177,28 +145,3 @@ def test_a_calibration_by_few_poses_is_no_worse_than_none(tmp_path):
         heldout = judge(diagnose(training, Settings(), 1), held_out, 1).document["heldout"]
         ratios.append(heldout["after"]["rms_m"] / heldout["uncalibrated"]["rms_m"])
     assert np.exp(np.log(ratios).mean()) < 1.03
-
-
-@pytest.mark.slow
-def test_a_lost_beam_changes_nothing_in_what_is_stated_of_the_accuracy(kuka, tmp_path):
-    """One row of the held-out poses and one of the fitted ones 50 mm off: both are left out of every figure."""
-    table = made_table(kuka, "made", seed=3, plan=USUAL)
-    stated = []
-    for name in ("clean", "spoilt"):
-        if name == "spoilt":
-            table = table | {"x": table["x"] + np.where(np.isin(np.arange(len(table["x"])), [5, 60]), 0.05, 0.0)}
-        stated.append(diagnosed(made_folder(tmp_path / name, kuka, name, table=table), ROBOTS, 1))
-    assert stated[1]["gross_errors"]
-    assert stated[1]["accuracy"]["rms_m"] == pytest.approx(stated[0]["accuracy"]["rms_m"], rel=0.1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("kind", "stated"), [("adequate", ["a contradiction"]), pytest.param("unexplained", [], marks=MISSED)])
-def test_what_contradicts_an_adequate_model_is_stated_of_no_other(kind, stated, kuka, tmp_path, monkeypatch):
-    """Where an alarm was raised it is the residual that is unexplained, and the report says that."""
-    monkeypatch.setattr("elastocal.diagnosis.diagnose.contradictions", lambda *_: ["a contradiction"])
-    verdict = verdict_of(tmp_path, kuka, kind)
-    assert (verdict["verdict"], verdict["contradictions"]) == ("unexplained", stated)
-    text = " ".join(campaign_sentences(verdict)["sentences"])
-    assert ("the declared model cannot be right: a contradiction" in text) == bool(stated)
-    assert ("residual of the declared model is more than noise" in text) != bool(stated)

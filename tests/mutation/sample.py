@@ -29,7 +29,7 @@ PACKAGE = Path("src/elastocal")
 GROUPS = {
     "elastostatics": ["mechanics/elastostatics.py"],
     "mechanics": ["mechanics/*.py"],
-    "identification": ["study/equation_11.py", "study/identify.py", "study/strategies.py", "study/gauss_newton.py"],
+    "identification": ["study/equation_11.py", "study/strategies.py"],
     "metrics": ["study/metrics.py", "study/evaluation.py", "study/simulation.py"],
     **{room: [f"{room}/**/*.py"] for room in ("effects", "fitting", "data_checks", "diagnosis", "campaigns", "validation")},
 }

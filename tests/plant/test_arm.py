@@ -27,12 +27,6 @@ def arm_of(*arguments, **more):
     return arm_from_document(document(*arguments, **more))
 
 
-def one_link(length_m, joints=1, **more):
-    """One joint about y with all the reach behind it, others after it."""
-    rest = " ".join(f"Ry(q{joint})" for joint in range(2, joints + 1))
-    return arm_of(f"Tz(0.7) Ry(q1) Tx({length_m}) {rest} [A]", joints, **more)
-
-
 def test_a_chain_is_cut_into_stretches_at_its_joints():
     arm = arm_of()
     column, link, flange = arm.stretches
@@ -44,16 +38,6 @@ def test_a_chain_is_cut_into_stretches_at_its_joints():
     # [A] stands before the fixed rotation.
     np.testing.assert_array_equal(link.points[0].rotation, np.eye(3))
     np.testing.assert_allclose(link.points[0].position_m, [-0.2, 0, 0])
-
-
-def test_a_measuring_point_behind_a_fixed_rotation_is_turned_and_placed_by_it():
-    arm = arm_of("Rz(q1) Tx(1) Rx(90deg) Ty(0.5) [A] Rz(90deg) Tx(0.1) [B]", 1)
-    first, second = arm.stretches[1].points
-    np.testing.assert_allclose(first.position_m, [1.0, 0.0, 0.5], atol=1e-15)
-    np.testing.assert_allclose(first.rotation, pin.exp3(np.array([np.pi / 2, 0, 0])), atol=1e-15)
-    # x of [B] is y of [A], which is z of the link.
-    np.testing.assert_allclose(second.position_m, [1.0, 0.0, 0.6], atol=1e-15)
-    np.testing.assert_allclose(second.rotation, [[0, -1, 0], [0, 0, -1], [1, 0, 0]], atol=1e-15)
 
 
 @pytest.mark.parametrize("chain", ["Rz(q1) Tx(1)", "Rz(q1) Tx(1) [A] Tx(0.1)", "[A] Rz(q1)"])
@@ -83,29 +67,6 @@ def test_masses_and_gravity_are_as_the_file_declares_them_or_of_the_usual_kind()
     ]
     assert arm.gravity_m_s2 == (9.8, 0.0, 0.0)
     assert arm_of().masses == () and arm_of().gravity_m_s2 == (0.0, 0.0, -9.80665)
-
-
-@pytest.mark.parametrize(
-    "more, compensated",
-    [
-        ({}, True),
-        ({"masses": []}, False),
-        ({"masses": [], "compensator": {"joint": 2, "kind": "spring"}}, True),
-        ({"compensator": {"joint": 2, "kind": "spring"}}, True),
-    ],
-)
-def test_only_a_file_with_weights_and_no_compensator_is_of_an_arm_without_one(more, compensated):
-    assert arm_of(**more).compensated == compensated
-
-
-@pytest.mark.parametrize("payload, share", [(70, 0.5), (140, 1.0), (500, 1.0)])
-def test_forces_grow_with_the_rated_load_up_to_those_of_a_heavy_arm(payload, share):
-    assert one_link(1.0, payload_kg=payload).load_share == pytest.approx(share)
-
-
-def test_softness_is_the_median_gear_over_a_heavy_arms_and_never_less_than_one():
-    assert one_link(1.0, 3, compliance_urad_per_Nm=[1.0, 8.0, 90.0]).softness == pytest.approx(4.0)
-    assert one_link(1.0, 3, compliance_urad_per_Nm=[0.1, 0.5, 90.0]).softness == 1.0
 
 
 def test_rotations_are_pinocchios_and_survive_the_way_there_and_back_up_to_a_half_turn(rng):

@@ -1,4 +1,4 @@
-"""Slips that are planted in a measured table: each changes what it says, in so many rows, and states its size."""
+"""Slips that are planted in a measured table: each changes what it says, in so many rows."""
 
 import numpy as np
 import pytest
@@ -50,24 +50,18 @@ def test_a_slip_changes_its_columns_in_its_rows_and_no_others(campaign, kind, se
     assert rows == {row for slip in slips for row in slip.rows}
     assert len(slips) == (2 if kind == "swapped" else 3)
     assert len({campaign[0]["pose"][slip.rows[0]] for slip in slips}) == len(slips)
-    assert all(slip.kind == kind and len(slip.sizes) == len(slip.rows) for slip in slips)
+    assert all(slip.kind == kind for slip in slips)
     # What is given is left alone.
     assert all((before[name] == campaign[0][name]).all() for name in before)
 
 
-def test_a_position_is_off_by_its_size_in_standard_deviations_of_the_tracker(campaign):
-    after, (slip,) = planted(campaign, "position", 3, 1)
-    row = slip.rows[0]
-    away = [after[axis][row] - campaign[0][axis][row] for axis in "xyz"]
-    assert np.linalg.norm(away) == pytest.approx(slip.sizes[0] * 60e-6)
-
-
-def test_a_rotation_is_turned_by_its_size_and_half_a_turn_at_most(campaign):
+def test_sizes_of_wrong_positions_and_rotations_are_within_what_is_drawn(campaign):
     for seed in range(20):
-        after, (slip,) = planted(campaign, "rotation", seed, 1)
-        before, then = (turned(np.array([t[f"r{a}"][slip.rows[0]] for a in "xyz"])) for t in (campaign[0], after))
-        angle = np.linalg.norm(rotation_vector(then @ before.T))
-        assert angle == pytest.approx(slip.sizes[0] * 60e-6) and angle <= np.pi + 1e-9
+        (there, (moved,)), (turn, (slip,)) = (planted(campaign, kind, seed, 1) for kind in ("position", "rotation"))
+        away = np.linalg.norm([there[axis][moved.rows[0]] - campaign[0][axis][moved.rows[0]] for axis in "xyz"])
+        assert 5 * 60e-6 <= away <= 1e5 * 60e-6
+        before, then = (turned(np.array([t[f"r{a}"][slip.rows[0]] for a in "xyz"])) for t in (campaign[0], turn))
+        assert 5 * 60e-6 - 1e-9 <= np.linalg.norm(rotation_vector(then @ before.T)) <= np.pi + 1e-9
 
 
 def test_a_held_point_is_what_was_read_before_and_zeros_are_nothing(campaign):
@@ -93,23 +87,7 @@ def test_a_wrong_angle_stays_within_the_limits_and_is_of_the_whole_pose_where_a_
         angles = np.column_stack([after[f"q{joint}"] for joint in range(1, 7)])
         low, high = robot.arm.limits.T
         assert ((angles >= low - 1e-9) & (angles <= high + 1e-9)).all()
-        assert max(slips[0].sizes) > 0
     assert kinds == {"pose", 1, 2}
-
-
-def test_the_size_of_a_wrong_angle_is_how_far_it_would_have_moved_the_point(campaign):
-    """Of joint 1, about the vertical: its angle times the distance from its axis."""
-    table = campaign[0]
-    for seed in range(100):
-        after, (slip,) = planted(campaign, "joint_angle", seed, 1)
-        (name,) = changed(table, after)[0]
-        off = (after[name] - table[name])[slip.rows[0]]
-        if name == "q1" and abs(off) < 0.3:
-            break
-    expected = [
-        max(2 * np.sin(abs(off) / 2) * np.hypot(table["x"][row], table["y"][row]), abs(off)) / 60e-6 for row in slip.rows
-    ]
-    np.testing.assert_allclose(slip.sizes, expected, rtol=0.02)
 
 
 def test_a_wrong_load_keeps_its_line_and_is_bounded(campaign):

@@ -3,11 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from elastocal_proof.plant.campaigns import Design, continued, dynamic_table, measured_table, schedule_of
-from elastocal_proof.plant.defects import Defect, drawn_defect, with_defects
+from elastocal_proof.plant.campaigns import Design, dynamic_table, measured_table, schedule_of
 from elastocal_proof.plant.instruments import Tracker
+from elastocal_proof.plant.kinds import Defect, with_defects
 from elastocal_proof.plant.physical_robot import Schedule, seen_poses
 
 
@@ -47,15 +46,6 @@ def test_a_repeat_comes_from_the_same_side_and_a_ladder_without_moves_from_one(f
         assert (schedule.previous < 0).all() == each
 
 
-def test_loads_without_a_move_share_their_approach(fanuc_arm, small):
-    schedule = schedule_of(fanuc_arm, replace(small, approach_each_load=False), 2)
-    for state in np.flatnonzero(schedule.previous >= 0):
-        assert schedule.previous[state] == state - 1
-        assert schedule.approach[state] == schedule.approach[state - 1]
-        assert (schedule.pose[state], schedule.repeat[state]) == (schedule.pose[state - 1], schedule.repeat[state - 1])
-    assert len(np.unique(schedule.approach)) == (schedule.load == 0).sum()
-
-
 def test_in_the_trackers_frame_all_measurements_are_moved_as_one_body(fanuc_specimen, small):
     tracker = Tracker(sigma_m=0.0, sigma_rad=0.0, frame_turn=(0.2, 0.1, -0.7))
     robot, schedule = replace(fanuc_specimen, tracker=tracker), schedule_of(fanuc_specimen.arm, small, 2)
@@ -64,23 +54,6 @@ def test_in_the_trackers_frame_all_measurements_are_moved_as_one_body(fanuc_spec
     distances = [np.linalg.norm(points[:, None] - points, axis=-1) for points in (one, other)]
     np.testing.assert_allclose(*distances, atol=1e-12)
     assert np.abs(one - other).max() > 1.0
-
-
-@pytest.mark.parametrize("kind", ["frame_drift", "outside:slipping_zero", "hysteresis"])
-def test_a_further_experiment_changes_no_measurement_that_is_there(fanuc_specimen, small, kind):
-    robot = with_defects(fanuc_specimen, [drawn_defect(kind, fanuc_specimen.arm, 1)])
-    robot = replace(robot, tracker=replace(robot.tracker, outliers=0.05))
-    schedule = schedule_of(robot.arm, small, 2)
-    angle, wrench = 0.5 * schedule.angle[[0, -1]], schedule.shown_wrench[schedule.load == 1][[0, 2]]
-    longer, shares = continued(schedule, angle, wrench, (0.0, 1.0, -0.5)), np.array([0, 1, -0.5])[:, None]
-    before, after = (measured_table(robot, small, given)[0] for given in (schedule, longer))
-    for column in before:
-        np.testing.assert_array_equal(before[column], after[column][: len(before[column])])
-    rows = slice(len(schedule.pose), None)
-    assert longer.load[rows].tolist() == [0, 1, 2, 0, 1, 2] and longer.pose[rows].tolist() == [8, 8, 8, 9, 9, 9]
-    np.testing.assert_allclose(longer.shown_wrench[rows], np.concatenate([shares * wrench[0], shares * wrench[1]]), atol=1e-9)
-    assert longer.training[rows].all() and (longer.previous[rows] == -1).all() and (np.diff(longer.time_s) > 0).all()
-    assert (np.diff(longer.approach[rows]) == 1).all() and longer.approach[rows][0] == schedule.approach.max() + 1
 
 
 def test_the_dynamic_mode_reads_the_arm_at_rest_along_a_slow_path_within_the_limits(fanuc_specimen):

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from analysed_robots import ROBOTS, analysed
-from arms_at_rest import STATES, angles_and_wrenches, arm_of, at_rest, driven_to, forces_at
+from arms_at_rest import STATES, angles_and_wrenches, arm_of, at_rest, forces_at
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from support import OTHER_CHAINS, robot_of
@@ -21,7 +21,6 @@ from elastocal.mechanics.robot import Tube
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.machine import (
     Compensator,
-    Loading,
     Mass,
     Structure,
     TaperedTube,
@@ -32,7 +31,6 @@ from elastocal_proof.plant.machine import (
 # One joint about y, its link forwards along x, and a measuring point at its end.
 LEVER = arm_of("Ry(q1) Tx(1.0) [A]", compliance_urad_per_Nm=[50.0])
 TWO = arm_of("Tz(0.4) Rz(q1) Tx(1) [A] Ry(q2) Tx(0.5) [B]")
-DOWN = np.array([0.0, 0.0, -9.80665])
 
 
 def everything(arm):
@@ -158,29 +156,6 @@ def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(ar
         assert np.abs(left).max() < 1e-9 * np.abs(force).max()
 
 
-def test_forces_do_the_work_that_moving_each_coordinate_takes(fanuc_arm):
-    """Virtual work: of the load, the weights and the compensator together, by differences of their energies."""
-    structure = everything(fanuc_arm)
-    machine = machine_of(fanuc_arm, structure)
-    model, data = machine.model, mujoco.MjData(machine.model)
-    angles, push = np.random.default_rng(3).uniform(-1, 1, (1, 6)), np.array([[400.0, -700.0, 300.0, 0.0, 0.0, 0.0]])
-    coordinates = driven_to(machine, angles)
-    force = machine.forces(coordinates, np.zeros((1, 7)), push)[0][0]
-
-    def energy(row):
-        data.qpos[:] = row
-        mujoco.mj_kinematics(model, data)
-        spring = np.linalg.norm(data.site("anchor").xpos - data.site("crank").xpos) - structure.compensator.free_length_m
-        weight = -model.body_mass @ data.xipos @ DOWN
-        return (
-            weight + 0.5 * structure.compensator.stiffness_N_per_m * spring**2 - data.site_xpos[machine.sites[-1]] @ push[0, :3]
-        )
-
-    step = 1e-5
-    wanted = [(energy(coordinates[0] - e) - energy(coordinates[0] + e)) / (2 * step) for e in step * np.eye(model.nq)]
-    np.testing.assert_allclose(force, wanted, atol=1e-3)
-
-
 def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
     mass, angles = 200.0, np.array([[-1.0], [0.0], [0.7], [np.pi / 2]])
     machine, found = at_rest(LEVER, angles, np.zeros((4, 6)), Structure(masses=(Mass(1, mass, 0.8),)))
@@ -194,50 +169,22 @@ def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
 def test_a_structural_spring_yields_by_its_compliance_its_law_and_its_offset():
     machine = machine_of(LEVER, Structure(base=(0.0, 0.0, 2e-8, 0.0, 0.0, 0.0)))
     index, wrench = machine.springs["base_z"], np.array([[0.0, 0.0, 1000.0, 0.0, 0.0, 0.0], [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]])
-    loading = Loading(np.full((2, 1), np.pi / 2), wrench, np.zeros((2, 2)), {index: np.array([1e-5, 3e-5])})
+    loading, offsets = (np.full((2, 1), np.pi / 2), wrench, np.zeros((2, 2))), {index: np.array([1e-5, 3e-5])}
     laws = [("base_z", lambda force: 1e-11 * force**2), ("nothing", lambda force: force)]
-    found = equilibrium(machine, loading, lambda torque, unloaded: 0.0 * torque, laws)
+    found = equilibrium(machine, *loading, lambda torque, unloaded: 0.0 * torque, laws, offsets)
     np.testing.assert_allclose(found.coordinates[:, index], [2e-5 + 1e-5 + 1e-5, -1e-5 + 0.25e-5 + 3e-5], rtol=1e-9)
 
 
-def test_gears_know_the_torque_before_the_load_came_on():
-    seen, machine = [], machine_of(LEVER, Structure(masses=(Mass(1, 100.0, 1.0),)))
-
-    def law(torque, unloaded):
-        seen.append(unloaded.copy())
-        return 0.0 * torque
-
-    equilibrium(machine, Loading(np.zeros((1, 1)), np.array([[0, 0, -50.0, 0, 0, 0]]), np.zeros((1, 2))), law)
-    np.testing.assert_allclose(seen, np.full((len(seen), 1, 1), 100.0 * 9.80665), atol=1e-9)
-
-
 def test_an_arm_that_finds_no_rest_is_an_error_and_a_start_near_it_saves_sweeps():
-    signs, loading = cycle([0.01, -0.01]), Loading(np.zeros((1, 1)), np.zeros((1, 6)), np.zeros((1, 2)))
+    signs, loading = cycle([0.01, -0.01]), (np.zeros((1, 1)), np.zeros((1, 6)), np.zeros((1, 2)))
     with pytest.raises(RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"):
-        equilibrium(machine_of(LEVER, Structure()), loading, lambda torque, _: 0 * torque + next(signs))
+        equilibrium(machine_of(LEVER, Structure()), *loading, lambda torque, _: 0 * torque + next(signs))
     wrench = np.tile([0.0, 0.0, -900.0, 0.0, 0.0, 0.0], (1, 1))
     machine, first = at_rest(LEVER, np.array([[0.9]]), wrench)
-    loading, start = Loading(np.array([[0.9]]), wrench, np.zeros((1, 2))), first.coordinates[:, machine.gear]
-    again = equilibrium(machine, loading, lambda torque, _: LEVER.compliance * torque, start=start)
+    loading, start = (np.array([[0.9]]), wrench, np.zeros((1, 2))), first.coordinates[:, machine.gear]
+    again = equilibrium(machine, *loading, lambda torque, _: LEVER.compliance * torque, start=start)
     np.testing.assert_allclose(again.coordinates, first.coordinates, atol=1e-12)
     assert again.sweeps == 1 < first.sweeps
-
-
-def test_stretches_that_grow_move_targets_as_longer_links_do_and_the_model_keeps_its_own_lengths(arm):
-    angles, _ = angles_and_wrenches(arm)
-    each, machine = np.linspace(2e-4, -1e-4, arm.joints + 1), machine_of(arm, Structure())
-    # Only every second state has grown.
-    grown = np.outer(np.arange(STATES) % 2, each)
-    before = machine.model.body_pos.copy()
-    found = machine.forces(driven_to(machine, angles), grown)[1][:, -1]
-    np.testing.assert_array_equal(machine.model.body_pos, before)
-    longer = tuple(
-        replace(s, vector_m=s.vector_m * (1 + g), points=tuple(replace(p, position_m=p.position_m * (1 + g)) for p in s.points))
-        for s, g in zip(arm.stretches, each, strict=True)
-    )
-    models = [machine_of(one, Structure()) for one in (arm, replace(arm, stretches=longer))]
-    short, long = (forces_at(model, angles)[1][:, -1] for model in models)
-    np.testing.assert_allclose(found, np.where(np.arange(STATES)[:, None] % 2, long, short), atol=1e-12)
 
 
 def at(machine, **coordinates):
@@ -274,15 +221,6 @@ def test_a_load_counts_from_the_flange_and_turns_with_it(flange):
     np.testing.assert_allclose(at(machine, drive2=0.5 * np.pi).xipos[body], wanted, atol=1e-9)
 
 
-@pytest.mark.parametrize("segments", [1, 4])
-def test_a_mass_on_an_elastic_link_stands_where_it_does_on_a_rigid_one(segments):
-    masses = (Mass(1, 30.0, 0.0), Mass(1, 20.0, 0.55, (0.0, 0.1, 0.0)), Mass(1, 10.0, 1.0))
-    machine = machine_of(TWO, Structure(masses=masses, tubes={1: TaperedTube(1e6, 1e6)}, segments=segments))
-    data, weighs = at(machine, drive1=0.3), machine.model.body_mass
-    wanted = np.array([(20 * 0.55 + 10) / 60, 20 * 0.1 / 60, 0.0])
-    np.testing.assert_allclose(weighs @ data.xipos / 60.0, [0, 0, 0.4] + pin.exp3(np.array([0, 0, 0.3])) @ wanted, atol=1e-9)
-
-
 def test_a_tube_that_gets_thinner_yields_as_the_integrals_along_it():
     tube, count = TaperedTube(2e6, 1e6, 3e7, 4e7, 0.3), 40
     machine = machine_of(TWO, Structure(tubes={1: tube}, segments=count))
@@ -301,22 +239,6 @@ def test_a_tube_that_gets_thinner_yields_as_the_integrals_along_it():
         assert total(f"shear{which}") == pytest.approx(integral(4e7, 1), rel=1e-3)
     assert total("twist") == pytest.approx(integral(1e6, 3), rel=1e-3)
     assert total("axial") == pytest.approx(integral(3e7, 1), rel=1e-3)
-
-
-@pytest.mark.parametrize("tubes", [{}, {1: TaperedTube(1e6, 1e6)}])
-def test_wrong_dimensions_are_at_the_far_end_of_their_stretch_and_carry_on(tubes):
-    structure = Structure(wrong_vectors_m={1: (0.0, 0.02, 0.0)}, wrong_turns={1: (0.0, 0.0, 0.1)}, tubes=tubes)
-    data, turn = at(machine_of(TWO, structure)), pin.exp3(np.array([0.0, 0.0, 0.1]))
-    np.testing.assert_allclose(data.site("A").xpos, [1.0, 0.02, 0.4], atol=1e-14)
-    np.testing.assert_allclose(data.site("A").xmat.reshape(3, 3), turn, atol=1e-14)
-    np.testing.assert_allclose(data.site("B").xpos, [1.0, 0.02, 0.4] + turn @ [0.5, 0.0, 0.0], atol=1e-14)
-
-
-def test_a_wrong_turn_is_about_the_axes_at_the_far_end_of_its_stretch():
-    arm = arm_of("Rz(q1) Tx(1) Rx(90deg) Ry(q2) Tx(0.5) [B]")
-    data = at(machine_of(arm, Structure(wrong_turns={1: (0.0, 0.0, 0.1)})))
-    wanted = pin.exp3(np.array([np.pi / 2, 0.0, 0.0])) @ pin.exp3(np.array([0.0, 0.0, 0.1]))
-    np.testing.assert_allclose(data.site("B").xpos, [1.0, 0.0, 0.0] + wanted @ [0.5, 0.0, 0.0], atol=1e-14)
 
 
 def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_inside_an_elastic_one():

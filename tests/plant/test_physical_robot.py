@@ -7,9 +7,8 @@ import pytest
 
 from elastocal_proof.plant.arm import rotation_vector
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.instruments import LoadCell
 from elastocal_proof.plant.machine import machine_of
-from elastocal_proof.plant.physical_robot import Warmth, at_rest, driven, seen_poses, specimen
+from elastocal_proof.plant.physical_robot import Warmth, driven, seen_poses, specimen
 
 
 def test_castings_warm_up_behind_the_thermometer_and_reach_it():
@@ -52,17 +51,6 @@ def test_a_specimen_follows_from_its_seed_and_its_weights_change_no_gear(fanuc_a
     assert [mass.aside_m for mass in heavy.structure.masses] != [mass.aside_m for mass in off.structure.masses]
 
 
-def test_errors_of_all_drives_add_to_the_commanded_angles(weightless, schedule):
-    laws = ((1, lambda done: 2e-4), (1, lambda done: 3e-4), (3, lambda done: 1e-3 * done.angle[:, 0]))
-    drive, growth, offsets = driven(
-        replace(weightless, drives=laws), schedule, machine_of(weightless.arm, weightless.structure)
-    )
-    error = drive - schedule.angle
-    np.testing.assert_allclose(error[:, 1], 5e-4, atol=1e-15)
-    np.testing.assert_allclose(error[:, 3], 1e-3 * schedule.angle[:, 0], atol=1e-15)
-    assert not np.delete(error, [1, 3], axis=1).any() and not growth.any() and not offsets
-
-
 @pytest.mark.parametrize(("kind", "group"), [("repeatability_rad", "approach"), ("pose_rad", "pose")])
 def test_chance_of_the_drives_is_drawn_afresh_for_each_approach_or_pose_by_the_seed(weightless, fanuc_arm, kind, group):
     done = schedule_of(fanuc_arm, Design(poses=60, approach_each_load=False), 2)
@@ -78,32 +66,3 @@ def test_chance_of_the_drives_is_drawn_afresh_for_each_approach_or_pose_by_the_s
     np.testing.assert_array_equal(error, again)
     assert np.abs(error - other)[:, 0].min() > 0
     np.testing.assert_allclose(error[first].std(axis=0), [2e-5, 0.0, 1e-5, 0.0, 0.0, 0.0], rtol=0.35, atol=1e-15)
-
-
-def test_expansion_changes_evenly_from_the_column_to_the_flange(weightless, schedule):
-    robot = replace(weightless, expansion_per_K=1e-5, gradient_per_K=(2e-6, -4e-6), warmth=Warmth(10.0, 1.0, 0.5))
-    late = replace(schedule, time_s=schedule.time_s + 1e6)
-    growth = driven(robot, late, machine_of(robot.arm, robot.structure))[1]
-    np.testing.assert_allclose(growth, np.tile(10 * np.linspace(1.2e-5, 0.6e-5, 7), (len(late.pose), 1)), rtol=1e-9)
-
-
-def test_gears_come_to_rest_by_their_linear_springs_and_their_other_laws_together(fanuc_specimen, schedule):
-    gears = ((1, lambda done, torque, unloaded: 1e-11 * torque[:, 1] ** 2),)
-    machine, rest = at_rest(replace(fanuc_specimen, gears=gears), schedule)
-    torque = rest.force[:, machine.gear]
-    wanted = fanuc_specimen.compliance * torque
-    wanted[:, 1] += 1e-11 * torque[:, 1] ** 2
-    np.testing.assert_allclose(rest.coordinates[:, machine.gear], wanted, atol=1e-13)
-    assert np.abs(1e-11 * torque[:, 1] ** 2).max() > 1e-6
-
-
-def test_a_cells_bias_fixed_in_the_flange_pulls_along_the_axes_of_the_unloaded_flange(weightless, schedule):
-    bias, loaded = np.array([4.0, -3.0, 2.0]), schedule.force.any(axis=1)
-    robot = replace(weightless, cell=LoadCell(bias_N=tuple(bias), in_flange=("bias",)))
-    unloaded = replace(schedule, force=0.0 * schedule.force)
-    facing = seen_poses(weightless, unloaded)[1][:, -1]
-    # The display shows so much that the flange feels as much less.
-    less = replace(schedule, force=schedule.force - loaded[:, None] * (facing @ bias))
-    found, wanted = (seen_poses(one, done)[0] for one, done in ((robot, schedule), (weightless, less)))
-    np.testing.assert_allclose(found, wanted, atol=1e-12)
-    assert np.abs(found - seen_poses(weightless, schedule)[0]).max() > 1e-6

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.defects import Defect, drawn_defect, with_defects
 from elastocal_proof.plant.instruments import Move
-from elastocal_proof.plant.kinds import KINDS
+from elastocal_proof.plant.kinds import KINDS, Defect, drawn_defect, with_defects
 from elastocal_proof.plant.sizing import Yardstick, size_for
 from elastocal_proof.plant.weights import declared_masses, on_stretches
 
@@ -74,25 +73,9 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_speci
     assert yardstick.signal(bad).retained == pytest.approx(left @ left, rel=1e-3)
 
 
-def test_a_defect_that_these_poses_do_not_show_adds_no_direction_to_the_angle(yardstick, fanuc_specimen):
-    """A gear that stiffens at a torque that no load reaches leaves nothing to compare with."""
-    wave, runout = (
-        with_defects(fanuc_specimen, [Defect(k, (2,), 1e-4, 1)]) for k in ("transmission_harmonic", "bearing_runout")
-    )
-    assert yardstick.angle_deg(wave, [fanuc_specimen]) == 90.0
-    assert yardstick.angle_deg(wave, [fanuc_specimen, runout]) == yardstick.angle_deg(wave, [runout]) < 90.0
-
-
 def shifted(robot, *shift, turn=(0.0, 0.0, 0.0)):
     """All that the tracker reads is moved as one body."""
     return replace(robot, tracker=replace(robot.tracker, move=Move(-1.0, shift, turn)))
-
-
-def test_a_shift_of_all_measurements_has_its_length_and_the_non_centrality_of_its_count(weightless, schedule):
-    signal = Yardstick(weightless, schedule).signal(shifted(weightless, 3e-5, 0.0, -4e-5))
-    assert (signal.rms_m, signal.rms_rad) == (pytest.approx(5e-5), pytest.approx(0.0, abs=1e-12))
-    # Four targets in each state that is not held out; sigma is 60 um.
-    assert signal.raw == pytest.approx(4 * schedule.training.sum() * (5 / 6) ** 2)
 
 
 def test_a_tracker_farther_away_makes_the_same_shift_weigh_less(weightless, schedule):
@@ -111,15 +94,3 @@ def test_a_free_frame_absorbs_any_motion_as_one_body_and_a_known_one_does_not(we
     # To second order of a turn of 40 urad at some metres.
     assert free.retained < 1e-6 * free.raw
     assert known.retained > 0.5 * known.raw
-
-
-def test_a_defect_is_at_no_angle_to_itself_and_within_the_span_of_two(yardstick, fanuc_specimen):
-    first, second = (Defect("joint_offset", (joint,), 1e-5, 1) for joint in (1, 2))
-    one, other, both, twice = (
-        with_defects(fanuc_specimen, defects) for defects in ([first], [second], [first, second], [replace(first, size=2e-5)])
-    )
-    assert yardstick.angle_deg(one, [twice]) < 0.1
-    assert yardstick.angle_deg(both, [one, other]) < 0.1
-    a, b = (left / np.linalg.norm(left) for left in (yardstick.seen_and_left(robot)[1] for robot in (both, one)))
-    alone = yardstick.angle_deg(both, [one])
-    assert alone > 1.0 and np.cos(np.radians(alone)) == pytest.approx(abs(a @ b))

@@ -1,7 +1,5 @@
 """What links weigh: as declared, by rule, as drawn, and the torques that follow."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS
@@ -14,7 +12,6 @@ from elastocal_proof.plant.weights import (
     centre_std_m,
     declared_masses,
     off_the_line,
-    on_stretches,
     true_masses,
     usual_gravity_torque,
 )
@@ -29,17 +26,6 @@ def test_where_the_file_has_none_each_link_behind_the_carousel_weighs_half_of_th
     assert [m.link for m in guessed] == list(range(7)) and {m.relative_std for m in guessed} == {0.1}
     np.testing.assert_allclose(mass[3:] / mass[2:-1], 0.5, rtol=5e-3)
     np.testing.assert_allclose(mass[:2] / total, [0.18, 0.27], rtol=1e-3)
-
-
-@pytest.mark.parametrize("name, kilograms", [("abb", 1280), ("gp180", 991), ("ur10", 28.9)])
-def test_the_guessed_mass_of_an_arm_is_no_more_than_half_off_its_data_sheet(name, kilograms):
-    arm = replace(arm_from_file(ROBOTS / f"{name}.yaml"), masses=())
-    assert sum(m.mass_kg for m in declared_masses(arm)) == pytest.approx(kilograms, rel=0.5)
-
-
-def test_a_guessed_centre_is_before_the_middle_of_its_link_and_beside_it():
-    # Of a reach of three metres.
-    np.testing.assert_allclose([m.centre_m for m in declared_masses(TWO)], [[0, 0.03, 0.18], [0.9, 0.03, 0], [0.45, 0.03, 0]])
 
 
 @pytest.mark.parametrize(
@@ -73,15 +59,6 @@ def test_centres_off_the_line_move_across_it_alone_and_weights_stay():
         mine = shift[link::2]
         np.testing.assert_allclose(mine[:, along], 0.0, atol=1e-15)
         assert (np.abs(mine[:, across]) <= largest).all() and (np.abs(mine[:, across]).max(axis=0) > 0.8 * largest).all()
-
-
-@pytest.mark.parametrize("centre, along", [((0.5, 0.1, -0.2), 0.25), ((-0.3, 0.0, 0.1), 0.0), ((2.5, 0.0, 0.1), 1.0)])
-def test_a_weight_stands_on_its_stretch_and_aside_of_it_where_its_centre_is(centre, along):
-    (mass,) = on_stretches((LinkMass(1, 8.0, centre, 0.1),), TWO)
-    assert (mass.stretch, mass.mass_kg, mass.along) == (1, 8.0, pytest.approx(along))
-    np.testing.assert_allclose(mass.along * TWO.stretches[1].vector_m + mass.aside_m, centre, atol=1e-15)
-    if 0 < along < 1:
-        assert mass.aside_m[0] == pytest.approx(0.0, abs=1e-15)
 
 
 def test_usual_torque_of_weight_is_the_root_mean_square_of_mass_gravity_and_horizontal_lever():

@@ -79,7 +79,7 @@ def stands(number, found):
     return any(Decimal(other).quantize(digits, ROUND_HALF_UP) == Decimal(number) for other in found)
 
 
-@pytest.mark.parametrize(("page", "source", "heading", "words", "row", "column"), entries())
+@pytest.mark.parametrize(("page", "source", "heading", "words", "row", "column"), list(entries()))
 def test_a_figure_is_that_of_its_table(page, source, heading, words, row, column):
     assert plain(words) in plain((ROOT / page).read_text(encoding="utf-8"))
     if column is None:

@@ -13,7 +13,7 @@ from made_proofs import made_proofs
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 NAMES = [
     *(f"blind/{name}" for name in ("cases", "intervals", "rates", "reliability", "summary")),
-    *("closed_loop/cases", "closed_loop/closed_loop", "closed_loop/goals", "bad_rows/cases", "bad_rows/summary"),
+    *("closed_loop/cases", "closed_loop/closed_loop", "closed_loop/goals"),
     *("league/small/league", "league/small/mechanisms"),
 ]
 

@@ -1,6 +1,7 @@
-"""What jobs and commands may load before they need it: imports are a third of a job of the study, and all of a help text."""
+"""What jobs and commands may load before they need it, a third of a job of the study; and the tool never loads its proof."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,12 +16,8 @@ _BY_DOCUMENTS = {"jsonschema", "rich", "typer"}
 _OF_STUDY = _NEVER | _BY_DOCUMENTS | {"pandas", "scipy.spatial", "scipy.linalg", "yaml"}
 # Scripts of the rules, or modules whose functions are steps of rules, and the packages that none of them loads.
 SCRIPTS = {
-    "study": ("elastocal.study.evaluation elastocal.study.identify elastocal.study.simulation", _OF_STUDY | {"scipy"}),
-    "expectations": ("elastocal.study.repeated", _OF_STUDY),
-    "questions": (
-        " ".join(f"elastocal.study.{name}" for name in ("arm_points", "assumptions", "ladder", "measurement_kinds", "points")),
-        _OF_STUDY,
-    ),
+    "study": ("elastocal.study.equation_11 elastocal.study.evaluation elastocal.study.simulation", _OF_STUDY | {"scipy"}),
+    "questions": ("elastocal.study.ladder elastocal.study.points elastocal.study.repeated", _OF_STUDY | {"scipy"}),
     "reading": ("elastocal.loop.loading", _NEVER | {"jsonschema", "pandas", "rich", "typer", "scipy"}),
     "loop": ("elastocal.loop.diagnosis_tables elastocal.loop.whole", _NEVER | _BY_DOCUMENTS | {"pandas"}),
     "blind": ("elastocal_proof.blind.verdicts", _NEVER | _BY_DOCUMENTS | {"pandas"}),
@@ -73,3 +70,10 @@ assert {{name: values.tolist() for name, values in read.items()}} == kinds
 """)
     assert "elastocal.io.storage" in found
     assert not found & _OF_STUDY
+
+
+def test_the_tool_imports_the_proof_in_its_demonstration_alone():
+    """For annotations too, which import-linter leaves out."""
+    importing = re.compile(r"^ *(?:from|import) elastocal_proof", re.MULTILINE)
+    found = [path for path in (TOP / "src/elastocal").rglob("*.py") if importing.search(path.read_text(encoding="utf-8"))]
+    assert [path.relative_to(TOP).as_posix() for path in found] == ["src/elastocal/command/demo.py"]

@@ -1,4 +1,4 @@
-"""What is installed is used where it is installed for, and the public CI runs what is pinned, with the rights that it needs."""
+"""What is installed is used, CI and container run pins with the rights that they need, and SECURITY.md names its tests."""
 
 import re
 import tomllib
@@ -13,6 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 JOBS = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8"))["jobs"]
 WORKFLOW = (ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")
+RECIPE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
+SECURITY = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
 # Where a run begins, of what a wheel has too.
 RUN = [*ROOT.glob("src/**/*.py"), *ROOT.glob("workflow/rules/*.py"), *ROOT.glob("workflow/scripts/*.py")]
 AUDIT = [path for path in RUN if "audit" in path.parts]
@@ -92,3 +94,32 @@ def test_a_wheel_is_made_after_the_check_for_vulnerabilities_and_signed_with_the
     signed = [step["with"] for step in JOBS["attest"]["steps"][1:]]
     assert signed == [{"subject-path": "dist/*.whl"}, {"subject-path": "dist/*.whl", "sbom-path": "sbom.cdx.json"}]
     assert JOBS["wheel"]["steps"][-1]["with"]["path"].split() == ["dist/*.whl", "sbom.cdx.json"]
+
+
+def test_the_container_copies_what_is_there_and_is_handed_nothing_else():
+    copied = {name for line in re.findall(r"^COPY (.*) \S+$", RECIPE, re.MULTILINE) for name in line.split()}
+    assert [name for name in copied if not (ROOT / name).exists()] == []
+    assert {"Snakefile", "config.yaml", "config", "profiles", "src", "workflow", "pyproject.toml"} <= copied
+    rules = (ROOT / "docker" / "Dockerfile.dockerignore").read_text(encoding="utf-8").splitlines()
+    assert "*" in rules and {rule[1:] for rule in rules if rule.startswith("!")} == copied
+
+
+def test_it_installs_by_digest_and_names_no_index():
+    assert RECIPE.count("--require-hashes") == 2 and "http" not in RECIPE and "index" not in RECIPE
+
+
+def test_its_base_is_one_image_and_what_it_runs_is_not_root():
+    """The user comes after all that installs, before what runs; one whom the image does not know has a home and a name."""
+    assert re.findall(r"^FROM \S+@sha256:[0-9a-f]{64}$", RECIPE, re.MULTILINE) == re.findall(r"^FROM .*", RECIPE, re.MULTILINE)
+    assert re.search(r"^ENV HOME=/tmp USER=\w+$", RECIPE, re.MULTILINE)
+    instructions = re.findall(r"^[A-Z]+ .*", RECIPE, re.MULTILINE)
+    assert re.fullmatch(r"USER [1-9]\d*:[1-9]\d*", instructions[-2]) and instructions[-1].startswith("ENTRYPOINT ")
+
+
+def test_every_sentence_of_the_security_page_names_a_test_that_is_there():
+    named = set(re.findall(r"`(test_\w+)`", SECURITY))
+    files = (path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    assert len(named) > 10 and named <= {name for file in files for name in re.findall(r"def (test_\w+)", file)}
+    for paragraph in ("Writing", "At the door", "Supply chain", "What a pass rests on"):
+        body = " ".join(SECURITY.split(f"**{paragraph}.** ")[1].split("\n\n")[0].split())
+        assert [part for part in re.split(r"(?<=[.)])\s+(?=[A-Z])", body) if "`test_" not in part] == []

@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -19,12 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "Snakefile", "config.yaml", "config", "profiles", "src", "workflow")
 SOURCES += ("paper", "CITATION.cff", "data/measured")
 # Of the checkout alone: it checks, rehearses and explains.
-LEFT_OUT = (
-    "workflow/lint.py",
-    "workflow/examples/",
-    "workflow/searches/",
-    "config/README.md",
-)
+LEFT_OUT = ("workflow/lint.py", "workflow/examples/", "workflow/searches/", "config/README.md")
 OUTSIDE = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {"OMP_NUM_THREADS": "1"}
 IGNORED = shutil.ignore_patterns("__pycache__", "*.egg-info")
 
@@ -99,23 +93,6 @@ def test_the_wheel_says_whose_it_is_and_which(wheel):
     assert f"\nVersion: {elastocal.__version__}\n" in metadata
     assert "\nAuthor: the elastocal developers\n" in metadata
     assert "\nLicense-Expression: MIT\n" in metadata
-
-
-def test_the_version_stands_in_one_place():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert "version" not in project["project"]
-    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "elastocal.__version__"}
-
-
-@pytest.mark.slow
-def test_a_campaign_is_begun_and_checked_where_there_is_no_checkout(run, tmp_path):
-    begun = run("elastocal", "init", "cell", "--robot", ROOT / "config" / "robots" / "ur5.yaml")
-    assert begun.returncode == 0, begun.stderr
-    assert sorted(path.name for path in (tmp_path / "cell").iterdir()) == ["campaign.yaml", "measurements.csv", "robot.yaml"]
-    checked = run("elastocal", "check", "cell")
-    assert checked.returncode == 1
-    assert checked.stderr.startswith("cell/measurements.csv: found no row of data"), checked.stderr
-    assert len(checked.stderr.splitlines()) == 1
 
 
 @pytest.mark.slow

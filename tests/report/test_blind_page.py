@@ -8,7 +8,7 @@ from elastocal_proof.report.blind_page import reached_words, targets_page
 
 
 def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_limit():
-    pairs = [truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot) for robot in ("m900ib700", "panda")]
+    pairs = [truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot) for robot in ("irb7600", "gen3")]
     both, best = verdict("several", effect("payload"), effect("joint_tilt", 2)), {"detected": True, "right": True}
     entries = [
         (pairs[0], both, oracle(), best),
@@ -17,7 +17,7 @@ def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_li
     ]
     cases = frame(*entries)
     summary, alone = summarize(PLAN, cases, pd.DataFrame(), 1), of_each_robot(PLAN, cases, 1)
-    page = targets_page(PLAN, summary, {"The heavy one": alone["m900ib700"], "A soft one": alone["panda"]}, "full", 7)
+    page = targets_page(PLAN, summary, {"The heavy one": alone["irb7600"], "A soft one": alone["gen3"]}, "full", 7)
     assert page.startswith("# ") and "blind_pictures --config blind=full seed=7`" in page
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in page.splitlines() if line.startswith("| ")]
     found = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:]}

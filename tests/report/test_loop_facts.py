@@ -13,15 +13,12 @@ from made_loop_tables import (
     experiment_rows,
     parameter_table,
     remainder_facts,
-    split_rows,
     step_rows,
     verdict_document,
 )
 from selected import slow_but
 
-from elastocal.application.accuracy import BASE, PREDICTED, Accuracy
-from elastocal.diagnosis.verdict import CLASS, NAMED
-from elastocal.effects.catalogue import effects
+from elastocal.diagnosis.verdict import NAMED
 from elastocal.figures.residuals import before_after
 from elastocal.figures.style import save
 from elastocal.report.loop_facts import (
@@ -29,11 +26,14 @@ from elastocal.report.loop_facts import (
     AT_FAULT,
     campaign_sentences,
     cause_rows,
+    compliance_rows,
     cost_words,
-    description,
     effect_facts,
+    held_rows,
+    untestable_rows,
     write_loop_report,
 )
+from elastocal.report.loop_facts import step_rows as table_rows
 
 WORDS = {
     "adequate": "none of 30 candidate causes is needed",
@@ -106,14 +106,6 @@ def test_the_headline_has_the_robot_as_it_was_and_as_it_is_and_its_caption_what_
     assert campaign_sentences(CAMPAIGNS["fault of the data"])["headline_line"] == []
 
 
-def test_an_effect_that_validation_poses_do_not_confirm_is_said_to_be_so():
-    for gain, said in ((-0.02, True), (0.3, False)):
-        verdict = verdict_document(NAMED, [effect_entry() | {"heldout_gain": gain}])
-        words = " ".join(campaign_sentences(verdict)["sentences"])
-        assert ("does not lower the RMS error of the validation poses (+2 %): they do not confirm it" in words) == said
-        assert cause_rows(verdict)[0]["gain"] == ("+2 %" if said else "−30 %")
-
-
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
@@ -141,25 +133,6 @@ def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities
         ("Nothing is missing", "4 %", ""),
     ]
     assert cause_rows(CAMPAIGNS["unexplained"])[0]["name"] == "Something that the catalogue does not have"
-
-
-MOSTLY = {
-    "left_out_m": "effects that no command contains",
-    "form_m": "the form of the model",
-    "repeated_m": "each pose's own error and the repeatability of the joints",
-    "rms_m": "the uncertainty of the parameters",
-}
-
-
-@pytest.mark.parametrize("part", MOSTLY)
-def test_measured_and_predicted_errors_stand_apart_and_the_predicted_one_has_its_largest_part(part):
-    stated = Accuracy(BASE, PREDICTED, 1.74e-4, 4e-4, 2e-4, None, "", 9, "some poses").document() | {part: 1.57e-4}
-    facts = facts_of(CAMPAIGNS["named"] | {"accuracy": stated})
-    (measured, rms, _), (own, predicted, worst) = facts["accuracy"]
-    assert measured == "the tracker against the model, at 10 validation poses" and rms == "0.084"
-    assert own == "the robot itself, predicted over some poses (9)" and worst == "0.400"
-    assert predicted == f"{1e3 * stated['rms_m']:.3f} (95 % sure: below 0.200)"
-    assert f"the same frame. It comes mostly from {MOSTLY[part]}." in facts["accuracy_words"]
 
 
 @pytest.mark.parametrize("campaign", ["named, not adopted", "class, not adopted"])
@@ -191,12 +164,6 @@ def test_a_fault_of_the_data_is_no_effect():
     assert not facts_of(CAMPAIGNS["named"])["faulty"]
 
 
-def test_every_effect_of_the_catalogue_is_described_without_formulas():
-    for name in effects():
-        said = description(name)
-        assert said and not set("=[]^_") & set(said), said
-
-
 def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_whom_they_are():
     effect, heldout = effect_entry(), CAMPAIGNS["named"]["heldout"]
     assert effect_facts(effect, heldout)["parameters"] == [["half play", "120.0 ± 3.0", "µrad", "measurements"]]
@@ -213,25 +180,11 @@ def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_who
     assert len(many["parameters"]) == 10 and many["left_out"] == str(len(HARMONICS) * len(WAVES)) and many["with_angle"]
 
 
-def test_what_a_regression_adds_is_said_with_shares_intervals_and_where_it_corrects_nothing():
-    def said(remainder):
-        return plainly(" ".join(campaign_sentences(CAMPAIGNS["named"] | {"remainder": remainder})["remainder"]))
-
-    words = said(remainder_facts(outside=3))
-    assert "RMS error of 60.0 µm (95 %: 50.0 µm to 72.0 µm) instead of 84.0 µm: a change of the error by −31 to +5 %" in words
-    assert "the effects explain 51.0 % and the regression 24.0 %; 25.0 % is left" in words
-    assert "± 100 µm within the range of the fitted poses, ± 400 µm outside (median of a coordinate), hold 95 %" in words
-    assert "At the 3 poses beyond the fitted joints or loads it corrects nothing" in words
-    assert "outside" not in said(remainder_facts()) and said(None) == ""
-    none = said(remainder_facts() | {"regression": ""})
-    assert none.startswith("What the final model leaves shows no pattern") and none.endswith("none is used.")
-
-
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory):
     """One in the place of each."""
     folder = tmp_path_factory.mktemp("figures")
-    names = [str(folder / f"{name}.pdf") for name in ("before_after", "arrows", "residuals", "candidates", "confounding")]
+    names = [str(folder / f"{name}.pdf") for name in ("before_after", "arrows", "candidates")]
     save(before_after(step_rows(), 5e-5), names[0], str(folder / "before_after.png"))
     return [names[0], *(shutil.copy(names[0], name) for name in names[1:])]
 
@@ -249,29 +202,63 @@ def test_every_verdict_compiles_within_its_margins(campaign, pictures, pages, tm
     assert_within_margins(pages)
 
 
-def test_long_names_wrap(pictures, pages, tmp_path):
-    long = "a_campaign_with_a_name_that_nobody_would_type_twice_but_that_a_script_made_" + "x1_" * 20
-    effect = effect_entry(parameters=["compliance_times_mass_at_end_of_link_" + "and_of_another_" * 8])
-    effect["alternatives"] = sorted(effects())
-    verdict = verdict_document(
-        CLASS, [effect], [f"{long}: is a long name"], campaign=long, held=[f"link_geometry@{k} dx" for k in range(1, 7)]
-    )
-    changed = {
-        "descriptions": campaign_descriptions(
-            long, f"{long} robot", f"{long}_static", targets=[f"target_{k}_of_a_long_bar" for k in range(2)]
-        ),
-        "steps": step_rows(["lost_motion", ", ".join(HARMONICS[:5])]),
-        "experiment": experiment_rows() + experiment_rows("transmission_harmonic"),
-        "parameters": parameter_table(
-            [f"link_geometry@{k} {name}" for k in range(1, 9) for name in ("dx", "dy", "dz", "rx", "ry", "rz")]
-        ),
-        "splits": split_rows(blocks=12),
-    }
-    write_loop_report(str(tmp_path / "report.pdf"), facts_of(verdict, **changed), pictures)
-    assert_within_margins(pages)
-
-
 def test_a_rerun_gives_the_same_bytes(pictures, tmp_path):
     for run in "ab":
         write_loop_report(str(tmp_path / f"{run}.pdf"), facts_of(CAMPAIGNS["class"], experiment=experiment_rows()), pictures)
     assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
+
+
+def test_before_and_after_have_intervals_and_multiples():
+    table = table_rows(step_rows(), 5e-5)
+    assert table["unit"] == "µm" and [row["kind"] for row in table["rows"]] == ["frames", "declared", "effect"]
+    cells = table["rows"][0]["cells"]
+    assert cells[1:] == [["180", "[144, 216]", "3.60 × floor"], ["270", "≥ 216", "5.40 × floor"], ["300", "–", "6.00 × floor"]]
+    assert table_rows(step_rows(largest_m=0.05), None)["rows"][0]["cells"][0] == ["25.000", "[20.000, 30.000]"]
+
+
+def test_the_next_experiment_is_in_degrees_and_says_what_it_brings():
+    facts = facts_of(CAMPAIGNS["class"], experiment=experiment_rows(count=3))["experiment"]
+    loads = ["fx N", "fy N", "fz N", "mx N·m", "my N·m", "mz N·m"]
+    # All states have one point, which the caption names.
+    assert facts["heads"] == [*(f"q{k} °" for k in range(1, 7)), *loads, "separation", "resolved"] and facts["points"] == "6DoF"
+    angles, wrench = ["−5.7", "−11.5", "−17.2", "−22.9", "−28.6", "−34.4"], ["910", "0", "−412", "−206", "0", "455"]
+    assert facts["rows"][2] == [*angles, *wrench, "12.0", "58\u00a0%"]
+    unloaded = [row | dict.fromkeys(("fx", "fy", "fz", "mx", "my", "mz"), 0.0) for row in experiment_rows()]
+    assert facts_of(CAMPAIGNS["class"], experiment=unloaded)["experiment"]["heads"][-3:-1] == ["q6 °", "separation"]
+
+
+def test_what_was_measured_is_stated_apart_for_fitted_and_held_out_poses():
+    facts = facts_of(CAMPAIGNS["named"], descriptions=campaign_descriptions(held_out="another"))
+    measured = {name: (training, held_out) for name, training, held_out in facts["measured"]}
+    assert measured["campaign"] == ("made_up", "another")
+    assert measured["poses"] == ("20 poses in 1 session", "10 poses in 1 session")
+    assert measured["loads"][0].startswith("1 load of 500 N on 50")
+    assert facts["method"]["held_out"] == "10 poses of another campaign (another)"
+
+
+def test_parameters_that_are_not_determined_are_gathered_by_owner_and_stand_apart():
+    rows = held_rows(["joint_offset@1 offset", "link_geometry@1 dz", "link_geometry@1 ry"])
+    assert rows == [["Zero offset of joint 1", "offset"], ["Geometric error of link 1", "shift along z, rotation about y"]]
+    left = "joint_offset@3 offset"
+    facts = facts_of(CAMPAIGNS["named"], parameters=parameter_table(["joint_offset@2 offset", left], by_prior=[left]))
+    assert facts["held"] == [["Zero offset of joint 3", "offset"]]
+
+
+def test_what_cannot_be_tested_is_gathered_by_effect_and_reason_and_long_lists_are_cut():
+    few = {f"lost_motion@{k}": "too few different angles of a joint" for k in (1, 2)}
+    many = {f"cross_compliance@{k}+{k + 1}": "no approach in the data" for k in range(1, 10)}
+    assert untestable_rows(few | many | {"payload": "no load"}) == [
+        [
+            "Elastic coupling",
+            "joints 1 and 2, of joints 2 and 3, of joints 3 and 4 and of joints 4 and 5 and 5 more",
+            "no direction of approach in the data",
+        ],
+        ["Weight of an undeclared payload", "–", "no load"],
+        ["Lost motion (backlash)", "joints 1 and 2", "too few different angles of a joint"],
+    ]
+
+
+def test_of_a_compliance_that_is_not_identifiable_no_number_is_stated_and_of_a_file_that_fits_none_all_are():
+    rows = compliance_rows({"before": [0.5, 0.4], "after": [0.48, 0.4], "std_error": [0.01, 0.0]})
+    assert rows == [["1", "0.500", "0.480 ± 0.010"], ["2", "not identifiable", "not identifiable"]]
+    assert compliance_rows({"before": [0.5], "after": [0.5], "std_error": [0.0]}) == [["1", "0.5", "0.5"]]

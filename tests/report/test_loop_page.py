@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from durations import HUNG_S
-from made_loop_facts import CAMPAIGNS, facts_of, plainly
-from made_loop_tables import candidate_table, residual_table
+from made_loop_facts import CAMPAIGNS, facts_of
+from made_loop_tables import residual_table
 
 from elastocal.io.origin import Origin
-from elastocal.loop.schemas import angles_of, worst_measurement
+from elastocal.loop.schemas import angles_of
 from elastocal.mechanics.kinematics import corners
 from elastocal.report.loop_page import loop_page, write_loop_page
 
@@ -53,7 +53,7 @@ LEAST_CONTRAST = """() => {
 
 def page_of(kuka, name="named", **changed):
     verdict = CAMPAIGNS[name] | changed
-    return loop_page(facts_of(verdict), residual_table(), candidate_table(), kuka)
+    return loop_page(facts_of(verdict), residual_table(), kuka)
 
 
 def data_in(path):
@@ -80,18 +80,10 @@ def test_measurements_are_in_metres_and_micrometres_with_what_they_may_be_drawn_
     assert all(np.ptp(entry["values"]) > 0 for entry in data["against"])
 
 
-def test_the_robot_stands_where_its_chain_says(kuka):
-    _, data = page_of(kuka)
-    assert len(data["outlines"]) == len(data["poses"])
-    # Base, and behind each of the six lengths.
-    assert np.shape(data["outlines"][0]) == (7, 3)
-    np.testing.assert_allclose(data["outlines"][0][:2], [[0, 0, 0], [0, 0, 0.675]], atol=1e-4)
-
-
 def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_reports(kuka):
     table, verdict = residual_table(), CAMPAIGNS["named"]
     other = replace(kuka, reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]), reported_offset=np.full(6, 0.3))
-    _, data = loop_page(facts_of(verdict), table, candidate_table(), other)
+    _, data = loop_page(facts_of(verdict), table, other)
     np.testing.assert_allclose(data["outlines"][0], corners(kuka.chain, angles_of(table, 6)[:1])[:, 0], atol=1e-4)
 
 
@@ -99,54 +91,13 @@ def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at
     """Both campaigns count their poses from nought."""
     table, verdict = residual_table(poses=6), CAMPAIGNS["named"]
     table |= {"held_out": table["pose"] >= 3, "pose": table["pose"] % 3}
-    _, data = loop_page(facts_of(verdict), table, candidate_table(), kuka)
+    _, data = loop_page(facts_of(verdict), table, kuka)
     assert data["poses"] == ["0", "1", "2", "0, validation", "1, validation", "2, validation"]
     joints = angles_of(table, 6)
     for outline, rows in zip(data["outlines"], data["targets"], strict=True):
         assert sorted(table["target"][rows]) == [0, 1]
         for row in rows:
             np.testing.assert_allclose(outline, corners(kuka.chain, joints[[row]])[:, 0], atol=1e-4)
-
-
-def test_the_leading_candidates_stand_by_falling_bayes_factor(kuka):
-    table = candidate_table()
-    page, _ = page_of(kuka)
-    assert len(page["candidates"]) == 15
-    factors = [float(row["factor"].replace("\u2212", "-")) for row in page["candidates"]]
-    expected = np.sort(table["log_bayes_factor"][np.isfinite(table["log_bayes_factor"])])[::-1][:15]
-    np.testing.assert_allclose(factors, expected, atol=0.051)
-    assert [row["chosen"] for row in page["candidates"]].count("yes") == table["chosen"].sum()
-
-
-def test_a_candidate_of_several_shapes_has_the_factor_of_the_best_and_the_probability_of_all(kuka):
-    """A model has one of them at most. The page once stated 62 % of a step of which verdict.json has over 99 %."""
-    table = candidate_table()
-    key = table["candidate"][np.nanargmax(table["log_bayes_factor"])]
-    best = table["candidate"] == key
-    table["probability"] = np.where(best, 0.62, table["probability"])
-    lesser = {name: values[best][:1].copy() for name, values in table.items()}
-    lesser |= {
-        "log_bayes_factor": lesser["log_bayes_factor"] - 1,
-        "probability": np.array([0.379]),
-        "chosen": np.zeros(1, bool),
-    }
-    twice = {name: np.concatenate([lesser[name], values]) for name, values in table.items()}
-    once, both = (
-        loop_page(facts_of(CAMPAIGNS["named"]), residual_table(), some, kuka)[0]["candidates"] for some in (table, twice)
-    )
-    assert plainly(once[0]["words"]) == "62 %" and plainly(both[0]["words"]) == "> 99 %"
-    assert [row | {"words": ""} for row in once] == [row | {"words": ""} for row in both]
-
-
-def test_joints_are_drawn_on_the_arm_and_the_page_opens_at_the_worst_pose(kuka):
-    table = residual_table()
-    _, data = page_of(kuka)
-    assert np.shape(data["joints"]) == (len(data["poses"]), 6, 2, 3)
-    np.testing.assert_allclose(np.linalg.norm(np.array(data["joints"])[:, :, 1], axis=2), 1, atol=1e-3)
-    worst = worst_measurement(table)
-    assert data["poses"][data["worst"]].split(",")[0] == str(table["pose"][worst])
-    size = np.linalg.norm(data["before"], axis=1)
-    assert size.max() == size[data["targets"][data["worst"]]].max() or table["load"][worst]
 
 
 def test_texts_of_other_people_stay_texts(kuka, tmp_path):

@@ -1,9 +1,6 @@
 """A document compiles with the data and pictures that it reads, and its PDF appears whole or not at all."""
 
-import fnmatch
-import tomllib
 from importlib import resources
-from pathlib import Path
 
 import pytest
 import typst
@@ -66,16 +63,6 @@ def test_what_cannot_be_compiled_leaves_the_earlier_pdf_as_it_was(written, docum
         compile_document(written / "report.pdf", document, data, pictures)
     assert [file.name for file in written.iterdir()] == ["report.pdf"]
     assert (written / "report.pdf").read_text(encoding="utf-8") == "earlier"
-
-
-def test_templates_are_installed_with_the_package():
-    top = Path(__file__).resolve().parents[2]
-    patterns = tomllib.loads((top / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["elastocal"]
-    files = [
-        f"report/{file.name}" for file in (top / "src/elastocal/report").iterdir() if file.is_file() and file.suffix != ".py"
-    ]
-    assert len(files) > 8
-    assert [file for file in files if not any(fnmatch.fnmatch(file, pattern) for pattern in patterns)] == []
 
 
 def test_a_template_has_paragraphs_and_rows_and_keeps_what_may_not_break(tmp_path, monkeypatch):

@@ -4,7 +4,6 @@ import pytest
 from support import ODD_CHAINS, OTHER_CHAINS, chain_of
 from synthetic import equipped
 
-from elastocal.diagnosis.findings import location_words
 from elastocal.effects.catalogue import candidates_on, effects
 from elastocal.figures.candidates import short_name
 from elastocal.report.words import (
@@ -12,7 +11,6 @@ from elastocal.report.words import (
     alternative_words,
     candidate_words,
     effect_words,
-    found_words,
     hypotheses_words,
     in_common,
     in_words,
@@ -60,11 +58,6 @@ def test_no_two_candidates_are_printed_alike(chain):
 )
 def test_locations_are_gathered(effect, locations, expected):
     assert effect_words(effect, locations).endswith(expected)
-
-
-def test_locations_are_read_as_findings_write_them():
-    written = location_words("link_elasticity", (1, 2, "one section"))
-    assert effect_words("link_elasticity", [written]) == found_words("link_elasticity", ["link_elasticity@1+2[one section]"])
 
 
 def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is_unknown_or_related():

@@ -5,16 +5,7 @@ import pandas as pd
 import pytest
 from made_studies import few_of
 
-from elastocal.study.designs import (
-    CONTINUOUS,
-    RANDOM,
-    design_columns,
-    observability,
-    observability_columns,
-    observability_table,
-    rate_designs,
-    simulated_design_blocks,
-)
+from elastocal.study.designs import CONTINUOUS, RANDOM, design_columns, rate_designs, simulated_design_blocks
 
 
 @pytest.fixture(scope="module")
@@ -38,13 +29,6 @@ def test_designs_lie_between_the_bound_and_random_ones(found, size):
     # What is optimised is best, as far as an exchange finds it.
     assert worth(found, "I", size)[0] <= 1.001 * min(worth(found, "D", size)[0], worth(found, "A", size)[0])
     assert random[1] < random[0] < random[2]
-
-
-def test_indices_are_those_of_the_singular_values():
-    singular = np.array([4.0, 2.0, 1.0])
-    turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
-    indices = observability((turn * singular**2) @ turn.T, 4)
-    assert [float(indices[name]) for name in ("O1", "O2", "O3", "O4", "O5")] == pytest.approx([1.0, 0.25, 1.0, 0.25, 1 / 1.75])
 
 
 def test_designs_are_worth_more_than_random_ones(kuka):
@@ -74,21 +58,3 @@ def test_chosen_configurations_leave_less_than_random_ones(table):
 def test_the_test_pose_criterion_is_best_at_its_pose(table):
     by = table[(table.load == "random") & (table.configurations == 12)].set_index("design")
     assert by.there["test pose"] < 1.2 * by.there.drop("test pose").min() and by.rms["I"] < by.rms["test pose"]
-
-
-def test_observability_stands_beside_bound_and_error_of_the_same_data_set(kuka):
-    table = observability_columns(few_of(kuka))
-    assert {"data_set", "O1", "O5", "bound", "mean_square"} <= set(table)
-    assert (table["bound"] > 0).all() and 0.1 < table["mean_square"].mean() / table["bound"].mean() < 4
-
-
-def test_an_index_that_orders_data_sets_as_the_bound_does_has_rank_correlation_one():
-    rng = np.random.default_rng(1)
-    bound = rng.uniform(1, 2, 400)
-    frame = pd.DataFrame({f"O{number}": rng.uniform(size=400) for number in range(1, 6)})
-    frame = frame.assign(O1=1 / bound, bound=bound, mean_square=bound * rng.chisquare(3, 400))
-    table = observability_table({"arm": frame}).set_index("index")
-    assert table.rank_correlation_with_bound["O1"] == pytest.approx(-1.0)
-    # Unrelated: within four standard errors of nothing.
-    assert abs(table.rank_correlation_with_bound["O2"]) < 4 * table.rank_correlation_with_bound_std_error["O2"]
-    assert table.rank_correlation_with_error["bound"] == pytest.approx(-table.rank_correlation_with_error["O1"])

@@ -1,27 +1,28 @@
 """Equation 11 for every prefix, against a plain loop of numpy.linalg.lstsq and against explicit matrices."""
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import random_loads, without_tool
+from made_study_blocks import AT, OFFSET, compliances, deflections_of, experiments_of, identified, pinocchio_regressors
+from support import OTHER_CHAINS, random_loads, robot_of, without_tool
 
 from elastocal.mechanics.elastostatics import joint_torques, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.equation_11 import (
+    LARGEST_CONDITION,
     Measurements,
-    Prior,
-    condition_numbers,
     estimate_compliance,
     first_solvable_length,
-    identify,
     prefix_triangles,
+    regressors_of,
     undetermined,
 )
-from elastocal.study.simulation import true_deflections
+from elastocal.study.simulation import to_deflections, to_experiments, true_deflections
 from elastocal.study.strategies import Stage, Strategy
 
 SETS, CONFIGURATIONS = 3, 5
@@ -76,11 +77,6 @@ def data_of(robot_key, rows, load):
     return Data(with_target_offset(robot, (0.1, 0.05, 0.2)) if rows == 3 else robot, rows)
 
 
-@pytest.fixture(params=["kuka", "fanuc"])
-def data(request, robots):
-    return data_of(request.param, 6, robots)
-
-
 @pytest.fixture
 def robots(kuka, fanuc):
     return {"kuka": kuka, "fanuc": fanuc}.__getitem__
@@ -98,16 +94,6 @@ def plain(strategy, matrix, measured, joints=6):
     return compliance
 
 
-def first(data, data_set, length):
-    matrix = {name: array[data_set, :length] for name, array in data.matrix.items()}
-    return matrix, {name: array[data_set, :length] for name, array in data.measured.items()}
-
-
-def prefixes(strategy, rows):
-    start = first_solvable_length(strategy, rows)
-    return [(k, s) for k in range(start, CONFIGURATIONS + 1) for s in range(SETS)]
-
-
 @pytest.fixture
 def strategy_called(strategies):
     return lambda name: (UNUSUAL | {"seven": SEVEN} | strategies)[name]
@@ -117,54 +103,14 @@ def strategy_called(strategies):
 @pytest.mark.parametrize(("name", "rows"), [*((name, 6) for name in (*NAMES, *UNUSUAL)), *((name, 3) for name in BY_POSITIONS)])
 def test_estimates_of_every_prefix_are_those_of_a_plain_loop(robots, strategy_called, name, rows, key):
     strategy, data = strategy_called(name), data_of(key, rows, robots)
-    found = identify(strategy, data.measurements(), 6)[0]
+    found = estimate_compliance(strategy, data.measurements(), 6)[0]
     # One position says two things about three joints that meet in a wrist, so one configuration is not enough.
-    for k, s in [(k, s) for k, s in prefixes(strategy, rows) if rows == 6 or k > 1]:
-        expected = plain(strategy, *first(data, s, k))
+    for k, s in product(range(1 if rows == 6 else 2, CONFIGURATIONS + 1), range(SETS)):
+        expected = plain(
+            strategy, *({name: part[s, :k] for name, part in all_.items()} for all_ in (data.matrix, data.measured))
+        )
         tolerance = {6: 1e-9, 3: 1e-8}[rows]
         np.testing.assert_allclose(found[k - 1, :, s], expected, rtol=0, atol=tolerance * np.abs(expected).max())
-
-
-def explicit_covariance(strategy, matrix, measured):
-    """The estimator is linear in the measurements: its matrix, column by column, times its own transpose."""
-    columns = []
-    for name in dict.fromkeys(name for stage in strategy.stages for name in stage.points):
-        for index in np.ndindex(measured[name].shape):
-            unit = {other: np.zeros_like(array) for other, array in measured.items()}
-            unit[name][index] = 1.0
-            columns.append(plain(strategy, matrix, unit))
-    gain = np.column_stack(columns)
-    return gain @ gain.T
-
-
-def assert_same_covariance(found, expected):
-    scale = np.sqrt(np.diag(expected))
-    # Correlations, so that the small variances of the stiff joints count as much as the others.
-    np.testing.assert_allclose(found / np.outer(scale, scale), expected / np.outer(scale, scale), rtol=0, atol=1e-8)
-
-
-@pytest.mark.parametrize(("name", "rows"), [*((name, 6) for name in (*NAMES, *UNUSUAL)), *((name, 3) for name in BY_POSITIONS)])
-def test_covariance_is_that_of_the_estimator_written_as_one_matrix(robots, strategy_called, name, rows):
-    strategy, data = strategy_called(name), data_of("kuka", rows, robots)
-    found = identify(strategy, data.measurements(), 6)[1]
-    assert found.shape == (CONFIGURATIONS, SETS, 6, 6)
-    for k, s in [(1, 0), (2, 1), (CONFIGURATIONS, 2)] if rows == 6 else [(CONFIGURATIONS, 0)]:
-        assert_same_covariance(found[k - 1, s], explicit_covariance(strategy, *first(data, s, k)))
-
-
-@pytest.mark.parametrize("name", [*NAMES, *UNUSUAL])
-def test_condition_is_that_of_the_stacked_regressor_of_the_worst_stage(data, strategy_called, name):
-    strategy = strategy_called(name)
-    found = identify(strategy, data.measurements(), 6)[2]
-    for k, s in prefixes(strategy, 6):
-        matrix, _ = first(data, s, k)
-        stacked = [
-            np.concatenate([matrix[point].reshape(-1, 6) for point in stage.points])[:, list(stage.identified)]
-            for stage in strategy.stages
-        ]
-        expected = max(np.linalg.cond(rows) for rows in stacked)
-        # Eigenvalues of R^T R lose the square of the condition number: up to 1e4 here.
-        assert found[k - 1, s] == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -175,13 +121,14 @@ def test_first_solvable_length_counts_measurements_against_unknowns_of_a_stage(s
     assert (first_solvable_length(strategy, 6), first_solvable_length(strategy, 3)) == (poses, positions)
 
 
-def test_condition_tells_a_prefix_that_has_measurements_enough_but_not_the_right_ones(robots, strategies):
+def test_a_prefix_that_has_measurements_enough_but_not_the_right_ones_is_undetermined(robots, strategies):
     # One position of the end-effector cannot tell three joints that meet in a wrist apart.
     strategy, measurements = strategies["4-6DoF-after-3DoF"], data_of("kuka", 3, robots).measurements()
-    found = identify(strategy, measurements, 6)[2]
-    assert np.isnan(found[0]).all() and (found[1:] < 1e5).all()
+    compliance, triangles = estimate_compliance(strategy, measurements, 6)
+    unknown = undetermined(strategy, 3, triangles)
+    assert unknown[0].all() and not unknown[1:].any()
     # Nor are its compliances rounding over rounding where no condition is asked for.
-    assert np.isnan(estimate_compliance(strategy, measurements, 6)[0][0, 3:]).all()
+    assert np.isnan(compliance[0, 3:]).all()
 
 
 systems = st.tuples(st.integers(1, 5), st.integers(0, 2), st.integers(1, 4), st.integers(1, 7), st.integers(0, 2**32 - 1))
@@ -201,25 +148,55 @@ def test_triangles_carry_the_normal_equations_of_every_prefix(shape):
             np.testing.assert_allclose(triangle.T @ triangles[k, ..., s], expected, rtol=0, atol=1e-12 * rows * configurations)
 
 
-def test_a_strong_prior_gives_its_values_and_a_weak_one_those_of_least_squares(data, strategies):
-    strategy, nominal = strategies["6DoF"], np.tile(np.arange(1.0, 7.0)[:, None] * 1e-6, SETS)
-    strong, weak = (
-        estimate_compliance(strategy, data.measurements(), 6, Prior(nominal, np.full_like(nominal, std)))[0]
-        for std in (1e-9, 1e9)
-    )
-    np.testing.assert_allclose(strong, np.broadcast_to(nominal, strong.shape), rtol=1e-3)
-    plain = estimate_compliance(strategy, data.measurements(), 6)[0]
-    np.testing.assert_allclose(weak[3:], plain[3:], rtol=1e-6)
-
-
-def test_undetermined_are_the_prefixes_whose_condition_is_not_a_number():
+def test_undetermined_are_the_prefixes_beyond_the_largest_condition():
     rng = np.random.default_rng(5)
     strategy, sets = Strategy("A", (Stage(("A",), (0, 1, 2)),)), 200
     # The third column is the first but for parts from 1e-4 to 1e-9, on either side of the largest condition.
-    regressor = rng.standard_normal((6, 3, 2, sets))
-    regressor[:, 2] = regressor[:, 0] + np.logspace(-9, -4, sets) * regressor[:, 2]
-    measurements = {"A": Measurements(regressor, np.zeros((6, 2, sets)))}
-    triangles = estimate_compliance(strategy, measurements, 3)[1]
-    unknown = np.isnan(condition_numbers(strategy, measurements, triangles))
-    assert 0 < unknown.sum() < unknown.size
-    np.testing.assert_array_equal(undetermined(strategy, 6, triangles), unknown)
+    matrix = rng.standard_normal((6, 3, 2, sets))
+    matrix[:, 2] = matrix[:, 0] + np.logspace(-9, -4, sets) * matrix[:, 2]
+    triangles = estimate_compliance(strategy, {"A": Measurements(matrix, np.zeros((6, 2, sets)))}, 3)[1]
+    found = undetermined(strategy, 6, triangles)
+    for length in (1, 2):
+        conditions = np.array([np.linalg.cond(np.moveaxis(matrix[:, :, :length, s], 2, 0).reshape(-1, 3)) for s in range(sets)])
+        clear = np.abs(np.log(conditions / LARGEST_CONDITION)) > 0.1
+        np.testing.assert_array_equal(found[length - 1][clear], (conditions > LARGEST_CONDITION)[clear])
+        assert 0 < found[length - 1].sum() < sets
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_estimates_of_every_prefix_are_numpy_least_squares_of_its_measurements(kuka, strategies, rows):
+    moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka, sets=3)
+    deflections = deflections_of(moved, experiments, noise=2e-4)
+    table = identified(moved, strategies["3+6DoF-comb"], experiments, deflections, rows)
+    matrices = {name: pinocchio_regressors(moved.chain, experiments[0], name, rows=rows) for name in ("3DoF", "6DoF")}
+    matrices = {name: matrix.reshape(3, 4, rows, 6) for name, matrix in matrices.items()}
+    measured = {name: to_deflections(deflections[name][0])[..., :rows] for name in matrices}
+    for length in (3, 4):
+        for number, found in enumerate(compliances(table, length)):
+            matrix = np.concatenate([matrices[name][number, :length].reshape(-1, 6) for name in matrices])
+            seen = np.concatenate([measured[name][number, :length].ravel() for name in matrices])
+            np.testing.assert_allclose(found, np.linalg.lstsq(matrix, seen, rcond=None)[0], rtol=1e-7)
+
+
+def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_after(kuka, strategies):
+    (experiments,) = experiments_of(kuka, sets=2)
+    # No load in the first configuration of one data set and the first two of the other.
+    empty = np.array([True, False, False, False, True, True, False, False])
+    for name in ("fx", "fy", "fz", "mx", "my", "mz"):
+        experiments[name] = np.where(empty, 0.0, experiments[name])
+    table = identified(kuka, strategies["6DoF"], [experiments], deflections_of(kuka, [experiments]))
+    for joint in range(1, 7):
+        np.testing.assert_array_equal(np.isnan(table[f"compliance_{joint}"]), empty)
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+@pytest.mark.parametrize("at", AT)
+def test_regressors_are_those_of_equation_10_by_pinocchio(at, rows):
+    robot = robot_of(OTHER_CHAINS["seven joints"])
+    (block,) = experiments_of(robot, sets=2, configurations=3)
+    regressors = regressors_of(to_experiments(block), robot.chain, ("elbow", "flange"), rows, at)
+    assert set(regressors) == {"elbow", "flange"}
+    for name, found in regressors.items():
+        assert found.shape == (rows, 7, 3, 2)
+        expected = pinocchio_regressors(robot.chain, block, name, at, rows).reshape(2, 3, rows, 7)
+        np.testing.assert_allclose(found, expected.transpose(2, 3, 1, 0), rtol=0, atol=1e-9)

@@ -1,13 +1,9 @@
 """Data sets in memory are those of the pipeline, by number."""
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
 from made_studies import SIZE, USUAL
 from made_study_blocks import deflections_of, experiments_of, judge
 
-from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.in_memory import StudyInMemory
 from elastocal.study.metrics import position_errors
 from elastocal.study.simulation import to_deflections
@@ -23,6 +19,7 @@ def test_data_sets_of_studies_follow_on_each_other_without_overlap(kuka):
     whole = study_of(kuka).measure(np.arange(8), ("6DoF",))["6DoF"]
     np.testing.assert_array_equal(later.deflection, whole.deflection[..., 4:])
     assert len(np.unique(whole.deflection[0, 0])) == 8
+    assert [sets.tolist() for sets in study_of(kuka).blocks(2)] == [[8, 9, 10, 11]]
 
 
 def test_measurements_are_those_of_the_pipelines_steps(kuka):
@@ -34,15 +31,3 @@ def test_measurements_are_those_of_the_pipelines_steps(kuka):
 def test_the_score_sheet_of_the_study_of_the_tables_is_the_pipelines(kuka):
     found, models = study_of(kuka).judge(), 1.1 * kuka.compliance[None]
     np.testing.assert_allclose(position_errors(found, models), position_errors(judge(kuka), models), rtol=1e-9)
-
-
-@pytest.mark.parametrize("point", ["6DoF", "3DoF"])
-def test_a_reflector_is_a_target_that_the_point_carries(kuka, point):
-    offset, size = (0.1, -0.1, 0.05), replace(SIZE, noise=0.0)
-    carried = replace(USUAL, rows=3, reflectors_m=(offset, (0.0, 0.0, 0.0)))
-    found = StudyInMemory(kuka, "kuka", 1, carried, size).measure(np.arange(4), (point,))[point]
-    alone = StudyInMemory(with_target_offset(kuka, offset), "kuka", 1, replace(USUAL, rows=3), size)
-    expected = alone.measure(np.arange(4), (point,))[point]
-    np.testing.assert_allclose(found.deflection[:3], expected.deflection, atol=1e-12)
-    np.testing.assert_allclose(found.regressor[:3], expected.regressor, rtol=1e-9, atol=1e-9)
-    assert found.deflection.shape[0] == 6 and carried.independent_rows == 6

@@ -38,15 +38,6 @@ def test_columns_times_the_true_compliances_are_the_linear_deflection(kuka_exten
     np.testing.assert_allclose(columns @ found, expected, atol=1e-6 * np.abs(expected).max())
 
 
-def test_errors_of_products_are_those_of_the_rows(seen):
-    _, columns = seen
-    deflection = np.random.default_rng(1).standard_normal(columns.shape[:3])
-    coefficients = np.random.default_rng(2).standard_normal((3, columns.shape[-1]))
-    left = deflection - (columns @ coefficients[:, None, :, None])[..., 0]
-    found = products_of(columns, deflection).squared_error(coefficients)
-    np.testing.assert_allclose(found, (left**2).sum(axis=(1, 2)), rtol=1e-9)
-
-
 def test_cross_validation_is_that_of_fits_to_all_other_folds(kuka_extended, seen):
     """Joints alone, by numpy's least squares for each fold."""
     drawn, columns = seen
@@ -59,18 +50,6 @@ def test_cross_validation_is_that_of_fits_to_all_other_folds(kuka_extended, seen
         fitted = np.linalg.lstsq(left, deflection[0, inside].ravel(), rcond=None)[0]
         total += ((deflection[0, outside] - columns[0, outside][..., :6] @ fitted) ** 2).sum()
     assert found.cross_validated[0, 0] == pytest.approx(total, rel=1e-6)
-
-
-def test_each_step_adds_the_link_that_leaves_least_and_none_twice(kuka_extended, seen):
-    drawn, columns = seen
-    deflection = true_deflections(kuka_extended, drawn, kuka_extended.chain.end_effector, "end_effector")
-    links = len(kuka_extended.links)
-    found = ladder(folds_of(columns, deflection), 6, links)
-    assert (np.sort(found.order, axis=1) == np.arange(links)).all()
-    for number in range(links):
-        kept = np.concatenate([np.arange(6), 6 + 8 * number + np.arange(8)])
-        alone = ladder(folds_of(columns[..., kept], deflection), 6, 1)
-        assert (found.cross_validated[:, 1] <= alone.cross_validated[:, 1] * (1 + 1e-6)).all()
 
 
 def test_a_robot_with_one_yielding_link_gets_that_spring_first_and_nothing_of_worth_after(kuka_extended, seen):

@@ -4,18 +4,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_studies import USUAL
-from made_study_blocks import deflections_of, experiments_of, identified, judge
+from made_study_blocks import experiments_of, judge, pinocchio_regressors
 
-from elastocal.study.evaluation import bound_blocks
 from elastocal.study.in_memory import Size, StudyInMemory
-from elastocal.study.metrics import position_errors
 from elastocal.study.points import (
     break_even_table,
     budget_blocks,
-    budget_table,
     configurations_needed,
     lengths_table,
     paired_table,
+    ratio_of_roots,
     root_mean,
 )
 
@@ -46,10 +44,13 @@ def test_pairs_are_compared_data_set_by_data_set():
     assert (table.difference_um_std_error < 0.2 * 1e6 * alone).all()
 
 
-def test_data_sets_that_are_too_short_for_the_budget_have_no_row():
-    short = frame_of().query("length < 12")
-    assert paired_table({"arm": short}, POINT_SETS, 6).empty
-    assert set(budget_table({"arm": short}, POINT_SETS, 6).configurations) == {4, 6}
+def test_the_interval_of_a_ratio_is_that_of_the_bootstrap_over_data_sets():
+    """2,000 replicates: its ends are known to 3 %."""
+    rng = np.random.default_rng(4)
+    ours, theirs = rng.chisquare(5, (2, 200))
+    drawn = rng.integers(0, 200, (2000, 200))
+    expected = np.quantile(np.sqrt(ours[drawn].mean(axis=1) / theirs[drawn].mean(axis=1)), [0.025, 0.975])
+    assert ratio_of_roots(ours, theirs)[1:] == pytest.approx(expected, rel=0.02)
 
 
 def test_lengths_are_exact_with_an_interval():
@@ -126,21 +127,15 @@ def found(kuka):
     return {block["points"]: {name: block[name].reshape(40, 6) for name in ("mean_square", "bound")} for block in blocks}
 
 
-@pytest.mark.parametrize(("points", "strategy"), [("6DoF", "6DoF"), ("3+6DoF", "3+6DoF-comb")])
-def test_errors_are_those_of_the_strategy_that_measures_the_points_together(kuka, strategies, found, points, strategy):
-    experiments = experiments_of(kuka, 40, 6)
-    table = identified(kuka, strategies[strategy], experiments, deflections_of(kuka, experiments, 1e-5))
-    models = np.column_stack([table[f"compliance_{j}"] for j in range(1, 7)])[table["length"] == 6]
-    expected = (position_errors(judge(kuka), models) ** 2).mean(axis=1)
-    np.testing.assert_allclose(found[points]["mean_square"][:, 5], expected, rtol=1e-6)
-
-
-def test_bounds_are_those_of_the_pipeline(kuka, found):
-    sets = [("6DoF",), ("3DoF", "6DoF")]
-    blocks = bound_blocks(experiments_of(kuka, 40, 6), kuka.chain, sets, 6, "end_effector", judge(kuka))
-    expected = {block["points"]: block["rms_per_noise"] for block in blocks}
-    for ours, theirs in (("6DoF", "6DoF"), ("3+6DoF", "3DoF+6DoF")):
-        np.testing.assert_allclose(np.sqrt(found[ours]["bound"].mean(axis=0))[2:], 1e-5 * expected[theirs][2:], rtol=1e-8)
+@pytest.mark.parametrize(("points", "names"), [("6DoF", ["6DoF"]), ("3+6DoF", ["3DoF", "6DoF"])])
+def test_bounds_are_traces_with_inverses_of_pinocchios_information(kuka, found, points, names):
+    (block,) = experiments_of(kuka, 40, 6)
+    moment = judge(kuka).form[:-1, :-1]
+    parts = [pinocchio_regressors(kuka.chain, block, name).reshape(40, 6, 6, 6) for name in names]
+    for number, length in ((0, 6), (7, 3), (39, 1)):
+        matrix = np.concatenate([part[number, :length].reshape(-1, 6) for part in parts])
+        expected = 1e-10 * np.trace(moment @ np.linalg.inv(matrix.T @ matrix))
+        assert found[points]["bound"][number, length - 1] == pytest.approx(expected, rel=1e-5)
 
 
 def test_a_point_measured_twice_has_half_the_variance_and_noise_of_its_own(found):

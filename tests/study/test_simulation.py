@@ -7,7 +7,7 @@ import pytest
 from made_study_blocks import AT, WRENCH, deflections_of, experiments_of, identified, joined
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
-from support import OTHER_CHAINS, PinocchioPoint, random_loads, robot_of, without_tool
+from support import OTHER_CHAINS, PinocchioPoint, robot_of, without_tool
 
 from elastocal.mechanics.kinematics import poses
 from elastocal.study import simulation
@@ -21,14 +21,10 @@ from elastocal.study.simulation import (
     bootstrap_weights,
     data_sets,
     deflection_columns,
-    experiment_columns,
-    experiments,
     ideal_blocks,
-    measured_blocks,
     measurement_noise,
     random_experiments,
     to_deflections,
-    to_experiments,
     weight_blocks,
 )
 
@@ -58,17 +54,13 @@ def test_forces_are_uniform_on_the_sphere(kuka):
     np.testing.assert_allclose((direction**4).mean(axis=0), 1 / 5, atol=five_sigma * np.sqrt(1 / 9 - 1 / 25))
 
 
-def test_joint_angles_are_uniform_over_the_full_turn(kuka):
-    angles = draw(kuka, data_sets=range(10), configurations=500).joint_angles.reshape(-1, 6)
-    # Of 5,000 it sees 0.05 anywhere with a power of 0.99.
-    for joint in angles.T:
-        assert kstest(joint, "uniform", (-np.pi, 2 * np.pi)).pvalue > 1e-4
-
-
-def test_joint_angles_are_uniform_within_the_limits(fanuc):
-    loading = replace(PAPER, joint_range="limits")
+@pytest.mark.parametrize("joint_range", ["full_turn", "limits"])
+def test_joint_angles_are_uniform_over_the_full_turn_or_within_the_limits(fanuc, joint_range):
+    loading = replace(PAPER, joint_range=joint_range)
     angles = draw(fanuc, loading, data_sets=range(10), configurations=500).joint_angles.reshape(-1, 6)
-    for joint, (low, high) in zip(angles.T, fanuc.joint_limits, strict=True):
+    ranges = fanuc.joint_limits if joint_range == "limits" else [(-np.pi, np.pi)] * 6
+    # Of 5,000 it sees 0.05 anywhere with a power of 0.99.
+    for joint, (low, high) in zip(angles.T, ranges, strict=True):
         assert kstest(joint, "uniform", (low, high - low)).pvalue > 1e-4
         assert low <= joint.min() and joint.max() <= high
 
@@ -97,14 +89,6 @@ def test_numbers_of_a_data_set_do_not_depend_on_how_many_there_are_or_how_long_t
         np.testing.assert_array_equal(many[name][shared], values)
 
 
-@pytest.mark.parametrize(("size", "expected"), [(2, [[0, 1], [2, 3], [4]]), (5, [[0, 1, 2, 3, 4]]), (9, [[0, 1, 2, 3, 4]])])
-def test_blocks_are_full_but_for_the_last_and_hold_each_data_set_once(kuka, monkeypatch, size, expected):
-    monkeypatch.setattr(simulation, "SETS_PER_BLOCK", size)
-    found = experiments_of(kuka, sets=5, configurations=3)
-    assert [block["data_set"].tolist() for block in found] == [np.repeat(sets, 3).tolist() for sets in expected]
-    assert all(block["configuration"].tolist() == [0, 1, 2] * len(sets) for block, sets in zip(found, expected, strict=True))
-
-
 @pytest.mark.parametrize("at", AT)
 @pytest.mark.parametrize("name", ["three joints", "fixed rotations"])
 def test_ideal_deflections_are_the_poses_by_pinocchio_with_the_joints_yielded(name, at):
@@ -127,14 +111,6 @@ def test_ideal_deflections_are_the_poses_by_pinocchio_with_the_joints_yielded(na
             np.testing.assert_allclose(row, [*(after - before), *turn], rtol=0, atol=1e-12)
 
 
-COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
-
-
-def make_zeros(sets, configurations):
-    columns = deflection_columns("6DoF", sets, np.zeros((len(sets), configurations, 6)))
-    return columns | {"point": np.full(len(columns["data_set"]), "6DoF", dtype=object)}
-
-
 def test_measurements_are_ideal_plus_scaled_noise_of_each_point(kuka):
     experiments = experiments_of(kuka)
     ideal = deflections_of(kuka, experiments)
@@ -144,24 +120,6 @@ def test_measurements_are_ideal_plus_scaled_noise_of_each_point(kuka):
             error = to_deflections(measured[name][0]) - to_deflections(ideal[name][0])
             expected = noise * measurement_noise(1, "kuka", name, range(5), 4)
             np.testing.assert_allclose(error, expected, rtol=0, atol=1e-15)
-
-
-def test_noise_of_a_data_set_is_the_same_in_whatever_block_it_stands():
-    (whole,) = measured_blocks([make_zeros(range(4), 3)], "kuka", 1, 1e-4)
-    parts = list(measured_blocks([make_zeros([0], 3), make_zeros([1, 2, 3], 3)], "kuka", 1, 1e-4))
-    for name in COMPONENTS:
-        np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), whole[name])
-
-
-def test_experiments_come_back_as_they_were():
-    for text in OTHER_CHAINS.values():
-        robot = robot_of(text)
-        loads = random_loads(robot, 2, 3)
-        columns = experiment_columns([0, 1], loads)
-        assert set(columns) == {column.name for column in experiments(robot.joints).columns}
-        back = to_experiments(columns)
-        np.testing.assert_array_equal(back.joint_angles, loads.joint_angles)
-        np.testing.assert_array_equal(back.wrench, loads.wrench)
 
 
 def test_deflections_come_back_as_they_were():
@@ -188,17 +146,6 @@ def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatc
         assert [block["members"] for block in sets] == [DATA_SETS] * -(-5 // size) and tests["members"] == TESTS
         np.testing.assert_array_equal(np.hstack([to_weights(b) for b in sets]), bootstrap_weights(1, "kuka", range(5), 4))
         assert to_weights(tests).shape == (5, 7)
-
-
-def test_data_sets_count_once_on_average_and_independently_of_the_tests():
-    sets, tests = (to_weights(block)[1:] for block in weight_blocks("kuka", 1, 400, 400, 50))
-    # 20 000 Poisson counts of mean and variance one: five standard errors, a level of 1e-6 for each of two means and variances;
-    # a mean or variance off by 8 % is seen with power above 0.99.
-    for counts in (sets, tests):
-        assert abs(counts.mean() - 1) < 5 / np.sqrt(counts.size)
-        assert abs(counts.var() - 1) < 5 * np.sqrt(3 / counts.size)
-    # Uncorrelated: at a level of 1e-6.
-    assert abs(np.corrcoef(sets.ravel(), tests.ravel())[0, 1]) < 5 / np.sqrt(sets.size)
 
 
 def test_numbers_do_not_depend_on_blocks(kuka, strategies, monkeypatch):

@@ -1,11 +1,10 @@
 """Tables, against hand calculations."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from made_metrics import metrics_of, replicates_of
 
-from elastocal.study.tables import merge_errors, per_dataset_table, table4, word_value
+from elastocal.study.tables import merge_errors, table4, word_value
 
 
 def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law_it_follows():
@@ -21,19 +20,6 @@ def test_lengths_of_table4_are_those_of_its_own_limits_each_between_two_lengths(
     # Replicates of 36, 40 and 44 %.
     assert table.n_k_sigma_3_percent_std_error == pytest.approx(np.std([12, 14, 15], ddof=1))
     assert table.n_dev_7_um_std_error == pytest.approx(np.std([6, 6, 7], ddof=1))
-
-
-def test_efficiency_is_the_squared_ratio_of_bound_and_error_and_is_empty_without_noise():
-    accuracy = pd.DataFrame({"robot": "arm", "strategy": "A", "noise_um": [0.0, 100.0], "length": 20})
-    for name in ("mean", "rms", "p95", "max"):
-        accuracy[name], accuracy[f"{name}_std_error"] = 80e-6, 4e-6
-    accuracy["relative_error_1"], accuracy["relative_error_1_std_error"] = 3.0, 0.1
-    bounds = {"arm": pd.DataFrame({"points": ["2DoF+6DoF", "6DoF"], "length": 20, "rms_per_noise": [0.4, 9.0]})}
-    table = per_dataset_table(accuracy, bounds, {"A": ("6DoF", "2DoF")})
-    assert table.crlb_rms_um.tolist() == pytest.approx([0.0, 40.0])
-    assert np.isnan(table.efficiency[0]) and table.efficiency[1] == pytest.approx(0.25)
-    assert table.efficiency_std_error[1] == pytest.approx(2 * 0.25 * 4 / 80)
-    assert {"length", "relative_error_1_percent", "relative_error_1_percent_std_error"} <= set(table)
 
 
 @pytest.mark.parametrize(

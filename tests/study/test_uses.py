@@ -10,7 +10,7 @@ from elastocal.application.inverse_kinematics import find_beyond_limits
 from elastocal.mechanics.kinematics import poses
 from elastocal.study.in_memory import Size, StudyInMemory
 from elastocal.study.metrics import position_errors
-from elastocal.study.uses import REFERENCE, Score, iso_9283, milling_path, pairs_table, ranks_table, scores, use_blocks
+from elastocal.study.uses import REFERENCE, iso_9283, milling_path, pairs_table, ranks_table, scores, use_blocks
 
 CENTRE = (1.6, 0.0, 1.0)
 
@@ -113,25 +113,6 @@ def test_only_the_metric_that_puts_them_in_the_other_order_reverses(found):
     assert table[table.reversed].metric.tolist() == ["k_sigma_percent_fixed_joints"]
 
 
-def test_intervals_of_ratios_hold_the_ratio_of_the_population():
-    """Two independent strategies of ratio 1.5: 95 % of 100 intervals hold it; fewer than 88 % by chance in 1 of 500 tries."""
-    covered = dict.fromkeys((REFERENCE, "mean_um", "pooled_p95_um"), 0)
-    for seed in range(100):
-        one, other = uses_of("A", 75.0, 2 * seed), uses_of("B", 50.0, 2 * seed + 1)
-        metrics, replicates = (pd.concat(parts) for parts in zip(average("A", 1, 1), average("B", 1, 1), strict=True))
-        found = scores(pd.concat([one, other]), metrics, replicates, LENGTH)
-        for metric in covered:
-            _, low, high = found[metric]["A"].ratio(found[metric]["B"])
-            covered[metric] += low < 1.5 < high
-    assert min(covered.values()) >= 88, covered
-
-
-def test_pairing_takes_out_what_strategies_share():
-    shared = np.random.default_rng(3).normal(size=100)
-    one, other = Score(2.0, shared, 0.1), Score(1.0, shared, 0.1)
-    assert one.ratio(other) == (2.0, 2.0, 2.0) and one.std_error() == pytest.approx(0.2 * shared.std(ddof=1))
-
-
 def test_metrics_at_places_that_a_robot_does_not_reach_are_left_out():
     uses = uses_of("A", 50.0).assign(iso_9283=np.nan)
     found = scores(uses, *average("A", 4.0, 4.0), LENGTH)
@@ -158,16 +139,3 @@ def test_errors_are_those_of_the_pipelines_estimates(kuka, strategies, tables, n
     np.testing.assert_allclose(found["mean"], errors.mean(axis=1), rtol=1e-6)
     np.testing.assert_allclose(found["mean_square"], (errors**2).mean(axis=1), rtol=1e-6)
     assert found.pooled_p95.unique() == pytest.approx([np.quantile(errors, 0.95)], rel=1e-6)
-
-
-def test_influence_values_give_the_standard_error_of_the_pooled_percentile(tables):
-    """Against the bootstrap over data sets, whose own error is 5 % with 200 replicates; the density is rough with 40 sets."""
-    influence = tables["6DoF"].pooled_p95_influence
-    assert abs(influence.mean()) < 0.2 * influence.std()
-    assert 0.01 < influence.std() / np.sqrt(40) / tables["6DoF"].pooled_p95[0] < 0.2
-
-
-def test_a_robot_that_does_not_reach_has_no_errors_there(kuka, strategies):
-    study = StudyInMemory(kuka, "kuka", 1, USUAL, Size(data_sets=3, configurations=10, tests=30, noise=1e-5))
-    (block,) = use_blocks(study, [strategies["6DoF"]], USES | {"centre_m": (9.0, 0.0, 1.0)})
-    assert np.isnan(block["iso_9283"]).all() and np.isnan(block["path_max"]).all() and (block["mean"] > 0).all()

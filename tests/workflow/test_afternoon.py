@@ -27,7 +27,8 @@ def named(words):
     return " ".join(words[:2]) if words[0] == "import" else words[0]
 
 
-def test_each_command_of_the_readme_is_run_by_the_script():
+def test_each_command_and_option_of_the_readme_is_one_of_the_script():
+    """What the script adds is for the stand-in; what README shows is nowhere made up."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8").split(SECTION)[1].split("\n## ")[0]
     script = (ROOT / "workflow" / "examples" / "afternoon.sh").read_text(encoding="utf-8")
     shown, run = commands(readme), commands(script)
@@ -37,16 +38,10 @@ def test_each_command_of_the_readme_is_run_by_the_script():
     assert order.index("plan") < order.index("check") < order.index("diagnose") < order.index("correct")
     known = {command.callback.__name__ for command in app.registered_commands}
     assert {name for name in map(named, shown) if " " not in name} <= known
-
-
-def test_options_of_the_readme_are_those_of_the_script():
-    """What the script adds is for the stand-in; what README shows is nowhere made up."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8").split(SECTION)[1].split("\n## ")[0]
-    script = (ROOT / "workflow" / "examples" / "afternoon.sh").read_text(encoding="utf-8")
-    used = {named(words): set() for words in commands(script)}
-    for words in commands(script):
+    used = {named(words): set() for words in run}
+    for words in run:
         used[named(words)] |= {word for word in words if word.startswith("--")}
-    for words in commands(readme):
+    for words in shown:
         assert {word for word in words if word.startswith("--")} <= used[named(words)], words
 
 

@@ -40,16 +40,6 @@ def test_a_small_setting_has_a_ratio_for_each_row_and_touches_no_report(name, sm
     assert report() == before
 
 
-def test_every_module_with_rows_is_a_benchmark_that_runs():
-    modules = {path.stem for path in BENCHMARKS.glob("*.py") if "\ndef rows(" in path.read_text(encoding="utf-8")}
-    assert modules == set(RUN["NAMES"])
-
-
-def test_the_coverage_of_intervals_has_a_line_for_each_kind_and_number_of_poses():
-    lines = ended("interval_coverage.py", "--campaigns", "1").splitlines()
-    assert lines[0].startswith("| errors | poses |") and len(lines) == 2 + 4 * 3
-
-
 def test_the_cost_of_a_finished_run_is_stated(small_study, tmp_path):
     proof = tmp_path / "proof"
     shutil.copytree(small_study.path("results/timings"), proof / "results" / "timings")

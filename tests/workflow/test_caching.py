@@ -123,12 +123,6 @@ def test_what_is_added_runs_no_job_of_what_is_there(finished_paper):
     assert {value for job in planned for value in job} >= new
 
 
-def test_more_data_sets_rerun_their_draws_but_not_those_of_the_test(finished_paper, every_job):
-    finished_paper.configure({"data_sets": 21})
-    planned = of_the_grid(finished_paper.planned(PAPER))
-    assert planned == {job for job in every_job if "/test" not in job} != every_job
-
-
 def test_every_script_is_of_a_rule_and_a_rule_watches_the_sources_of_its_own():
     """`complete_rules` gives them to each rule that names none; that of a named step watches the function that it calls."""
     seen = []

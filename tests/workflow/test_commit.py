@@ -23,20 +23,12 @@ def checkout(tmp_path):
     return tmp_path
 
 
-def test_a_clean_checkout_is_its_commit(checkout):
+@pytest.mark.parametrize(("edited", "ending"), [("notes.md", ""), ("Snakefile", "-dirty"), ("src/new.py", "-dirty")])
+def test_a_checkout_is_its_commit_with_a_word_behind_it_where_a_source_is_edited_or_new(checkout, edited, ending):
     assert commit_of(checkout, ["Snakefile", "src"]) == git(checkout, "rev-parse", "HEAD")
-
-
-@pytest.mark.parametrize("name", ["Snakefile", "src/new.py"])
-def test_an_edited_or_new_source_is_said_behind_it(checkout, name):
-    (checkout / name).parent.mkdir(exist_ok=True)
-    (checkout / name).write_text("b\n")
-    assert commit_of(checkout, ["Snakefile", "src"]) == git(checkout, "rev-parse", "HEAD") + "-dirty"
-
-
-def test_an_edited_page_is_no_edited_source(checkout):
-    (checkout / "notes.md").write_text("b\n")
-    assert not commit_of(checkout, ["Snakefile", "src"]).endswith("-dirty")
+    (checkout / edited).parent.mkdir(exist_ok=True)
+    (checkout / edited).write_text("b\n")
+    assert commit_of(checkout, ["Snakefile", "src"]) == git(checkout, "rev-parse", "HEAD") + ending
 
 
 def test_sources_inside_of_another_repository_have_no_commit_nor_have_those_without_one_or_without_git(checkout, monkeypatch):

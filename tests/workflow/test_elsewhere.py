@@ -4,18 +4,7 @@ import re
 
 from snakemake_starts import started
 
-TARGETS = (
-    "paper",
-    "study",
-    "extended_study",
-    "loop",
-    "measured",
-    "league",
-    "blind",
-    "closed_loop",
-    "bad_rows",
-    "audit",
-)
+TARGETS = ["paper", "study", "loop", "measured", "league", "blind", "closed_loop", "audit"]
 
 
 def test_every_target_finds_its_sources_and_its_jobs_can_be_grouped(unstarted, tmp_path):
@@ -32,5 +21,5 @@ def test_every_target_finds_its_sources_and_its_jobs_can_be_grouped(unstarted, t
 def test_the_paper_is_its_tables_and_figures_alone(paper):
     rules = {job[0] for job in paper.planned("paper", "--forceall")}
     assert {"typeset_table", "tabulate_strategies", "draw_noise_impact", "draw_deviations", "draw_scheme"} <= rules
-    beyond = {"repeat_studies", "compare_point_sets", "judge_claims", "diagnose_campaign", "simulate_designs"}
+    beyond = {"repeat_studies", "compare_point_sets", "compare_with_studies", "diagnose_campaign", "simulate_designs"}
     assert not rules & beyond

@@ -17,19 +17,15 @@ IDENTIFIED = "results/identified/kuka/200um/6DoF.parquet"
 SECOND_SEED = "seed: 1\nseed: 2\n"
 
 
-def _typing_error(study):
-    study.replace("config.yaml", "data_sets:", "data_set:")
-
-
-def _unknown_point(study):
-    study.replace("config/strategies/6DoF.yaml", "[6DoF]", "[7DoF]")
-
-
 # Of each door one: the schema, a strategy, the command line, a further file. The rest is in tests/study/test_configuration.py.
 FAULTS = {
-    "a key": (_typing_error, (), ["config.yaml: ", "data_set: ", "allowed: 'data_sets'?"]),
+    "a key": (
+        lambda study: study.replace("config.yaml", "data_sets:", "data_set:"),
+        (),
+        ["config.yaml: ", "data_set: ", "allowed: 'data_sets'?"],
+    ),
     "a strategy": (
-        _unknown_point,
+        lambda study: study.replace("config/strategies/6DoF.yaml", "[6DoF]", "[7DoF]"),
         (),
         ["config/strategies/6DoF.yaml: stages[0].points: ", "'7DoF'"],
     ),
@@ -82,15 +78,6 @@ def test_two_runs_of_the_same_files_are_refused_in_one_line(unstarted):
     assert ended.returncode != 0
     last = ended.stderr.splitlines()[-1]
     assert last == "snakemake: found another run at work on the same files; allowed: the same command once that one has ended"
-
-
-def test_what_stands_in_a_folder_of_the_pipeline_and_is_no_file_is_refused_before_any_job(unstarted, tmp_path):
-    place = unstarted.path("results/logs/measure/kuka/200um.log")
-    place.parent.mkdir(parents=True)
-    place.symlink_to(tmp_path / "victim")
-    last = unstarted.snakemake("-j1", MEASURED).stderr.splitlines()[-1]
-    assert last.startswith(f"{place.relative_to(unstarted.folder)}: found a link; allowed: a place for a file")
-    assert place.is_symlink() and not unstarted.path(MEASURED).exists()
 
 
 def test_at_every_name_of_a_finished_study_a_link_or_pipe_is_refused(finished_paper, tmp_path, monkeypatch):

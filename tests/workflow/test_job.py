@@ -84,12 +84,6 @@ def test_the_log_holds_the_traceback_of_anything_else(job, fault):
     assert "Traceback" in log(job) and type(fault).__name__ in log(job).splitlines()[-1]
 
 
-def test_a_log_that_cannot_be_written_hides_no_fault(job):
-    job.log = ["nowhere/b.log"]
-    with pytest.raises(SystemExit, match="found x"):
-        run(lambda _: (_ for _ in ()).throw(InputError("a", "", "x", "y")), job)
-
-
 def test_a_job_that_ended_well_leaves_a_record_of_what_it_read_and_wrote_when_and_from_what(job):
     run(copied, job)
     record = json.loads(Path("results/records/results/b.csv.json").read_text(encoding="utf-8"))

@@ -12,10 +12,9 @@ from made_folders import made_folder, made_table
 from study_folder import Study
 from typer.testing import CliRunner
 
-from elastocal.command.main import app
 from elastocal.command.pipeline import diagnosed_campaign
+from elastocal.command.main import app
 from elastocal.errors import InputError
-from elastocal.mechanics.components import COMPONENTS
 
 CELL = "cells/made"
 OWN = ("diagnose", "--config", f"campaign={CELL}")
@@ -61,40 +60,9 @@ def test_verdict_has_every_key_of_the_contract(diagnosed):
     (effect,) = verdict["effects"]
     assert (effect["name"], effect["family"], effect["joints"], effect["alternatives"]) == ("joint_offset", "geometry", [3], [])
     assert effect["locations"][0]["location"] == "joint 3" and 0.9 < effect["probability"] < 1 + 1e-9
-    assert 0 < effect["p_value"] < 0.05 and 0 < effect["heldout_gain"] < 1 and effect["angle_to_nearest_deg"] >= 0
+    assert 0 < effect["p_value"] < 0.05 and 0 < effect["heldout_gain"] < 1
     (parameter,) = effect["parameters"]
     assert parameter["unit"] == "rad" and abs(parameter["value"] - OFFSET) < 5 * parameter["std_error"]
-
-
-def test_every_file_of_the_contract_is_there(diagnosed, kuka):
-    table = pd.read_csv(diagnosed.path(CELL) / "measurements.csv")
-    steps = pd.read_csv(report(diagnosed, "before_after.csv"))
-    assert steps.kind.tolist() == ["frames", "declared", "effect"]
-    for metric in ("mean", "rms", "p95", "max"):
-        assert {f"train_{metric}_m", f"heldout_{metric}_m"} <= set(steps.columns)
-        assert any(column.startswith("heldout_") and f"{metric}_over_floor" in column for column in steps.columns)
-    splits = pd.read_csv(report(diagnosed, "splits.csv"))
-    assert splits.split.tolist() == ["held out", *["joint space"] * 5] and splits.block[0] == "all"
-    assert splits.after_rms_m[0] == pytest.approx(steps.set_index("kind").loc["effect", "heldout_rms_m"])
-    residuals = pq.ParquetFile(report(diagnosed, "residuals.parquet")).read().to_pandas()
-    assert len(residuals) == len(table) and sorted(residuals.row) == list(range(1, len(table) + 1))
-    assert {f"{stage}_{name}" for stage in ("before", "after") for name, *_ in COMPONENTS} <= set(residuals.columns)
-    candidates = pq.ParquetFile(report(diagnosed, "candidates.parquet")).read().to_pandas()
-    assert {"log_bayes_factor", "probability", "angle_deg", "noncentrality", "note"} <= set(candidates.columns)
-    assert candidates.candidate[candidates.chosen].tolist() == ["joint_offset@3"]
-    # Nothing is confounded: there is nothing to measure.
-    proposed = pd.read_csv(report(diagnosed, "next_experiment.csv"))
-    assert len(proposed) == 0 and {"pose", "point", "q1", "q6", "fx", "mz"} <= set(proposed.columns)
-
-
-def test_residuals_and_figures_agree(diagnosed):
-    """Held-out figures are those of the residuals of the single measurements, but for the repeats that they average."""
-    residuals = pq.ParquetFile(report(diagnosed, "residuals.parquet")).read().to_pandas().query("held_out")
-    steps = pd.read_csv(report(diagnosed, "before_after.csv")).set_index("kind")
-    for stage, kind in (("before", "declared"), ("after", "effect")):
-        mean = residuals.groupby(["pose", "load", "target"])[[f"{stage}_d{axis}" for axis in "xyz"]].mean()
-        rms = np.sqrt((mean.to_numpy() ** 2).sum(axis=1).mean())
-        assert steps.loc[kind, "heldout_rms_m"] == pytest.approx(rms, rel=1e-6)
 
 
 # What each needs besides a campaign, and would write.
@@ -117,7 +85,7 @@ def files_behind_the_report(study):
 def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(cell, monkeypatch):
     """In one line, before it writes: edited and deleted, and by the commands, in turn."""
     files = files_behind_the_report(cell)
-    assert {name.split("/")[0] for name in files} == {"cells", "results", "reports", "src", "config"} and len(files) > 50
+    assert {name.split("/")[0] for name in files} == {"cells", "results", "reports", "src", "config"} and len(files) > 40
     monkeypatch.chdir(cell.folder)
     assert diagnosed_campaign(Path(CELL)).name == "made"
     for number, name in enumerate(files):
@@ -149,16 +117,6 @@ def test_no_step_before_the_judgement_reads_held_out_poses(diagnosed):
 
 def rules_of(planned):
     return {job[0] for job in planned}
-
-
-def test_another_seed_of_the_held_out_poses_reruns_the_campaign_and_nothing_of_the_study(cell):
-    file = cell.path(CELL) / "campaign.yaml"
-    document = yaml.safe_load(file.read_text(encoding="utf-8"))
-    file.write_text(yaml.safe_dump(document | {"holdout": {"fraction": 0.3, "seed": 2}}), encoding="utf-8")
-    planned = cell.planned(OF_THE_STUDY, *OWN)
-    assert rules_of(planned) >= {*STEPS, "diagnose"}
-    assert {job[1] for job in planned if len(job) > 1} == {"made"}
-    assert "simulate" not in rules_of(planned) and "measure" not in rules_of(planned)
 
 
 # Modules edited at once, the rules that run again, and those that do not.

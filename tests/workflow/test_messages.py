@@ -39,14 +39,6 @@ def test_the_log_of_a_script_that_fails_while_it_imports_says_why(finished_paper
     assert log[0].startswith("Traceback") and log[-1] == last
 
 
-def test_a_source_that_is_no_python_is_one_line(unstarted):
-    unstarted.append("workflow/scripts/run_step.py", "half = (\n")
-    ended = unstarted.snakemake("-j1", IDENTIFIED)
-    last = ended.stderr.splitlines()[-1]
-    assert ended.returncode != 0 and "workflow/scripts/run_step.py: line " in last and last.endswith("; allowed: Python")
-    assert "Traceback" not in ended.stderr
-
-
 def test_a_script_that_is_ended_before_it_begins_has_no_log_and_is_said_to_have_none(finished_paper):
     finished_paper.replace(
         "workflow/scripts/typeset_table.py", "from job import Job, origin_of, run\n", "import os\n\nos._exit(9)\n"

@@ -42,19 +42,11 @@ def first_data_sets(path):
 
 
 @pytest.mark.slow
-def test_one_core_and_two_make_the_same_reports(paper, serial_study):
-    names = serial_study.files(*REPORTS)
-    assert {"reports/tables/table4.csv", *SOME} <= set(names)
-    differing = [name for name in names if paper.path(name).read_bytes() != serial_study.path(name).read_bytes()]
-    assert differing == []
-
-
-@pytest.mark.slow
-def test_one_core_and_two_make_the_same_data(paper, serial_study):
-    names = serial_study.files("data/**/*.parquet", "results/**/*.parquet")
-    assert len(names) > 8
-    differing = [name for name in names if contents(paper.path(name)) != contents(serial_study.path(name))]
-    assert differing == []
+def test_one_core_and_two_make_the_same_reports_and_data(paper, serial_study):
+    names, data = serial_study.files(*REPORTS), serial_study.files("data/**/*.parquet", "results/**/*.parquet")
+    assert {"reports/tables/table4.csv", *SOME} <= set(names) and len(data) > 8
+    assert [name for name in names if paper.path(name).read_bytes() != serial_study.path(name).read_bytes()] == []
+    assert [name for name in data if contents(paper.path(name)) != contents(serial_study.path(name))] == []
 
 
 def test_every_figure_and_table_has_a_record_that_names_commit_configuration_and_seed(paper):

@@ -1,6 +1,5 @@
 """A finished run on an object store, for which moto stands in: what is fetched is whole; only what changed goes up again."""
 
-import os
 import subprocess
 import sys
 
@@ -12,13 +11,6 @@ from moto.server import ThreadedMotoServer
 pytestmark = pytest.mark.slow
 BUCKET, FOLDER, BLIND = "results", "of/study/", "of/blind/"
 STORE = ("store", "--config", f"store=s3://{BUCKET}/{FOLDER.rstrip('/')}")
-# Python imports this before all else: nothing finds the plugin.
-WITHOUT_PLUGIN = """
-import pkgutil, sys
-name, listed = "snakemake_storage_plugin_s3", pkgutil.iter_modules
-sys.modules[name] = None
-pkgutil.iter_modules = lambda *arguments: (found for found in listed(*arguments) if found.name != name)
-"""
 
 
 @pytest.fixture(scope="module")
@@ -117,20 +109,3 @@ def test_a_file_that_is_not_as_its_job_wrote_it_is_not_uploaded(study, bucket):
     assert done.returncode != 0
     assert study.path(f"results/logs/upload/{name}.log").read_text(encoding="utf-8").startswith(f"{name}: FAILED")
     assert name not in uploaded(bucket)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "refusal"),
-    [
-        ((), "store: found no object store; allowed: snakemake -j2 store --config store=s3://BUCKET/FOLDER"),
-        (STORE[1:], "store: found no snakemake-storage-plugin-s3; allowed: after make .venv/ready-for-cluster"),
-    ],
-    ids=["no store", "no plugin"],
-)
-def test_one_line_says_what_the_target_lacks(arguments, refusal, study, tmp_path):
-    (tmp_path / "sitecustomize.py").write_text(WITHOUT_PLUGIN, encoding="utf-8")
-    command = study.command("-n", "store", *arguments)
-    command["env"] = command["env"] | {"PYTHONPATH": os.pathsep.join([str(tmp_path), command["env"]["PYTHONPATH"]])}
-    done = subprocess.run(**command, capture_output=True, text=True, timeout=HUNG_S)
-    assert done.returncode != 0
-    assert done.stderr.splitlines()[-1] == refusal

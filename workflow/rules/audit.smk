@@ -13,8 +13,6 @@ AUDITED_TOO = {
     "league_small": "reports/league/small/league.csv",
     "blind": "reports/blind/summary.csv",
     "closed_loop": "reports/closed_loop/goals.csv",
-    "bad_rows": "reports/bad_rows/summary.csv",
-    "extended_study": "reports/tables/interpretations.csv",
 }
 
 

@@ -2,9 +2,7 @@
 
 `snakemake -j2 blind` makes the size quick; `--config blind=full` the whole; cases, sizes and targets stand in config/blind.yaml. Writes
 data/blind/, data/sealed/, results/blind/ and reports/blind/. What is sealed is read by seal_cases and, after the diagnosis, by
-oracle_cases, score_cases and score_follow_ups. The loop goes once more on cases that end in a class: propose, carry out on the same
-plant, diagnose anew, score (blind_follow_up). Rules of the analyst (diagnose_.., propose_..) run in processes of their own, which get
-campaigns and verdicts alone; carry_out_follow_ups finds the robot by the name of the case.
+oracle_cases and score_cases. diagnose_cases, the analyst, runs in processes of its own, which get campaigns alone.
 """
 
 from elastocal.io.documents import read_document
@@ -14,7 +12,7 @@ if config["blind"] not in PLAN["sizes"]:
     sys.exit(f"config.yaml: blind: found {config['blind']!r}; allowed: {', '.join(PLAN['sizes'])}")
 BLIND_SIZE = PLAN["sizes"][config["blind"]]
 # All that the cases follow from: another target or another size makes none anew.
-CASES = {key: PLAN[key] for key in ("tuned", "absent", "settings", "sweep", "limit")} | {"sizes": {config["blind"]: BLIND_SIZE}}
+CASES = {key: PLAN[key] for key in ("tuned", "absent", "settings", "limit")} | {"sizes": {config["blind"]: BLIND_SIZE}}
 BLIND = [f"{config['blind']}_{number + 1}" for number in range(BLIND_SIZE["blocks"])]
 BLIND_ROBOTS = list(dict.fromkeys(robot for part in BLIND_SIZE["parts"] for robot in part["robots"]))
 
@@ -113,7 +111,6 @@ rule score_cases:
         rates=shown(
             "reports/blind/rates.csv", "blind_power", "Blind proof", shows="Rates by group, truth and size", kind="table"
         ),
-        sweep=shown("reports/blind/sweep.csv", "blind_sweep", "Blind proof", shows="How near relatives are named", kind="table"),
         reliability="reports/blind/reliability.csv",
     log:
         "results/logs/score_cases.log",
@@ -197,96 +194,8 @@ rule blind_pictures:
         "(cp {input.page} {output.page}; for one in {input.figures}; do cp $one docs/blind_$(basename $one); done) 2> {log}"
 
 
-rule propose_follow_ups:
-    input:
-        blind=rules.make_cases.output.blind,
-        verdicts=rules.diagnose_cases.output.verdicts,
-        sources=sources("elastocal_proof.blind.follow_up.propose_follow_ups"),
-    output:
-        proposals="results/blind/proposed/{block}.csv",
-    log:
-        "results/logs/propose_follow_ups/{block}.log",
-    benchmark:
-        "results/timings/propose_follow_ups/{block}.tsv"
-    params:
-        step="elastocal_proof.blind.follow_up.propose_follow_ups",
-        most=BLIND_SIZE["followed_up"],
-        seed=config["seed"],
-        robots=f"{CONFIG}/robots",
-    script:
-        "../scripts/run_step.py"
-
-
-rule carry_out_follow_ups:
-    input:
-        proposals=rules.propose_follow_ups.output.proposals,
-        robots=rules.make_cases.input.robots,
-        sources=sources("elastocal_proof.blind.carrying_out.carry_out_follow_ups"),
-    output:
-        campaigns=directory("data/follow_up/{block}"),
-    log:
-        "results/logs/carry_out_follow_ups/{block}.log",
-    benchmark:
-        "results/timings/carry_out_follow_ups/{block}.tsv"
-    params:
-        step="elastocal_proof.blind.carrying_out.carry_out_follow_ups",
-        plan=CASES,
-        size=config["blind"],
-        seed=config["seed"],
-    script:
-        "../scripts/run_step.py"
-
-
-rule diagnose_follow_ups:
-    input:
-        campaigns=rules.carry_out_follow_ups.output.campaigns,
-        sources=sources("elastocal_proof.blind.verdicts.diagnose_follow_ups"),
-    output:
-        verdicts="results/blind/follow_up/{block}.json",
-    log:
-        "results/logs/diagnose_follow_ups/{block}.log",
-    benchmark:
-        "results/timings/diagnose_follow_ups/{block}.tsv"
-    params:
-        step="elastocal_proof.blind.verdicts.diagnose_follow_ups",
-        seed=config["seed"],
-        robots=f"{CONFIG}/robots",
-    script:
-        "../scripts/run_step.py"
-
-
-rule score_follow_ups:
-    input:
-        sealed=expand(rules.make_cases.output.sealed, block=BLIND),
-        manifest=rules.seal_cases.output.manifest,
-        first=expand(rules.diagnose_cases.output.verdicts, block=BLIND),
-        proposals=expand(rules.propose_follow_ups.output.proposals, block=BLIND),
-        anew=expand(rules.diagnose_follow_ups.output.verdicts, block=BLIND),
-        sources=sources("elastocal_proof.blind.summary.score_follow_ups"),
-    output:
-        rates=shown(
-            "reports/blind/follow_up.csv", "blind_follow_up", "Blind proof", shows="Names after further poses", kind="table"
-        ),
-        cases="reports/blind/follow_up_cases.csv",
-    log:
-        "results/logs/score_follow_ups.log",
-    benchmark:
-        "results/timings/score_follow_ups.tsv"
-    params:
-        step="elastocal_proof.blind.summary.score_follow_ups",
-        plan=PLAN,
-    script:
-        "../scripts/run_step.py"
-
-
-rule blind_follow_up:
-    input:
-        rules.score_follow_ups.output,
-
-
 rule blind:
     input:
         rules.score_cases.output,
         rules.draw_blind.output,
         rules.write_blind_page.output,
-        rules.score_follow_ups.output if BLIND_SIZE["followed_up"] else [],

@@ -30,7 +30,7 @@ rule summarize_closed_loop:
     input:
         moved=expand(rules.close_loop.output.moved, robot=CLOSED_LOOP["robots"]),
         robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=CLOSED_LOOP["robots"]),
-        sources=sources("elastocal_proof.blind.closed_loop_summary.summarize_closed_loop"),
+        sources=sources("elastocal_proof.blind.closed_loop.summarize_closed_loop"),
     output:
         errors="reports/closed_loop/cases.csv",
         summary=shown(
@@ -46,7 +46,7 @@ rule summarize_closed_loop:
     benchmark:
         "results/timings/summarize_closed_loop.tsv"
     params:
-        step="elastocal_proof.blind.closed_loop_summary.summarize_closed_loop",
+        step="elastocal_proof.blind.closed_loop.summarize_closed_loop",
         robots=CLOSED_LOOP["robots"],
         seed=config["seed"],
     script:
@@ -99,7 +99,7 @@ rule state_accuracy:
 rule tabulate_coverage:
     input:
         stated=expand(rules.state_accuracy.output.stated, robot=CLOSED_LOOP["robots"], frame=["base", "tracker"]),
-        sources=sources("elastocal_proof.blind.closed_loop_summary.tabulate_coverage"),
+        sources=sources("elastocal_proof.blind.closed_loop.tabulate_coverage"),
     output:
         cases="reports/closed_loop/stated.csv",
         coverage="reports/closed_loop/coverage.csv",
@@ -108,7 +108,7 @@ rule tabulate_coverage:
     benchmark:
         "results/timings/tabulate_coverage.tsv"
     params:
-        step="elastocal_proof.blind.closed_loop_summary.tabulate_coverage",
+        step="elastocal_proof.blind.closed_loop.tabulate_coverage",
     script:
         "../scripts/run_step.py"
 

@@ -11,10 +11,9 @@ from pathlib import Path
 import elastocal
 from snakemake.iocontainers import Wildcards
 
-from elastocal.campaigns.importers.catalogue import importer
+from elastocal.campaigns.importers import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
-from elastocal.counting import spell_count
 from elastocal.errors import InputError
 from elastocal.io.origin import Origin, configuration_sha256, environment
 from elastocal.io.provenance import SOURCES_DIGEST
@@ -104,8 +103,7 @@ NOISE = [f"{level:g}" for level in config["noise_um"]]
 TABLE_NOISE = f"{config['tables']['noise_um']:g}"
 CLASSICAL = config["tables"]["classical_strategy"]
 INTERPRETATIONS = config["interpretations"]
-# The interpretation of config.yaml among those of `switched`.
-USUAL = "as_configured"
+LOADING = config["loading"] | {key: INTERPRETATIONS[key] for key in ("offset_frame", "joint_range")}
 STUDY_SIZE = {
     "data_sets": config["data_sets"],
     "configurations": config["configurations"],
@@ -115,7 +113,7 @@ STUDY_SIZE = {
 # Keys of config.yaml that the files of study, loop and league depend on, and so their audit.
 AUDITED = [
     *("seed", "robots", "strategies", "noise_um", "data_sets", "configurations", "test_configurations", "loading"),
-    *("interpretations", "switched", "identification", "evaluation", "tables", "questions", "loop", "league"),
+    *("interpretations", "evaluation", "tables", "questions", "loop", "league"),
 ]
 # Files that jobs make.
 MADE = re.compile("(data|results|reports)/")
@@ -242,30 +240,17 @@ def strategy_document(wildcards):
     return STUDY.strategies[wildcards.strategy]
 
 
-def loading_of(interpretations):
-    return config["loading"] | {key: interpretations[key] for key in ("offset_frame", "joint_range")}
-
-
-def conventions_of(interpretations):
-    kept = {key: interpretations[key] for key in ("wrench_at", "average", "deviation_of")}
-    return kept | {"rows": rows_read(interpretations["measured"]), "reflectors_m": interpretations.get("reflectors_m", [])}
-
-
 def study_in_memory(**size):
     """What a script draws the study of a robot from: the robot, the seed, how the paper is read, the study's size."""
-
-    def parameters(wildcards):
-        read = INTERPRETATIONS | config["switched"].get(wildcards.get("interpretation", USUAL), {})
-        return {
-            "robot": robot_document(wildcards),
-            "seed": config["seed"],
-            "tool_offset_m": read["tool_offset_m"],
-            "loading": loading_of(read),
-            "interpretation": conventions_of(read),
-            "size": STUDY_SIZE | size,
-        }
-
-    return parameters
+    read = {key: INTERPRETATIONS[key] for key in ("wrench_at", "average")} | {"rows": rows_read(INTERPRETATIONS["measured"])}
+    return lambda wildcards: {
+        "robot": robot_document(wildcards),
+        "seed": config["seed"],
+        "tool_offset_m": INTERPRETATIONS["tool_offset_m"],
+        "loading": LOADING,
+        "interpretation": read,
+        "size": STUDY_SIZE | size,
+    }
 
 
 def cells(kind, robots, noise, strategies=config["strategies"]):
@@ -301,9 +286,9 @@ def files_of_campaign(campaign):
 
 
 def robots_of_import(wildcards):
-    """Files of the robots that an importer reads or names; importers are imported only where one is needed."""
-    source = importer(SOURCES[wildcards.campaign]["importer"], f"campaign {wildcards.campaign}")
-    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.ROBOTS)
+    """Files of the robots that an importer reads or names."""
+    source = importer(SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}")
+    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.all_robots)
 
 
 def loop_reports(campaigns):

@@ -11,18 +11,13 @@ SCHEME_ROBOTS |= {"figure3": (EXTENDED or REDUCED)[-1]}
 # Figures 5a and 5c show the first robot, 5b and 5d the second, as in the paper.
 STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
 DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
-BEST_TWO = [name for name in (CLASSICAL, "3+6DoF-comb") if name in config["strategies"]]
 PAPER_FIGURES = [*SCHEME_ROBOTS, "figure4", *(f"figure5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS))]
 FIGURES = [
     *PAPER_FIGURES,
-    "studies",
     "costs",
-    "bias_and_accuracy",
     "scores_against_paper",
     "ladder",
     "designs",
-    "arm_map",
-    "metrics",
 ]
 
 # Each other figure: its function, file, caption, category, what it shows, tables, settings.
@@ -32,18 +27,9 @@ DRAWN = {
         {"metrics": cells("metrics", REDUCED, NOISE, CLASSICAL)},
         {"strategy": NAMES[CLASSICAL], "titles": REDUCED_TITLES},
     ),
-    "draw_bias_and_accuracy": (
-        ("bias_and_accuracy", "bias_and_accuracy", "bias_and_accuracy", ABOUT, "What the paper's scores measure"),
-        {"metrics": cells("metrics", REDUCED, TABLE_NOISE, BEST_TWO), "per_dataset": rules.tabulate_accuracy.output.table},
-        {
-            "titles": REDUCED_TITLES,
-            "order": [NAMES[name] for name in BEST_TWO],
-            "accuracy_um": QUESTIONS["accuracies_um"][0],
-        },
-    ),
     "draw_scores": (
         ("scores", "scores_against_paper", "scores_against_paper", PAPER, "Table 4 against further studies"),
-        {"comparison": rules.compare_with_studies.output.table, "expectations": rules.tabulate_expectations.output.table},
+        {"comparison": rules.compare_with_studies.output.table},
         {"titles": REDUCED_TITLES},
     ),
     "draw_ladder": (
@@ -64,14 +50,6 @@ DRAWN = {
         ("costs", "costs", "costs", ABOUT, "Cost of an accuracy (RQ2)"),
         {"table": rules.tabulate_costs.output.costs, "break_even": rules.tabulate_costs.output.break_even},
         {"titles": REDUCED_TITLES, "accuracy_um": QUESTIONS["accuracies_um"][0]},
-    ),
-    "draw_studies": (
-        ("over_studies", "studies", "studies", PAPER, "Strategies over studies"),
-        {
-            "studies": expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
-            "printed": f"{CONFIG}/paper/reference.csv",
-        },
-        {"titles": REDUCED_TITLES, "order": list(NAMES.values())},
     ),
 }
 # Figures 5a and 5b, and 5c and 5d: their panels, function, caption, words, and the limit that they show.
@@ -97,28 +75,20 @@ for drawn, ((function, file, caption, category, words), tables, settings) in DRA
             drawn
         input:
             **tables,
-            sources=sources("draw_study.py"),
         output:
             pdf=f"reports/figures/{file}.pdf",
             png=shown(f"reports/figures/{file}.png", caption, category, shows=words, kind="figure"),
-        log:
-            f"results/logs/{drawn}/{file}.log",
-        benchmark:
-            f"results/timings/{drawn}/{file}.tsv"
         wildcard_constraints:
             panel="|".join(PANELS[drawn][0] if drawn in PANELS else ()) or "none",
         params:
             figure=function,
             tables=[*tables],
             settings=settings,
-            noise_um=config["tables"]["noise_um"],
         script:
             "../scripts/draw_study.py"
 
 
 rule draw_scheme:
-    input:
-        sources=sources("draw_scheme.py"),
     output:
         pdf="reports/figures/{scheme}.pdf",
         png=shown(
@@ -128,10 +98,6 @@ rule draw_scheme:
             shows="Figures 2 and 3: {scheme}",
             kind="figure",
         ),
-    log:
-        "results/logs/draw_scheme/{scheme}.log",
-    benchmark:
-        "results/timings/draw_scheme/{scheme}.tsv"
     wildcard_constraints:
         scheme="|".join(SCHEME_ROBOTS),
     params:
@@ -139,50 +105,3 @@ rule draw_scheme:
         scheme=lambda wildcards: "spring_scheme" if wildcards.scheme == "figure3" else "kinematic_scheme",
     script:
         "../scripts/draw_scheme.py"
-
-
-rule draw_arm_map:
-    input:
-        table=rules.tabulate_places.output.table,
-        sources=sources("draw_arm_map.py"),
-    output:
-        pdf="reports/figures/arm_map.pdf",
-        png=shown(
-            "reports/figures/arm_map.png",
-            "arm_map",
-            "Questions beyond the paper",
-            shows="A second target anywhere on the arm (RQ2)",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_arm_map.log",
-    benchmark:
-        "results/timings/draw_arm_map.tsv"
-    params:
-        robots={name: STUDY.robots[name] for name in REDUCED},
-        titles=REDUCED_TITLES,
-    script:
-        "../scripts/draw_arm_map.py"
-
-
-rule draw_metrics:
-    input:
-        table=rules.tabulate_uses.output.scores,
-        sources=sources("draw_metrics.py"),
-    output:
-        pdf="reports/figures/metrics.pdf",
-        png=shown(
-            "reports/figures/metrics.png",
-            "metrics",
-            "Questions beyond the paper",
-            shows="Metrics against one another (RQ4)",
-            kind="figure",
-        ),
-    log:
-        "results/logs/draw_metrics.log",
-    benchmark:
-        "results/timings/draw_metrics.tsv"
-    params:
-        titles=REDUCED_TITLES,
-    script:
-        "../scripts/draw_metrics.py"

@@ -1,43 +1,13 @@
-"""Estimates and their scores: each strategy on each robot at each noise level, its own job; and what is possible.
+"""Estimates and their scores: each strategy on each robot at each noise level, its own job.
 
-Needs data/simulated/. Writes results/design/{robot}/{strategy}.parquet, which holds for all noise levels,
-results/weights/{robot}.parquet, results/identified/, results/metrics/, results/replicates/ and results/accuracy/, each
-{robot}/{noise}um/{strategy}.parquet, and results/bounds/{robot}.parquet.
+Needs data/simulated/. Writes results/weights/{robot}.parquet, results/identified/, results/metrics/ and results/replicates/, each
+{robot}/{noise}um/{strategy}.parquet.
 """
 
 
-rule judge_design:
-    input:
-        experiments="data/simulated/{robot}/experiments.parquet",
-        sources=sources("elastocal.study.identify.judge_design"),
-    output:
-        design="results/design/{robot}/{strategy}.parquet",
-    log:
-        "results/logs/judge_design/{robot}/{strategy}.log",
-    benchmark:
-        "results/timings/judge_design/{robot}/{strategy}.tsv"
-    params:
-        step="elastocal.study.identify.judge_design",
-        chain=lambda wildcards: robot_document(wildcards)["chain"],
-        lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
-        strategy=strategy_document,
-        seed=config["seed"],
-        rows=rows_read(INTERPRETATIONS["measured"]),
-        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
-        wrench_at=INTERPRETATIONS["wrench_at"],
-    script:
-        "../scripts/run_step.py"
-
-
 rule draw_weights:
-    input:
-        sources=sources("elastocal.study.simulation.draw_weights"),
     output:
         weights="results/weights/{robot}.parquet",
-    log:
-        "results/logs/draw_weights/{robot}.log",
-    benchmark:
-        "results/timings/draw_weights/{robot}.tsv"
     params:
         step="elastocal.study.simulation.draw_weights",
         seed=config["seed"],
@@ -55,12 +25,10 @@ rule identify:
         weights=rules.draw_weights.output.weights,
         test_experiments="data/simulated/{robot}/test/experiments.parquet",
         test_ideal="data/simulated/{robot}/test/ideal.parquet",
-        sources=sources("elastocal.study.evaluation.identify"),
     output:
         identified="results/identified/{robot}/{noise}um/{strategy}.parquet",
         metrics="results/metrics/{robot}/{noise}um/{strategy}.parquet",
         replicates="results/replicates/{robot}/{noise}um/{strategy}.parquet",
-        accuracy="results/accuracy/{robot}/{noise}um/{strategy}.parquet",
     log:
         "results/logs/identify/{robot}/{noise}um/{strategy}.log",
     benchmark:
@@ -74,36 +42,5 @@ rule identify:
         tool_offset_m=INTERPRETATIONS["tool_offset_m"],
         wrench_at=INTERPRETATIONS["wrench_at"],
         average=INTERPRETATIONS["average"],
-        deviation_of=INTERPRETATIONS["deviation_of"],
-        lengths=config["evaluation"]["lengths"],
-        start=(
-            1e-6 * config["identification"]["start_urad_per_Nm"]
-            if config["identification"]["solver"] == "gauss_newton"
-            else None
-        ),
-    script:
-        "../scripts/run_step.py"
-
-
-rule bound:
-    input:
-        experiments="data/simulated/{robot}/experiments.parquet",
-        test_experiments="data/simulated/{robot}/test/experiments.parquet",
-        test_ideal="data/simulated/{robot}/test/ideal.parquet",
-        sources=sources("elastocal.study.evaluation.bound"),
-    output:
-        bounds="results/bounds/{robot}.parquet",
-    log:
-        "results/logs/bound/{robot}.log",
-    benchmark:
-        "results/timings/bound/{robot}.tsv"
-    params:
-        step="elastocal.study.evaluation.bound",
-        robot=robot_document,
-        point_sets=list(STUDY.points.values()),
-        seed=config["seed"],
-        rows=rows_read(INTERPRETATIONS["measured"]),
-        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
-        wrench_at=INTERPRETATIONS["wrench_at"],
     script:
         "../scripts/run_step.py"

@@ -88,7 +88,6 @@ rule tabulate_league:
         sources=sources("elastocal_proof.figures.league.tabulate_league"),
     output:
         league=shown("reports/league/{league}/league.csv", "league", "League", shows="Errors of all methods", kind="table"),
-        costs="reports/league/{league}/costs.csv",
         mechanisms="reports/league/{league}/mechanisms.csv",
         page="reports/league/{league}/league.md",
         picture_pdf="reports/league/{league}/league.pdf",
@@ -108,7 +107,6 @@ rule tabulate_league:
         entered=lambda wildcards: entry_keys(wildcards.league),
         rounds=lambda wildcards: rounds_of(wildcards.league),
         missing=lambda wildcards: missing_of(wildcards.league),
-        timings="results/timings",
         robots=lambda wildcards: LEAGUES[wildcards.league],
         reference=LEAGUE["reference"],
         methods=LEAGUE["methods"],

@@ -1,6 +1,6 @@
 """Which data sets of the league are at hand, and the names of its files: functions for league.smk."""
 
-from elastocal.campaigns.public_data import find_missing
+from elastocal.campaigns.importers import find_missing
 
 LEAGUE = config["league"]
 
@@ -9,7 +9,7 @@ def missing_data(names):
     """A file that is missing of each data set of which one is."""
     sources = {name: SOURCES[name] for name in names if SOURCES[name]["source"] == "public"}
     files = {
-        name: find_missing(source["files"], importer(source["importer"], name).FILES, "data/public", BOX)
+        name: find_missing(source["files"], importer(source["importer"], CONFIG, name).files, "data/public", BOX)
         for name, source in sources.items()
     }
     return {name: file for name, file in files.items() if file}

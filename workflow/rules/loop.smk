@@ -10,9 +10,7 @@ PUBLIC = [name for name in SOURCES if name not in SIMULATED]
 LOOP_FIGURES = {
     "before_after": "Errors before and after",
     "arrows": "Residuals in space",
-    "residuals": "Residuals before and after",
     "candidates": "Candidates",
-    "confounding": "What the poses confuse",
 }
 LOOP_REPORTS = [
     "verdict.json",
@@ -42,6 +40,7 @@ rule simulate_campaign:
 
 rule import_campaign:
     input:
+        sources=f"{CONFIG}/public_data.yaml",
         robots=robots_of_import,
     output:
         document="data/campaigns/{campaign}/campaign.yaml",
@@ -80,8 +79,6 @@ rule diagnose_campaign:
         diagnosis="results/loop/{campaign}/diagnosis.json",
         steps="results/loop/{campaign}/steps.parquet",
         correlations="results/loop/{campaign}/correlations.parquet",
-        models="results/loop/{campaign}/models.parquet",
-        confounding="results/loop/{campaign}/confounding.parquet",
         candidates="reports/loop/{campaign}/candidates.parquet",
         experiment="reports/loop/{campaign}/next_experiment.csv",
     params:

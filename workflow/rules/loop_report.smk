@@ -15,7 +15,6 @@ rule draw_campaign:
         before_after=rules.judge_campaign.output.before_after,
         diagnosis=rules.diagnose_campaign.output.diagnosis,
         candidates=rules.diagnose_campaign.output.candidates,
-        confounding=rules.diagnose_campaign.output.confounding,
     output:
         pdf=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=[*LOOP_FIGURES]),
         png=[
@@ -43,7 +42,6 @@ rule compile_loop_report:
         residuals=rules.judge_campaign.output.residuals,
         experiment="reports/loop/{campaign}/next_experiment.csv",
         diagnosis=rules.diagnose_campaign.output.diagnosis,
-        candidates=rules.diagnose_campaign.output.candidates,
         steps=rules.diagnose_campaign.output.steps,
         descriptions=rules.read_campaign.output.descriptions,
         figures=rules.draw_campaign.output.pdf,

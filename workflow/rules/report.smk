@@ -8,9 +8,7 @@ documentation, docs/study_tables.md.
 STATED = {
     "force_N": config["loading"]["force_N"],
     "offset_m": max(map(abs, config["loading"]["offset_m"])),
-    "tracker_m": QUESTIONS["tracker_m"],
     **{key: QUESTIONS["uses"][key] for key in ("edge_m", "weight_N", "path_m", "cutting_N")},
-    **{key: QUESTIONS["arm_points"][key] for key in ("bar_m", "acceptance_deg")},
 }
 
 
@@ -20,15 +18,10 @@ rule compile_paper:
         figures=expand("reports/figures/{figure}.pdf", figure=PAPER_FIGURES),
         citation=placed(ROOT / "CITATION.cff"),
         pages=placed(PACKAGES / "elastocal" / "report" / "paper.typ"),
-        sources=sources("compile_paper.py"),
     output:
         report=shown(
             "reports/paper.pdf", "paper", "Tables and figures of the paper", shows="The paper, regenerated", kind="report"
         ),
-    log:
-        "results/logs/compile_paper.log",
-    benchmark:
-        "results/timings/compile_paper.tsv"
     params:
         names=TITLES,
         stated={
@@ -41,68 +34,25 @@ rule compile_paper:
         "../scripts/compile_paper.py"
 
 
-rule judge_claims:
-    input:
-        studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
-        expected=cells("expected", REDUCED, NOISE, CLASSICAL),
-        comparison=rules.compare_with_studies.output.table,
-        solvers=rules.tabulate_solvers.output.table,
-        starts=rules.tabulate_starts.output.table,
-        stiffness=rules.tabulate_stiffness.output.table,
-        designs=rules.tabulate_designs.output.table,
-        pairs=rules.tabulate_budget.output.pairs,
-        score_pairs=rules.tabulate_uses.output.pairs,
-        sources=sources("elastocal.study.claims.judge_claims"),
-    output:
-        table=table_of("claims", PAPER, "claims", "Claims of the paper"),
-    log:
-        "results/logs/judge_claims.log",
-    benchmark:
-        "results/timings/judge_claims.tsv"
-    params:
-        step="elastocal.study.claims.judge_claims",
-        length=config["tables"]["length"],
-        robots=REDUCED,
-    script:
-        "../scripts/run_step.py"
-
-
 rule state_answers:
     input:
         comparison=rules.compare_with_studies.output.table,
-        expectations=rules.tabulate_expectations.output.table,
         ladder=rules.tabulate_ladder.output.table,
         budget=rules.tabulate_budget.output.budget,
         pairs=rules.tabulate_budget.output.pairs,
         needed=rules.tabulate_budget.output.lengths,
-        observability=rules.tabulate_observability.output.table,
-        places=rules.tabulate_places.output.table,
         scores=rules.tabulate_uses.output.scores,
         score_pairs=rules.tabulate_uses.output.pairs,
-        tubes=rules.tabulate_tubes.output.table,
-        geometry=rules.tabulate_assumptions.output.geometry,
-        weighting=rules.tabulate_assumptions.output.weighting,
         table2=rules.tabulate_initial.output.table,
         extended=rules.tabulate_extended.output.table,
-        solvers=rules.tabulate_solvers.output.table,
-        claims=rules.judge_claims.output.table,
         studies=rules.tabulate_studies.output.table,
-        joint=rules.tabulate_studies.output.joint,
-        costs=rules.tabulate_costs.output.costs,
+        joint=rules.compare_with_studies.output.joint,
         break_even=rules.tabulate_costs.output.break_even,
-        simulated="reports/tables/simulated_designs_few.csv",
-        few=rules.tabulate_few.output.table,
-        kinds=rules.tabulate_kinds.output.table,
-        stiffness=rules.tabulate_stiffness.output.table,
+        simulated=rules.tabulate_simulated_designs.output.table,
         citation=placed(ROOT / "CITATION.cff"),
         template=placed(PACKAGES / "elastocal" / "report" / "study.txt"),
-        sources=sources("state_answers.py"),
     output:
         answers="reports/answers.json",
-    log:
-        "results/logs/state_answers.log",
-    benchmark:
-        "results/timings/state_answers.tsv"
     params:
         robots=REDUCED,
         names=TITLES,
@@ -121,13 +71,8 @@ rule write_study_page:
     input:
         answers=rules.state_answers.output.answers,
         template=placed(PACKAGES / "elastocal" / "report" / "study_tables.md"),
-        sources=sources("write_study_page.py"),
     output:
         page="docs/study_tables.md",
-    log:
-        "results/logs/write_study_page.log",
-    benchmark:
-        "results/timings/write_study_page.tsv"
     script:
         "../scripts/write_study_page.py"
 
@@ -143,15 +88,10 @@ rule compile_report:
         figures=expand("reports/figures/{figure}.pdf", figure=FIGURES),
         bibliography=placed(ROOT / "paper" / "paper.bib"),
         pages=placed(PACKAGES / "elastocal" / "report" / "study.typ"),
-        sources=sources("compile_report.py"),
     output:
         report=shown(
             "reports/study.pdf", "study", "Tables and figures of the paper", shows="The report of the study", kind="report"
         ),
-    log:
-        "results/logs/compile_report.log",
-    benchmark:
-        "results/timings/compile_report.tsv"
     params:
         figures=FIGURES,
     script:

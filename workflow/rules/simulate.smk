@@ -20,7 +20,7 @@ rule draw_experiments:
         lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
         joint_limits_deg=lambda wildcards: robot_document(wildcards)["joint_limits_deg"],
         seed=config["seed"],
-        loading=config["loading"] | {key: INTERPRETATIONS[key] for key in ("offset_frame", "joint_range")},
+        loading=LOADING,
         purpose=lambda wildcards: "test" if wildcards.test else "identification",
         data_sets=lambda wildcards: 1 if wildcards.test else config["data_sets"],
         configurations=lambda wildcards: config["test_configurations" if wildcards.test else "configurations"],

@@ -7,43 +7,12 @@ Needs results/. Writes reports/tables/*.csv and, for each, the same as Markdown 
 rule summarize_initial:
     input:
         ideal="data/simulated/{robot}/ideal.parquet",
-        sources=sources("elastocal.study.simulation.summarize_initial"),
     output:
         initial="results/initial/{robot}.parquet",
-    log:
-        "results/logs/summarize_initial/{robot}.log",
-    benchmark:
-        "results/timings/summarize_initial/{robot}.tsv"
     params:
         step="elastocal.study.simulation.summarize_initial",
         seed=config["seed"],
         end_effector=lambda wildcards: STUDY.end_effectors[wildcards.robot],
-    script:
-        "../scripts/run_step.py"
-
-
-rule compare_solvers:
-    input:
-        experiments="data/simulated/{robot}/experiments.parquet",
-        measured=f"data/simulated/{{robot}}/{TABLE_NOISE}um/measured.parquet",
-        sources=sources("elastocal.study.solvers.compare_solvers"),
-    output:
-        solvers="results/solvers/{robot}.parquet",
-    log:
-        "results/logs/compare_solvers/{robot}.log",
-    benchmark:
-        "results/timings/compare_solvers/{robot}.tsv"
-    params:
-        step="elastocal.study.solvers.compare_solvers",
-        chain=lambda wildcards: robot_document(wildcards)["chain"],
-        lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
-        strategies=list(STUDY.strategies.values()),
-        seed=config["seed"],
-        rows=rows_read(INTERPRETATIONS["measured"]),
-        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
-        wrench_at=INTERPRETATIONS["wrench_at"],
-        length=config["tables"]["length"],
-        start=1e-6 * config["identification"]["start_urad_per_Nm"],
     script:
         "../scripts/run_step.py"
 
@@ -85,25 +54,6 @@ STUDY_TABLES |= {
         {"table": table_of("extended", ABOUT, "extended", "Elastic links")},
         {"robots": EXTENDED, "strategies": list(NAMES.values())} | AT,
     ),
-    "tabulate_accuracy": (
-        "tables",
-        {
-            "accuracy": cells("accuracy", config["robots"], NOISE),
-            "bounds": expand(rules.bound.output.bounds, robot=config["robots"]),
-        },
-        {"table": table_of("per_dataset", ABOUT, "per_dataset", "Accuracy of one data set")},
-        {
-            "robots": config["robots"],
-            "points": {NAMES[name]: list(points) for name, points in STUDY.points.items()},
-            "slugs": {name: key for key, name in NAMES.items()},
-        },
-    ),
-    "tabulate_solvers": (
-        "solvers",
-        {"solvers": expand(rules.compare_solvers.output.solvers, robot=REDUCED)},
-        {"table": table_of("solvers", ABOUT, "solvers", "Strategies that are one estimator")},
-        {"robots": REDUCED, "joints": [len(STUDY.robots[name]["compliance_urad_per_Nm"]) for name in REDUCED]},
-    ),
     "compare_with_paper": (
         "printed",
         REFERENCE
@@ -114,8 +64,11 @@ STUDY_TABLES |= {
     ),
     "compare_with_studies": (
         "printed",
-        {"beside": "reports/tables/beside_paper.csv"} | ONE_STUDY | INITIAL,
-        {"table": table_of("comparison", PAPER, "comparison", "Every printed figure among further studies")},
+        {"beside": "reports/tables/beside_paper.csv"} | ONE_STUDY | INITIAL | REFERENCE,
+        {
+            "table": table_of("comparison", PAPER, "comparison", "Every printed figure among further studies"),
+            "joint": table_of("joint_test", PAPER),
+        },
         {"robots": config["robots"], "length": config["tables"]["length"]},
     ),
 }
@@ -129,13 +82,8 @@ for tabulated, (module, given, made, settings) in STUDY_TABLES.items():
             tabulated
         input:
             **given,
-            sources=sources(step),
         output:
             **made,
-        log:
-            f"results/logs/{tabulated}.log",
-        benchmark:
-            f"results/timings/{tabulated}.tsv"
         params:
             **settings,
             step=step,
@@ -146,14 +94,9 @@ for tabulated, (module, given, made, settings) in STUDY_TABLES.items():
 rule typeset_table:
     input:
         table="reports/tables/{table}.csv",
-        sources=sources("typeset_table.py"),
     output:
         markdown="reports/tables/{table}.md",
         latex="reports/tables/{table}.tex",
-    log:
-        "results/logs/typeset_table/{table}.log",
-    benchmark:
-        "results/timings/typeset_table/{table}.tsv"
     wildcard_constraints:
         table=r"table\d",
     script:

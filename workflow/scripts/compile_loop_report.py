@@ -7,7 +7,7 @@ import pandas as pd
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import final_parameters
-from elastocal.loop.schemas import CANDIDATES, STEPS, read_residuals
+from elastocal.loop.schemas import STEPS, read_residuals
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.report.loop_facts import loop_facts, write_loop_report
 from elastocal.report.loop_page import loop_page, write_loop_page
@@ -18,11 +18,10 @@ def compile_loop_report(job: Job) -> None:
     robot = robot_from_document(descriptions["robot"])
     rows = [pd.read_csv(path).to_dict("records") for path in (job.input.before_after, job.input.splits, job.input.experiment)]
     table = read_residuals(job.input.residuals, robot.joints)
-    candidates = read_table(job.input.candidates, CANDIDATES)
     parameters = final_parameters(read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
     facts = loop_facts(verdict, *rows, table, descriptions, parameters)
     write_loop_report(job.output.report, facts, job.input.figures, origin_of(job))
-    write_loop_page(job.output.page, *loop_page(facts, table, candidates, robot), origin_of(job))
+    write_loop_page(job.output.page, *loop_page(facts, table, robot), origin_of(job))
 
 
 run(compile_loop_report, snakemake)

@@ -4,12 +4,12 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.candidates import confounding, probabilities
-from elastocal.figures.residuals import arrows, before_after, residuals
+from elastocal.figures.candidates import probabilities
+from elastocal.figures.residuals import arrows, before_after
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
-from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, angles_of, read_residuals, worst_measurement
+from elastocal.loop.schemas import CANDIDATES, angles_of, read_residuals, worst_measurement
 from elastocal.mechanics.kinematics import corners
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -18,15 +18,12 @@ def draw_campaign(job: Job) -> None:
     robot = robot_from_document(read_json(job.input.descriptions)["robot"])
     table = read_residuals(job.input.residuals, robot.joints)
     arm = corners(robot.chain, angles_of(table, robot.joints)[worst_measurement(table)])
-    candidates = read_table(job.input.candidates, CANDIDATES)
     stated = read_json(job.input.diagnosis)["document"]["probabilities"]
     errors = pd.read_csv(job.input.before_after).to_dict("records")
     drawn = {
         "before_after": before_after(errors, read_json(job.input.verdict)["heldout"]["noise_floor_rms_m"]),
         "arrows": arrows(table, arm),
-        "residuals": residuals(table),
-        "candidates": probabilities(stated, candidates),
-        "confounding": confounding(candidates, read_table(job.input.confounding, CONFOUNDING)),
+        "candidates": probabilities(stated, read_table(job.input.candidates, CANDIDATES)),
     }
     for name, pdf, png in zip(job.params.figures, job.output.pdf, job.output.png, strict=True):
         save(drawn[name], pdf, png, origin_of(job))

@@ -11,14 +11,10 @@ from elastocal.io.documents import read_document
 from elastocal.report.study import brief_names, study_facts
 from elastocal.study.strategies import strategy_from_document
 
-_PLAIN = (
-    *("expectations", "table2", "extended", "solvers", "joint", "studies", "break_even", "costs", "few", "kinds", "stiffness"),
-    *("budget", "pairs", "needed", "places", "scores", "score_pairs", "tubes", "observability", "geometry", "weighting"),
-)
+_PLAIN = ("table2", "extended", "joint", "studies", "break_even", "budget", "pairs", "needed", "scores", "score_pairs")
 # Each table, and how it is read: what looks like a number may be none.
 _TABLES = {name: {} for name in _PLAIN} | {
     "comparison": {"dtype": {"table": str}},
-    "claims": {"keep_default_na": False, "na_values": {"p": [""]}},
     "ladder": {"dtype": {"link_springs": str}},
     "simulated": {"dtype": {"unobservable": str}},
 }

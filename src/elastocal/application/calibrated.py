@@ -1,6 +1,6 @@
 """The robot as corrected: the final model of a diagnosis without what belongs to one campaign's set-up and its instruments.
 
-All that uses it (`accuracy`, `compensation`, `certificate`, `forward_model`) asks the same of it: where it comes to rest
+All that uses it (`accuracy`, `compensation`, `certificate`, `exported`) asks the same of it: where it comes to rest
 (`come_to_rest` and `regressed`, `forward`), how surely (`pose_sensitivities` with its covariance, noise and scope), and where
 it was fitted (`beyond_fitted`). Poses are those of the end effector's measuring point in the robot's base frame: that of the
 chain, which the fit placed under the tracker. How far tool and work frame are known is another matter, and in no figure here.

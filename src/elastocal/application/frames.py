@@ -10,17 +10,12 @@ nothing. They are taken up over the campaign's poses, so that a single new pose 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
 ROBOT, BASE = "robot", "base"
 FRAMES = {ROBOT: "in the robot's own frame (after the best placement of its base)", BASE: "in the frame of the declared base"}
-_ARRAYS = ("origin", "absorbed", "absorbed_before")
 
 
 @dataclass(frozen=True)
@@ -48,17 +43,6 @@ class Scope:
     form_m: float = 0.0
     contradicted: bool = False
     repeated_freedom: float = 0.0
-
-    def document(self) -> dict[str, Any]:
-        """As JSON."""
-        return asdict(self) | {name: getattr(self, name).tolist() for name in _ARRAYS} | {"left_out": list(self.left_out)}
-
-
-def scope_from(document: Mapping[str, Any]) -> Scope:
-    """The inverse of `Scope.document`."""
-    arrays = {name: np.array(document[name], float) for name in _ARRAYS}
-    unstated = tuple((name, rms, worst) for name, rms, worst in document["unstated"])
-    return Scope(**{**document, **arrays, "left_out": tuple(document["left_out"]), "unstated": unstated})
 
 
 def scope_in_base(parameters: int) -> Scope:

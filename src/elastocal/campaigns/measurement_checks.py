@@ -16,9 +16,6 @@ from elastocal.mechanics.robot import Robot
 # From pose to pose, in an order that has nothing to do with the time, it falls as often as not: in more than this share of at
 # least so many steps with a probability of one in 700 at most.
 _BACKWARDS, _FEWEST_IN_ORDER = 0.875, 5
-# What clocks are set back by: the end of summer time, and midnight where only the time of day was written. Between two
-# measurements pass so many seconds at most.
-_SET_BACK_S, _BETWEEN_S = (3600.0, 86400.0), 900.0
 # A joint this far beyond its limits is no joint at its limit.
 _BEYOND_LIMITS_RAD = 0.5
 # A unit is wrong in a whole file. What is off in fewer rows than this is a gross error of theirs, which the diagnosis names.
@@ -127,7 +124,7 @@ def _check_times(measurements: Measurements, table: MeasurementFile) -> None:
     """Refuse a clock that runs backwards: in a session times fall from pose to pose, by their numbers and as they stand.
 
     Poses may be measured in another order than that of their numbers, and stand in any order in the file: one of the two alone
-    says nothing of the clock. Refused too is one that was set back once, inside of a pose or among rows that rise otherwise.
+    says nothing of the clock.
     """
     if measurements.time_s is None:
         return
@@ -141,30 +138,6 @@ def _check_times(measurements: Measurements, table: MeasurementFile) -> None:
             last = members[np.argmax(first[members])]
             found = f"{begun[last]:.15g}, when the poses before it were measured later"
             raise table.cell_fault(int(first[last]), "time_s", found, "times that rise from pose to pose: s since any instant")
-        rows = np.flatnonzero(measurements.session == session)
-        inside = np.diff(pose_of[rows]) == 0
-        for of in (inside, np.ones_like(inside)):
-            if (place := _set_back(np.diff(measurements.time_s[rows])[of])) is not None:
-                before, index = rows[:-1][of][place], int(rows[1:][of][place])
-                if of is not inside and len({*pose_of[rows[rows < index]]} & {*pose_of[rows[rows >= index]]}) > 1:
-                    # One target after the other, each at the same poses.
-                    continue
-                early, late = measurements.time_s[[index, before]]
-                found = f"{early:.15g} after {late:.15g} in row {table.rows[before]}"
-                raise table.cell_fault(index, "time_s", found, "a clock that is not set back: add the hour or the day")
-
-
-def _set_back(steps: np.ndarray) -> int | None:
-    """Place of the only one of some steps of time (N,), s, that falls, where it does as a clock that is set back."""
-    falls = np.flatnonzero(steps < 0)
-    if len(falls) != 1:
-        return None
-    others = np.delete(steps, falls[0])
-    for back in _SET_BACK_S:
-        # Rows that were measured anew later rise by as much before they fall.
-        if 0.0 <= steps[falls[0]] + back <= _BETWEEN_S and others.max(initial=0.0) < back - _BETWEEN_S:
-            return int(falls[0])
-    return None
 
 
 def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robot, targets: Sequence[Target]) -> None:

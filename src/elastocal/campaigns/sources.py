@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.campaigns.campaign import DOCUMENT
-from elastocal.campaigns.importers.catalogue import check_importer
+from elastocal.campaigns.importers import importer
 from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.errors import InputError
 from elastocal.io.documents import document_path, named_document
@@ -28,7 +28,7 @@ def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str 
         document = named_document(folder, "campaigns", "campaign_source", name, source)
         path = document_path(folder, "campaigns", name)
         if document["source"] == "public":
-            check_importer(document["importer"], path)
+            importer(document["importer"], folder, path)
         else:
             document["robot_document"] = named_document(folder, "robots", "robot", document["robot"], path)
             named_document(folder, "robots", "robot", document["declared_robot"], path)

@@ -64,8 +64,7 @@ def dh(
     """Make a robot file of a Denavit-Hartenberg table.
 
     The table has one row for each joint. Columns: theta_offset_deg, d_m, a_m, alpha_deg; optionally joint, type (R, P or F),
-    lower_deg, upper_deg, compliance_urad_per_Nm, mass_kg, cx_m, cy_m, cz_m, point. The first two rows of a UR5e, standard
-    notation:
+    lower_deg, upper_deg, point. The first two rows of a UR5e, standard notation:
 
     joint, theta_offset_deg, d_m, a_m, alpha_deg, type
 
@@ -97,7 +96,8 @@ def csv(
     ignore: Annotated[list[str] | None, Option(help="Header of a column to leave out; as often as needed.")] = None,
     unit: Annotated[list[str] | None, Option(help="NAME=UNIT of one column, such as fx=kN.")] = None,
     target: Annotated[
-        list[str] | None, Option(help="Name of the target where no column has it; of several in a row each, or NAME=MARKER.")
+        list[str] | None,
+        Option(help="Name of the target where no column has it; of each of several in a row NAME=X,Y,Z, its columns."),
     ] = None,
     wrench: Annotated[Literal["on-robot", "by-robot"] | None, Option(help="Forces on the robot, or by it.")] = None,
     skip_empty: Annotated[bool, Option("--skip-empty", help="Leave out rows without a position.")] = False,
@@ -133,7 +133,12 @@ def csv(
         raise InputError(folder, "", "measurements that are there already", allowed)
     earlier = read_import_options(options) if options else ImportOptions()
     alone = target is not None and len(target) == 1 and "=" not in target[0]
-    markers = {} if alone else _pairs("--target", [each if "=" in each else f"{each}={each}" for each in target or ()])
+    targets = {
+        name: [header.strip() for header in headers.split(",")]
+        for name, headers in _pairs("--target", None if alone else target).items()
+    }
+    if wrong := next((name for name, headers in targets.items() if len({*headers}) != 3), None):
+        raise InputError("--target", "", f"{wrong}={','.join(targets[wrong])}", "NAME=X,Y,Z, the columns of its position")
     units = _pairs("--unit", unit) | {kind: word for kind, word in (("angles", angles), ("lengths", lengths)) if word}
     stated: dict[str, Any] = {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty, "decimal": decimal}
     stated |= {"header": header, "encoding": encoding, "names": names and [name.strip() for name in names.split(",")]}
@@ -142,8 +147,8 @@ def csv(
         ignore=[*(earlier.ignore or ()), *(ignore or ())] or None,
         columns=dict(earlier.columns or {}) | _pairs("--column", column),
         units=dict(earlier.units or {}) | units,
-        target=target[0] if target and alone else None if markers else earlier.target,
-        targets=markers or (None if alone else earlier.targets),
+        target=target[0] if target and alone else None if targets else earlier.target,
+        targets=targets or (None if alone else earlier.targets),
         **{name: value for name, value in stated.items() if value},
     )
     known: set[str] = set()

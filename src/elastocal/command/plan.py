@@ -27,8 +27,7 @@ from elastocal.errors import InputError, text_fault
 
 if TYPE_CHECKING:
     from elastocal.application.planning.cell import Cell
-    from elastocal.application.planning.plan import Loads, Plan
-    from elastocal.application.planning.survey import Sensor, Survey
+    from elastocal.application.planning.plan import Loads, Plan, Sensor, Survey
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.chain import Chain
     from elastocal.mechanics.robot import Robot
@@ -118,7 +117,7 @@ plan.__signature__ = inspect.signature(_Options, eval_str=True)  # type: ignore[
 
 def _survey(options: _Options, arm: Robot, loads: Loads) -> tuple[Survey, Sensor]:
     """What is measured and how well, as stated or usual; options that do not go together are refused."""
-    from elastocal.application.planning.survey import SENSORS, Survey
+    from elastocal.application.planning.plan import SENSORS, Survey
 
     sensor, pose = SENSORS[options.measured], options.measured == "pose"
     if options.orientation_noise is not None and not pose:

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
-# Of the draws that map the workspace.
-_SEED = 1
 ROBOT, URDF, SIDECAR, DH, DELTAS = _EXPORTED = "robot.yaml", "robot.urdf", "effects.json", "dh.csv", "dh_deltas.csv"
 _ROUNDING_MM = 1e-5
 
@@ -33,13 +31,6 @@ def certificate(
     folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
     tolerance: Annotated[str, Option(help="Largest allowed RMS position error, such as 0.2mm.")],
     risk: Annotated[float, Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
-    use: Annotated[
-        Path | None,
-        Option(
-            help="CSV of the poses and loads that the robot is used at, as for `elastocal correct`: they are judged then, and "
-            "must lie within what was fitted. Without, the poses of the campaign."
-        ),
-    ] = None,
     physics_only: PhysicsOnly = False,
 ) -> None:
     """Certify a robot against a tolerance: pass, fail or undecided.
@@ -54,12 +45,11 @@ def certificate(
 
     from elastocal.campaigns.reading import read_descriptions
     from elastocal.data_checks.protocol import data_at_fault
-    from elastocal.exchange.target_path import read_target_path_of
     from elastocal.figures.certificate import budget_bars
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
-    from elastocal.loop.certificate import Wanted, use_at
+    from elastocal.loop.certificate import Wanted
     from elastocal.loop.certificate import certificate as certified
     from elastocal.report.certificate import certificate_facts, write_certificate
 
@@ -69,13 +59,12 @@ def certificate(
     found = diagnosed_campaign(folder, physics_only)
     place = workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=workplace() / "reports")
-    used = None if use is None else use_at(found.calibrated, read_target_path_of(use, found.calibrated.robot))
     if data_at_fault(found.verdict):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
     stated = {"measured_on": campaign.get("measured_on", "")} | campaign.get("certificate", {})
-    wanted = Wanted(limit, risk, campaign.get("serial_number", ""), date.today().isoformat(), _SEED, stated)
+    wanted = Wanted(limit, risk, campaign.get("serial_number", ""), date.today().isoformat(), stated)
     with console.status("working"):
-        document = certified(folder, robots(), found, wanted, used)
+        document = certified(folder, robots(), found, wanted)
         facts = certificate_facts(document)
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             names = [row[0] for row in facts["budget"]]
@@ -127,8 +116,8 @@ def export(
 
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
     from elastocal.application.calibrated import OperatingConditions, regressed
-    from elastocal.application.forward_model import find_left_out_m, fold_effects, sidecar
-    from elastocal.exchange.urdf_writing import urdf_of, write_calibrated_origins
+    from elastocal.application.exported import find_left_out_m, fold_effects, sidecar
+    from elastocal.exchange.urdf_writing import write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.json_files import write_json
     from elastocal.mechanics.robot_file import document_of
@@ -147,16 +136,10 @@ def export(
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
     accuracy = campaign_accuracy(calibrated)
     document = sidecar(calibrated, found.name, date.today().isoformat(), accuracy)
-    lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, URDF, SIDECAR))]
+    lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, *([URDF] if urdf else []), SIDECAR))]
     with write_together(output, _EXPORTED) as partial:
         write_text(partial / ROBOT, f"# {stated}\n{text}")
-        if drop_in is None:
-            write_text(partial / URDF, urdf_of(robot, f"{stated} Geometry alone: springs and effects are in {SIDECAR}."))
-            if nominal.joint_names:
-                lines.append(
-                    f"{URDF} has points for links, no meshes; --urdf FILE gives back the URDF that the robot was imported from"
-                )
-        else:
+        if drop_in is not None:
             (partial / URDF).write_bytes(drop_in.content)
             lines += _drop_in(drop_in, partial / URDF, nominal, robot, states.joint_angles)
         write_json(partial / SIDECAR, document)

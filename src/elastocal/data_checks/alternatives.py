@@ -1,14 +1,13 @@
 """Other ways to read the file: senses of joints, axes, units, frames and targets, compared by how well the data then fit.
 
 One scan over a short list of hypotheses, nearly all of them discrete. They are only compared where the measurements as written
-are absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change first, then a base or
-targets that stand elsewhere or were mounted anew, then two changes together. Senses, axes and units are facts, not parameters:
-each is tried, none is fitted.
+are absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change, or else a base or
+targets that stand elsewhere or were mounted anew. Senses, axes and units are facts, not parameters: each is tried, none is
+fitted. What one change mends in part is looked at again for another.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -31,7 +30,7 @@ from elastocal.data_checks.placement import (
 from elastocal.data_checks.protocol import Fault, Value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements, Target
     from elastocal.data_checks.hypotheses import Change
@@ -76,9 +75,9 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Reading:
-    """A campaign read with some changes, and where it then lies beside the nominal robot."""
+    """A campaign read with a change, or as written, and where it then lies beside the nominal robot."""
 
-    changes: tuple[Change, ...]
+    change: Change | None
     campaign: Campaign
     placement: Placement
 
@@ -100,8 +99,7 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     loaded = measurements.select(measurements.load > 0)
     if not found and len(loaded):
         # Rows of one pose that stand a row off show it at the last load alone, where the next pose's stand.
-        stages = [[[(change,) for change in shifted]]]
-        found, _ = _mended(replace(campaign, measurements=spread(loaded, POSES)), stages)
+        found, _ = _mended(replace(campaign, measurements=spread(loaded, POSES)), (shifted, []))
     if found or campaign.measured == "position":
         return found
     if slight := _slightly_turned(few):
@@ -134,30 +132,26 @@ def _slightly_turned(campaign: Campaign) -> list[Fault]:
     return [Fault("wrong_target", (), detail, parameters, (rms(written.turn), rms(fitted.turn)), (), False, ())]
 
 
-def _mended(campaign: Campaign, stages: Iterable[Sequence[Sequence[tuple[Change, ...]]]]) -> tuple[list[Fault], Campaign]:
-    """Faults of the simplest hypothesis that mends the measurements, and the campaign as it is then read."""
-    written = Reading((), campaign, robustly_placed(campaign, campaign.measurements))
+def _mended(campaign: Campaign, tried: tuple[Sequence[Change], Sequence[Change]]) -> tuple[list[Fault], Campaign]:
+    """Fault of the hypothesis that mends the measurements, and the campaign as it is then read; `tried`: as `hypotheses`."""
+    written = Reading(None, campaign, robustly_placed(campaign, campaign.measurements))
     # All measurements but a few, or all: a joint may move in a few poses only.
     measures = [measure for measure in (trimmed_rms, rms) if written.misfit(measure).implausible]
-    if not measures:
-        return [], campaign
-    for stage in stages:
-        tried = [[_read(campaign, changes) for changes in part] for part in stage]
-        for measure in measures:
-            before, best = written.misfit(measure), None
-            for part in tried:
-                winner = _best(part, before, measure) if part else None
-                if winner and (best is None or winner[1].together < best[1].together / FAR_BETTER):
-                    best = winner
-            if best:
-                return _faults(written, before, best), best[0].campaign
+    readings = [[_read(campaign, change) for change in part] for part in tried] if measures else []
+    for measure in measures:
+        before, best = written.misfit(measure), None
+        for part in readings:
+            winner = _best(part, before, measure) if part else None
+            if winner and (best is None or winner[1].together < best[1].together / FAR_BETTER):
+                best = winner
+        if best:
+            return [_fault(written, before, best)], best[0].campaign
     return [], campaign
 
 
-def _read(campaign: Campaign, changes: tuple[Change, ...]) -> Reading:
-    for change in changes:
-        campaign = change.correct(campaign)
-    return Reading(changes, campaign, placed(campaign, campaign.measurements))
+def _read(campaign: Campaign, change: Change) -> Reading:
+    read = change.correct(campaign)
+    return Reading(change, read, placed(read, read.measurements))
 
 
 _Winner = tuple[Reading, Misfit, tuple[float, float], tuple[str, ...]]
@@ -175,8 +169,8 @@ def _best(tried: Sequence[Reading], before: Misfit, measure: Callable[[np.ndarra
         best = replace(best, placement=robustly_placed(best.campaign, best.campaign.measurements))
         after = best.misfit(measure)
         if evidence := _evidence(before, after, best):
-            others = [tried[n].changes[0].detail for n in alike[1 : 1 + _MOST_ALIKE] if len(tried[n].changes) == 1]
-            return best, after, evidence, tuple(detail for detail in others if detail) * (len(best.changes) == 1)
+            others = [tried[n].change for n in alike[1 : 1 + _MOST_ALIKE]]
+            return best, after, evidence, tuple(change.detail for change in others if change and change.detail)
     return None
 
 
@@ -198,22 +192,20 @@ def _evidence(written: Misfit, corrected: Misfit, reading: Reading) -> tuple[flo
     return None
 
 
-def _faults(written: Reading, before: Misfit, best: _Winner) -> list[Fault]:
-    """One fault for each change."""
+def _fault(written: Reading, before: Misfit, best: _Winner) -> Fault:
+    """What the winning change says of the data, in its own words or in those of what it fits."""
     reading, after, evidence, alike = best
-    found, targets, estimate = [], reading.campaign.targets, reading.placement.estimate
+    change, targets, estimate = reading.change, reading.campaign.targets, reading.placement.estimate
     poses = Value("poses compared", float(len(np.unique(reading.campaign.measurements.pose))), "–")
-    for change in reading.changes:
-        detail, parameters, decisive = change.detail, change.parameters, True
-        if change.placement == "frame":
-            detail, parameters, decisive = _frame_fault(estimate, before, after)
-        if change.placement == "targets":
-            estimates = written.placement.estimate, estimate
-            detail, parameters, decisive = _target_fault(targets, *estimates, IMPLAUSIBLE_M, IMPLAUSIBLE_RAD)
-        if change.placement == "mounts":
-            detail, parameters = _mount_fault(targets, estimate)
-        found.append(Fault(change.name, change.joints, detail, (*parameters, poses), evidence, (), decisive, alike))
-    return found
+    detail, parameters, decisive = change.detail, change.parameters, True
+    if change.placement == "frame":
+        detail, parameters, decisive = _frame_fault(estimate, before, after)
+    if change.placement == "targets":
+        estimates = written.placement.estimate, estimate
+        detail, parameters, decisive = _target_fault(targets, *estimates, IMPLAUSIBLE_M, IMPLAUSIBLE_RAD)
+    if change.placement == "mounts":
+        detail, parameters = _mount_fault(targets, estimate)
+    return Fault(change.name, change.joints, detail, (*parameters, poses), evidence, (), decisive, alike)
 
 
 def _frame_fault(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str, tuple[Value, ...], bool]:

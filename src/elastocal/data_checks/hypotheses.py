@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import combinations, permutations, product
+from itertools import permutations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from elastocal.data_checks.placement import spread, with_measured
 from elastocal.data_checks.protocol import Value
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements
 
@@ -65,23 +65,12 @@ class Change:
     placement: str = ""
 
 
-def hypotheses(campaign: Campaign, first: Sequence[Change] = ()) -> Iterator[list[list[tuple[Change, ...]]]]:
-    """Everything that is tried, the simplest first, each stage where none before convinces.
-
-    Of a stage what is discrete comes before what is fitted, which is preferred only where it is far better.
-    """
+def hypotheses(campaign: Campaign, first: Sequence[Change] = ()) -> tuple[list[Change], list[Change]]:
+    """Everything that is tried: what is discrete, and what is fitted, which is preferred only where it is far better."""
     oriented = campaign.measured == "pose"
     single = [*_senses(campaign.robot.joints), *_lengths(campaign)]
     single += [*(_rotations() if oriented else []), *_axes(campaign.frame == "tracker" and not oriented, oriented), *first]
-    fitted = _placements(campaign)
-    yield [[(change,) for change in single], [(change,) for change in fitted]]
-    pairs: list[tuple[Change, ...]] = []
-    for change in fitted:
-        if change.placement == "frame":
-            elsewhere = next(hypotheses(replace(campaign, frame="tracker")))[0]
-            others = [*fitted, *(other for (other,) in elsewhere), *(_axes(True, False) if oriented else [])]
-            pairs += [(change, other) for other in others if other is not change]
-    yield [[*pairs, *combinations(_senses(campaign.robot.joints)[: campaign.robot.joints], 2)]]
+    return single, _placements(campaign)
 
 
 def _placements(campaign: Campaign) -> list[Change]:

@@ -1,10 +1,8 @@
-"""Loads turned round, in another unit than newtons and newton metres, or beside the deflections of others.
+"""Loads turned round, or in another unit than newtons and newton metres.
 
 A load has no size that is absurd in itself: what the loads did to the robot stands beside what the written loads should have
 done by its nominal compliances. All joints give way by the same factor more, or less; one between a third and three is nobody's
-unit. Loads are matched to deflections as an assignment problem [1].
-
-[1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
+unit.
 """
 
 from __future__ import annotations
@@ -14,10 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.constants import g, pound_force
-from scipy.optimize import linear_sum_assignment
 
-from elastocal.campaigns.groups import groups_of
-from elastocal.data_checks.placement import FAR_BETTER, at_targets, free_columns, rms, robust_sigma, robustly_placed, spread
+from elastocal.data_checks.placement import at_targets, free_columns, rms, robust_sigma, robustly_placed, spread
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.identifiability import solve_normal
 from elastocal.fitting.observations import single_observations, state_clusters
@@ -28,7 +24,7 @@ from elastocal.mechanics.kinematics import poses_and_jacobians
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
 
-NAMES, FAMILY, AFTER = ("wrong_sign", "wrong_unit", "shuffled_rows"), "data", ("constant_columns", "alternatives")
+NAMES, FAMILY, AFTER = ("wrong_sign", "wrong_unit"), "data", ("constant_columns", "alternatives")
 
 _MANY_POSES = 150
 # Compliances of a robot and those of its data sheet differ by no more, all together and each beside the others.
@@ -41,20 +37,9 @@ _UNEXPLAINED = 0.5
 _AS_WELL = 1.1
 _FEWEST_POSES = 4
 _ROUNDING_M = 1e-9
-# Compliances are sought only within these multiples of the nominal ones, or of those usual for a robot of the size.
-_RATIOS_OF_ROBOTS, _RATIOS_OF_USUAL = (0.3, 3.0), (0.05, 20.0)
 _APART, _REJECTIONS = 6.0, 4
 # Below this share of their square, loads of one pose do not differ.
 _DIFFERING = 1e-6
-# A load is out of place where it misses the deflection by this share of it, and by so many times what others miss; back in
-# place within so many.
-_MISSED, _MISSED_MORE, _MISSED_LIKE_OTHERS = 0.5, 6.0, 3.0
-_FEWEST_STATES, _MOST_STATES = 10, 1500
-_ROUNDS_OF_COMPLIANCE = 4
-# So many loads at least, and this share of those out of place, fit in the places of each other.
-_FEWEST_LOADS, _MOST = 2, 0.8
-# A matching of loads is no chance if it leaves so much less than one of the deflections of other poses.
-_CHANCE_LOADS = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -84,14 +69,14 @@ UNITS = (
 
 
 def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
-    """Sign and unit in which the loads explain the measurements, where they are not as they must be; or shuffled loads.
+    """Sign and unit in which the loads explain the measurements, where they are not as they must be.
 
-    The first only where compliances are known: no size of a deflection is to be expected else.
+    Only where compliances are known: no size of a deflection is to be expected else.
     """
     deflected = deflections(campaign, measurements) if campaign.robot.compliance_known else None
     found = unit_of_loads(deflected) if deflected else None
     if found is None:
-        return _of_loads(campaign, measurements)
+        return []
     evidence, faults = (found.rms_as_written, found.rms_corrected), []
     slope = Value("deflection over the one expected", found.slope, "–")
     if found.sign < 0:
@@ -223,91 +208,6 @@ def _left(seen: np.ndarray, expected: np.ndarray) -> tuple[float, float]:
     return left, min(left / max(rms(seen), factor * rms(expected)), 1.0)
 
 
-@dataclass(frozen=True)
-class StateDeflections:
-    """Loaded less unloaded mean of each target, for S loaded states; zero where a target was not read.
-
-    `wrench` (S, 6). `seen` (S, T, 3): m. `jacobian` (S, T, 3, n): of the targets. `end_jacobian` (S, 6, n). `targets` (S,): how
-    many were read. `rows`: loaded rows of the file behind each state. `compliance_known`: whether the robot file states
-    compliances.
-    """
-
-    wrench: np.ndarray
-    seen: np.ndarray
-    jacobian: np.ndarray
-    end_jacobian: np.ndarray
-    targets: np.ndarray
-    rows: tuple[tuple[int, ...], ...]
-    compliance_known: bool = True
-
-    def misfits(self, compliance: np.ndarray, seen: np.ndarray | None = None) -> np.ndarray:
-        """RMS over the targets of what the load of each state (columns) leaves of the deflections of each state (rows).
-
-        `compliance` (n,): rad/(N m). `seen` (S, T, 3): other deflections. Returns (S, S): m.
-        """
-        seen = self.seen if seen is None else seen
-        per_wrench = (self.jacobian * compliance) @ self.end_jacobian[:, None].transpose(0, 1, 3, 2)
-        linear = np.einsum("stck,stc->sk", per_wrench, seen)
-        square = np.einsum("stck,stcl->skl", per_wrench, per_wrench)
-        products = np.einsum("ik,il->ikl", self.wrench, self.wrench).reshape(len(self.wrench), -1)
-        total = (seen**2).sum(axis=(1, 2))[:, None] - 2 * linear @ self.wrench.T
-        total += square.reshape(len(square), -1) @ products.T
-        return np.sqrt(np.maximum(total, 0.0) / self.targets[:, None])
-
-    def compliance(self, states: np.ndarray, loads: np.ndarray, nominal: np.ndarray) -> np.ndarray:
-        """Compliances that fit the deflections of some states best under some loads, near the nominal ones.
-
-        `states`, `loads` (K,) of int, `nominal` (n,). Returns (n,).
-        """
-        torques = generalized_forces(self.end_jacobian[states], self.wrench[loads]) * nominal
-        left = (self.jacobian[states] * torques[:, None, None, :]).reshape(-1, len(nominal))
-        ratios = np.linalg.lstsq(left, self.seen[states].reshape(-1), rcond=1e-6)[0]
-        return nominal * np.clip(ratios, *(_RATIOS_OF_ROBOTS if self.compliance_known else _RATIOS_OF_USUAL))
-
-
-def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDeflections | None:
-    """Deflections of every loaded state that has an unloaded one of its pose beside it.
-
-    Returns None where there is none.
-    """
-    pose = state_clusters(measurements)
-    compared = np.isin(pose, pose[measurements.load == 0]) & np.isin(pose, pose[measurements.wrench.any(axis=1)])
-    if not compared.any():
-        return None
-    measurements = measurements.select(compared)
-    estimate = robustly_placed(campaign, spread(measurements)).estimate
-    position, _, jacobian = at_targets(campaign.robot.chain, measurements.joint_angles, campaign, measurements, estimate)
-    residual, end = measured_in_base(estimate, single_observations(measurements))[0] - position, _end(campaign, measurements)
-    keys = np.column_stack([measurements.session, measurements.pose, measurements.load])
-    first, state = groups_of(keys)
-    states, targets = keys[first], len(campaign.targets)
-    cell = state * targets + measurements.target
-    count = np.bincount(cell, minlength=len(states) * targets).reshape(len(states), targets)
-    seen = np.zeros((len(states) * targets, 3))
-    np.add.at(seen, cell, residual)
-    seen = seen.reshape(len(states), targets, 3) / np.maximum(count, 1)[..., None]
-    at_target = np.zeros((len(states) * targets, *jacobian.shape[1:]))
-    at_target[cell] = jacobian
-    at_target = at_target.reshape(len(states), targets, *jacobian.shape[1:])
-    # States are in order: the unloaded one of a pose, where there is one, is its first.
-    first_of_pose, pose = groups_of(states[:, :2])
-    unloaded = first_of_pose[pose]
-    both = (count > 0) & (count[unloaded] > 0)
-    loaded = measurements.wrench[first].any(axis=1) & (states[unloaded, 2] == 0) & both.any(axis=1)
-    if not loaded.any():
-        return None
-    rows = tuple(tuple(measurements.row[state == number].tolist()) for number in np.flatnonzero(loaded))
-    return StateDeflections(
-        measurements.wrench[first][loaded],
-        ((seen - seen[unloaded]) * both[..., None])[loaded],
-        (at_target * both[..., None, None])[loaded],
-        end[first][loaded],
-        both.sum(axis=1)[loaded],
-        rows,
-        campaign.robot.compliance_known,
-    )
-
-
 def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Compliance over nominal of the joints that are well known, and the rows left by sigma clipping."""
     joints = expected.shape[1]
@@ -341,67 +241,3 @@ def _centred(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     total = np.zeros((group.max() + 1, *values.shape[1:]))
     np.add.at(total, group, values)
     return values - (total / np.maximum(np.bincount(group), 1).reshape(-1, *[1] * (values.ndim - 1)))[group]
-
-
-def _of_loads(campaign: Campaign, measurements: Measurements) -> list[Fault]:
-    states = state_deflections(campaign, measurements)
-    if states is None or not _FEWEST_STATES <= len(states.wrench) <= _MOST_STATES:
-        return []
-    every, nominal = np.arange(len(states.wrench)), campaign.robot.compliance
-    compliance = nominal if states.compliance_known else states.compliance(every, every, nominal)
-    sizes = np.sqrt((states.seen**2).sum(axis=(1, 2)) / states.targets)
-    for _ in range(_ROUNDS_OF_COMPLIANCE):
-        missed = np.diag(states.misfits(compliance))
-        out = missed > _MISSED * sizes
-        if (~out).sum() < _FEWEST_STATES:
-            break
-        compliance = states.compliance(every[~out], every[~out], nominal)
-    if out.sum() < _FEWEST_LOADS:
-        return []
-    if (~out).sum() >= max(_FEWEST_STATES, len(out) / 2):
-        return _some_loads_matched(states, compliance, missed, out)
-    return _all_loads_matched(states, nominal)
-
-
-def _some_loads_matched(states: StateDeflections, compliance: np.ndarray, missed: np.ndarray, out: np.ndarray) -> list[Fault]:
-    """Most loads are in place and tell how well the others must fit where they belong."""
-    sigma = np.median(missed[~out])
-    if (out & (missed > _MISSED_MORE * sigma)).sum() < _FEWEST_LOADS:
-        return []
-    # By chance the load of another state may miss by little.
-    rows = np.flatnonzero(missed > _MISSED_LIKE_OTHERS * sigma)
-    cost = states.misfits(compliance)[np.ix_(rows, rows)]
-    there = linear_sum_assignment(cost**2)[1]
-    left = cost[np.arange(len(rows)), there]
-    back = left < _MISSED_LIKE_OTHERS * sigma
-    if back.mean() < _MOST:
-        return []
-    return _loads_fault(states, rows[back], rows[there[back]], missed[rows[back]], left[back])
-
-
-def _all_loads_matched(states: StateDeflections, nominal: np.ndarray) -> list[Fault]:
-    """Most loads are out of place; the matching must fit far better than one of deflections that these loads did not make."""
-    every, compliance = np.arange(len(states.wrench)), nominal
-    before = np.diag(states.misfits(nominal))
-    for _ in range(_ROUNDS_OF_COMPLIANCE):
-        cost = states.misfits(compliance)
-        there = linear_sum_assignment(cost**2)[1]
-        compliance = states.compliance(every, there, nominal)
-    left = cost[every, there]
-    strange = states.misfits(compliance, np.roll(states.seen, len(every) // 2, axis=0))
-    chance = strange[linear_sum_assignment(strange**2)]
-    if np.median(left) > _CHANCE_LOADS * np.median(chance):
-        return []
-    return _loads_fault(states, every, there, before, left)
-
-
-def _loads_fault(
-    states: StateDeflections, here: np.ndarray, there: np.ndarray, before: np.ndarray, left: np.ndarray
-) -> list[Fault]:
-    moved = here != there
-    if moved.sum() < _FEWEST_LOADS or rms(left[moved]) > rms(before[moved]) / FAR_BETTER:
-        return []
-    count, rows = int(moved.sum()), sorted(row for state in here[moved] for row in states.rows[state])
-    detail = f"{count} of {len(states.wrench)} loaded states fit with the load of another one of them"
-    share = Value("share of the loaded states", count / len(states.wrench), "–")
-    return [Fault("shuffled_rows", (), detail, (share,), (rms(before[moved]), rms(left[moved])), tuple(rows), True)]

@@ -3,15 +3,11 @@
 A row is out of place where it is absurdly far from the nominal robot as it stands, and where another place is not only better
 but clearly nearer than chance would have it: among many points some point is always near.
 
-Where most rows are out of place, they are matched by iterative closest points [1] from the principal axes of all points.
-
-[1] Besl, P. J. and McKay, N. D., A method for registration of 3-D shapes, IEEE Transactions on Pattern Analysis and Machine
-    Intelligence 14, 1992.
+Where frames are fitted, most rows must be in place; elsewhere all may be out of it.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,14 +16,11 @@ from scipy.spatial import cKDTree
 from elastocal.data_checks.placement import (
     FAR_BETTER,
     IMPLAUSIBLE_M,
-    placed,
     placed_by,
     rms,
     robust_sigma,
     robustly_placed,
     spread,
-    trimmed_rms,
-    with_measured,
 )
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.observations import state_clusters
@@ -35,7 +28,6 @@ from elastocal.fitting.observations import state_clusters
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.data_checks.placement import Placement
-    from elastocal.fitting.model import Estimate
 
 NAMES, FAMILY, AFTER = ("shuffled_rows",), "data", ("constant_columns", "alternatives")
 
@@ -48,7 +40,6 @@ _FEWEST_ROWS = 2
 _SAME_PLACE_M = 1e-3
 # Rows in place tell how well rows in place fit, if they are so many.
 _FEWEST_IN_PLACE = 10
-_MATCHING_ROUNDS = 10
 # Orientations distinguish places as points at this distance from the target would, m.
 _ARM_M = 0.5
 # No robot nor tracker reaches so far.
@@ -62,61 +53,14 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     as_written = placed_by(campaign, measurements, some.estimate)
     if (as_written.distance > IMPLAUSIBLE_M).sum() < _FEWEST_ROWS:
         return []
-    if trimmed_rms(some.distance) > IMPLAUSIBLE_M:
-        return _all_matched(campaign, measurements, as_written)
-    return _matched(measurements, as_written, as_written, as_written)
+    return _matched(measurements, as_written)
 
 
-def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Fault]:
-    """Frames, targets and rows found together, from the main axes of all points: most rows are out of place."""
-    starts = [as_written.estimate]
-    if campaign.frame == "tracker":
-        starts += _by_main_axes(campaign, measurements, as_written)
-
-    def nearest(estimate: Estimate) -> tuple[Placement, np.ndarray, np.ndarray]:
-        beside = placed_by(campaign, measurements, estimate)
-        predicted, measured = (_places(measurements, each, None) for each in (beside.predicted, beside.measured))
-        return beside, *cKDTree(measured).query(predicted)
-
-    estimate, before = min(starts, key=lambda start: trimmed_rms(nearest(start)[1])), None
-    for _ in range(_MATCHING_ROUNDS):
-        beside, _, source = nearest(estimate)
-        if before is not None and (source == before).all():
-            break
-        before = source
-        estimate = placed(campaign, spread(with_measured(measurements, source))).estimate
-    return _matched(measurements, as_written, beside, None)
-
-
-def _by_main_axes(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Estimate]:
-    """Estimates whose frames turn the main axes of the predicted points into those of the measured ones."""
-    found, estimate = [], as_written.estimate
-    unknown = [target.offset_m is None for target in campaign.targets]
-    offset = np.where(np.array(unknown)[:, None], 0.0, estimate.target_offset)
-    estimate = replace(estimate, target_offset=offset)
-    predicted = placed_by(campaign, measurements, estimate).predicted
-    for first, second in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-        rotation, position = estimate.frame_rotation.copy(), estimate.frame_position.copy()
-        for number, session in enumerate(estimate.sessions):
-            mask = measurements.session == session
-            ours, theirs = predicted[mask], measurements.position[mask]
-            from_axes, to_axes = _main_axes(ours), _main_axes(theirs) * [first, second, first * second]
-            rotation[number] = to_axes @ from_axes.T
-            position[number] = theirs.mean(axis=0) - rotation[number] @ ours.mean(axis=0)
-        found.append(replace(estimate, frame_rotation=rotation, frame_position=position))
-    return found
-
-
-def _main_axes(points: np.ndarray) -> np.ndarray:
-    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T
-    return axes * [1.0, 1.0, np.sign(np.linalg.det(axes))]
-
-
-def _matched(measurements: Measurements, as_written: Placement, beside: Placement, rest: Placement | None) -> list[Fault]:
-    """The fault that some rows fit in the places of each other; `rest` says how well rows fit that are in place."""
+def _matched(measurements: Measurements, beside: Placement) -> list[Fault]:
+    """The fault that some rows fit in the places of each other, as well as rows fit that are in place."""
     distance, level = beside.distance, IMPLAUSIBLE_M
     out = distance > IMPLAUSIBLE_M
-    if rest is not None and (~out).sum() >= _FEWEST_IN_PLACE:
+    if (~out).sum() >= _FEWEST_IN_PLACE:
         sigma = robust_sigma(distance[~out], 3)
         out &= distance > _OUT_OF_PLACE * sigma
         # Loads move some targets much more than others.
@@ -134,7 +78,7 @@ def _matched(measurements: Measurements, as_written: Placement, beside: Placemen
     taken = len(np.unique(pose[source[back]])), len(np.unique(pose[rows[back]]))
     if back.sum() < max(_FEWEST_ROWS, _MOST * len(rows)) or taken[0] < _MOST * taken[1]:
         return []
-    before, after = rms(as_written.distance[rows]), rms(left[back])
+    before, after = rms(distance[rows]), rms(left[back])
     if after > before / FAR_BETTER:
         return []
     detail = f"{back.sum()} of {len(measurements)} rows fit with the measured columns of another one of them"

@@ -8,23 +8,18 @@ then on average
     -2 ln p_j = u'G u - u'G_j (P_j + G_jj)^-1 G_j'u + tr((P_j + G_jj)^-1 P_j) + ln |P_j + G_jj| - ln |P_j| - d_j + const,
 
 with u = t - m_j and d_j coefficients, and the difference between two models, drawn over the posterior of t, is the
-*separation*: twice the Kullback-Leibler divergence of which Box and Hill add up all pairs [1]. Such a sum never has enough of
-two models that are far apart already; the expected fall of the entropy [2] does. Of models with one covariance it is bounded
-from below through exp(-separation / 8), their Bhattacharyya coefficient [3]; here, where covariances differ and each draw of t
-has its separations, that is an approximation, by which experiments are compared (`Criterion`). What one of them promises is
-simulated (`Promise`): preposterior analysis [4], with coefficients from the posterior and measurements of the whole experiment.
-Where coefficients are known, odds of 19:1 are reached with 50, 90 and 95 % if the separation is 6, 16 and 21; where they may
-turn out small, the separation that is stated is the one for which this holds.
+*separation*. Experiments are compared by the entropy that they leave, of models with one covariance bounded from below through
+exp(-separation / 8), their Bhattacharyya coefficient [1] (`Criterion`). What one of them promises is simulated (`Promise`):
+preposterior analysis [2], with coefficients from the posterior and measurements of the whole experiment. Where coefficients are
+known, odds of 19:1 are reached with 50, 90 and 95 % if the separation is 6, 16 and 21; where they may turn out small, the
+separation that is stated is the one for which this holds.
 
-[1] Box, G. E. P. and Hill, W. J., Discrimination among mechanistic models, Technometrics 9, 1967.
-[2] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
-[3] Kolchinsky, A. and Tracey, B. D., Estimating mixture entropy with pairwise distances, Entropy 19, 2017.
-[4] Raiffa, H. and Schlaifer, R., Applied Statistical Decision Theory, Harvard University, 1961.
+[1] Kolchinsky, A. and Tracey, B. D., Estimating mixture entropy with pairwise distances, Entropy 19, 2017.
+[2] Raiffa, H. and Schlaifer, R., Applied Statistical Decision Theory, Harvard University, 1961.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -39,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from elastocal.diagnosis.findings import Evidence
-    from elastocal.diagnosis.new_states import Instrument
+    from elastocal.diagnosis.next_experiment import Instrument
     from elastocal.diagnosis.search import Model
 
 # Draws of each model's coefficients, and times as many that are drawn where physics gives signs.
@@ -48,9 +43,8 @@ _DRAWS, _SPARE = 4, 16
 HALF_RESOLVED = 2 * np.log(19.0)
 # Simulated experiments of each hypothesis (standard error 2 %).
 PROMISE_DRAWS = 600
-# Poses after which nobody goes on: some two days with a tracker. Fewer are stated to be needed, or none.
+# Poses after which nobody goes on: some two days with a tracker.
 MOST_POSES = 100
-WANTED_PROBABILITY = 0.9
 
 
 @dataclass(frozen=True)
@@ -93,7 +87,7 @@ def alternatives_of(
     """
     problem, products = evidence.linearized.problem, evidence.linearized.products
     total = normal_equations(products, lead.pose_error_rad)[0] / factor**2
-    declared, added = products.declared, int(instrument.added.sum())
+    declared = products.declared
     place = np.zeros(products.gram.shape[0], int)
     place[declared + instrument.columns] = declared + np.arange(len(instrument.columns))
     known = np.arange(declared)
@@ -101,15 +95,11 @@ def alternatives_of(
     for name, model in [(name, model) for name, models in kept.items() for model in models]:
         mine, deviations = problem.columns_of(model.units, model.scales)
         chosen, at = (np.concatenate([known, where]) for where in (declared + mine, place[declared + mine]))
-        # Places of further targets: a prior of a metre and a radian decides nothing.
-        precision = np.eye(len(chosen) + added)
-        own = precision[: len(chosen), : len(chosen)]
-        own[:] = total[np.ix_(chosen, chosen)] + np.diag(np.append(np.zeros(declared), (factor * deviations) ** -2))
+        precision = total[np.ix_(chosen, chosen)] + np.diag(np.append(np.zeros(declared), (factor * deviations) ** -2))
         mean = np.zeros(instrument.unknowns)
-        mean[at] = np.linalg.solve(own, total[chosen, -1])
-        columns = np.concatenate([at, np.arange(instrument.unknowns - added, instrument.unknowns)])
-        signs = [np.zeros(declared, int), *(problem.units[n].signs for n in model.units), np.zeros(added, int)]
-        found.append(Alternative(name, model.log_odds, columns, mean, precision, np.concatenate(signs)))
+        mean[at] = np.linalg.solve(precision, total[chosen, -1])
+        signs = np.concatenate([np.zeros(declared, int), *(problem.units[n].signs for n in model.units)])
+        found.append(Alternative(name, model.log_odds, at, mean, precision, signs))
     return found
 
 
@@ -178,13 +168,9 @@ class Criterion(_Hypotheses):
 
 
 class Promise(_Hypotheses):
-    """What an experiment brings, by simulation with the same random numbers for every experiment.
-
-    Common random numbers [1]: experiments differ by what they tell, not by luck.
+    """What an experiment brings, by simulation with random numbers that are the same for every experiment.
 
     `log_prior` (H,): of the hypotheses. `source` (T,) of int: hypothesis of each simulated experiment.
-
-    [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random numbers, Management Science 38, 1992.
     """
 
     def __init__(self, models: Sequence[Alternative], stream: np.random.Generator) -> None:
@@ -233,22 +219,6 @@ class Promise(_Hypotheses):
         right = logs[np.arange(len(logs)), self.source] - log_sum_exp(logs, axis=1) >= np.log(0.95)
         weights = np.exp(self.log_prior[self.source]) / PROMISE_DRAWS
         return float(right @ weights / weights.sum())
-
-    def poses_needed(self, total: np.ndarray, resolved: np.ndarray) -> int | None:
-        """Poses after which 90 % are resolved: of those proposed, or as many more as tell the same; None beyond the most.
-
-        `total` (U, U): information of all poses proposed. `resolved` (E,): probability that it is resolved after each.
-        """
-        enough, poses = np.flatnonzero(resolved >= WANTED_PROBABILITY), len(resolved)
-        if len(enough):
-            return int(enough[0]) + 1
-
-        def reached(count: int) -> bool:
-            return self.resolved(self.log_factors(total * (count / poses))) >= WANTED_PROBABILITY
-
-        if poses >= MOST_POSES or not reached(MOST_POSES):
-            return None
-        return poses + bisect_left(range(poses, MOST_POSES), True, 1, key=reached)
 
 
 def separation_resolved(probability: float) -> float:

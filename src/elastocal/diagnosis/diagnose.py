@@ -13,6 +13,7 @@ from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained
+from elastocal.diagnosis.centres import with_probable_centres
 from elastocal.diagnosis.findings import Evidence
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept, fitted_to
@@ -122,6 +123,9 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     if decisive:
         # Where all measurements mean something else, no single row is wrong.
         part = fitted_to(case, np.ones(len(case.campaign.measurements), bool), settings)
+    elif not known:
+        part = with_probable_centres(part, settings)
+        case = replace(case, model=part.case.model)
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
     found: Evidence | None = None
     about, near, most_pose_error_rad = part.declared, None, np.inf

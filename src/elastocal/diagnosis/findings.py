@@ -9,7 +9,6 @@ import numpy as np
 
 from elastocal.counting import plural
 from elastocal.data_checks.protocol import OF_DATA
-from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities, locations_of
 from elastocal.effects.catalogue import effects
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.averaging import Averaged
     from elastocal.diagnosis.linearize import Linearized
-    from elastocal.diagnosis.search import Posterior, Problem
+    from elastocal.diagnosis.search import Posterior
     from elastocal.diagnosis.verdict import Conclusion
     from elastocal.effects.protocol import Candidate, Parameter
     from elastocal.fitting.fit_result import Fit
@@ -121,18 +120,10 @@ def effect_entries(found: Evidence, final: Fit, averages: Averaged, observations
                 "p_value": found.alarm.p_value,
                 "heldout_gain": None,
                 "alternatives": list(conclusion.alternatives[name]),
-                "angle_to_nearest_deg": _angle_to_nearest(problem, [n for n in numbers if problem.units[n].mechanism == name]),
                 "adopted": found.adopted,
             }
         )
     return entries
-
-
-def _angle_to_nearest(problem: Problem, found: Sequence[int]) -> float | None:
-    """Angle of what was found of a mechanism to the nearest candidate of another one; None where there is no other."""
-    mechanism = problem.units[found[0]].mechanism
-    others = [unit.mechanism not in (mechanism, OTHER) for unit in problem.units]
-    return float(nearest_angles(problem, found)[others].min()) if any(others) else None
 
 
 def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list[dict[str, Any]]:
@@ -211,7 +202,6 @@ def fault_entry(fault: Fault) -> dict[str, Any]:
         "heldout_gain": None,
         "adopted": False,
         "alternatives": list(fault.alternatives),
-        "angle_to_nearest_deg": None,
         "evidence": [float(value) if np.isfinite(value) else None for value in fault.evidence],
     }
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate, Displacing
     from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Model
     from elastocal.fitting.observations import Observations
 
     Shapes = tuple[float, ...]
@@ -86,6 +87,12 @@ class Linearized:
         vars(found).update({"_fitted": self._fitted})
         return found
 
+    def under(self, model: Model) -> Linearized:
+        """The same under other priors of the declared parameters, those of a model that is alike in all else."""
+        found = replace(self, about=replace(self.about, model=model))
+        vars(found).update({"_fitted": self._fitted})
+        return found
+
     @property
     def without_rows(self) -> Linearized:
         """The same where nothing but the statistics and what goes with them is needed any more."""
@@ -133,6 +140,11 @@ class Linearized:
         nothing = Factored(Displacements.of([], np.zeros(0), len(some.states)), white(line.coordinate_jacobian), some.state)
         rows = WhiteRows(white(line.sensitivities_to(~found)), nothing, white(residual), white(jacobian), some.cluster)
         return rows, line.conditions
+
+    @property
+    def declared_rows(self) -> WhiteRows:
+        """Whitened rows without candidates."""
+        return self._fitted[0]
 
     @property
     def rows(self) -> WhiteRows:

@@ -1,13 +1,14 @@
 """The next experiment: poses and loads after which the measurements, most probably, say which hypothesis holds.
 
-The experiment that leaves the least entropy between the models of the posterior ([1], `alternatives`) is looked for greedily,
-then by Fedorov's exchange [2] in its modified form, each pose in turn against all of a short list [3], then by random local
-search in angles, directions of loads and approaches. What is promised of it is simulated, by the same models.
+An entry is one pose, read at the campaign's targets without its load, under it and, where the campaign has such, under the
+opposite one, or under given shares of it. Loads are as large as the campaign's, or as the rated payload, at the same lever, in
+any direction where the campaign has loads in all of them.
+
+The experiment that leaves the least entropy between the models of the posterior ([1], `alternatives`) is chosen greedily from
+random entries, then by one round of Fedorov's exchange [2]. What is promised of it is simulated, by the same models.
 
 [1] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
 [2] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
-[3] Cook, R. D. and Nachtsheim, C. J., A comparison of algorithms for constructing exact D-optimal designs, Technometrics 22,
-    1980.
 """
 
 from __future__ import annotations
@@ -17,24 +18,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.constants import g as standard_gravity
+from scipy.spatial.transform import Rotation
 
-from elastocal.counting import counted
-from elastocal.diagnosis import new_states
 from elastocal.diagnosis.alternatives import (
     HALF_RESOLVED,
     MOST_POSES,
-    WANTED_PROBABILITY,
     Criterion,
     Promise,
     alternatives_of,
 )
-from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.refit import mean_square_left
+from elastocal.diagnosis.statistics import rows_alike
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE, mechanisms_of_models
+from elastocal.fitting.displacement import conditions
+from elastocal.fitting.linearization import effect_columns, linearize
+from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.parameters import parameters
+from elastocal.fitting.whitening import whitening
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     import pandas as pd
 
@@ -42,9 +46,11 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.diagnosis.findings import Evidence
     from elastocal.diagnosis.linearize import Linearized
-    from elastocal.diagnosis.new_states import Entries, Instrument
     from elastocal.diagnosis.search import Model
     from elastocal.diagnosis.settings import Settings
+    from elastocal.effects.protocol import Displacing
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
 
     _Name = tuple[str, ...]
@@ -53,19 +59,150 @@ if TYPE_CHECKING:
 NOT_DISTINGUISHABLE = "not distinguishable with this robot and tracker"
 NOTHING_MISSING, NOTHING_AMBIGUOUS = "nothing is missing", "nothing is ambiguous"
 DATA_AT_FAULT, NOTHING_TESTABLE = "the data are at fault", "the measurements can test no mechanism"
-# States that are looked at, and entries among them that greedy search and exchange choose from: as many by what they tell alone
-# as at random, for some tell only together with others.
-_STATES, _SHORT_LIST = 10_000, 300
-# Multiplications that the search may take: fewer entries are looked at where models have hundreds of unknowns. And numbers in
-# memory at once.
-_WORK, _MEMORY = 4e9, 5e5
+# Directions of force whose smallest principal mean square reaches this (a third where they are uniform) are free; loads are
+# of both senses where the cosine between two falls below this.
+_FREE_DIRECTIONS, _OPPOSITE = 0.02, -0.5
+# Entries that the search chooses from, and multiplications that it may take; numbers in memory at once, and entries whose
+# sensitivities are.
+_STATES, _WORK, _MEMORY, _BLOCK = 600, 4e9, 5e5, 250
 # Models that stand for the hypotheses; the others hold a few per cent.
 _MODELS, _HYPOTHESES = 12, 8
-# Standard deviations of the steps in the joint angles, and neighbours tried with each.
-_RADII, _NEIGHBOURS = (0.5, 0.2, 0.08), 24
-_EXCHANGES = 2
-# Targets on further points are not asked for where they bring less than this share of the fall of the entropy.
-_WORTH_A_TARGET = 0.05
+
+
+@dataclass(frozen=True)
+class Entries:
+    """E poses with their loads.
+
+    `joint_angles` (E, n): rad. `wrench` (E, 6): N, N m, at the last measuring point, base axes. `approach` (E, L, n): sense in
+    which each joint is approached at each of L shares of the load; None where the campaign does not note it.
+    """
+
+    joint_angles: np.ndarray
+    wrench: np.ndarray
+    approach: np.ndarray | None
+
+    def __len__(self) -> int:
+        return len(self.joint_angles)
+
+    def at(self, chosen: np.ndarray | list[int]) -> Entries:
+        """Some of the entries."""
+        approach = None if self.approach is None else self.approach[chosen]
+        return Entries(self.joint_angles[chosen], self.wrench[chosen], approach)
+
+
+def shares_of(states: States) -> tuple[float, ...]:
+    """Shares of its load at which each pose is read: none and all of it, and the opposite one where the campaign has such."""
+    force = states.wrench[states.wrench[:, :3].any(axis=1), :3]
+    along = force / np.linalg.norm(force, axis=1, keepdims=True)
+    return (1.0,) if not len(force) else (0.0, 1.0, -1.0) if (along @ along.T).min() < _OPPOSITE else (0.0, 1.0)
+
+
+def drawn(states: States, robot: Robot, shares: tuple[float, ...], count: int, stream: np.random.Generator) -> Entries:
+    """Random entries within reach of a robot and of the states of its campaign."""
+    low, high = np.clip(robot.joint_limits, -np.pi, np.pi).T
+    angles = low + (high - low) * stream.random((count, len(low)))
+    size = np.linalg.norm(states.wrench[:, :3], axis=1)
+    loaded, wrench = np.flatnonzero(size), np.zeros((count, 6))
+    if len(loaded):
+        heavy = loaded[size[loaded] >= np.median(size[loaded])]
+        chosen = heavy[stream.integers(0, len(heavy), count)]
+        largest = max(size.max(), (robot.payload_kg or 0.0) * standard_gravity)
+        wrench = states.wrench[chosen] * (largest / size[chosen])[:, None]
+        along = states.wrench[loaded, :3] / size[loaded, None]
+        if np.linalg.eigvalsh(along.T @ along / len(along))[0] > _FREE_DIRECTIONS:
+            turn = Rotation.random(count, rng=stream)
+            wrench = np.concatenate([turn.apply(wrench[:, :3]), turn.apply(wrench[:, 3:])], axis=1)
+        elif (along @ along.T).min() < _OPPOSITE:
+            wrench = wrench * stream.choice([-1.0, 1.0], (count, 1))
+    return Entries(angles, wrench, _sides(states, (count, len(shares), len(low)), stream))
+
+
+def _sides(states: States, shape: tuple[int, ...], stream: np.random.Generator) -> np.ndarray | None:
+    """Random senses of approach; none where the campaign does not note them."""
+    return None if states.approach is None else stream.choice([-1.0, 1.0], shape)
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """Turns entries into information on declared parameters and units.
+
+    `fitted`: about which sensitivities are taken. `linearized`: in the parameters of whose products information is stated.
+    `laws` (Displacing, tuple): in the order of the columns. `columns` (U,) of int: of the statistics. `sizes` (U,). `declared`
+    (P,) of bool: which of the model's parameters are those of the products. `noise`: with the error common to the measurements
+    of a pose. `states`: of the campaign, whose last session, time and usual temperature go on.
+    """
+
+    fitted: Fit
+    linearized: Linearized
+    laws: list[tuple[Displacing, tuple[float, ...]]]
+    columns: np.ndarray
+    sizes: np.ndarray
+    declared: np.ndarray
+    noise: Noise
+    states: States
+    shares: tuple[float, ...]
+
+    @property
+    def unknowns(self) -> int:
+        """Number of columns: declared parameters and units."""
+        return int(self.declared.sum()) + len(self.columns)
+
+    def information(self, entries: Entries) -> np.ndarray:
+        """Fisher information on all unknowns in each entry, ndarray (E, U, U)."""
+        parts = [np.zeros((0, self.unknowns, self.unknowns))]
+        for start in range(0, len(entries), _BLOCK):
+            rows = self._rows(entries.at(np.arange(start, min(start + _BLOCK, len(entries)))))
+            parts.append(rows.transpose(0, 2, 1) @ rows)
+        return np.concatenate(parts)
+
+    def _rows(self, entries: Entries) -> np.ndarray:
+        """Whitened sensitivities of the measurements of each entry, ndarray (E, rows, U)."""
+        model, estimate, observations = self.fitted.model, self.fitted.estimate, self.observations(entries)
+        around = conditions(model, estimate, observations.states)
+        # Nothing comes after the last row of the campaign but these.
+        around = replace(around, progress=np.ones(len(observations.states)))
+        line = linearize(model, estimate, observations, around)
+        jacobian = line.coordinate_jacobian
+        made = effect_columns(self.laws, line.conditions, jacobian, observations.state) * self.sizes
+        white = whitening(observations, jacobian[..., : model.sites.joints], self.noise)
+        parts = [white.apply(part) for part in (line.sensitivities[..., self.declared], made)]
+        rows = rows_alike(self.linearized.products, parts[0], parts[1], self.columns)
+        return np.asarray(rows.reshape(len(entries), -1, rows.shape[-1]))
+
+    def observations(self, entries: Entries) -> Observations:
+        """Entries as observations, those of an entry together; what is measured stays zero."""
+        model, each = self.fitted.model, len(self.shares)
+        count, targets = each * len(entries), len(model.targets)
+        states = States(
+            np.full(count, self.fitted.estimate.sessions[-1]),
+            np.repeat(np.arange(len(entries)), each),
+            np.tile(np.arange(each), len(entries)),
+            np.repeat(entries.joint_angles, each, axis=0),
+            (entries.wrench[:, None] * np.array(self.shares)[:, None]).reshape(count, 6),
+            np.ones(count, int),
+            None if entries.approach is None else entries.approach.reshape(count, -1),
+            None if self.states.time_s is None else np.full(count, self.states.time_s.max()),
+            None if self.states.temperature_c is None else np.full(count, self.states.temperature_c.mean()),
+        )
+        state, target = np.repeat(np.arange(count), targets), np.tile(np.arange(targets), count)
+        rotation = np.tile(np.eye(3), (len(target), 1, 1)) if model.rows == 6 else None
+        return Observations(states, state, target, np.zeros((len(target), 3)), rotation)
+
+
+def instrument_of(
+    linearized: Linearized, fitted: Fit, numbers: Sequence[int], noise: Noise, states: States, shares: tuple[float, ...]
+) -> Instrument:
+    """What tells the information in entries; `numbers`: units of the problem whose columns matter."""
+    owners = [owner for owner, _ in parameters(fitted.model, fitted.estimate)]
+    declared = np.array([owner not in linearized.candidates for owner in owners], bool)
+    units = [linearized.problem.units[number] for number in numbers]
+    laws: list[tuple[Displacing, tuple[float, ...]]] = []
+    for unit in units:
+        law = unit.candidate or unit.law
+        assert law is not None
+        laws.append((law, unit.shapes))
+    columns, sizes = (np.concatenate([getattr(unit, name) for unit in units]) for name in ("columns", "sizes"))
+    return Instrument(fitted, linearized, laws, columns, sizes, declared, noise, states, shares)
 
 
 @dataclass(frozen=True)
@@ -74,14 +211,11 @@ class Proposal:
 
     `best`: mechanisms of the best hypothesis. `indistinguishable`: alternatives that no experiment within reach distinguishes
     from the best; they do not count in the promise. `reason`: why there is nothing to measure; empty where there is. `nearest`:
-    of the alternative with the smallest separation. `entries`: poses and loads. `senses` (E, n): in which to approach each
-    joint; None where the campaign does not note it, or where a ladder is given: then any. `shares`: of its load at which each
-    pose is read; a weight hangs at their absolute values. `points`: measuring points at which targets are read in every pose.
-    `separation` (E,): from the nearest alternative, by measurements of this pose and all before it: at most twice the log Bayes
-    factor that they bring for the true hypothesis on average; 16 gives it odds of 19:1 from even ones with 90 %. `resolved`
-    (E,): probability that after this pose the right hypothesis has 95 %, those in `indistinguishable` aside. `present`:
-    separation from the nearest alternative that the present measurements give to an effect as large as the one found.
-    `poses_needed`: for `resolved` of 90 %, if further poses tell as much as these; None where a hundred are not enough.
+    of the alternative with the smallest separation. `entries`: poses and loads, to approach from any side. `shares`: of its
+    load at which each pose is read. `points`: measuring points at which targets are read in every pose. `separation` (E,): from
+    the nearest alternative, by measurements of this pose and all before it: at most twice the log Bayes factor that they bring
+    for the true hypothesis on average; 16 gives it odds of 19:1 from even ones with 90 %. `resolved` (E,): probability that
+    after this pose the right hypothesis has 95 %, those in `indistinguishable` aside.
     """
 
     best: _Name
@@ -89,13 +223,10 @@ class Proposal:
     reason: str = ""
     nearest: _Name = ()
     entries: Entries | None = None
-    senses: np.ndarray | None = None
     shares: tuple[float, ...] = ()
     points: tuple[str, ...] = ()
     separation: np.ndarray = field(default_factory=lambda: np.zeros(0))
     resolved: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    present: float = 0.0
-    poses_needed: int | None = None
 
     def __len__(self) -> int:
         return len(self.separation)
@@ -111,9 +242,8 @@ def propose(
 ) -> Proposal:
     """Choose the poses and loads that most probably resolve what a diagnosis leaves ambiguous.
 
-    `joint_limits` (n, 2): rad. `ladder`: shares of its load at which each pose is read, at the targets of the campaign and with
-    any approach. Without, each is read without its load, under it and, where the campaign has such, under the opposite one;
-    sizes and levers of the load, a reference weight, targets on further points and the side of the approach are chosen.
+    `joint_limits` (n, 2): rad. `ladder`: shares of its load at which each pose is read. Without, each is read without its load,
+    under it and, where the campaign has such, under the opposite one.
     """
     case, evidence = diagnosis.case, diagnosis.evidence
     if evidence is None:
@@ -124,18 +254,17 @@ def propose(
         return Proposal(best, reason=reason)
     problem, states = evidence.linearized.problem, case.observations.states
     numbers = sorted({n for models in kept.values() for model in models for n in model.units})
-    of_load_cell = any(problem.units[number].of_load_cell for number in numbers)
-    reach = new_states.reach_of(states, case.campaign.robot, joint_limits, ladder, of_load_cell)
+    shares = ladder or shares_of(states)
+    robot = replace(case.campaign.robot, joint_limits=joint_limits)
     lead = kept[best][0]
     factor = float(np.sqrt(max(mean_square_left(problem, lead), 1.0)))
     noise = replace(evidence.linearized.about.noise.scaled(factor), pose_rad=factor * lead.pose_error_rad)
-    instrument = new_states.instrument_of(evidence.linearized, diagnosis.final, numbers, noise, states, reach, ladder is None)
+    instrument = instrument_of(evidence.linearized, diagnosis.final, numbers, noise, states, shares)
     models = alternatives_of(evidence, kept, instrument, lead, factor)
-    entries, information, targets = _searched(models, instrument, poses, stream)
-    if not reach.free:
-        # Nobody is asked to approach from the sides with which the search was lucky.
-        entries = replace(entries, approach=new_states.approaches(reach, poses, stream))
-        information = instrument.information(entries, targets)
+    entries = _searched(models, instrument, robot, poses, stream)
+    # Nobody is asked to approach from the sides with which the search was lucky.
+    entries = replace(entries, approach=_sides(states, (poses, len(shares), robot.joints), stream))
+    information = instrument.information(entries)
     promise = Promise(models, stream)
     apart = promise.separations(promise.log_factors(information.sum(axis=0) * (MOST_POSES / poses)))
     unreachable = tuple(name for name, far in zip(promise.names[1:], apart[1:], strict=True) if far < HALF_RESOLVED)
@@ -145,24 +274,20 @@ def propose(
     if np.exp(promise.log_prior[0]) >= settings.credible:
         return Proposal(best, unreachable, NOT_DISTINGUISHABLE)
     order = _greedy(Criterion(models, stream), information, poses)
-    entries, totals = entries.at(order), np.cumsum(information[order], axis=0)
+    totals = np.cumsum(information[order], axis=0)
     factors = [promise.log_factors(total) for total in totals]
     separations = np.array([promise.separations(logs)[1:] for logs in factors])
     resolved = np.array([promise.resolved(logs) for logs in factors])
-    nearest = promise.names[1 + int(np.argmin(separations[-1]))]
     return Proposal(
         best,
         unreachable,
         "",
-        nearest,
-        entries,
-        entries.approach[:, 0] if reach.free and entries.approach is not None else None,
-        reach.shares,
-        tuple(dict.fromkeys(instrument.model.targets[target].point for target in targets)),
+        promise.names[1 + int(np.argmin(separations[-1]))],
+        entries.at(order),
+        shares,
+        tuple(dict.fromkeys(target.point for target in diagnosis.final.model.targets)),
         separations.min(axis=1),
         resolved,
-        _present_separation(evidence.linearized, lead, kept[nearest][0], factor),
-        promise.poses_needed(totals[-1], resolved),
     )
 
 
@@ -189,57 +314,18 @@ def _ambiguous(evidence: Evidence, settings: Settings) -> tuple[dict[_Name, list
 
 
 def _searched(
-    models: Sequence[Alternative], instrument: Instrument, poses: int, stream: np.random.Generator
-) -> tuple[Entries, np.ndarray, list[int]]:
-    """The experiment that leaves least entropy: its entries, their information, and the targets that are read."""
-    criterion, reach = Criterion(models, stream), instrument.reach
-    targets = list(range(len(instrument.model.targets)))
-    pool, looks = _STATES // len(reach.shares), (1 + _EXCHANGES) * poses
-    share = min(1.0, _WORK / (criterion.work * (pool + looks * _SHORT_LIST)))
-    short = max(int(share * _SHORT_LIST), 2 * poses)
-    # Hypotheses of a hundred units each leave time for one pass over the shortest list alone.
-    exchanges, radii = (_EXCHANGES, _RADII) if share * _SHORT_LIST >= poses else (0, ())
-    entries = new_states.drawn(reach, max(int(share * pool), short), stream)
-    size = max(int(_MEMORY / instrument.unknowns**2), 1)
-    parts = [entries.at(np.arange(start, min(start + size, len(entries)))) for start in range(0, len(entries), size)]
-    alone = np.concatenate([criterion.left(instrument.information(part, targets)) for part in parts])
-    order, half = np.argsort(alone, kind="stable"), short // 2
-    entries = entries.at(np.concatenate([order[:half], stream.permutation(order[half:])[: short - half]]))
-    information = instrument.information(entries, targets)
+    models: Sequence[Alternative], instrument: Instrument, robot: Robot, poses: int, stream: np.random.Generator
+) -> Entries:
+    """The experiment that leaves least entropy: greedily, then each pose in turn against all others."""
+    criterion = Criterion(models, stream)
+    # Hypotheses of a hundred units each leave time for few entries.
+    looked_at = int(_WORK / (criterion.work * 2 * poses))
+    entries = drawn(instrument.states, robot, instrument.shares, int(np.clip(looked_at, 2 * poses, _STATES)), stream)
+    information = instrument.information(entries)
     chosen = _greedy(criterion, information, poses)
-    for _ in range(exchanges):
-        before = list(chosen)
-        for place in range(poses):
-            rest = [number for number in chosen if number != chosen[place]]
-            chosen[place] = _best_beside(criterion, information, rest)
-        if chosen == before:
-            break
-    entries, information = entries.at(chosen), information[chosen]
-    for radius in radii:
-        tried = new_states.near(reach, entries, _NEIGHBOURS, radius, stream)
-        both, known = entries.then(tried), np.concatenate([information, instrument.information(tried, targets)])
-        numbers = np.arange(poses)
-        for place in range(poses):
-            mine = np.append(place, poses + _NEIGHBOURS * place + np.arange(_NEIGHBOURS))
-            rest = known[np.delete(numbers, place)].sum(axis=0)
-            numbers[place] = mine[int(np.argmin(criterion.left(rest + known[mine])))]
-        entries, information = both.at(numbers), known[numbers]
-    # Targets on further points are left out that are not worth mounting.
-    start = criterion.left(np.zeros((1, *information.shape[1:])))[0]
-    for point in instrument.extra_points:
-        fewer = [target for target in targets if target != point]
-        less = instrument.information(entries, fewer)
-        with_it, without = criterion.left(np.array([information.sum(axis=0), less.sum(axis=0)]))
-        if without - with_it < _WORTH_A_TARGET * (start - with_it):
-            targets, information = fewer, less
-    return entries, information, targets
-
-
-def _best_beside(criterion: Criterion, information: np.ndarray, chosen: list[int]) -> int:
-    """The entry that leaves least entropy beside those chosen."""
-    left = criterion.left(information[chosen].sum(axis=0) + information)
-    left[chosen] = np.inf
-    return int(np.argmin(left))
+    for place in range(poses if looked_at >= _STATES else 0):
+        chosen[place] = _best_beside(criterion, information, chosen[:place] + chosen[place + 1 :])
+    return entries.at(chosen)
 
 
 def _greedy(criterion: Criterion, information: np.ndarray, count: int) -> list[int]:
@@ -250,31 +336,20 @@ def _greedy(criterion: Criterion, information: np.ndarray, count: int) -> list[i
     return chosen
 
 
-def _present_separation(linearized: Linearized, found: Model, alternative: Model, factor: float) -> float:
-    """What the present measurements separate an effect as large as the one found from a model that is fitted to it."""
-    problem = linearized.problem
-    statistics = problem.statistics
-    at = statistics.nearest(found.pose_error_rad)
-    gram, along = statistics.gram[at] / factor**2, statistics.along[at] / factor**2
-
-    def of(model: Model) -> tuple[np.ndarray, np.ndarray]:
-        columns, deviations = problem.columns_of(model.units, factor * model.scales)
-        return columns, gram[np.ix_(columns, columns)] + np.diag(deviations**-2)
-
-    mine, inner = of(found)
-    value = np.linalg.solve(inner, along[mine])
-    others, inner = of(alternative)
-    seen = gram[np.ix_(others, mine)] @ value
-    return float(value @ gram[np.ix_(mine, mine)] @ value - seen @ np.linalg.solve(inner, seen))
+def _best_beside(criterion: Criterion, information: np.ndarray, chosen: list[int]) -> int:
+    """The entry that leaves least entropy beside those chosen."""
+    size = max(int(_MEMORY / information.shape[1] ** 2), 1)
+    known = information[chosen].sum(axis=0)
+    left = np.concatenate([criterion.left(known + part) for part in np.split(information, range(size, len(information), size))])
+    left[chosen] = np.inf
+    return int(np.argmin(left))
 
 
 def table_of(proposal: Proposal, robot: Robot) -> pd.DataFrame:
     """The proposal as whoever drives the robot wants it.
 
     Returns one row for each pose; joint angles as the controller reports them (rad), ``load`` 1 where it is loaded,
-    ``separation`` and ``resolved`` after it and all before, ``separation_without`` from the present measurements, and what the
-    promise leaves aside as ``indistinguishable``; ``approach1..n`` where the campaign has them and ``reference_weight_kg``
-    where a weight is asked for.
+    ``separation`` and ``resolved`` after it and all before, and what the promise leaves aside as ``indistinguishable``.
     """
     import pandas as pd
 
@@ -282,22 +357,16 @@ def table_of(proposal: Proposal, robot: Robot) -> pd.DataFrame:
     angles, wrench = (entries.joint_angles, entries.wrench) if entries else (np.zeros((0, robot.joints)), np.zeros((0, 6)))
     reported = robot.reported_angles(angles) if entries else angles
     columns: dict[str, Any] = {
-        "effect": [f"{words(proposal.best)} or {words(proposal.nearest)}"] * count,
+        "effect": [f"{' + '.join(proposal.best)} or {' + '.join(proposal.nearest)}"] * count,
         "pose": np.arange(count),
         "load": wrench.any(axis=1).astype(int),
         "point": [" ".join(proposal.points)] * count,
         **{f"q{joint + 1}": reported[:, joint] for joint in range(robot.joints)},
         **dict(zip(WRENCH_NAMES, wrench.T, strict=True)),
         "separation": proposal.separation,
-        "separation_without": np.full(count, proposal.present),
         "resolved": proposal.resolved,
-        "indistinguishable": ["; ".join(words(name) for name in proposal.indistinguishable)] * count,
+        "indistinguishable": ["; ".join(map(" + ".join, proposal.indistinguishable))] * count,
     }
-    if proposal.senses is not None:
-        columns |= {f"approach{joint + 1}": proposal.senses[:, joint] for joint in range(robot.joints)}
-    if entries and entries.weighed.any():
-        mass = np.linalg.norm(wrench[:, :3], axis=1) / standard_gravity
-        columns["reference_weight_kg"] = np.where(entries.weighed, mass, 0.0)
     return pd.DataFrame(columns)
 
 
@@ -310,49 +379,5 @@ def facts_of(proposal: Proposal) -> dict[str, Any]:
         "nearest": list(proposal.nearest),
         "separation": float(proposal.separation[-1]) if len(proposal) else None,
         "resolved": float(proposal.resolved[-1]) if len(proposal) else None,
-        "poses_needed": proposal.poses_needed,
         "indistinguishable": [list(name) for name in proposal.indistinguishable],
-        "sentence": sentence_of(proposal),
     }
-
-
-def sentence_of(proposal: Proposal) -> str:
-    """What the report says of the next experiment."""
-    aside = "".join(f" {sentence}" for sentence in _left_aside(proposal))
-    if proposal.reason == NOT_DISTINGUISHABLE:
-        return f"No further measurement is proposed.{aside}"
-    if proposal.reason:
-        return f"No further measurement is proposed: {proposal.reason}."
-    needed = counted(proposal.poses_needed, "pose") if proposal.poses_needed else f"more than {MOST_POSES} poses"
-    shares = ", ".join(f"{share:g}" for share in proposal.shares)
-    return (
-        f"{counted(len(proposal), 'further pose')}, each measured at {shares} times its load, separate "
-        f"{words(proposal.best)} from {words(proposal.nearest)} by "
-        f"{proposal.separation[-1]:.1f} and resolve the verdict at 19:1 with a probability of {proposal.resolved[-1]:.0%}; "
-        f"{WANTED_PROBABILITY:.0%} needs {needed}.{aside}"
-    )
-
-
-def words(mechanisms: Sequence[str]) -> str:
-    """A hypothesis in words: joint_tilt, payload and link_weight, joint_tilt or a related mechanism."""
-    named = [name for name in mechanisms if name != OTHER]
-    if not named:
-        return "a mechanism that the catalogue lacks"
-    return " and ".join(named) + (" with a related mechanism" if OTHER in mechanisms else "")
-
-
-def _left_aside(proposal: Proposal) -> Iterator[str]:
-    """Sentences on the alternatives that nothing within reach distinguishes from the best: instead of it, or beside it."""
-    best = set(proposal.best)
-    instead = [words(name) for name in proposal.indistinguishable if not set(name) > best or OTHER in set(name) - best]
-    beside = dict.fromkeys(
-        mechanism
-        for name in proposal.indistinguishable
-        if set(name) > best
-        for mechanism in name
-        if mechanism not in best and mechanism != OTHER
-    )
-    if instead:
-        yield f"{words(proposal.best)} and {', '.join(instead)} are {NOT_DISTINGUISHABLE}."
-    if beside:
-        yield f"Whether {' or '.join(beside)} acts beside {words(proposal.best)} is {NOT_DISTINGUISHABLE}."

@@ -84,6 +84,11 @@ class Settings:
         "part of a mechanism's displacements, root mean square, by which a machine may depart from its law: the laws of the"
         " catalogue at the true joints explain 96 % of the squares of those of another simulator in the median",
     )
+    smooth_tolerance: float = _setting(
+        0.5,
+        "the same of the smooth error of unknown cause, which has few functions of few inputs: of what is twice as large as a"
+        " mechanism beside it, that mechanism is a part",
+    )
     credible: float = _setting(0.95, "probability of the hypotheses between which a next experiment shall decide")
     gross_error_level: float = _setting(
         0.005,

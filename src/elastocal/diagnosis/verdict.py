@@ -159,15 +159,15 @@ def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[s
     what the machine does. So of the two that counts as a part of the other which makes displacements that the other cannot
     make, but within the tolerance of laws.
     """
-    found, tolerance = [], problem.settings.law_tolerance**2
+    found, of_laws, of_unknown = [], problem.settings.law_tolerance**2, problem.settings.smooth_tolerance**2
     for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
         names = {problem.units[unit].mechanism for unit in model.units}
         known = names - {OTHER}
         if known and known != names and probability > _TELLING:
             (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(problem, model, known)
-            if beyond_laws < tolerance * by_laws:
+            if beyond_laws < of_laws * by_laws:
                 names = known
-            elif beyond_unknown < tolerance * by_unknown:
+            elif beyond_unknown < of_unknown * by_unknown:
                 names = {OTHER}
         found.append(tuple(sorted(names)))
     return found

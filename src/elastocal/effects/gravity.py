@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.effects.protocol import LOADED_JOINTS, WAVES, Candidate, Parameter, effect, small_form, turning_joints
 from elastocal.effects.sizes import RATED, SAG, TORQUE, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+    from typing import Any
 
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidates, Displacements, Effect
@@ -25,6 +27,8 @@ DECLARED_WEIGHT = "declared_weight"
 # Links are as wide as a tenth of the arm is long (KUKA KR 270: 0.3 m of 2.7 m); motors and gears put the centre of a slender
 # one so far off the line as well.
 _WIDTH_OF_LENGTH, _LEAST_OFF_M = 0.1, 0.04
+# A centre on its joint's axis is stated no better than as so far from it.
+_LEAST_LEVER_M = 0.1
 
 
 def declared_weight(sites: Sites) -> Candidate:
@@ -45,9 +49,10 @@ def declared_weight(sites: Sites) -> Candidate:
         error = mass.relative_std * mass.mass_kg
         # Of a centre that is known as well as its mass is, and lies anywhere in the girth of its link (uniform distribution).
         of_girth = mass.mass_kg * max(_LEAST_OFF_M, width / 12**0.5)
-        moment = float(np.hypot(error * np.linalg.norm(mass.centre_m), of_girth))
+        stated = error * max(float(np.linalg.norm(mass.centre_m)), _LEAST_LEVER_M)
+        moment = float(np.hypot(stated, of_girth))
         parameters.append(Parameter(f"mass_error_of_link_{mass.link}", "kg", error, error))
-        parameters += [Parameter(f"moment_error_{axis}_of_link_{mass.link}", "kg m", moment, moment) for axis in "xyz"]
+        parameters += [Parameter(f"moment_error_{axis}_of_link_{mass.link}", "kg m", stated, moment) for axis in "xyz"]
     return Candidate(DECLARED_WEIGHT, "declared", (), "", tuple(parameters), law)
 
 
@@ -106,6 +111,36 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
             yield form(None, carried, across(carried, every), "all links")
     yield from [form(joint, links, (), "") for joint, links in near.items()]
     yield from [form(joint, links, off, _OFF_THE_LINE) for joint, links in near.items() if (off := across(links, [joint]))]
+
+
+@_effect(
+    "weight of the arm beyond its declared masses",
+    Size("share", 0.3, "files made of drawings lack motors, cables and dress, a third of an arm's weight"),
+)
+def declared_masses(own: Effect, sites: Sites) -> Candidates:
+    """Declared masses that are farther off than the robot file says: all by one factor, or each by its own.
+
+    theta_i = c_i sum_k s_k m_k tau_ik(q), with theta_i in rad, c_i the compliance (rad/(N m)), m_k the declared mass of link k
+    (kg), tau_ik its torque on joint i (N m/kg) and s_k the share by which it is heavier, one for all links or each its own.
+    A mass takes its declared centre with it. What the robot file says of its own tolerance is part of the declared model
+    (`declared_weight`). Without a load the compliances are free, and no factor of all masses is distinguishable from them.
+    """
+    bodies = [(number, mass) for number, mass in enumerate(sites.masses) if mass.link and mass.mass_kg]
+    if not bodies:
+        return
+    names = [f"share_of_link_{mass.link}_from_mass_{number}" for number, mass in bodies]
+
+    def law(around: Conditions) -> Displacements:
+        torques = [sites.masses[number].mass_kg * around.mass_torques[MASS_PARAMETERS * number] for number, _ in bodies]
+        return [dict(enumerate((torque * around.compliance).T)) for torque in torques]
+
+    def alike(around: Conditions) -> Displacements:
+        each = law(around)
+        return [{joint: np.sum([turns[joint] for turns in each], axis=0) for joint in range(sites.joints)}]
+
+    options: Mapping[str, Any] = {"needs": {"external load"}, "location_name": "arm"}
+    yield own.candidate((), own.parameters("share", ["share"], "1", sites), alike, detail="all alike", **options)
+    yield own.candidate((), own.parameters("share", names, "1", sites), law, detail="each", **options)
 
 
 # It hangs on the flange in tasks as in the campaign, until someone takes it off: that moves the robot.

@@ -5,5 +5,5 @@ Imports `campaigns`, `mechanics` and `io`.
 
 # How well masses are known, as a standard deviation over the value. A URDF does not say where they come from: of a drawing
 # without cables, grease and covers, or guessed; where dynamic parameters of robots were identified, masses and centres of such
-# models were off by a tenth to a third. A table with masses is a maker's or was identified, and a tenth is the best there is.
-URDF_MASS_STD, DH_MASS_STD = 0.2, 0.1
+# models were off by a tenth to a third.
+URDF_MASS_STD = 0.2

@@ -1,29 +1,21 @@
 """What the columns of other people's tables are: by their names, and in which unit; what is ambiguous is asked for.
 
-A column is recognized by what it is usually called, such as ``J1``, ``A1``, ``Joint 1`` or ``q1 [deg]`` for the first joint.
-Its unit stands in brackets or behind the name (``x_mm``), in a row under the names, or is stated by an option.
-
-Messages of joint states, as rosbag and PlotJuggler write them, have joints in any order, often that of the alphabet [1]:
-``position0`` stands beside ``name0``, whose cells name the joint, and counts for that joint and not for its place.
-
-Of several markers in a row, such as ``A_x, A_y, A_z, B_x, B_y, B_z``, each makes a row of its own. What such columns are called
-says of which marker they are, and not whether this is a target: it may be what was commanded. So the markers that are targets
-are stated, never guessed.
-
-[1] Open Robotics, sensor_msgs/JointState, docs.ros.org.
+A column is recognized by what it is usually called, such as ``J1``, ``A1``, ``Joint 1`` or ``q1 [deg]`` for the first joint, or
+by the end of a topic, ``/tcp/pose/position/x``. Its unit stands in brackets or behind the name (``x_mm``), in a row under the
+names, or is stated by an option. Orientations come in several notations, of which some say by themselves what they are.
 """
 
+import itertools
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy import constants
+from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError, closest_first
 from elastocal.exchange.csv_dialect import TextTable
-from elastocal.exchange.rotations import EULER, HOMOGENEOUS, MATRIX, QUATERNION, UNIT_LENGTH, VECTOR
 from elastocal.io.texts import plain_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
@@ -40,6 +32,27 @@ UNITS: dict[str, dict[str, float]] = {
     NONE: {"": 1.0},
 }
 POSITION, TRANSLATION = ("x", "y", "z"), ("t14", "t24", "t34")
+VECTOR, QUATERNION, EULER = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz"), ("e1", "e2", "e3")
+MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
+HOMOGENEOUS = tuple(f"t{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4))
+NO_ROTATION, QUATERNIONS, HOMOGENEOUS_MATRICES, EULER_ANGLES = "none", "quaternion", "homogeneous", "euler:"
+# Columns of each notation; those that say by themselves what they are come first.
+_NOTATIONS: dict[str, tuple[str, ...]] = {
+    HOMOGENEOUS_MATRICES: HOMOGENEOUS,
+    QUATERNIONS: QUATERNION,
+    "matrix": MATRIX,
+    "vector": VECTOR,
+    NO_ROTATION: (),
+}
+_CERTAIN = (HOMOGENEOUS_MATRICES, QUATERNIONS, "matrix")
+_ALLOWED = (
+    "none, vector, quaternion, matrix, homogeneous, or euler: with three axes such as euler:ZYX (about axes that turn with the "
+    "body; small letters, euler:xyz: about fixed ones)"
+)
+# Rounded to four digits, a quaternion's length and a matrix' columns are off by less.
+UNIT_LENGTH = 2e-3
+# Columns that a table may have in two meanings: external axes E1 to E3 beside an orientation.
+_OTHER_ANGLES = (("A", "B", "C"), ("W", "P", "R"), ("O", "A", "T"))
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _INDEX = re.compile(r"([^\[(]*?)\s*[\[(]\s*([0-9]+)\s*[\])](.*)", re.ASCII)
 # What has no unit, as people write it.
@@ -70,23 +83,6 @@ _KNOWN = {other: name for name, others in _ALSO.items() for other in (name.repla
 _KNOWN |= {name: name for name in (*EULER, *MATRIX, *HOMOGENEOUS)}
 # Last but one names of topics that hold angles by their number.
 _ANGLES = ("position", "positions", "jointstates", "joints", "jointpositions")
-# Three positions by their number may be x, y and z.
-_FEWEST_POSITIONS = 4
-_COUNTED = re.compile(r"(.*?)(name|position)s?[\s_.]?[\[(]?\s*([0-9]{1,2})\s*[\])]?", re.ASCII | re.IGNORECASE)
-
-# What a marker has of its own; all else of a row is of the robot.
-_OWN = frozenset((*POSITION, *VECTOR, *QUATERNION, *EULER, *MATRIX, *HOMOGENEOUS, "u95_m"))
-_BETWEEN = r"[\s_./:|\-]+"
-# Words of a topic or header that say what is measured, not of what.
-_WORDS = re.compile(
-    rf"(?:(?:^|{_BETWEEN})(?:pose|position|pos|orientation|rotation|translation|point|transform))+$", re.IGNORECASE
-)
-# Without anything between: x2, 2x, P1X, Ax.
-_JOINED = (
-    re.compile(r"(?P<axis>[xyz])(?P<marker>\d{1,3})", re.ASCII | re.IGNORECASE),
-    re.compile(r"(?P<marker>(?:[a-z]*\d{1,3}))(?P<axis>[xyz])", re.ASCII | re.IGNORECASE),
-    re.compile(r"(?P<marker>[A-Z])(?P<axis>[xyz])", re.ASCII),
-)
 
 
 def kind_of(name: str) -> tuple[str, ...]:
@@ -140,30 +136,16 @@ def read_units(cells: Sequence[str]) -> list[str] | None:
 
 
 def recognize_column(header: str) -> tuple[str | None, str | None]:
-    """What a column is, by its header.
+    """Name of a column and unit, each None where the header does not say it.
 
     A number in brackets is an index, whatever else stands there a unit. Of a topic such as ``/tcp/pose/position/x`` or
     ``field.pose.position.x`` the last two names count, or the last but one before ``position``.
-
-    Returns `name`: as this module calls columns, None where the header is not known; `unit`: as it stands in the header, None
-    where none does.
     """
     text, unit = split_unit(header)
     name = _find_name(text)
     if name is not None and unit is None:
         return name, {"time_s": "s", "temperature_c": "C", "u95_m": "m"}.get(header.lower())
     return name, unit
-
-
-def recognize_plain_header(text: str) -> str | None:
-    """What a header without a unit is by all of it; None where it is not known, or the end of a topic."""
-    plain = _simplify(text)
-    for pattern, letter in ((_JOINT, "q"), (_APPROACH, "approach")):
-        if match := pattern.fullmatch(plain):
-            # Joint 0 is somebody's first: whose, an option or the other columns have to say.
-            number = int(match[match.lastindex or 1])
-            return f"{letter}{number}" if number else None
-    return _KNOWN.get(plain)
 
 
 def split_unit(header: str) -> tuple[str, str | None]:
@@ -183,7 +165,14 @@ def split_unit(header: str) -> tuple[str, str | None]:
 
 
 def _find_name(text: str) -> str | None:
-    return next((name for plain in _names_in(text) if (name := recognize_plain_header(plain)) is not None), None)
+    for plain in _names_in(text):
+        for pattern, letter in ((_JOINT, "q"), (_APPROACH, "approach")):
+            # Joint 0 is somebody's first: whose, an option or the other columns have to say.
+            if (match := pattern.fullmatch(plain)) and (number := int(match[match.lastindex or 1])):
+                return f"{letter}{number}"
+        if plain in _KNOWN:
+            return _KNOWN[plain]
+    return None
 
 
 def _names_in(text: str) -> list[str]:
@@ -205,14 +194,6 @@ def _simplify_unit(unit: str) -> str:
     return re.sub(r"[ ·*.⋅]", "", unit).replace("degrees", "deg").replace("degree", "deg")
 
 
-def _unit_of_joint(header: str, joint: str) -> tuple[bool, str | None]:
-    """Whether a column has the name of a joint (alone, with a unit, or as a topic has it), and the unit."""
-    if _simplify(joint) in _names_in(header):
-        return True, None
-    text, unit = split_unit(header)
-    return _simplify(joint) in _names_in(text), unit
-
-
 def find_columns(
     text: TextTable, mapped: Mapping[str, str], robot: Robot | None
 ) -> tuple[dict[str, str], dict[str, str], list[str]]:
@@ -220,36 +201,32 @@ def find_columns(
     for header in mapped.values():
         if header not in text.columns:
             raise InputError(text.path, "header", f"no column {header!r}", closest_first(header, list(text.columns)))
-
-    def with_unit(header: str, name: str | None, unit: str | None) -> tuple[str | None, str | None]:
-        """The row under the header may state the unit, and may not contradict it."""
+    guesses = {header: recognize_column(header) for header in text.columns}
+    certain: set[str] = set()
+    for joint, called in enumerate((robot and robot.joint_names) or (), 1):
+        for header in text.columns:
+            for plain, unit in ((header, None), split_unit(header)):
+                if header not in certain and _simplify(called) in _names_in(plain):
+                    guesses[header] = (f"q{joint}", unit)
+                    certain.add(header)
+    for header, (name, unit) in guesses.items():
         below = text.units.get(header)
         if unit and below and unit != below:
             allowed = f"one unit; --ignore {header!r}, or a table with one of them"
             raise InputError(text.path, "header", f"{header!r} and {below!r} in the row under it", allowed)
-        return name, unit or below
-
-    found, known, joint_names = dict(mapped), {*mapped.values()}, (robot and robot.joint_names) or ()
-    guesses = {header: with_unit(header, *recognize_column(header)) for header in text.columns}
-    certain: set[str] = set()
-    for joint, called in enumerate(joint_names, 1):
-        for header in text.columns:
-            is_joint, unit = _unit_of_joint(header, called)
-            if is_joint:
-                guesses[header] = with_unit(header, f"q{joint}", unit)
-                certain.add(header)
-    named = _find_joints_by_name(text, joint_names, known)
+        guesses[header] = (name, unit or below)
     parts = {name: header for header, (name, _) in guesses.items() if name in QUATERNION}
     if parts.keys() == {"qx", "qy", "qz"} and "qw" not in mapped:
         # With the other three parts of a quaternion q0 has length 1.
-        zero = [header for header in text.columns if _simplify(header) == "q0" and header not in known]
-        named |= {header: "qw" for header in zero if _have_unit_length(text, [header, *parts.values()])}
-    guesses |= {header: (name, guesses[header][1]) for header, name in named.items()}
-    certain |= {*named}
+        for header in text.columns:
+            is_free = _simplify(header) == "q0" and header not in mapped.values()
+            if is_free and _have_unit_length(text, [header, *parts.values()]):
+                guesses[header] = ("qw", None)
+                certain.add(header)
     free = [header for header in text.columns if header not in certain and guesses[header][0] not in mapped]
-    joints, notes = _find_counted_joints(text, free, known)
+    joints, notes = _find_counted_joints(text, free, {*mapped.values()})
     guesses |= {header: (name, guesses[header][1]) for header, name in joints.items()}
-    stated: dict[str, str] = {}
+    found, stated = dict(mapped), dict[str, str]()
     for header, (guess, unit) in guesses.items():
         meant = next((name for name, named in mapped.items() if named == header), guess)
         if meant is None or mapped.get(meant, header) != header:
@@ -268,55 +245,13 @@ def find_columns(
     return found, stated, notes
 
 
-def _find_joints_by_name(text: TextTable, joint_names: Sequence[str], mapped: set[str]) -> dict[str, str]:
-    """Names of joint angles by the headers of positions beside which columns name the joints.
-
-    `joint_names`: as the robot has them; empty where nobody knows. `mapped`: headers that options state. Raises `InputError`:
-    a name that changes from row to row, or joints whose order nothing states.
-    """
-    families: dict[tuple[str, str], dict[int, str]] = {}
-    for header in text.columns:
-        if match := _COUNTED.fullmatch(split_unit(header)[0]):
-            families.setdefault((match[1], match[2].lower()), {})[int(match[3])] = header
-    found: dict[str, str] = {}
-    for (prefix, kind), names in families.items():
-        positions = families.get((prefix, "position"), {})
-        if kind != "name" or positions.keys() != names.keys() or mapped & {*positions.values()}:
-            continue
-        for number, header in names.items():
-            called, *others = dict.fromkeys(text.columns[header])
-            if others:
-                line = text.lines[text.columns[header].index(others[0])]
-                allowed = f"one joint in each column; it is {called!r} in line {text.lines[0]}"
-                raise InputError(text.path, f"line {line}, column {header}", repr(others[0]), allowed)
-            joint = next((f"q{j}" for j, name in enumerate(joint_names, 1) if _unit_of_joint(called, name)[0]), None)
-            joint = joint or (None if joint_names else recognize_column(called)[0])
-            if joint and find_joints([joint]):
-                found[positions[number]] = joint
-        if not found:
-            words = f"joints called {', '.join(text.columns[each][0] for each in names.values())}, in an order that need not be"
-            first = next(iter(positions.values()))
-            allowed = f"--robot FILE whose joint_names are these, or --column q1={first!r} …, each joint's"
-            raise InputError(text.path, "header", f"{words} the arm's", allowed)
-    return found
-
-
 def _find_counted_joints(text: TextTable, headers: Sequence[str], mapped: set[str]) -> tuple[dict[str, str], list[str]]:
-    """Names of joints that headers count, and notes; what may be a quaternion, or is counted in two ways, is asked for."""
+    """Names of joints that headers count from 0, and notes; what may be a quaternion, or counts in two ways, is asked for."""
     families: dict[str, dict[int, str]] = {}
     for header in headers:
         matches = (_JOINT.fullmatch(name) for name in _names_in(split_unit(header)[0]))
         if match := next(filter(None, matches), None):
             families.setdefault(match[1], {}).setdefault(int(match[2]), header)
-    notes = []
-    if not families:
-        # Of a message of joint states without the names beside.
-        counted = {header: match for header in text.columns if (match := _COUNTED.fullmatch(split_unit(header)[0]))}
-        members = {int(match[3]): header for header, match in counted.items() if match[2].lower() == "position"}
-        alone = len(members) == len(counted) and {*members.values()} <= {*headers}
-        if len(members) >= _FEWEST_POSITIONS and alone:
-            families = {"position": members}
-            notes = [f"{members[min(members)]!r} … taken for joints in the arm's order, as no columns name them"]
     # What options name needs no question, unless they name a part of what is counted from 0.
     families = {
         name: members if 0 in members and not mapped >= {*members.values()} else free
@@ -344,8 +279,8 @@ def _find_counted_joints(text: TextTable, headers: Sequence[str], mapped: set[st
                 allowed = f"--column q1={headers[0]!r} …, each joint's"
                 raise InputError(text.path, "header", f"{', '.join(headers)}, counted from 0", allowed)
             note = f"joints counted from 0: q1 is {headers[0]!r}, q{len(headers)} is {headers[-1]!r}"
-            return {header: f"q{number + 1}" for number, header in members.items()}, [note, *notes]
-    return ({header: f"q{number}" for number, header in families["position"].items()} if notes else {}), notes
+            return {header: f"q{number + 1}" for number, header in members.items()}, [note]
+    return {}, []
 
 
 def _have_unit_length(text: TextTable, headers: Sequence[str]) -> bool:
@@ -354,103 +289,73 @@ def _have_unit_length(text: TextTable, headers: Sequence[str]) -> bool:
     return len(numbers) > 0 and bool((np.abs(np.linalg.norm(numbers, axis=1) - 1.0) <= UNIT_LENGTH).all())
 
 
-def markers_in(headers: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Headers by the names of their quantities, of each marker with a position; that of headers such as ``x`` is called ""."""
-    found: dict[str, dict[str, str]] = {}
-    for header in headers:
-        if part := _marker_and_name(split_unit(header)[0]):
-            found.setdefault(part[0], {}).setdefault(part[1], header)
-    return {marker: named for marker, named in found.items() if has_position(named)}
+def columns_of_rotation(notation: str, there: Collection[str]) -> tuple[str, ...]:
+    """Names of the columns of an orientation in a notation.
 
-
-def _marker_and_name(text: str) -> tuple[str, str] | None:
-    """Marker and quantity of a header without its unit; None where it is neither."""
-    if name := recognize_plain_header(text):
-        return ("", name) if name in _OWN else None
-    parts, gaps = re.split(_BETWEEN, text), [*re.finditer(_BETWEEN, text)]
-    # The quantity is in the last words or in the first, the marker in the others.
-    for words, marker in (
-        *((parts[-last:], text[: gaps[-last].start()]) for last in (2, 1) if len(parts) > last),
-        *((parts[:first], text[gaps[first - 1].end() :]) for first in (2, 1) if len(parts) > first),
-    ):
-        if (name := recognize_plain_header(" ".join(words))) in _OWN:
-            return re.sub(rf"^{_BETWEEN}|{_BETWEEN}$", "", _WORDS.sub("", marker)), name
-    match = next((match for pattern in _JOINED if (match := pattern.fullmatch(text))), None)
-    return (match["marker"], match["axis"].lower()) if match else None
-
-
-def choose_markers(
-    text: TextTable, target: str | None, targets: Mapping[str, str] | None, mapped: Collection[str]
-) -> dict[str, str]:
-    """Markers of a table by the names of the targets that they are; empty where rows hold one position.
-
-    `target`: name of the target of all rows; where a marker is called so, it is meant. `targets`: markers by the names of
-    targets, as stated. `mapped`: names of columns that options state. Raises `InputError`: no such marker, or several positions
-    in a row of which none is stated.
+    `there`: columns that a table has: Euler angles about three different axes may be named after the axes, ``rx``, or
+    ``e1..e3``.
     """
-    markers = markers_in(text.columns)
-    if targets:
-        for name, marker in targets.items():
-            if marker not in markers:
-                known = _quoted(markers) or "none, each with columns for x, y and z"
-                raise InputError(
-                    text.path, "header", f"no marker {marker!r}, target {name!r}", f"markers of the table: {known}"
-                )
-        return dict(targets)
-    if has_position(mapped):
-        return {}
-    usual = [name for name, named in markers.items() if all(recognize_column(named.get(a, a))[0] == a for a in POSITION)]
-    if target and target in markers and target not in usual:
-        return {target: target}
-    # Beside plain x, y, z a number makes another marker; x_cmd and such are no measurements.
-    asked = usual + ([marker for marker in markers if marker.isdigit()] if len(usual) == 1 else [])
-    asked = asked or [*markers]
-    if len(asked) > 1 or (asked and not usual):
-        first = next((marker for marker in asked if marker), asked[0])
-        options = " ".join(f"--target {marker if marker else f'NAME={marker}'}" for marker in asked[:3])
-        found = f"positions of {_quoted(asked[:4])}{' …' if len(asked) > 4 else ''} in each row"
-        allowed = f"{options} for those that are targets (NAME={first} gives one another name), or --column x=NAME … for one"
-        raise InputError(text.path, "header", found, allowed)
-    return {}
+    if not notation.startswith(EULER_ANGLES):
+        return _NOTATIONS[notation]
+    axes = notation.removeprefix(EULER_ANGLES).lower()
+    by_axis = tuple(f"r{axis}" for axis in axes)
+    return by_axis if len(set(axes)) == 3 and all(name in there for name in by_axis) else EULER
 
 
-def _quoted(markers: Iterable[str]) -> str:
-    return ", ".join(repr(marker) if marker else "x, y, z" for marker in markers)
+def find_rotation(text: TextTable, columns: Mapping[str, str], mapped: Mapping[str, str], notation: str | None) -> str:
+    """Notation of the orientations of a table: the one that is stated, or the one that the names of columns leave.
 
-
-def one_row_each(
-    text: TextTable, targets: Mapping[str, str], mapped: Mapping[str, str]
-) -> tuple[TextTable, dict[str, str], list[str]]:
-    """A table with one row for each target of a row, whose columns have the headers of the first target's.
-
-    `targets`: markers by the names of targets. `mapped`: headers by names of columns that options state. Returns the table,
-    with a column of the targets' names; headers by names, those of the options among them; and notes which columns are of
-    which target. Raises `InputError`: a target without a column that another has, or with another unit of it.
+    `columns`: headers by name. `mapped`: those of them that options state. Raises `InputError` where it is ambiguous.
     """
-    each = {name: markers_in(text.columns)[marker] for name, marker in targets.items()}
-    first, named = next(iter(each.items()))
-    for name, other in each.items():
-        for what in sorted({*named} ^ {*other}):
-            header, of = (named[what], first) if what in named else (other[what], name)
-            allowed = f"--ignore {header!r}, or the same of each target"
-            raise InputError(text.path, "header", f"{header!r} of {of} alone", allowed)
-        for what, header in named.items():
-            units = [text.units.get(one) or recognize_column(one)[1] or "no unit" for one in (header, other[what])]
-            if units[0] != units[1]:
-                found = f"{header!r} in {units[0]} and {other[what]!r} in {units[1]}"
-                raise InputError(text.path, "header", found, "one unit for what the targets have in common")
-    if wrong := next((what for what, header in named.items() if mapped.get(what, header) != header), None):
-        raise InputError("--column", wrong, repr(mapped[wrong]), f"{named[wrong]!r}, as {first} has it, or no --target")
-    chosen = {header for other in each.values() for header in other.values()}
-    columns = {
-        name: tuple(cell for cell in cells for _ in targets) for name, cells in text.columns.items() if name not in chosen
-    }
-    for what, header in named.items():
-        columns[header] = tuple(
-            cell for row in zip(*(text.columns[o[what]] for o in each.values()), strict=True) for cell in row
-        )
-    column = "target" if "target" not in columns else "marker of the row"
-    columns[column] = tuple(targets) * len(text.lines)
-    notes = [f"{name} has {', '.join(map(repr, other.values()))}" for name, other in each.items()]
-    long = replace(text, columns=columns, lines=tuple(line for line in text.lines for _ in targets))
-    return long, {**mapped, **named, "target": column}, notes
+    if notation is not None:
+        axes = notation.removeprefix(EULER_ANGLES)
+        turns = re.fullmatch(r"[XYZ]{3}|[xyz]{3}", axes) and all(one != other for one, other in itertools.pairwise(axes))
+        if not (turns if axes != notation else notation in _NOTATIONS):
+            raise InputError("--rotation", "", repr(notation), _ALLOWED)
+        if columns_of_rotation(notation, columns) == EULER:
+            _check_external_axes(text, columns, mapped)
+        return notation
+    for certain in _CERTAIN:
+        if all(name in columns for name in _NOTATIONS[certain]):
+            return certain
+    if part := [columns[name] for name in QUATERNION if name in columns]:
+        allowed = "--column qw=NAME and such for what is missing, or --rotation none"
+        raise InputError(text.path, "header", f"a part of a quaternion, {', '.join(part)}", allowed)
+    if angles := [columns[name] for name in (*VECTOR, *EULER) if name in columns]:
+        allowed = f"--rotation vector, euler:ZYX, euler:xyz … or none: {_ALLOWED}"
+        raise InputError(text.path, "header", f"orientations {', '.join(angles)} of an unknown notation", allowed)
+    return NO_ROTATION
+
+
+def _check_external_axes(text: TextTable, columns: Mapping[str, str], mapped: Mapping[str, str]) -> None:
+    """Ask where angles ``E1`` to ``E3`` may be external axes, as other columns look like the orientation."""
+    plain = {re.split(r"[\[(]", header)[0].strip().upper(): header for header in text.columns}
+    guessed = [columns[name] for name in EULER if name in columns and name not in mapped]
+    others = [[plain[letter] for letter in letters] for letters in _OTHER_ANGLES if plain.keys() >= {*letters}]
+    if guessed and (others or plain.keys() & {"E4", "E5", "E6"}):
+        other_names = others[0] if others else ["NAME", "NAME", "NAME"]
+        allowed = " ".join(f"--column {name}={header!r}" for name, header in zip(EULER, other_names, strict=True))
+        own = " or ".join([f"{', '.join(guessed)} (external axes?)", *(", ".join(each) for each in others)])
+        raise InputError(text.path, "header", f"orientations in {own}", f"{allowed}, or the same with {', '.join(guessed)}")
+
+
+def rotation_vectors(notation: str, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation vectors of orientations in a notation that is not "none".
+
+    `values` (N, columns): in the order of `columns_of_rotation`; angles in rad. Of homogeneous matrices the translations are
+    left aside. Returns `vectors` (N, 3): rad; `off` (N,) of bool: whether a quaternion is not of length one or a matrix not a
+    rotation, more than rounding to four digits explains.
+    """
+    off = np.zeros(len(values), bool)
+    if notation == "vector":
+        return values, off
+    if notation.startswith(EULER_ANGLES):
+        return Rotation.from_euler(notation.removeprefix(EULER_ANGLES), values).as_rotvec(), off
+    if notation == QUATERNIONS:
+        off = np.abs(np.linalg.norm(values, axis=1) - 1.0) > UNIT_LENGTH
+        safe = np.where(off[:, None], [1.0, 0.0, 0.0, 0.0], values)
+        return Rotation.from_quat(safe, scalar_first=True).as_rotvec(), off
+    matrices = values.reshape(len(values), 3, -1)[:, :, :3]
+    off = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2)) > UNIT_LENGTH
+    off |= np.linalg.det(matrices) < 0.0
+    return Rotation.from_matrix(np.where(off[:, None, None], np.eye(3), matrices)).as_rotvec(), off

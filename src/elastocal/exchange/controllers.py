@@ -36,8 +36,8 @@ class JointTargets:
 class Controller:
     """A language: `words` as a person calls it, `suffix` of its files, what it calls the axes of the robot and those beside.
 
-    `pattern`, `pattern_words`: of names of programs. `reserved`: words in lower case that no program may be called, between
-    blanks. `write`: the text of a program from its name, targets and notes; `remarks` makes these comments.
+    `pattern`, `pattern_words`: of names of programs. `write`: the text of a program from its name, targets and notes;
+    `remarks` makes these comments.
     """
 
     name: str
@@ -47,7 +47,6 @@ class Controller:
     external: tuple[str, ...]
     pattern: str
     pattern_words: str
-    reserved: str
     write: Callable[[str, JointTargets, Sequence[str]], list[str]]
 
     def program(self, name: str, targets: JointTargets, notes: Sequence[str] = ()) -> str:
@@ -119,40 +118,22 @@ _RAPID_AXES, _RAPID_EXTERNAL = tuple(f"rax_{axis}" for axis in range(1, 7)), tup
 _TP_AXES, _TP_EXTERNAL = tuple(f"J{axis}" for axis in range(1, 7)), tuple(f"E{axis}" for axis in range(1, 4))
 _UR_AXES = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
 _NAMED = "letters, digits and underscores that begin with"
-_KRL_WORDS = (
-    "and anin anout axis b_and b_exor b_not b_or base bas bool brake cast_from cast_to case ccirc char circ circ_rel "
-    "confirm const continue decl def default defdat deffct do e6axis e6pos else end enddat endfct endfor endif endloop "
-    "endswitch endwhile enum exit exor ext extfct false for frame global goto halt i if import int interrupt is lin lin_rel "
-    "loop not off on or pos private ptp ptp_rel public pulse real repeat resume return sec signal spl spline step struc "
-    "switch then to trigger true until wait when while"
-)
-_RAPID_WORDS = (
-    "alias and backward case connect const default div do else elseif endfor endfunc endif endmodule endproc endrecord "
-    "endtest endtrap endwhile error exit false for from func goto if inout local mod module nostepin not noview or pers "
-    "proc raise readonly record retry return step sysmodule test then to trap true trynext undo var viewonly while with xor "
-    "go_to_targets used_tool main robtarget jointtarget tooldata base user"
-)
-_TP_WORDS = "con prn aux nul com1 com2 com3 com4 com5 com6 com7 com8 com9 lpt1 lpt2 lpt3"
-_UR_WORDS = (
-    "and break continue def elif else end enter_critical exit_critical false for global halt if join kill local not or pass "
-    "return run sec thread true while xor movej movel movec movep servoj speedj stopj sleep sync textmsg"
-)
 _ALL = (
     Controller(
         "krl", "KUKA KRL", ".src", tuple(f"A{axis}" for axis in range(1, 7)), tuple(f"E{axis}" for axis in range(1, 7)),
-        r"[A-Za-z_]\w{0,23}", f"up to 24 {_NAMED} no digit, and no word of the language", _KRL_WORDS, _krl,
+        r"[A-Za-z_]\w{0,23}", f"up to 24 {_NAMED} no digit", _krl,
     ),
     Controller(
         "rapid", "ABB RAPID", ".mod", _RAPID_AXES, _RAPID_EXTERNAL, r"(?!(?i:target_\d+)$)[A-Za-z]\w{0,31}",
-        f"up to 32 {_NAMED} a letter, and no word of the language", _RAPID_WORDS, _rapid,
+        f"up to 32 {_NAMED} a letter", _rapid,
     ),
     Controller(
         "tp", "FANUC TP", ".ls", _TP_AXES, _TP_EXTERNAL,
-        r"[A-Za-z]\w{0,35}", f"up to 36 {_NAMED} a letter, and no device", _TP_WORDS, _tp,
+        r"[A-Za-z]\w{0,35}", f"up to 36 {_NAMED} a letter", _tp,
     ),
     Controller(
         "urscript", "URScript", ".script", _UR_AXES, (),
-        r"[A-Za-z_]\w*", f"{_NAMED} no digit, and no word of the language", _UR_WORDS, _urscript,
+        r"[A-Za-z_]\w*", f"{_NAMED} no digit", _urscript,
     ),
 )  # fmt: skip
 CONTROLLERS = {each.name: each for each in _ALL}
@@ -168,7 +149,7 @@ def controller_of(name: str, suffix: str) -> Controller | None:
 def check_name(controller: Controller, path: Path) -> str:
     """The name of the program in a file: the file's without its suffix, which an InputError refuses where it is none."""
     name = path.stem
-    if not re.fullmatch(controller.pattern, name, re.ASCII) or name.lower() in controller.reserved.split():
+    if not re.fullmatch(controller.pattern, name, re.ASCII):
         found = f"{name!r} as the name of a program"
         raise InputError(path, "--output", found, f"in {controller.words}: {controller.pattern_words}")
     return name

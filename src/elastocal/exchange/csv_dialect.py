@@ -6,7 +6,6 @@ Neither `csv.Sniffer`, which guesses, nor pandas, which knows no lines, can ask 
 import codecs
 import csv
 import re
-from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -77,7 +76,6 @@ def read_text_table(
     wanted: str = _WANTED,
     units_in: Callable[[Sequence[str]], Sequence[str] | None] = lambda cells: None,
     names: Sequence[str] = (),
-    is_small: Callable[[str], bool] = lambda name: False,
 ) -> TextTable:
     """Read a table, finding out what is not stated of its dialect.
 
@@ -86,9 +84,8 @@ def read_text_table(
     `is_header`: of the cells of a line, whether they name the columns; the first such line does where no line is stated, else
     one behind a comment mark. `wanted`: what a header has, for messages. `ignored`: names of columns that are left out whatever
     they hold. `units_in`: the units of a row of cells that is nothing but units, such as one under the header. `names`: of all
-    columns of a table without a header. `is_small`: by the name of a column, whether none of its numbers is a thousand or more,
-    as angles in rad: 1,234 has a decimal comma there. Raises `InputError`: a file that cannot be read or has no header, a row
-    of another length, or numbers that may be read in two ways.
+    columns of a table without a header. Raises `InputError`: a file that cannot be read or has no header, a row of another
+    length, or numbers that may be read in two ways.
     """
     source = Path(path).as_posix()
     lines, encoding = _read_lines(path, stated.encoding)
@@ -98,11 +95,12 @@ def read_text_table(
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
     if names:
-        header, named_above, names = 0, False, [name or f"column {place}" for place, name in enumerate(names, 1)]
+        header = 0
         separator = stated.separator or next((name for name, mark in SEPARATORS.items() if mark in kept[0][1]), "comma")
     else:
         separator, header, line = _find_header(kept, comments, is_header, stated, wanted, source)
-        names, named_above = _read_names(_split_cells(line, separator, source, header), kept, separator, header)
+        names = _split_cells(line, separator, source, header)
+    names = [name or f"column {place}" for place, name in enumerate(names, 1)]
     where = f"line {header}" if header else "--columns"
     table = [(number, _split_cells(line, separator, source, number)) for number, line in kept if number > header]
     rows = [row for row in table if any(row[1])]
@@ -132,7 +130,7 @@ def read_text_table(
         elif name not in ignored:
             columns[name] = each
     numbers = [number for number, _ in rows]
-    decimal, comma = stated.decimal or _find_decimal(columns, numbers, separator, source, is_small), _DECIMAL["comma"]
+    decimal, comma = stated.decimal or _find_decimal(columns, numbers, separator, source), _DECIMAL["comma"]
     if decimal == "comma":
         columns = {
             name: tuple(cell.replace(",", ".") if comma.fullmatch(cell) else cell for cell in cells)
@@ -140,7 +138,7 @@ def read_text_table(
         }
     unread = (
         (len(table) - len(rows) - bool(units), "row", "of empty cells"),
-        (sum(number < header for number, _ in filled) - named_above, "line", "above the header"),
+        (sum(number < header for number, _ in filled), "line", "above the header"),
         (sum(number > header for number, _ in comments), "line", "of comments below the header"),
         (nameless, "column", "without name and values"),
     )
@@ -178,11 +176,6 @@ def _decode(content: bytes, path: str | Path, encoding: str | None) -> tuple[str
             known = "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, shift_jis, gb18030 or utf-16-le"
             raise InputError("--encoding", "", f"{encoding!r}: {error}", known) from None
     found = next((name for mark, name in _MARKS if content.startswith(mark)), "")
-    # In UTF-16 every other byte of digits, letters and separators is zero.
-    for name, first in (("utf-16-le", 0), ("utf-16-be", 1)):
-        zeros = content[1 - first : 200 : 2]
-        if not found and zeros and not any(zeros) and all(content[first:200:2]):
-            found = name
     try:
         return decoded(content, path, found or "utf-8"), found or "utf-8"
     except InputError as error:
@@ -212,32 +205,11 @@ def _find_header(
         for name in marks_in(line):
             if is_header(_split_cells(line, name, source, number)):
                 return name, number, line
-    found: list[tuple[str, int, str]] = []
     for number, line in comments:
-        found += [(name, number, line) for name in marks_in(line) if is_header(_split_cells(line, name))][:1]
-    if len({line for _, _, line in found}) > 1:
-        allowed = "--header LINE, the one that names the columns"
-        raise InputError(source, f"line {found[0][1]} and line {found[1][1]}", "two headers behind comment marks", allowed)
-    if not found:
-        raise InputError(source, f"line {kept[0][0]}", repr(kept[0][1][:60]), wanted)
-    return found[0]
-
-
-def _read_names(cells: Sequence[str], kept: _Lines, separator: str, header: int) -> tuple[list[str], bool]:
-    """Names of columns, and whether some are of two lines: those that stand there twice, by what the line above has there.
-
-    So are the three columns X, Y, Z of each marker. Of cells that a spreadsheet joined the first one has the text.
-    """
-    names = [name or f"column {place}" for place, name in enumerate(cells, 1)]
-    twice = {name for name, times in Counter(names).items() if times > 1}
-    if not twice or separator == "space":
-        return names, False
-    groups = _split_cells(next((line for number, line in reversed(kept) if number < header), ""), separator)
-    of, both = "", []
-    for name, group in zip(names, [*groups, *[""] * (len(names) - len(groups))], strict=False):
-        of = group or of
-        both.append(f"{of} {name}" if name in twice and of else name)
-    return (both, True) if len(set(both)) == len(both) else (names, False)
+        for name in marks_in(line):
+            if is_header(_split_cells(line, name)):
+                return name, number, line
+    raise InputError(source, f"line {kept[0][0]}", repr(kept[0][1][:60]), wanted)
 
 
 def _split_cells(line: str, separator: str, source: str = "", number: int = 0) -> list[str]:
@@ -259,18 +231,16 @@ def _split_cells(line: str, separator: str, source: str = "", number: int = 0) -
     return [cell.strip() for cell in row]
 
 
-def _find_decimal(
-    columns: dict[str, tuple[str, ...]], lines: Sequence[int], separator: str, source: str, is_small: Callable[[str], bool]
-) -> str:
+def _find_decimal(columns: dict[str, tuple[str, ...]], lines: Sequence[int], separator: str, source: str) -> str:
     """The decimal mark that all numbers have; refused are numbers that may be read in two ways."""
     seen: dict[str, tuple[int, str]] = {}
-    sure, small = False, [is_small(name) for name in columns]
+    sure = False
     for number, row in zip(lines, zip(*columns.values(), strict=True), strict=True):
-        for cell, below in zip(row, small, strict=True):
+        for cell in row:
             name = "comma" if "," in cell else "point" if "." in cell and "point" not in seen else ""
             if name and _DECIMAL[name].fullmatch(cell):
                 seen.setdefault(name, (number, cell))
-                sure |= name == "comma" and (below or not _EITHER.fullmatch(cell))
+                sure |= name == "comma" and not _EITHER.fullmatch(cell)
         if len(seen) == 2:
             (one, left), (other, right) = seen["point"], seen["comma"]
             allowed = "one decimal mark, and none between thousands; --decimal point or comma says which"

@@ -8,9 +8,8 @@ One row for each joint, or for what is fixed before, between or behind joints::
 
 begins a UR5e in the standard notation. ``type`` is R (revolute, also where the column is left out), P (prismatic) or F (fixed).
 A column of angles or lengths ends in ``_deg``, ``_rad``, ``_m`` or ``_mm``, has ``[mm]`` behind its name or a row of units
-under the header; without, an option says which. In radians ``pi/2`` may stand for a number. Optional columns: ``lower`` and
-``upper`` (joint limits; of prismatic joints lengths), ``compliance_urad_per_Nm``, ``mass_kg`` with ``cx``, ``cy``, ``cz``
-(centre of mass in the frame of the row), and ``point`` (name of a measuring point at the frame of the row).
+under the header; without, an option says which. Optional columns: ``lower`` and ``upper`` (joint limits; of prismatic joints
+lengths), and ``point`` (name of a measuring point at the frame of the row).
 
 A row of the standard notation [1] is ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, one of Craig's modified notation [2]
 ``Rx(alpha) Tx(a) Rz(theta) Tz(d)`` with the alpha and a of its own row, which he calls alpha and a of i - 1. A joint's angle is
@@ -42,25 +41,26 @@ import numpy as np
 
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
-from elastocal.exchange import DH_MASS_STD
 from elastocal.exchange.column_names import read_units, split_unit
-from elastocal.exchange.csv_dialect import Dialect, read_text_table
-from elastocal.exchange.fixed_transforms import displacement_words, elementary, origin_transform, word
-from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, mass_entries, point_name
+from elastocal.exchange.csv_dialect import Dialect, TextTable, read_text_table
+from elastocal.exchange.fixed_transforms import (
+    displacement_words,
+    elementary,
+    origin_transform,
+    word,
+)
+from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, point_name
 from elastocal.io.documents import read_document
 from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
 from elastocal.mechanics.robot import UNLIMITED_DEG
 
-_ANGLE_UNITS = {"deg": math.radians(1.0), "rad": 1.0}
-_LENGTH_UNITS = {"m": 1.0, "mm": 1e-3}
-_ANGLES, _LENGTHS, _LIMITS = ("theta_offset", "alpha"), ("d", "a", "cx", "cy", "cz"), ("lower", "upper")
-_PLAIN, _WORDS = ("compliance_urad_per_Nm", "mass_kg"), ("joint", "type", "point")
+_SCALES = {"deg": math.radians(1.0), "rad": 1.0, "m": 1.0, "mm": 1e-3}
+_ANGLE_UNITS, _LENGTH_UNITS = ("deg", "rad"), ("m", "mm")
+_ANGLES, _LENGTHS, _LIMITS, _WORDS = ("theta_offset", "alpha"), ("d", "a"), ("lower", "upper"), ("joint", "type", "point")
 _NEEDED = ("d", "a", "alpha")
-_USUAL = ("joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type", "lower_deg", "upper_deg", *_PLAIN,
-          "cx_m", "cy_m", "cz_m", "point")  # fmt: skip
+_USUAL = ("joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type", "lower_deg", "upper_deg", "point")
 # By which the unit is stated of what turns, and of what does not.
 _OPTIONS = {True: "--angles deg or rad", False: "--lengths m or mm"}
-_PI = re.compile(r"([+-]?)(\d+(?:\.\d+)?)?\*?pi(?:/(\d+(?:\.\d+)?))?", re.ASCII | re.IGNORECASE)
 # The chain of more has no room in a robot file.
 _MOST_ROWS = 500
 _DECIMALS = 9
@@ -82,12 +82,11 @@ _Piece = tuple[np.ndarray, str]
 
 @dataclass(frozen=True)
 class DhRow:
-    """One row, in SI units.
+    """One row, in SI units: rad and m; limits of a prismatic joint in m.
 
-    `where`: line or row of the file, for messages. `joint`: as the table calls it; empty where it does not. `kind`: one of "R",
-    "P", "F". `theta`, `d`, `a`, `alpha`: rad and m; theta of a revolute joint is the offset that is added to its angle, d of a
-    prismatic one to its shift. `limits`: rad, of a prismatic joint m. `compliance`: µrad/(N m), of a prismatic joint µm/N.
-    `centre_m`: in the frame of the row. `point`: measuring point at the frame of the row; empty for none.
+    `where`: line of the file, for messages. `joint`: as the table calls it; empty where it does not. `kind`: one of "R", "P",
+    "F". `theta` of a revolute joint is the offset that is added to its angle, `d` of a prismatic one to its shift. `point`:
+    measuring point at the frame of the row; empty for none.
     """
 
     where: str
@@ -98,9 +97,6 @@ class DhRow:
     a: float
     alpha: float
     limits: tuple[float, float] | None
-    compliance: float | None
-    mass_kg: float | None
-    centre_m: tuple[float, float, float]
     point: str
 
     def displacements(self, modified: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -128,17 +124,12 @@ _AS_STATED = DhOptions()
 
 
 def robot_from_dh(
-    path: str | Path,
-    modified: bool = False,
-    options: DhOptions = _AS_STATED,
-    name: str | None = None,
-    relative_std: float = DH_MASS_STD,
+    path: str | Path, modified: bool = False, options: DhOptions = _AS_STATED, name: str | None = None
 ) -> Imported:
     """The robot of a Denavit-Hartenberg table, or of a YAML file with the kinematics of a ROS driver.
 
-    `modified`: Craig's notation; else the standard one. `name`: of the robot; that of the file without. `relative_std`: how
-    well masses are known. Raises `InputError`: as in `read_dh_table`; compliances of some joints only, a prismatic joint
-    without limits, two points of one name.
+    `modified`: Craig's notation; else the standard one. `name`: of the robot; that of the file without. Raises `InputError`: as
+    in `read_dh_table`; a prismatic joint without limits, two points of one name.
     """
     source = Path(path).as_posix()
     if Path(path).suffix.lower() in (".yaml", ".yml"):
@@ -157,30 +148,18 @@ def robot_from_dh(
             if not row.joint or names.count(row.joint) > 1:
                 raise InputError(source, f"{row.where}, joint", repr(row.joint), "a name for every joint, each once")
         document["joint_names"] = names
-    words, slid = _words(rows, points, modified), np.zeros(len(joints) + 1)
-    near, slides = _slid_words(_gaps(rows, points, modified), [row.kind for row in joints])
+    words, notes = _words(rows, points, modified), ["no masses: the weight of the links is not known"]
+    near = _slid_words(_gaps(rows, points, modified), [row.kind for row in joints])
     written, short = (sum(abs(float(match[1])) for each in both if (match := _SHIFT.fullmatch(each))) for both in (words, near))
     if short < _MUCH_SHORTER * written:
-        words, slid = near, slides
-    document["chain"] = " ".join(words)
-    if any(row.limits or row.kind == "P" for row in joints):
-        document["joint_limits_deg"] = [_limits(row, source) for row in joints]
-    compliances = [row.compliance for row in joints]
-    if None not in compliances:
-        document["compliance_urad_per_Nm"] = compliances
-    elif any(compliances):
-        row = joints[compliances.index(None)]
-        raise InputError(source, f"{row.where}, compliance_urad_per_Nm", "nothing", "one for every joint, or for none")
-    masses = _masses(rows, modified, relative_std, slid)
-    notes = [] if masses else ["no masses: the weight of the links is not known"]
-    if slid.any():
+        words = near
         notes.append(
             f"lengths of {written:.4g} m that cancel along nearly parallel axes became {short:.4g} m in the chain, "
             "whose joints are at other places of the same axes: the pose at the end is the same"
         )
-    if masses:
-        document["masses"] = masses
-        notes.append(f"masses are known to {100 * relative_std:g} %, by assumption")
+    document["chain"] = " ".join(words)
+    if any(row.limits or row.kind == "P" for row in joints):
+        document["joint_limits_deg"] = [_limits(row, source) for row in joints]
     if free := [str(number) for number, row in enumerate(joints, 1) if row.limits is None]:
         notes.append(f"no limits of q{', q'.join(free)}: a turn either way")
     notation = f"{'modified' if modified else 'standard'} Denavit-Hartenberg parameters"
@@ -190,55 +169,47 @@ def robot_from_dh(
 def read_dh_table(path: str | Path, options: DhOptions = _AS_STATED) -> tuple[list[DhRow], list[str]]:
     """Rows of a Denavit-Hartenberg table, and notes how they were understood and what was left out.
 
-    Raises `InputError`: file, line and column of what cannot be read, or a
-    column whose unit nothing states.
+    An `InputError` names file, line and column of what cannot be read, or a column whose unit nothing states.
     """
     source = Path(path).as_posix()
     if Path(path).suffix.lower() != ".csv":
         raise InputError(source, "", f"a file that ends in {Path(path).suffix!r}", f".csv, or .yaml with {_KINEMATICS}")
-    wanted = "columns d, a and alpha, such as d_m or d_mm"
     text = read_text_table(
         path,
         lambda cells: any(split_unit(cell)[0] in _NEEDED for cell in cells),
         Dialect(decimal=options.decimal),
         options.ignore,
-        wanted,
+        "columns d, a and alpha, such as d_m or d_mm",
         read_units,
-        is_small=lambda name: split_unit(name)[0] in ("theta", "theta_offset", "alpha"),
     )
-    dialect = text.dialect
-    meanings: dict[str, _Meaning] = {}
-    for column in text.columns:
-        meaning = _find_meaning(column, text.units.get(column, ""), options, source)
-        if any(meaning.name == other.name for other in meanings.values()):
-            raise InputError(source, "header", f"{meaning.name} twice", "each column once")
-        meanings[column] = meaning
+    columns: dict[str, _Column] = {}
+    for header in text.columns:
+        column = _column(header, text.units.get(header, ""), options, source)
+        if column.name in columns:
+            raise InputError(source, "header", f"{column.name} twice", "each column once")
+        columns[column.name] = column
     for name in _NEEDED:
-        if not any(meaning.name == name for meaning in meanings.values()):
+        if name not in columns:
             raise InputError(source, "header", f"no column {name}", "theta_offset, d, a and alpha, such as d_m or d_mm")
     if len(text.lines) > _MOST_ROWS:
         raise InputError(source, "", counted(len(text.lines), "row"), f"at most {_MOST_ROWS}, one for each joint")
-    names = [meaning.name for meaning in meanings.values()]
-    cells = zip(*text.columns.values(), strict=True)
-    rows = [
-        _row(f"line {line}", dict(zip(names, row, strict=True)), meanings, source)
-        for line, row in zip(text.lines, cells, strict=True)
-    ]
+    rows = [_row(text, place, columns) for place in range(len(text.lines))]
     if not any(row.kind != "F" for row in rows):
         raise InputError(source, "", "no joint", "a row of type R or P for each joint")
     return rows, [
-        f"read: {'; '.join(f'{name!r} as {meaning}' for name, meaning in meanings.items())}",
-        f"file: names of columns in line {dialect.header}, separator {dialect.separator}, decimal {dialect.decimal}, "
-        f"encoding {dialect.encoding}",
+        f"read: {'; '.join(f'{column.header!r} as {column}' for column in columns.values())}",
+        f"file: names of columns in line {text.dialect.header}, separator {text.dialect.separator}, "
+        f"decimal {text.dialect.decimal}, encoding {text.dialect.encoding}",
         *([f"not used: {', '.join(options.ignore)}"] if options.ignore else []),
         *text.left_out,
     ]
 
 
 @dataclass(frozen=True)
-class _Meaning:
-    """What a column holds: its name without the unit, and the units that its angles and its lengths have, if any."""
+class _Column:
+    """Header of a column, its name without the unit, and the units that its angles and its lengths have, if any."""
 
+    header: str
     name: str
     angle: str = ""
     length: str = ""
@@ -248,85 +219,63 @@ class _Meaning:
         return f"{self.name} in {units}" if units else self.name
 
 
-def _find_meaning(column: str, below: str, options: DhOptions, source: str) -> _Meaning:
-    """What a column is, by its name and the unit of the row under it."""
-    if column in (*_PLAIN, *_WORDS):
-        return _Meaning(column)
-    name, stated = split_unit(column)
+def _column(header: str, below: str, options: DhOptions, source: str) -> _Column:
+    """What a column is, by its header and the unit of the row under it."""
+    if header in _WORDS:
+        return _Column(header, header)
+    name, stated = split_unit(header)
     stated, beneath = ("deg" if unit == "°" else unit or "" for unit in (stated, below))
     unit = stated or beneath
     if stated and beneath and stated != beneath:
-        raise InputError(source, "header", f"{column!r} and {below!r} in the row under it", "one unit")
+        raise InputError(source, "header", f"{header!r} and {below!r} in the row under it", "one unit")
     turns, shifts = name in (*_ANGLES, *_LIMITS), name in (*_LENGTHS, *_LIMITS)
     if not (turns or shifts):
-        allowed = f"{closest_first(column, _USUAL)}; import dh --ignore {column!r} leaves it out"
-        raise InputError(source, "header", repr(column), allowed)
+        allowed = f"{closest_first(header, _USUAL)}; import dh --ignore {header!r} leaves it out"
+        raise InputError(source, "header", repr(header), allowed)
     units = [*(_ANGLE_UNITS if turns else ()), *(_LENGTH_UNITS if shifts else ())]
     if unit and unit not in units:
-        raise InputError(source, "header", f"{column!r} in {unit}", ", ".join(units))
+        raise InputError(source, "header", f"{header!r} in {unit}", ", ".join(units))
     angle = unit if unit in _ANGLE_UNITS else options.angles
     length = unit if unit in _LENGTH_UNITS else options.lengths
-    meaning = _Meaning(name, (turns and angle) or "", (shifts and length) or "")
-    if not (meaning.angle or meaning.length):
+    column = _Column(header, name, (turns and angle) or "", (shifts and length) or "")
+    if not (column.angle or column.length):
         allowed = f"{_OPTIONS[turns]}, or {name}_{'deg' if turns else 'mm'} and such"
-        raise InputError(source, "header", f"no unit of {column!r}", allowed)
-    return meaning
+        raise InputError(source, "header", f"no unit of {header!r}", allowed)
+    return column
 
 
-def _row(where: str, text: Mapping[str, str], meanings: Mapping[str, _Meaning], source: str) -> DhRow:
-    """The row of the cells of a line, which have the names of their meanings."""
-    column_of = {meaning.name: column for column, meaning in meanings.items()}
-    kind = (text.get("type") or "R").upper()[:1]
+def _row(text: TextTable, place: int, columns: Mapping[str, _Column]) -> DhRow:
+    """A row of the table, its numbers in SI units."""
+    cells = {name: text.columns[column.header][place] for name, column in columns.items()}
+    source, where = text.path, f"line {text.lines[place]}"
+    kind = (cells.get("type") or "R").upper()[:1]
     if kind not in "RPF":
-        raise InputError(source, f"{where}, type", repr(text["type"]), "R (revolute), P (prismatic) or F (fixed)")
+        raise InputError(source, f"{where}, type", repr(cells["type"]), "R (revolute), P (prismatic) or F (fixed)")
 
     def number(name: str) -> float | None:
-        """In SI units; None where nothing stands."""
-        if not text.get(name):
+        if not cells.get(name):
             return None
-        column, meaning = column_of[name], meanings[column_of[name]]
-        turns = name in _ANGLES or (name in _LIMITS and kind != "P")
-        if name not in _PLAIN and not (meaning.angle if turns else meaning.length):
-            raise InputError(source, f"{where}, {column}", "a limit without a unit", _OPTIONS[turns])
-        rad = meaning.angle == "rad"
-        value = _number(text[name], turns and rad)
-        most = 2 if rad and name in _ANGLES else MOST_TURNS  # 90 is in degrees, whatever is stated.
-        if value is None or abs(value) > (most * (2.0 * math.pi if rad else 360.0) if turns else LARGEST_NUMBER):
+        column, turns = columns[name], name in _ANGLES or (name in _LIMITS and kind != "P")
+        unit = column.angle if turns else column.length
+        if not unit:
+            raise InputError(source, f"{where}, {column.header}", "a limit without a unit", _OPTIONS[turns])
+        value = plain_number(cells[name])
+        most = 2 if unit == "rad" and name in _ANGLES else MOST_TURNS  # 90 is in degrees, whatever is stated.
+        if value is None or abs(value) > (most * (2.0 * math.pi if unit == "rad" else 360.0) if turns else LARGEST_NUMBER):
             allowed = f"a number, {most} turns at most{'; degrees are --angles deg' * (most == 2)}" if turns else A_NUMBER
-            raise InputError(source, f"{where}, {column}", repr(text[name]), allowed)
-        if name in _PLAIN:
-            if not value > 0:
-                raise InputError(source, f"{where}, {column}", text[name], "more than 0")
-            return value
-        return value * (_ANGLE_UNITS[meaning.angle] if turns else _LENGTH_UNITS[meaning.length])
+            raise InputError(source, f"{where}, {column.header}", repr(cells[name]), allowed)
+        return value * _SCALES[unit]
 
     for name in _NEEDED:
-        if not text[name]:
-            raise InputError(source, f"{where}, {column_of[name]}", "nothing", "a number")
+        if not cells[name]:
+            raise InputError(source, f"{where}, {columns[name].header}", "nothing", "a number")
     low, high = number("lower"), number("upper")
     if (low is None) != (high is None) or (low is not None and high is not None and low >= high):
-        found = " to ".join(text.get(name) or "nothing" for name in _LIMITS)
+        found = " to ".join(cells.get(name) or "nothing" for name in _LIMITS)
         raise InputError(source, f"{where}, lower and upper", found, "both limits, the lower one first, or none")
-    mass, centre = number("mass_kg"), [number(name) for name in ("cx", "cy", "cz")]
-    if mass is None and any(part is not None for part in centre):
-        raise InputError(source, f"{where}, mass_kg", "nothing, but a centre", "the mass in kg")
-    if mass is not None and None in centre:
-        raise InputError(source, f"{where}, cx, cy, cz", "no centre of the mass", "three numbers, in the frame of the row")
-    x, y, z = (part or 0.0 for part in centre)
     theta, d, a, alpha = (number(name) or 0.0 for name in ("theta_offset", "d", "a", "alpha"))
-    joint, point, compliance = text.get("joint", ""), text.get("point", ""), number("compliance_urad_per_Nm")
-    stated = None if low is None or high is None else (low, high)
-    return DhRow(where, joint, kind, theta, d, a, alpha, stated, compliance, mass, (x, y, z), point)
-
-
-def _number(text: str, of_pi: bool) -> float | None:
-    """A number, or in radians a multiple of pi; None for anything else."""
-    match = _PI.fullmatch(text.replace(" ", "")) if of_pi else None
-    if not match:
-        return plain_number(text)
-    sign, *parts = match.groups()
-    factor, divisor = (plain_number(part or "1") for part in parts)
-    return (-1.0 if sign == "-" else 1.0) * factor * math.pi / divisor if factor is not None and divisor else None
+    limits = None if low is None or high is None else (low, high)
+    return DhRow(where, cells.get("joint", ""), kind, theta, d, a, alpha, limits, cells.get("point", ""))
 
 
 def _words(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[str]:
@@ -352,25 +301,6 @@ def _limits(row: DhRow, source: str) -> list[float]:
     return [round(value if row.kind == "P" else math.degrees(value), _DECIMALS) for value in row.limits]
 
 
-def _masses(rows: Sequence[DhRow], modified: bool, relative_std: float, slid: np.ndarray) -> list[dict[str, Any]]:
-    """Masses of each link, that of fixed rows with the joint before; centres in the frame directly behind the joint.
-
-    `slid` (n + 1,) is by how much the frame of each link is moved along z from where the table has it (m).
-    """
-    body, here = 0, np.eye(4)
-    moments: dict[int, np.ndarray] = {}
-    for row in rows:
-        before, behind = row.displacements(modified)
-        if row.kind == "F":
-            here = here @ before
-        else:
-            body, here = body + 1, elementary("T", 2, -slid[body + 1])
-        here = here @ behind
-        if row.mass_kg is not None:
-            moments[body] = moments.get(body, np.zeros(4)) + row.mass_kg * here @ np.append(row.centre_m, 1.0)
-    return mass_entries(moments, relative_std)
-
-
 def _gaps(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[list[_Piece]]:
     """What stands before, between and behind the joints: displacements, each with the point at its end."""
     gaps: list[list[_Piece]] = [[]]
@@ -384,28 +314,28 @@ def _gaps(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[
     return gaps
 
 
-def _slid_words(gaps: Sequence[Sequence[_Piece]], kinds: Sequence[str]) -> tuple[list[str], np.ndarray]:
-    """A chain in words whose joints lie as near as their axes allow to the joint before, and how far each was moved.
+def _slid_words(gaps: Sequence[Sequence[_Piece]], kinds: Sequence[str]) -> list[str]:
+    """A chain in words whose joints lie as near as their axes allow to the joint before.
 
-    `gaps`: displacements before, between and behind n joints, which move about or along z. `kinds` (n,) of str: ``P`` of
-    prismatic joints. Returns `slides` (n + 1,): m along z of each joint, and 0 before for the base.
+    `gaps`: displacements before, between and behind n joints, which move about or along z. `kinds` (n,): ``P`` of prismatic
+    joints.
     """
     words: list[str] = []
-    slides = np.zeros(len(gaps))
+    slide = 0.0
     for number, gap in enumerate(gaps):
-        here = elementary("T", 2, -slides[number])
+        here = elementary("T", 2, -slide)
         for place, (piece, point) in enumerate(gap):
             here, last = here @ piece, place == len(gap) - 1
             if last and number < len(kinds):
                 # Of the points of the next axis the nearest one.
-                slides[number + 1] = -here[:3, 2] @ here[:3, 3]
-                here = here @ elementary("T", 2, slides[number + 1])
+                slide = -here[:3, 2] @ here[:3, 3]
+                here = here @ elementary("T", 2, slide)
             if point or last:
                 words += [*displacement_words(here), *([f"[{point}]"] if point else [])]
                 here = np.eye(4)
         if number < len(kinds):
             words.append(f"{'T' if kinds[number] == 'P' else 'R'}z(q{number + 1})")
-    return words, slides
+    return words
 
 
 def _robot_from_kinematics(path: str | Path, name: str | None) -> Imported:

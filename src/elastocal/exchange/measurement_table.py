@@ -5,7 +5,9 @@ rotation vector or Euler angles. What was found out is returned as options with 
 """
 
 import hashlib
+import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -16,12 +18,12 @@ import yaml
 from scipy.spatial import cKDTree
 
 from elastocal.campaigns.measurements import (
+    BOUNDS,
     FARTHEST_RAD,
     MOST_JOINTS,
-    SHOWN,
-    SHOWN_TO,
     TICK,
     file_columns,
+    find_beyond,
     sheet_columns,
     show_cell,
 )
@@ -29,34 +31,34 @@ from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, text_fault
 from elastocal.exchange.column_names import (
     ANGLE,
+    FORCE,
+    HOMOGENEOUS_MATRICES,
     LENGTH,
+    MOMENT,
+    NONE,
     POSITION,
+    QUATERNIONS,
+    TEMPERATURE,
+    TIME,
     TRANSLATION,
     UNITS,
-    choose_markers,
+    VECTOR,
+    columns_of_rotation,
     find_columns,
     find_joints,
+    find_rotation,
     has_position,
     is_name,
     kind_of,
     lengths_in,
-    markers_in,
-    one_row_each,
     read_units,
     recognize_column,
+    rotation_vectors,
+    unit_scale,
 )
 from elastocal.exchange.csv_dialect import Dialect, TextTable, read_text_table
-from elastocal.exchange.measurement_cells import CellReader, covariates_of, find_units, rows_with_position
-from elastocal.exchange.rotations import (
-    HOMOGENEOUS_MATRICES,
-    QUATERNIONS,
-    VECTOR,
-    columns_of_rotation,
-    find_rotation,
-    rotation_vectors,
-)
 from elastocal.io.documents import check_document, read_document
-from elastocal.io.texts import plain_number
+from elastocal.io.texts import A_NUMBER, plain_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
@@ -65,6 +67,14 @@ IMPORT = "import.yaml"
 SAME_POSE = 1e-3
 # Rows of one pose whose joints stand farther apart (rad or m) are not of one pose: a label says something else.
 _ONE_POSE = 0.1
+# Of what has a usual unit; angles and lengths have two each and must be stated.
+_USUAL = {FORCE: "N", MOMENT: "Nm", TIME: "s", TEMPERATURE: "C"}
+# Nanoseconds since 1970 are 2e18.
+_LARGEST_TIME = 1e19
+# Of a pose, load, repeat or session; as in measurements.csv.
+_LARGEST_ORDINAL = 2**31 - 1
+# What programs write where nothing was measured.
+_EMPTY = re.compile(r"|[+-]?nan(\(\w+\))?|[-–—]+|#?n/?a|n\.a\.|null|none", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -73,7 +83,7 @@ class ImportOptions(Dialect):
 
     `ignore`: headers of columns that are left out. `columns`: headers by the names of `column_names`. `units`: units by the
     same names; ``angles`` and ``lengths`` for all that have no other. `rotation`: notation of `rotations`. `target`: name for
-    all rows where no column has it. `targets`: markers of rows that hold several, by the names of the targets that they are.
+    all rows where no column has it. `targets`: of rows that hold several, headers of x, y and z by the targets' names.
     `wrench`: what the forces act on; those that the robot exerts, ``by-robot``, are turned round. `skip_empty`: whether rows
     without a position are left out. `names`: of the columns of a table without a header, in their order.
     """
@@ -85,7 +95,7 @@ class ImportOptions(Dialect):
     wrench: str = "on-robot"
     skip_empty: bool = False
     ignore: Sequence[str] | None = None
-    targets: Mapping[str, str] | None = None
+    targets: Mapping[str, Sequence[str]] | None = None
     names: Sequence[str] | None = None
 
 
@@ -109,32 +119,166 @@ def import_options_text(options: ImportOptions, source: str | Path) -> str:
 def _sheet_options(text: TextTable, options: ImportOptions) -> ImportOptions:
     """Options of an import with the units of a sheet of `plan` that a spreadsheet saved, where the table is one.
 
-    Its columns are those of measurements.csv, in its units; stated ones go first. An InputError names the row in which
-    ``q1_deg`` is not ``q1``: one of them was edited.
+    Its columns are those of measurements.csv, in its units; those beside, such as ``q1_deg``, are left out.
     """
-    headers = {header for header in text.columns if header}
-    beside = headers & sheet_columns(MOST_JOINTS) - {TICK}
-    names = {header.partition("_")[0]: header for header in beside}
-    needed = {TICK, "pose", "load", "repeat", "target", *POSITION, *names}
-    if not (names and needed <= headers and headers - beside - {TICK} <= {*file_columns(MOST_JOINTS)}):
+    headers = set(text.columns)
+    beside = headers & sheet_columns(MOST_JOINTS)
+    needed = {TICK, "pose", "load", "repeat", "target", *POSITION}
+    if not (needed <= headers and headers - beside <= {*file_columns(MOST_JOINTS)}):
         return options
-    units = {}
-    for name, header in names.items():
-        unit = header.partition("_")[2]
-        units[name] = "m" if unit == "mm" else "rad"
-        for line, exact, seen in zip(text.lines, text.columns[name], text.columns[header], strict=True):
-            value, other = plain_number(exact), plain_number(seen)
-            if value is not None and other is not None and abs(value / SHOWN[unit] - other) > SHOWN_TO:
-                allowed = f"{value / SHOWN[unit]:.3f}, which is {name}, or a table without the column {header}"
-                raise InputError(text.path, f"line {line}, column {header}", show_cell(seen), allowed)
-    given = dict(options.units or {})
-    for name in (*POSITION, *VECTOR):
-        kind, usual = ("lengths", "m") if kind_of(name)[0] == LENGTH else ("angles", "rad")
-        if name in headers and kind not in given:
-            units[name] = usual
-    columns = {name: name for name in names} | dict(options.columns or {})
+    joints = {header.partition("_")[0]: "m" if header.endswith("mm") else "rad" for header in beside - {TICK}}
+    units = joints | {"lengths": "m", "angles": "rad"} | dict(options.units or {})
     rotation = options.rotation or ("vector" if {*VECTOR} <= headers else None)
-    return replace(options, columns=columns, units=units | given, rotation=rotation)
+    return replace(options, units=units, rotation=rotation, ignore=[*(options.ignore or ()), *sorted(beside)])
+
+
+def _one_row_each(text: TextTable, targets: Mapping[str, Sequence[str]]) -> TextTable:
+    """A table with one row for each target of a row, whose position has the headers of the first target's."""
+    for name, headers in targets.items():
+        for header, axis in zip(headers, POSITION, strict=True):
+            if header not in text.columns:
+                raise InputError(text.path, "header", f"no column {header!r}", f"{axis} of {name}: {', '.join(text.columns)}")
+    units = [{text.units.get(h) or recognize_column(h)[1] for h in axis} for axis in zip(*targets.values(), strict=True)]
+    if any(len(each) > 1 for each in units):
+        raise InputError(text.path, "header", "positions of targets in several units", "one unit for all targets")
+    others = {header for headers in targets.values() for header in headers}
+    columns = {name: tuple(c for c in cells for _ in targets) for name, cells in text.columns.items() if name not in others}
+    for headers in zip(*targets.values(), strict=True):
+        columns[headers[0]] = tuple(c for row in zip(*(text.columns[h] for h in headers), strict=True) for c in row)
+    columns["target"] = tuple(targets) * len(text.lines)
+    return replace(text, columns=columns, lines=tuple(line for line in text.lines for _ in targets))
+
+
+def rows_with_position(text: TextTable, columns: Mapping[str, str], position: Sequence[str], skip_empty: bool) -> np.ndarray:
+    """Rows that have a position; `skip_empty`: NaN, - and N/A are none either."""
+    empty = _EMPTY.fullmatch if skip_empty else re.compile("").fullmatch
+    filled = np.array([[not empty(cell) for cell in text.columns[columns[name]]] for name in position]).all(axis=0)
+    if not filled.all() and not skip_empty:
+        row = int(np.argmin(filled))
+        of = f" of {text.columns[columns['target']][row]}" if "target" in columns else ""
+        allowed = "three numbers, or --skip-empty to leave such rows out"
+        raise InputError(text.path, f"line {text.lines[row]}", f"no position{of}", allowed)
+    if not filled.any():
+        raise InputError(text.path, "", "no position in any row", "at least one measurement")
+    return np.flatnonzero(filled)
+
+
+def find_units(
+    text: TextTable,
+    columns: Mapping[str, str],
+    wanted: Sequence[str],
+    stated: Mapping[str, str],
+    given: Mapping[str, str],
+    robot: Robot | None = None,
+) -> dict[str, str]:
+    """Units of wanted columns by their names: by options, by headers, or of what has a usual unit that one.
+
+    `stated`: by headers. `given`: by options, ``angles`` and ``lengths`` for all that have no other. Raises `InputError`: no
+    unit, or one of another kind.
+    """
+    found: dict[str, str] = {}
+    for name in wanted:
+        kinds = kind_of(name)
+        if robot and len(kinds) > 1:
+            kinds = (LENGTH if robot.chain.prismatic[int(name[1:]) - 1] else ANGLE,)
+        if kinds == (NONE,):
+            continue
+        for_all = given.get("lengths" if kinds[0] == LENGTH else "angles")
+        # Options go before headers, those for one column before those for all.
+        unit = given.get(name) or stated.get(name) or _USUAL.get(kinds[0]) or for_all
+        if unit is None:
+            option = "--lengths mm" if kinds[0] == LENGTH else "--angles deg"
+            raise InputError(text.path, "header", f"no unit of {columns[name]!r}", f"{option} or such, or --unit {name}=UNIT")
+        if unit_scale(unit, kinds) is None:
+            allowed = f"{', '.join(unit for kind in kinds for unit in UNITS[kind])}, by --unit {name}=UNIT"
+            raise InputError(text.path, f"unit of {columns[name]!r}", repr(unit), allowed)
+        found[name] = unit
+    return found
+
+
+class CellReader:
+    """Cells as numbers in SI units, with the line of what is none."""
+
+    def __init__(self, text: TextTable, columns: Mapping[str, str], units: dict[str, str], kept: np.ndarray) -> None:
+        self.text, self.columns, self.units, self.kept = text, columns, units, kept
+
+    def fault(self, index: int, name: str, allowed: str) -> InputError:
+        """InputError of one cell; `index` counts the rows kept."""
+        row = self.kept[index]
+        header = self.columns[name]
+        where = f"line {self.text.lines[row]}, column {header}"
+        return InputError(self.text.path, where, show_cell(self.text.columns[header][row]), allowed)
+
+    def cells(self, name: str) -> list[str]:
+        """list of str (N,)."""
+        cells = self.text.columns[self.columns[name]]
+        return [cells[row] for row in self.kept]
+
+    def times(self, name: str) -> np.ndarray:
+        """ndarray (N,), s: as numbers, times of day or dates of ISO 8601; of dates since 1970, at Greenwich without a zone."""
+        cells = self.cells(name)
+        numbers = [plain_number(cell, _LARGEST_TIME) for cell in cells]
+        if None not in numbers:
+            return self._bounded(name, np.array(numbers, float) * UNITS[TIME][self.units[name]])
+        with suppress(ValueError, OverflowError):
+            dates = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True)
+            if dates.notna().all() and all("-" in cell or "/" in cell for cell in cells):
+                return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
+        with suppress(ValueError, OverflowError):
+            seconds = pd.to_timedelta(pd.Series(cells)).dt.total_seconds().to_numpy()
+            if np.isfinite(seconds).all() and all(":" in cell for cell in cells):
+                # On over midnight.
+                return seconds + 86400.0 * np.concatenate([[0], np.cumsum(np.diff(seconds) < -43200.0)])
+        raise self.fault(numbers.index(None), name, "numbers, times as 10:20:33 or dates as 2023-05-04 10:20:33")
+
+    def numbers(self, name: str) -> np.ndarray:
+        """ndarray (N,), SI units."""
+        values = np.array([np.nan if (value := plain_number(cell)) is None else value for cell in self.cells(name)])
+        if not np.isfinite(values).all():
+            raise self.fault(int(np.argmin(np.isfinite(values))), name, A_NUMBER)
+        unit = self.units.get(name)
+        return self._bounded(name, values if unit is None else values * (unit_scale(unit, kind_of(name)) or 1.0))
+
+    def _bounded(self, name: str, values: np.ndarray) -> np.ndarray:
+        if (index := find_beyond(name, values)) is not None:
+            raise self.fault(index, name, BOUNDS[name].allowed)
+        return values
+
+    def integers(self, name: str) -> np.ndarray:
+        """ndarray of int (N,)."""
+        values = self.numbers(name)
+        wrong = (values != np.round(values)) | (np.abs(values) > _LARGEST_ORDINAL)
+        if wrong.any():
+            raise self.fault(int(np.argmax(wrong)), name, f"an integer, up to {_LARGEST_ORDINAL}")
+        return values.astype(np.int64)
+
+
+def _covariates(
+    read: CellReader, mapped: Mapping[str, str], stated: Mapping[str, str], given: Mapping[str, str], notes: list[str]
+) -> dict[str, np.ndarray]:
+    """Time, temperature and uncertainty; of the first two is left out, with a note, what nobody asked for and cannot be read.
+
+    `mapped`: names of columns that options state. `stated`, `given`: units by headers and by options. `notes` is added to.
+    """
+    found = {}
+    for name in ("time_s", "temperature_c", "u95_m"):
+        if name not in read.columns:
+            continue
+        header = read.columns[name]
+        try:
+            read.units |= find_units(read.text, read.columns, [name], stated, given)
+            found[name] = read.times(name) if name == "time_s" else read.numbers(name)
+        except InputError as error:
+            if name in mapped or name in given or name == "u95_m":
+                raise InputError(error.source, error.key, error.found, f"{error.allowed}, or --ignore {header!r}") from None
+            read.units.pop(name, None)
+            notes.append(f"{header!r} not read: {error.key} has {error.found}")
+            continue
+        if plain_number(read.cells(name)[0], _LARGEST_TIME) is None:
+            notes.append(f"{header!r} read as times of day or dates, such as {read.cells(name)[0]!r}, in s")
+        elif name not in stated and name not in given:
+            notes.append(f"{header!r} in {read.units[name]}, as nothing states a unit")
+    return found
 
 
 @dataclass(frozen=True)
@@ -168,24 +312,18 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
 
     def is_header(cells: Sequence[str]) -> bool:
         names = {recognize_column(cell)[0] for cell in cells} | {name for name, header in mapped.items() if header in cells}
-        only_lengths = any(name and find_joints([name]) for name in names) and lengths_in(cells)
-        return has_position(names) or bool(markers_in(cells) or only_lengths)
+        # Joints without a position are a header too, of which is said what it lacks.
+        only_joints = any(name and find_joints([name]) for name in names) and len(cells) > 1
+        return has_position(names) or (only_joints and not any(plain_number(cell) is not None for cell in cells))
 
-    def is_small(header: str) -> bool:
-        """Whether it is of angles in degrees or radians: no joint turns a thousand."""
-        name, unit = recognize_column(header)
-        unit = unit or (options.units or {}).get("angles")
-        shifts = robot is not None and any(robot.chain.prismatic)
-        return bool(name and find_joints([name])) and unit in ("deg", "°", "rad") and not shifts
-
-    text = read_text_table(
-        path, is_header, options, options.ignore or (), units_in=read_units, names=options.names or (), is_small=is_small
-    )
+    text = read_text_table(path, is_header, options, options.ignore or (), units_in=read_units, names=options.names or ())
     options = _sheet_options(text, options)
-    mapped, notes = dict(options.columns or {}), [f"units in the row under the header: {len(text.units)}"] if text.units else []
-    if targets := choose_markers(text, options.target, options.targets, mapped):
-        text, mapped, of_targets = one_row_each(text, targets, mapped)
-        options, notes = replace(options, target=None, targets=targets), [*notes, *of_targets]
+    text = replace(text, columns={name: cells for name, cells in text.columns.items() if name not in (options.ignore or ())})
+    notes = [f"units in the row under the header: {len(text.units)}"] if text.units else []
+    if options.targets:
+        text, first = _one_row_each(text, options.targets), next(iter(options.targets.values()))
+        mapped |= dict(zip(POSITION, first, strict=True)) | {"target": "target"}
+        notes += [f"{name} has {', '.join(map(repr, headers))}" for name, headers in options.targets.items()]
     columns, stated, of_joints = find_columns(text, mapped, robot)
     notes += of_joints
     if find_joints(columns) and not has_position(columns) and (lengths := lengths_in(text.columns)):
@@ -199,7 +337,7 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     wanted = [*angles, *position, *orientation, *(name for name in WRENCH_NAMES if name in columns)]
     units = find_units(text, columns, wanted, stated, options.units or {}, robot)
     read = CellReader(text, columns, units, rows_with_position(text, columns, position, options.skip_empty))
-    covariates = covariates_of(read, mapped, stated, options.units or {}, notes)
+    covariates = _covariates(read, mapped, stated, options.units or {}, notes)
     notes += _surprises(read, angles, {*stated, *(options.units or {})})
     table = _number_poses(read, angles, mapped)
     table |= {name: read.numbers(name) for name in angles}
@@ -222,7 +360,9 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     resolved = replace(
         options,
         **asdict(text.dialect),
-        columns={name: header for name, header in columns.items() if name in used and not (name == "target" and targets)},
+        columns={
+            name: header for name, header in columns.items() if name in used and not (name == "target" and options.targets)
+        },
         units=units,
         rotation=rotation,
     )

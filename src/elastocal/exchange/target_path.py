@@ -15,7 +15,7 @@ from elastocal.campaigns.measurement_checks import find_degrees
 from elastocal.campaigns.measurements import FARTHEST_RAD
 from elastocal.errors import InputError, closest_first
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
-from elastocal.exchange.measurement_cells import CellReader
+from elastocal.exchange.measurement_table import CellReader
 from elastocal.mechanics.components import WRENCH
 from elastocal.mechanics.robot import Robot
 

@@ -4,9 +4,9 @@ The Unified Robot Description Format [1] is XML. No document type is accepted, a
 file; meshes, materials and plug-ins are left out, and no other file is opened.
 
 A joint of a URDF is a fixed transform (``origin``), and then a rotation about or a translation along an axis. The transform
-becomes ``Tx Ty Tz Rz Ry Rx``; an axis that is not x, y or z is turned into z and back, ``Rz Ry Rz(q1) Ry Rz``. A joint that
-mimics another one of the chain, by +1 or -1, stands in the chain as a passive joint ``Ry(-q2)``. All that a joint carries
-rigidly is one mass, side branches and what stands behind the tip included.
+becomes ``Tx Ty Tz Rz Ry Rx``; an axis that is not x, y or z is turned into z and back, ``Rz Ry Rz(q1) Ry Rz``. A chain with a
+joint that mimics another one is refused. All that a joint carries rigidly is one mass, side branches and what stands behind the
+tip included.
 
 [1] Open Robotics, XML Robot Description Format (URDF), wiki.ros.org/urdf/XML.
 """
@@ -14,7 +14,7 @@ rigidly is one mass, side branches and what stands behind the tip included.
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -30,11 +30,9 @@ from elastocal.exchange import URDF_MASS_STD
 from elastocal.exchange.fixed_transforms import (
     axis_rotation,
     displacement_words,
-    elementary,
     express_axis,
     homogeneous,
     origin_transform,
-    word,
 )
 from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, mass_entries, point_name
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
@@ -49,34 +47,26 @@ _MOST_PARTS = 2000
 _MOVING = {"revolute": "R", "continuous": "R", "prismatic": "T"}
 _KINDS = (*_MOVING, "fixed", "floating", "planar")
 _XACRO = "a URDF; this is xacro, run it first: xacro FILE > robot.urdf"
-# What is read of each, once at most.
-_READ = {
-    "link": ("inertial",),
-    "inertial": ("origin", "mass"),
-    "joint": ("parent", "child", "origin", "axis", "limit", "mimic"),
-}
-# How many numbers each attribute has that is read.
+# How many numbers each attribute has that is read, by its element and name, and what they are where nothing states them.
 _NUMBERS = {
-    "origin": {"xyz": 3, "rpy": 3},
-    "axis": {"xyz": 3},
-    "limit": {"lower": 1, "upper": 1, "effort": 1, "velocity": 1},
-    "mimic": {"multiplier": 1, "offset": 1},
-    "mass": {"value": 1},
+    ("origin", "xyz"): (3, "0 0 0"),
+    ("origin", "rpy"): (3, "0 0 0"),
+    ("axis", "xyz"): (3, "1 0 0"),
+    ("limit", "lower"): (1, "0"),
+    ("limit", "upper"): (1, "0"),
+    ("mass", "value"): (1, ""),
 }
-_NEEDED = {"mass": "value", "mimic": "joint"}
 # Limits to a billionth of a degree, or to a nanometre; gravity to so many m/s².
 _DECIMALS = 9
 # Two turns, and rounding; the limits of a joint in degrees are farther, and few joints turn so often.
 _FARTHEST_RAD = 4.0 * math.pi + 0.01
-# An angle this close to a right one, and none, is one that was written with few digits: 1.57 and 1.5708 are.
-_NEARLY_RAD, _EXACTLY_RAD = 1e-3, 1e-9
 # So many links of a robot never weigh the same; links and joints that a note names.
 _FEWEST_ALIKE, _NAMED = 3, 4
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: `origin` (4, 4) in the parent's frame, `axis` (3,) in its own; limits not stated are 0; whom it follows."""
+    """A joint: `origin` (4, 4) in the parent's frame, `axis` (3,) in its own; limits not stated are 0; whether it mimics."""
 
     name: str
     kind: str
@@ -86,13 +76,12 @@ class Joint:
     axis: np.ndarray
     lower: float
     upper: float
-    # The other joint, multiplier and offset.
-    mimic: tuple[str, float, float] | None
+    mimics: bool
 
 
 @dataclass(frozen=True)
 class Urdf:
-    """A tree of links: every name once, every joint between two of them; `left_out` names other elements of the file.
+    """A tree of links: every name once, every joint between two of them.
 
     `moments` (4,): of each link by its name the mass times its centre in the link's frame (kg m), and the mass (kg, 0 where
     none is stated). `above`: the joint that carries a link, by the link's name; the root has none.
@@ -101,7 +90,6 @@ class Urdf:
     name: str
     moments: dict[str, np.ndarray]
     joints: tuple[Joint, ...]
-    left_out: tuple[str, ...]
     above: dict[str, Joint]
 
     def joints_above(self, link: str) -> Iterator[Joint]:
@@ -116,25 +104,16 @@ class Urdf:
 
 
 @dataclass(frozen=True)
-class Carried:
-    """Where a link of the chain is: `body` is the number of the joint that carries it, 0 for the column.
-
-    `transform` (4, 4): of its frame, in the frame directly behind that joint, all joints at zero. `behind_passive`: whether a
-    passive joint turns it against that joint's frame.
-    """
-
-    body: int
-    transform: np.ndarray
-    behind_passive: bool
-
-
-@dataclass(frozen=True)
 class UrdfChain:
-    """The chain between two links: in the notation, with measuring points; the joints of q1, q2, ...; links on it."""
+    """The chain between two links: in the notation, with measuring points; the joints of q1, q2, ...
+
+    `links`: of each link on it the number of the joint that carries it, 0 for the column, and its frame (4, 4) in the one
+    directly behind that joint, all joints at zero.
+    """
 
     notation: str
     joints: tuple[Joint, ...]
-    links: dict[str, Carried]
+    links: dict[str, tuple[int, np.ndarray]]
 
 
 def robot_from_urdf(
@@ -170,14 +149,8 @@ def robot_from_urdf(
     if masses:
         document["masses"] = masses
         notes.append(f"masses are known to {100 * relative_std:g} %, by assumption: a URDF does not say")
-    on_chain = [joint for joint in urdf.joints if joint.child in chain.links]
-    off = {joint.name: np.abs(joint.origin[:3, :3] - np.round(joint.origin[:3, :3])).max() for joint in on_chain}
-    if few := [name for name, far in off.items() if _EXACTLY_RAD < far < _NEARLY_RAD]:
-        notes.append(f"nearly right angles stay as they are written, with few digits: those of {', '.join(few)}")
     if beside := [joint.name for joint in urdf.joints if joint.kind != "fixed" and joint.child not in chain.links]:
         notes.append(f"joints that are no part of the chain, left out: {', '.join(beside)}")
-    if urdf.left_out:
-        notes.append(f"not used: {', '.join(urdf.left_out)}, nor limits of effort and velocity")
     return check_imported(document, path, f"the links from {base!r} to {tip!r}", notes)
 
 
@@ -208,38 +181,61 @@ def read_urdf(path: str | Path) -> Urdf:
     for part in (*links, *joints):
         if not part.get("name"):
             raise InputError(source, f"<{part.tag}>", "no name", "a name")
-        _check_part(part, f"{part.tag} {part.get('name')!r}", source)
     _check_tree(links, joints, source)
-    parts = [root, *links, *joints, *root.iterfind("link/inertial")]
-    left_out = {child.tag for part in parts for child in part if child.tag not in ("link", "joint", *_READ.get(part.tag, ()))}
     moments = {}
     for part in links:
-        centre = _values(part, "inertial/origin", "xyz", "0 0 0")
-        moments[part.attrib["name"]] = _values(part, "inertial/mass", "value", "0")[0] * np.array([*centre, 1.0])
-    made = tuple(map(_joint, joints))
+        called, inertial = f"link {part.attrib['name']!r}", _child(part, "inertial", source)
+        mass, centre = 0.0, [0.0, 0.0, 0.0]
+        if inertial is not None:
+            centre = _numbers(inertial, "origin", "xyz", called, source)
+            if _child(inertial, "mass", source) is not None:
+                (mass,) = _numbers(inertial, "mass", "value", called, source)
+            if mass < 0:
+                raise InputError(source, f"{called}: mass value", f"{mass:g}", "0 or more kg")
+        moments[part.attrib["name"]] = mass * np.array([*centre, 1.0])
+    made = tuple(_joint(part, source) for part in joints)
     name = root.get("name") or Path(path).stem
-    return Urdf(name, moments, made, tuple(sorted(left_out)), {joint.child: joint for joint in made})
+    return Urdf(name, moments, made, {joint.child: joint for joint in made})
 
 
-def _joint(part: Element) -> Joint:
-    def number(tag: str, name: str, default: str = "0") -> float:
-        return _values(part, tag, name, default)[0]
+def _joint(part: Element, source: str) -> Joint:
+    name = part.attrib["name"]
 
-    origin = origin_transform(*(_values(part, "origin", name, "0 0 0") for name in ("xyz", "rpy")))
-    mimic = (_end(part, "mimic", "joint"), number("mimic", "multiplier", "1"), number("mimic", "offset"))
-    ends, axis = (_end(part, "parent"), _end(part, "child")), np.array(_values(part, "axis", "xyz", "1 0 0"))
-    limits, follows = (number("limit", "lower"), number("limit", "upper")), part.find("mimic") is not None
-    return Joint(part.attrib["name"], part.attrib["type"], *ends, origin, axis, *limits, mimic if follows else None)
+    def numbers(tag: str, attribute: str) -> list[float]:
+        return _numbers(part, tag, attribute, f"joint {name!r}", source)
 
-
-def _values(part: Element, tag: str, attribute: str, default: str) -> list[float]:
-    child = part.find(tag)
-    return [float(word) for word in (default if child is None else child.get(attribute, default)).split()]
+    origin = origin_transform(numbers("origin", "xyz"), numbers("origin", "rpy"))
+    (lower,), (upper,), axis = numbers("limit", "lower"), numbers("limit", "upper"), np.array(numbers("axis", "xyz"))
+    ends = _end(part, "parent"), _end(part, "child")
+    return Joint(name, part.attrib["type"], *ends, origin, axis, lower, upper, part.find("mimic") is not None)
 
 
-def _end(joint: Element, tag: str, attribute: str = "link") -> str:
+def _child(part: Element, tag: str, source: str) -> Element | None:
+    """What a part has of a tag, once at most."""
+    children = part.findall(tag)
+    if len(children) > 1:
+        raise InputError(source, f"{part.tag} {part.get('name', '')!r}", f"<{tag}> {len(children)} times", "once at most")
+    return children[0] if children else None
+
+
+def _numbers(part: Element, tag: str, attribute: str, called: str, source: str) -> list[float]:
+    """Numbers of an attribute of a child, or what they are where nothing states them."""
+    count, default = _NUMBERS[tag, attribute]
+    child = _child(part, tag, source)
+    text = default if child is None else child.get(attribute, default)
+    # Programs write 1e16 and more where a joint has no limit.
+    largest = 1e100 if tag == "limit" else LARGEST_NUMBER
+    words = text.split(None, count)
+    numbers = [number for each in words if (number := plain_number(each, largest)) is not None]
+    if not len(words) == len(numbers) == count:
+        allowed = f"{'a number' if count == 1 else f'{count} numbers'}, up to {largest:g} in size"
+        raise InputError(source, f"{called}: {tag} {attribute}", repr(text), allowed)
+    return numbers
+
+
+def _end(joint: Element, tag: str) -> str:
     end = joint.find(tag)
-    return "" if end is None else end.get(attribute, "")
+    return "" if end is None else end.get("link", "")
 
 
 def _root_of(data: bytes, source: str) -> Element:
@@ -285,30 +281,6 @@ def _root_of(data: bytes, source: str) -> Element:
     return root
 
 
-def _check_part(part: Element, called: str, source: str) -> None:
-    """Each child that is read stands once at most, with numbers where there must be some."""
-    for tag in _READ[part.tag]:
-        children = part.findall(tag)
-        if len(children) > 1:
-            raise InputError(source, called, f"<{tag}> {len(children)} times", "once at most")
-        for child in children:
-            # Programs write 1e16 and more where a joint, a force or a speed has no limit.
-            largest = 1e100 if tag == "limit" else LARGEST_NUMBER
-            for attribute, count in _NUMBERS.get(tag, {}).items():
-                text = child.get(attribute)
-                words = None if text is None else text.split(None, count)
-                if words is not None and (len(words) != count or any(plain_number(each, largest) is None for each in words)):
-                    allowed = f"{'a number' if count == 1 else f'{count} numbers'}, up to {largest:g} in size"
-                    raise InputError(source, f"{called}: {tag} {attribute}", repr(text), allowed)
-            needed = _NEEDED.get(tag)
-            if needed and not child.get(needed):
-                raise InputError(source, called, f"<{tag}> without {needed}", f"<{tag} {needed}=...>")
-            if tag == "mass" and float(child.attrib["value"]) < 0:
-                raise InputError(source, f"{called}: mass value", child.attrib["value"], "0 or more kg")
-            if tag == "inertial":
-                _check_part(child, called, source)
-
-
 def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str) -> None:
     for tag, parts in (("link", links), ("joint", joints)):
         if not parts:
@@ -350,8 +322,6 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
     does not carry, a joint that the notation cannot say.
     """
     path = _path(urdf, base, tip, source)
-    masters = _masters(urdf, path, source)
-    named = {joint.name: joint for joint in path}
     on_chain = [base, *(joint.child for joint in path)]
     for name in points:
         if name not in on_chain:
@@ -362,39 +332,25 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
         allowed = "links whose names differ by more than blanks and brackets"
         raise InputError(source, "point", ", ".join(map(repr, marked)), allowed)
     words = [f"[{marked[base]}]"] if base in marked else []
-    numbers: dict[str, int] = {}
-    place = Carried(0, np.eye(4), False)
-    links = {base: place}
+    moving: list[Joint] = []
+    body, here = 0, np.eye(4)
+    links = {base: (body, here)}
     for joint in path:
         words += displacement_words(joint.origin)
-        place = replace(place, transform=place.transform @ joint.origin)
-        if joint.name in masters:
-            moved, place = _write_joint(joint, *masters[joint.name], numbers, place, source)
-            words += moved
+        here = here @ joint.origin
+        if joint.kind in _MOVING:
+            # Of a shorter axis the direction is no more than rounding.
+            if not np.linalg.norm(joint.axis) > 1e-9:
+                axis = " ".join(f"{part:g}" for part in joint.axis)
+                raise InputError(source, f"joint {joint.name!r}: axis xyz", axis, "a direction")
+            moving.append(joint)
+            before, letter, minus, after = express_axis(joint.axis)
+            body, here = len(moving), homogeneous(axis_rotation(joint.axis).T)
+            words += [*before, f"{_MOVING[joint.kind]}{letter}({minus}q{body})", *after]
         if joint.child in marked:
             words.append(f"[{marked[joint.child]}]")
-        links[joint.child] = place
-    return UrdfChain(" ".join(words), tuple(named[name] for name in numbers), links)
-
-
-def _write_joint(
-    joint: Joint, master: str, sign: float, offset: float, numbers: dict[str, int], place: Carried, source: str
-) -> tuple[list[str], Carried]:
-    """Words of a joint that moves, and where it carries what is behind it."""
-    # Of a shorter axis the direction is no more than rounding.
-    if not np.linalg.norm(joint.axis) > 1e-9:
-        raise InputError(source, f"joint {joint.name!r}: axis xyz", " ".join(f"{part:g}" for part in joint.axis), "a direction")
-    kind = _MOVING[joint.kind]
-    before, letter, minus, after = express_axis(joint.axis)
-    negative, offset = (minus == "-") != (sign < 0), -offset if minus else offset
-    fixed, passive = word(f"{kind}{letter}", offset), master in numbers
-    number = numbers.setdefault(master, len(numbers) + 1)
-    words = [*before, *([fixed] if fixed else []), f"{kind}{letter}({'-' if negative else ''}q{number})", *after]
-    turn = homogeneous(axis_rotation(joint.axis))
-    if not passive:
-        return words, Carried(number, turn.T, False)
-    step = turn @ elementary(kind, "xyz".index(letter), offset) @ turn.T
-    return words, Carried(place.body, place.transform @ step, place.behind_passive or kind == "R")
+        links[joint.child] = (body, here)
+    return UrdfChain(" ".join(words), tuple(moving), links)
 
 
 def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
@@ -411,53 +367,33 @@ def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
         raise InputError(source, both, "no joint that moves between them", "links with joints between")
     if wrong := next((joint for joint in path if joint.kind not in (*_MOVING, "fixed")), None):
         raise InputError(source, f"joint {wrong.name!r}", f"type {wrong.kind}", " | ".join((*_MOVING, "fixed")))
+    if wrong := next((joint for joint in path if joint.mimics), None):
+        allowed = (
+            "a chain of joints that move by themselves; parallel links are written in the robot file, see docs/campaign.md"
+        )
+        raise InputError(source, f"joint {wrong.name!r}", "a joint that mimics another one", allowed)
     return path
-
-
-def _masters(urdf: Urdf, path: Sequence[Joint], source: str) -> dict[str, tuple[str, float, float]]:
-    """By name of each joint that moves: the joint of the chain whose coordinate it has, +1 or -1 of it, and an offset."""
-    mimics = {joint.name: joint.mimic for joint in urdf.joints}
-    kinds = {joint.name: _MOVING[joint.kind] for joint in path if joint.kind in _MOVING}
-    masters = {}
-    for name in kinds:
-        master, factor, offset, seen = name, 1.0, 0.0, {name}
-        while (mimic := mimics[master]) is not None:
-            called, (followed, multiplier, shift) = f"joint {master!r}: mimic", mimic
-            if followed not in kinds:
-                raise InputError(source, called, repr(followed), f"a joint that moves in the chain: {', '.join(kinds)}")
-            if followed in seen:
-                raise InputError(source, called, f"a loop back to {followed!r}", "a joint that mimics no other in the end")
-            master, factor, offset = followed, factor * multiplier, offset + factor * shift
-            seen.add(master)
-        if abs(factor) != 1.0 or kinds[master] != kinds[name]:
-            found = f"{factor:g} times {master!r}" if kinds[master] == kinds[name] else f"{master!r}, which moves otherwise"
-            raise InputError(source, f"joint {name!r}: mimic", found, "a joint of the same type with multiplier 1 or -1")
-        masters[name] = (master, math.copysign(1.0, factor), offset)
-    return masters
 
 
 def _weights(urdf: Urdf, chain: UrdfChain, relative_std: float) -> tuple[list[dict[str, Any]], list[str]]:
     """Entries of ``masses`` of a robot file, see `mechanics.robot_file`, and what is to be said of them."""
     moments: dict[int, np.ndarray] = {}
-    at_zero, passive = set(), set()
+    at_zero = set()
     for name, moment in urdf.moments.items():
         path = [*takewhile(lambda joint: joint.child not in chain.links, urdf.joints_above(name))]
         carrier = chain.links.get(path[-1].parent if path else name)
         moved = [joint.name for joint in path if joint.kind != "fixed"]
         # What moves beside the column weighs on no joint of the chain.
-        if not moment[3] or carrier is None or (carrier.body == 0 and moved):
+        if not moment[3] or carrier is None or (carrier[0] == 0 and moved):
             continue
         at_zero.update(moved)
-        passive |= {name} if carrier.behind_passive else set()
         for joint in path:
             moment = joint.origin @ moment
-        moments[carrier.body] = moments.get(carrier.body, np.zeros(4)) + carrier.transform @ moment
+        moments[carrier[0]] = moments.get(carrier[0], np.zeros(4)) + carrier[1] @ moment
     alike = {float(moment[3]) for moment in moments.values()}
     if len(moments) >= _FEWEST_ALIKE and len(alike) == 1:
         return [], [f"every link weighs {alike.pop():g} kg: placeholders, which are left out"]
     notes = [] if moments else ["no masses: the weight of the links is not known"]
-    if passive:
-        notes.insert(0, f"behind a passive joint, but weighing as if it did not turn: {first_names(sorted(passive), _NAMED)}")
     if at_zero:
         held = first_names(sorted(at_zero), _NAMED)
         notes.insert(0, f"joints beside the chain are held at zero for what they carry: {held}")

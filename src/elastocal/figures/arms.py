@@ -1,12 +1,10 @@
-"""Pictures of arms: with errors at their poses, with what a second target is worth at each place, and with a plan of poses."""
+"""Pictures of arms: with errors at their poses, and with a plan of poses."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
@@ -17,7 +15,6 @@ from elastocal.mechanics.kinematics import poses
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -27,8 +24,6 @@ if TYPE_CHECKING:
 
 _AZIMUTH, _ELEVATION = np.radians(-60.0), np.radians(20.0)
 _ARM, _EDGE, _SHADOW = "#8d9aa5", "#55636e", "#e3e3e3"
-# Light to dark, so that it prints in grey.
-_COLOURS = "viridis_r"
 # Errors are drawn so many times larger than they are.
 _TIMES = 400
 # Of the curve, above its end.
@@ -60,47 +55,10 @@ def draw_arm(axis: Axes, links: np.ndarray, width: float) -> None:
         axis.plot(*project_view(links).T, color=color, lw=share * width, zorder=1, **round_ends)
 
 
-@styled
-def arm_map(table: pd.DataFrame, outlines: Mapping[str, np.ndarray], titles: Mapping[str, str]) -> Figure:
-    """Side views of the arms, each place coloured by the error with a target there, over that with none.
-
-    `table`: from `arm_points.places_table`. `outlines` (K, 3): corners of each robot's arm in one posture, m. `titles`:
-    name of each robot to draw, by its key.
-    """
-    figure, axes = panels(1, len(titles), 104, sharex=True, sharey=True)
-    scale = Normalize(1.0, table.ratio.max())
-    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
-        _draw_places(axis, table[table.robot == robot], outlines[robot], scale)
-        axis.set(title=title, xlabel="x (m)", aspect="equal")
-        axis.margins(0.1, 0.06)
-    axes[0, 0].set_ylabel("z (m)")
-    # Room for words beside the flange.
-    axes[0, 0].set_xlim(None, 1.0 + max(corners[:, 0].max() for corners in outlines.values()))
-    label = "RMS error with a second target there\nover that of as many measurements of the end-effector"
-    figure.colorbar(ScalarMappable(scale, _COLOURS), ax=axes[0].tolist(), location="bottom", aspect=50, shrink=0.7, label=label)
-    return figure
-
-
 def draw_links(axis: Axes, plane: np.ndarray) -> None:
     """The corners (K, 2) of an arm joined, behind all else."""
     style: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round", "gid": "arm"}
     axis.plot(*plane.T, color="#c8c8c8", linewidth=6, zorder=1, **style)
-
-
-def _draw_places(axis: Axes, cells: pd.DataFrame, corners: np.ndarray, scale: Normalize) -> None:
-    plane = corners[:, [0, 2]]
-    draw_links(axis, plane)
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    on_links = cells[~cells.side.str.startswith("bar")]
-    for joints, link in on_links.groupby("joints"):
-        by_place = link.groupby("along_m").agg({"ratio": "mean", "seen_turned_percent": "max"})
-        places = np.column_stack([np.interp(by_place.index, way, column) for column in plane.T])
-        edge: dict[str, Any] = {"s": 34, "edgecolors": "black", "linewidths": 0.6, "zorder": 2}
-        axis.scatter(places[:, 0], places[:, 1], c=by_place.ratio, cmap=_COLOURS, norm=scale, **edge)
-        # One of a link tells of its neighbours.
-        chosen = len(by_place) - 1 if joints == cells.joints.max() else len(by_place) // 2
-        words = f"{by_place.ratio.iloc[chosen]:.2f}, seen {by_place.seen_turned_percent.iloc[chosen]:.0f} %"
-        axis.annotate(words, places[chosen], (7, -9), textcoords="offset points", ha="left", va="center", fontsize=7)
 
 
 @styled

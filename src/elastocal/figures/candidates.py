@@ -1,4 +1,4 @@
-"""What may be missing in a model: probabilities of hypotheses, candidates one by one, and which of them contribute alike."""
+"""What may be missing in a model: probabilities of hypotheses, and candidates one by one."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -6,17 +6,15 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 
-from elastocal.effects.protocol import at_shapes
-from elastocal.figures.style import PALETTE, ink_on, note, panels, styled
+from elastocal.figures.style import PALETTE, note, panels, styled
 from elastocal.report.words import candidate_words, capital, hypotheses_words, probability_words
 
 FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
-# Hypotheses and candidates with a bar of their own, and candidates whose angles are shown.
-_HYPOTHESES, _NAMED, _LEADING = 8, 15, 16
+# Hypotheses and candidates with a bar of their own.
+_HYPOTHESES, _NAMED = 8, 15
 _REST = "Everything else"
 # Letters in a line of a label, and in the longest label.
 _LINE, _LONGEST = 44, 80
@@ -98,49 +96,6 @@ def _label_rows(axis: Axes, labels: Sequence[str], heights_mm: np.ndarray) -> np
     return rows
 
 
-@styled
-def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]) -> Figure:
-    """Angles between the contributions of the leading candidates beyond the declared model.
-
-    `table`: columns of the candidates table. `pairs`: columns of the confounding table.
-    """
-    known = set(pairs["one"]) | set(pairs["other"])
-    # Those chosen whatever their place, as far as there is room; each by its name in the pairs, which have a shape's values.
-    ranked = [index for index in rank_candidates(table) if _in_pairs(table, index) in known]
-    kept = sorted(ranked, key=lambda index: not table["chosen"][index])[:_LEADING]
-    shown = [index for index in ranked if index in kept]
-    if not shown:
-        return _note_nothing_tested(table)
-    chosen = [bool(table["chosen"][table["candidate"] == table["candidate"][index]].any()) for index in shown]
-    angles = angle_matrix([_in_pairs(table, index) for index in shown], pairs)
-    labels = [f"{short_name(table['candidate'][index])}  {number}" for number, index in enumerate(shown, 1)]
-    count, row_mm = len(shown), max(_heights_mm(labels).max(), _ROW_MM)
-    figure, axes = panels(1, 1, 18 + row_mm * max(count, 6))
-    axis = axes[0, 0]
-    # Never black, so that the numbers can be read everywhere.
-    colours = LinearSegmentedColormap.from_list("angles", ["#08306b", "#4292c6", "#c6dbef", "#ffffff"])
-    image = axis.imshow(np.ma.masked_invalid(angles), cmap=colours, vmin=0, vmax=90, interpolation="nearest", aspect="auto")
-    for row, column in np.argwhere(np.isfinite(angles) & ~np.eye(count, dtype=bool)):
-        ink = ink_on(colours(angles[row, column] / 90))
-        axis.text(column, row, f"{angles[row, column]:.0f}", ha="center", va="center", fontsize=7, color=ink)
-    axis.set(xticks=range(count), yticks=range(count))
-    axis.set_xticklabels(range(1, count + 1), fontsize=7)
-    axis.set_yticklabels(labels, fontsize=7, linespacing=1.0)
-    axis.tick_params(length=0)
-    axis.grid(visible=False)
-    axis.spines[:].set_visible(False)
-    frame: dict[str, Any] = {"edgecolor": PALETTE[1], "linewidth": 1.4}
-    for number in np.flatnonzero(chosen):
-        axis.get_yticklabels()[number].set(fontweight="bold", color=PALETTE[1])
-        axis.add_patch(Rectangle((-0.5, number - 0.5), count, 1, fill=False, zorder=4, **frame))
-    bar = figure.colorbar(image, ax=axis, ticks=[0, 20, 45, 70, 90])
-    bar.set_label("angle between the contributions (°)")
-    if any(chosen):
-        handle = Patch(facecolor="none", label="in the most probable model", **frame)
-        figure.legend(handles=[handle], loc="outside lower center")
-    return figure
-
-
 def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
     """Indices (tested,) of the tested candidates by falling Bayes factor; each at the best value of its shape."""
     tested = np.flatnonzero(np.isfinite(table["log_bayes_factor"]))
@@ -149,27 +104,11 @@ def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
     return order[np.sort(first)]
 
 
-def angle_matrix(names: Sequence[str], pairs: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Angles between candidates as a symmetric matrix (names, names), zeros on its diagonal; not a number where unknown."""
-    place = {name: number for number, name in enumerate(names)}
-    angles = np.full((len(names), len(names)), np.nan)
-    np.fill_diagonal(angles, 0.0)
-    for one, other, angle in zip(pairs["one"], pairs["other"], pairs["angle_deg"], strict=True):
-        if one in place and other in place:
-            angles[place[one], place[other]] = angles[place[other], place[one]] = angle
-    return angles
-
-
 def short_name(key: str) -> str:
     """A candidate's key as words, in two lines where it is long and cut in the middle where it is very long."""
     words = capital(candidate_words(key))
     words = words if len(words) <= _LONGEST else f"{words[: _LONGEST // 2]} … {words[-(_LONGEST // 2 - 2) :]}"
     return textwrap.fill(words, 48)
-
-
-def _in_pairs(table: Mapping[str, np.ndarray], index: int) -> str:
-    shape = table["shape"][index]
-    return at_shapes(table["candidate"][index], [shape] if np.isfinite(shape) else [])
 
 
 def _note_nothing_tested(table: Mapping[str, np.ndarray]) -> Figure:

@@ -22,12 +22,12 @@ _KINDS = {
 
 @styled
 def budget_bars(budget: Sequence[Mapping[str, Any]], names: Sequence[str], tolerance_m: float, tracker_m: float) -> Figure:
-    """Lines of an error budget as bars with their intervals, the largest first, against the tolerance.
+    """Lines of an error budget as bars, the largest first, against the tolerance.
 
-    `budget`: ``name, rms_m, low_m, high_m``. `names`: of the lines, in words. `tracker_m`: RMS position error that the
+    `budget`: ``name, rms_m``. `names`: of the lines, in words. `tracker_m`: RMS position error that the
     tracker's noise alone shows.
     """
-    own = {"name": TRACKER, "rms_m": tracker_m, "low_m": None, "high_m": None}
+    own = {"name": TRACKER, "rms_m": tracker_m}
     lines = [*zip(names, budget, strict=True), ("noise of the tracker alone", own)]
     shown = sorted((line for line in lines if line[1]["rms_m"] > 0.0), key=lambda line: -line[1]["rms_m"])
     figure, axes = panels(1, 1, 26 + 6.5 * len(shown))
@@ -35,12 +35,10 @@ def budget_bars(budget: Sequence[Mapping[str, Any]], names: Sequence[str], toler
     for row, (_, line) in enumerate(shown):
         kind = line["name"] if line["name"] in _KINDS else "rest" if line["name"] in _REST else "effect"
         kinds.append(kind)
-        size, end = MILLI * line["rms_m"], MILLI * (line["high_m"] or line["rms_m"])
+        size = MILLI * line["rms_m"]
         axis.barh(row, size, height=0.6, color=_KINDS[kind][0], edgecolor="black" if kind == TRACKER else None, linewidth=0.6)
-        if line["low_m"] is not None:
-            axis.plot([MILLI * line["low_m"], end], [row, row], color="black", lw=1.2)
         style: dict[str, Any] = {"fontsize": 7, "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.6}}
-        axis.annotate(f"{size:.3f}", (max(size, end), row), (4, 0), textcoords="offset points", va="center", **style)
+        axis.annotate(f"{size:.3f}", (size, row), (4, 0), textcoords="offset points", va="center", **style)
     axis.axvline(MILLI * tolerance_m, color=PALETTE[1], ls="--", zorder=0, label=f"tolerance {MILLI * tolerance_m:g} mm")
     axis.set(xlim=(0, 1.1 * max(axis.get_xlim()[1], MILLI * tolerance_m)), xlabel="predicted RMS position error (mm)")
     axis.set_yticks(range(len(shown)), [name for name, _ in shown])

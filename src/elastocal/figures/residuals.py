@@ -1,4 +1,4 @@
-"""Errors of a campaign, before and after: against what the robot did, as arrows where it stood, and model by model."""
+"""Errors of a campaign, before and after: as arrows where the robot stood, and model by model."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -11,24 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.patheffects import withStroke
 
 from elastocal.counting import counted, first_names
 from elastocal.figures.arms import draw_links
-from elastocal.figures.style import MICRO, MILLI, STAGES, label_decades, legend_below, note, panels, styled
+from elastocal.figures.style import MICRO, MILLI, STAGES, label_decades, legend_below, panels, styled
 from elastocal.report.words import in_words
 
-# About the vertical of the base, since what turns with the first joint then stays one component; and along the force, since
-# what gives way does so in its direction.
-COMPONENTS = ("radial", "tangential", "vertical", "along force")
-# More points than this are drawn as pixels, so that the PDF stays small, and more dots per inch then make them sharp.
-_MOST_VECTORS = 1500
-_PIXELS_PER_INCH = 200
-# Bins of a running median: as many as leave so many measurements in each, within limits.
-_FEWEST_BINS, _MOST_BINS, _READINGS_IN_BIN = 16, 50, 80
-# No line is drawn over a share of the range in which there is no measurement.
-_GAP = 0.1
-_FEWEST_IN_BIN = 4
 # Of more states than this only one is drawn in each cell of a grid of so many columns.
 _MOST_ARROWS = 320
 _CELLS = 18
@@ -46,53 +34,6 @@ LOOKS = {
 _LARGEST_RATIO = 25
 _LINE, _NAMES = 26, 3
 _DIAMOND: dict[str, Any] = {"linestyle": "", "marker": "D", "color": "white", "markeredgecolor": "black", "markersize": 3.4}
-
-
-@styled
-def residuals(table: Mapping[str, np.ndarray]) -> Figure:
-    """Residual against each joint angle, the load and the time, before and after.
-
-    `table`: columns of the residuals table. Returns one panel for each quantity that the campaign varies; each shows the
-    component that this quantity explains best.
-    """
-    drawn_against, stages = quantities(table), _stages(table)
-    if not drawn_against:
-        return note("All measurements were taken at the same joint angles and load: there is nothing to draw them against.")
-    # Three in a row, or four where that saves a row.
-    columns = min((3, 4), key=lambda count: -(-len(drawn_against) // count))
-    rows = -(-len(drawn_against) // columns)
-    figure, axes = panels(rows, columns, 24 + 43 * rows, sharey=True)
-    parts = {stage: components(table, stage) for stage in stages}
-    # By the residuals and not by a few outliers.
-    scale, unit = (MILLI, "mm") if np.nanquantile(np.abs(parts["before"]), 0.95) > 1e-3 else (MICRO, "µm")
-    # A few measurements may lie outside, which would press all others together.
-    low, high = scale * np.nanquantile(parts["before"], [0.001, 0.999])
-    limits = (min(1.2 * low, -0.2 * high), max(1.2 * high, -0.2 * low))
-    held_out = table["held_out"].astype(bool)
-    for axis, (label, values) in zip(axes.flat, drawn_against.items(), strict=False):
-        bins = bins_of(values)
-        shares = {stage: [share_explained(bins, part) for part in parts[stage].T] for stage in stages}
-        shown = int(np.argmax(shares["before"]))
-        for stage in stages:
-            _cloud(axis, values, scale * parts[stage][:, shown], held_out, STAGES[stage][1], bins)
-        percent = " → ".join(f"{100 * shares[stage][shown]:.0f}" for stage in stages)
-        axis.set_title(f"{COMPONENTS[shown]}: {percent} %", fontsize=7.5, loc="left")
-        axis.set(xlabel=label, ylim=limits)
-        axis.axhline(0, color="black", linewidth=0.6)
-    for axis in axes.flat[len(drawn_against) :]:
-        axis.remove()
-    for axis in axes[:, 0]:
-        axis.set_ylabel(f"residual ({unit})")
-    above = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
-    drawn = [STAGES[stage] for stage in stages]
-    handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
-    look: dict[str, Any] = {"color": "#666666", "linestyle": ""}
-    handles.append(Line2D([], [], marker="o", markersize=2.5, label="fitted measurement", **look))
-    if held_out.any():
-        handles.append(Line2D([], [], marker="x", markersize=4, label="validation measurement", **look))
-    figure.legend(handles=handles, title=above, loc="outside lower center", ncols=4, columnspacing=1.4)
-    figure.set_dpi(_PIXELS_PER_INCH)
-    return figure
 
 
 @styled
@@ -136,93 +77,6 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
     handles = [Line2D([], [], color=STAGES[stage][1], linewidth=2, label=STAGES[stage][0]) for stage in stages]
     figure.legend(handles=handles, title=which, loc="outside lower center", ncols=2)
     return figure
-
-
-def quantities(table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """What a residual can be drawn against: angles, load and time, where the campaign varies them.
-
-    Returns (M,): by the label of the axis.
-    """
-    joints = sum(name[0] == "q" and name[1:].isdigit() for name in table)
-    found = {f"angle of joint {joint} (°)": np.degrees(table[f"q{joint}"]) for joint in range(1, joints + 1)}
-    found["force (N)"] = np.linalg.norm([table[name] for name in ("fx", "fy", "fz")], axis=0)
-    time = table["time_s"] - np.nanmin(table["time_s"]) if np.isfinite(table["time_s"]).any() else table["time_s"]
-    hours = np.isfinite(time).any() and np.nanmax(time) > 7200
-    found["time (h)" if hours else "time (min)"] = time / (3600 if hours else 60)
-    return {label: values for label, values in found.items() if np.isfinite(values).any() and np.nanstd(values) > 1e-6}
-
-
-def components(table: Mapping[str, np.ndarray], stage: str) -> np.ndarray:
-    """Position residuals in m, radial, tangential and vertical at the place of each measurement, and along its force.
-
-    `stage`: one of "before", "after". Returns (M, 4): not a number along the force where there is none.
-    """
-    off = np.column_stack([table[f"{stage}_d{axis}"] for axis in "xyz"])
-    force = np.column_stack([table[f"f{axis}"] for axis in "xyz"])
-    azimuth = np.arctan2(table["y"], table["x"])
-    cos, sin = np.cos(azimuth), np.sin(azimuth)
-    size = np.linalg.norm(force, axis=1)
-    along = np.full(len(off), np.nan)
-    np.divide((off * force).sum(axis=1), size, out=along, where=size > 0)
-    return np.column_stack([cos * off[:, 0] + sin * off[:, 1], cos * off[:, 1] - sin * off[:, 0], off[:, 2], along])
-
-
-def bins_of(values: np.ndarray) -> np.ndarray:
-    """Bin of each measurement, (M,): its own for each value where there are few, else of about equal counts; -1 where none."""
-    finite = np.isfinite(values)
-    levels = np.unique(np.round(values[finite], 3))
-    edges = levels[:-1] + np.diff(levels) / 2
-    if len(levels) > _FEWEST_BINS:
-        count = int(np.clip(finite.sum() / _READINGS_IN_BIN, _FEWEST_BINS, _MOST_BINS))
-        edges = np.unique(np.quantile(values[finite], np.linspace(0, 1, count + 1)[1:-1]))
-    return np.where(finite, np.searchsorted(edges, values), -1)
-
-
-def share_explained(bins: np.ndarray, values: np.ndarray) -> float:
-    """Share of the mean square of values that the means of their bins make, beyond what chance gives to as many bins.
-
-    `bins` (M,) of int, `values` (M,). Returns at least 0.
-    """
-    known = (bins >= 0) & np.isfinite(values)
-    if not known.any():
-        return 0.0
-    bins, values = bins[known], values[known]
-    counts = np.bincount(bins)
-    sums = np.bincount(bins, values)
-    explained = (sums[counts > 0] ** 2 / counts[counts > 0]).sum()
-    total, used = (values**2).sum(), (counts > 0).sum()
-    rest = (total - explained) / max(len(values) - used, 1)
-    return float(max(explained - used * rest, 0.0) / total) if total > 0 else 0.0
-
-
-def _cloud(axis: Axes, values: np.ndarray, residual: np.ndarray, held_out: np.ndarray, color: str, bins: np.ndarray) -> None:
-    """Points of one stage, those held out as crosses, with the running median and the middle half of all."""
-    as_pixels = len(values) > _MOST_VECTORS
-    alpha = float(np.clip(400 / len(values), 0.05, 0.45))
-    common: dict[str, Any] = {"color": color, "alpha": alpha, "rasterized": as_pixels, "linewidths": 0.5}
-    axis.scatter(values[~held_out], residual[~held_out], s=4, marker="o", edgecolors="none", **{**common, "linewidths": 0})
-    axis.scatter(values[held_out], residual[held_out], s=9, marker="x", **{**common, "alpha": min(1.5 * alpha, 1.0)})
-    middle, quartiles = running_quartiles(values, residual, bins)
-    axis.fill_between(middle, quartiles[:, 0], quartiles[:, 2], color=color, alpha=0.22, linewidth=0)
-    # Edged in white, so that it is seen on a dense cloud of its own colour; a bin between two gaps has no line but a point.
-    axis.plot(middle, quartiles[:, 1], color=color, linewidth=1.3, path_effects=[withStroke(linewidth=2.4, foreground="white")])
-    axis.plot(middle, quartiles[:, 1], color=color, linestyle="", marker="o", markersize=1.8)
-
-
-def running_quartiles(values: np.ndarray, residual: np.ndarray, bins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Quartiles of the residual bin by bin, with a row that is not a number where a line would cross a gap.
-
-    `values`, `residual` (M,). `bins` (M,) of int: from `bins_of`. Returns `middle` (B,): median of the values in each bin;
-    `quartiles` (B, 3).
-    """
-    known = (bins >= 0) & np.isfinite(residual)
-    groups = pd.DataFrame({"at": values, "off": residual})[known].groupby(bins[known])
-    enough = groups.size() >= _FEWEST_IN_BIN
-    rows = np.column_stack([groups["at"].median()[enough], groups["off"].quantile([0.25, 0.5, 0.75]).unstack()[enough]])
-    if len(levels := np.unique(np.round(values[known], 3))) > _FEWEST_BINS:
-        gaps = levels[:-1][np.diff(levels) > _GAP * np.ptp(levels)]
-        rows = np.insert(rows, np.searchsorted(rows[:, 0], gaps, "right"), np.nan, axis=0)
-    return rows[:, 0], rows[:, 1:]
 
 
 def middle_of_cells(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray:

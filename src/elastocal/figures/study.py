@@ -96,71 +96,6 @@ def deviations(
     return figure
 
 
-@styled
-def over_studies(studies: pd.DataFrame, printed: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str]) -> Figure:
-    """k_sigma over the fixed joints and deviation against the data set length: mean over studies and how they scatter.
-
-    `studies`: robot and the columns of `repeated.repeated`. `printed`: the printed figures. `titles`: name of each robot
-    to draw, by its key. `order`: strategies; one estimator under several names is drawn once, under the first of them.
-    """
-    figure, axes = panels(2, len(titles), 118, sharex=True, sharey="row")
-    quantities = (("k_sigma_fixed_joints", 1.0, "k_sigma", (0.2, 20)), ("deviation", MICRO, "dev", (0.5, 40)))
-    for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
-        for axis, (quantity, scale, name, span) in zip(column, quantities, strict=True):
-            mine = studies[studies.robot == robot]
-            means = mine.pivot_table(index="length", columns="strategy", values=quantity, observed=True)
-            for index in _find_distinct(means, order):
-                strategy, style = order[index], line_style(index)
-                curves = scale * mine[mine.strategy == strategy].pivot(index="study", columns="length", values=quantity)
-                middle, spread = curves.mean(), curves.std()
-                axis.plot(middle.index, middle, label=strategy, **style)
-                axis.fill_between(middle.index, middle - spread, middle + spread, color=style["color"], alpha=0.12, linewidth=0)
-            _printed_marks(axis, printed, robot, name, order)
-            # A margin on the right, where diamonds at the longest length would be cut in halves.
-            axis.set(xscale="log", yscale="log", xlim=(8, 1.05 * studies.length.max()), ylim=span)
-            label_decades(axis.xaxis, axis.yaxis)
-        column[0].set_title(title)
-        column[1].set_xlabel(_LENGTH)
-    axes[0, 0].set_ylabel(r"$k_\Sigma$ of the fixed joints (%)")
-    axes[1, 0].set_ylabel("dev, equation 15 (µm)")
-    bands = "bands: ± one standard deviation between studies"
-    legend_below(figure, 4, f"{bands}; one estimator under several names is drawn once")
-    return figure
-
-
-@styled
-def bias_and_accuracy(
-    metrics: pd.DataFrame, per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str], accuracy_um: float
-) -> Figure:
-    """What the paper's metric hides: the bias of the averaged model against the error that one data set leaves.
-
-    `metrics`: long, of one noise level. `per_dataset`: the table of the same name, of the same noise level. `titles`: name of
-    each robot to draw, by its key. `order`: strategies to draw. `accuracy_um`: wanted; marked by a line.
-    """
-    figure, axes = panels(1, len(titles), 92, sharey=True)
-    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
-        for index, strategy in enumerate(order):
-            averaged = metrics[(metrics.robot == robot) & (metrics.strategy == strategy) & (metrics.length > 1)]
-            single = per_dataset[(per_dataset.robot == robot) & (per_dataset.strategy == strategy)]
-            color = PALETTE[index]
-            axis.fill_between(single.length, single.mean_um, single.p95_um, color=color, alpha=0.13, linewidth=0)
-            axis.plot(
-                single.length, single.rms_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, RMS"
-            )
-            bound = {"color": "black", "marker": "_", "markersize": 7, "linestyle": "none", "zorder": 3 + index}
-            axis.plot(single.length, single.crlb_rms_um, label=f"{strategy}: Cramér-Rao bound, RMS", **bound)
-            label = f"{strategy}: dev of the paper"
-            axis.plot(averaged.length, MICRO * averaged.deviation, color=color, linestyle="--", label=label)
-        _limit(axis, accuracy_um, "µm")
-        axis.set(title=title, xlabel=_LENGTH, xscale="log", yscale="log", xlim=(2, 100), ylim=(0.5, 2000))
-        for plain in (axis.xaxis, axis.yaxis):
-            plain.set_major_formatter("{x:g}")
-    axes[0, 0].set_ylabel("end-effector error (µm)")
-    title = "bands: from the mean to the 95th percentile of one data set's error"
-    legend_below(figure, len(order), title)
-    return figure
-
-
 def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str, scale: float, order: Sequence[str]) -> None:
     # Where the mean of 1/c exists in practice.
     mine = metrics[(metrics.robot == robot) & metrics.trustworthy]
@@ -202,10 +137,10 @@ def _limit(axis: Axes, value: float, unit: str) -> None:
 
 
 @styled
-def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
-    """Table 4 among studies of the same size: the paper's figures, how studies scatter, and what is expected of them.
+def scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
+    """Table 4 among studies of the same size: the paper's figures, and how studies scatter.
 
-    `comparison`, `expectations`: the tables of these names. `titles`: name of each robot to draw, by its key.
+    `comparison`: the table of this name. `titles`: name of each robot to draw, by its key.
     """
     shown = comparison[(comparison.table == "4") & comparison.studies_mean.notna()]
     quantities, strategies = list(dict.fromkeys(shown.quantity)), list(dict.fromkeys(shown.strategy))
@@ -219,8 +154,6 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
             look: dict[str, Any] = {"color": PALETTE[0], "markersize": 3, "elinewidth": 3, "alpha": 0.6}
             name = "further studies, mean ± 2 standard deviations"
             axis.errorbar(cells.studies_mean, rows, xerr=2 * cells.studies_std, fmt="o", label=name, **look)
-            expected = _read_expected(expectations, robot, quantity)
-            axis.plot(expected, [strategies.index(name) for name in expected.index], "|", color="black", markersize=8)
             for differs, colour, name in ((False, "white", "paper"), (True, PALETTE[1], "paper, differs (Holm)")):
                 some = ((cells.p_holm < LEVEL) == differs).to_numpy()
                 at = np.array(rows)[some]
@@ -229,15 +162,8 @@ def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping
             axis.grid(visible=False, axis="y")
         line[0].set(yticks=range(len(strategies)), ylabel=title)
         line[0].set_yticklabels(strategies)
-    legend_below(figure, 2, more={"expectation in closed form": axes[0, 0].lines[-3]})
+    legend_below(figure, 2)
     return figure
-
-
-def _read_expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Series:
-    """Expectations of one quantity by strategy; none of lengths."""
-    names = {f"{quantity}_percent_fixed_joints", f"{quantity}_um"}
-    mine = expectations[(expectations.robot == robot) & expectations.quantity.isin(names) & expectations.paper.notna()]
-    return mine.set_index("strategy").expected
 
 
 @styled
@@ -318,31 +244,5 @@ def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, 
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("bound of the RMS error (µm)")
     title = f"band: 5 to 95 % of random designs; line: {accuracy_um:g} µm"
-    legend_below(figure, 5, title)
-    return figure
-
-
-@styled
-def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, str]) -> Figure:
-    """Scores of the strategies over those of the classical one, metric by metric.
-
-    `table`: from `uses.ranks_table`. `titles`: name of each robot to draw, by its key. `names`: what each metric is called.
-    Returns one estimator under several names is drawn once, under the first of them.
-    """
-    figure, axes = panels(1, len(titles), 26 + 8 * len(names), sharey=True, sharex=True)
-    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
-        mine = table[table.robot == robot]
-        strategies = mine[mine.metric == next(iter(names))].drop_duplicates("value").strategy
-        for index, strategy in enumerate(strategies):
-            cells = mine[mine.strategy == strategy].set_index("metric").reindex([*names])
-            rows = np.arange(len(names)) + 0.7 * ((index + 0.5) / len(strategies) - 0.5)
-            spans = np.abs(cells[["ratio_low", "ratio_high"]].to_numpy() - cells[["ratio"]].to_numpy()).T
-            axis.errorbar(cells.ratio, rows, xerr=spans, fmt="o", color=PALETTE[index], markersize=3.5, label=strategy)
-        axis.axvline(1.0, color="black", linewidth=0.7)
-        axis.set(title=title, xscale="log", yticks=range(len(names)), ylim=(len(names) - 0.5, -0.5))
-        label_decades(axis.xaxis)
-        axis.grid(visible=False, axis="y")
-    axes[0, 0].set_yticklabels([name.replace("k_Σ", r"$k_\Sigma$") for name in names.values()])
-    title = "score over that of the first strategy, 95 % intervals"
     legend_below(figure, 5, title)
     return figure

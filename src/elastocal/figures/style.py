@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import numpy as np
-    from matplotlib.artist import Artist
     from matplotlib.axis import Axis
     from matplotlib.typing import RcKeyType
 
@@ -56,10 +55,9 @@ def panels(rows: int, columns: int, height_mm: float, width_mm: float = WIDTH_MM
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def legend_below(figure: Figure, columns: int, title: str | None = None, more: Mapping[str, Artist] | None = None) -> None:
-    """One legend of all panels below them, each entry once, and of `more` artists by their labels."""
+def legend_below(figure: Figure, columns: int, title: str | None = None) -> None:
+    """One legend of all panels below them, each entry once."""
     entries = {label: one for axis in figure.axes for one, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    entries |= more or {}
     figure.legend([*entries.values()], [*entries], title=title, loc="outside lower center", ncols=columns)
 
 

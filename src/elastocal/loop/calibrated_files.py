@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pandas as pd
-
 from elastocal.application.accuracy import calibrate_on_case, regression_on, set_form
 from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.errors import InputError
@@ -32,7 +30,7 @@ if TYPE_CHECKING:
 # Of results/loop/<campaign>/ and of reports/loop/<campaign>/, whose last file has all others behind it.
 DESCRIPTIONS, TRAINING, DIAGNOSIS = "campaign.json", "training.parquet", "diagnosis.json"
 STEPS_TABLE, CORRELATIONS_TABLE = "steps.parquet", "correlations.parquet"
-VERDICT, ERRORS, REPORT = "verdict.json", "before_after.csv", "report.html"
+VERDICT, REPORT = "verdict.json", "report.html"
 
 
 @dataclass(frozen=True)
@@ -41,16 +39,14 @@ class Diagnosed:
 
     `name`: of the campaign. `case`: of the training poses, without their gross errors. `calibrated`: by the final model, its
     errors as large as verdict.json says after a look at held-out poses. `verdict`: verdict.json; of physics alone, where that
-    was asked for, as if there were no regression. `errors`: before_after.csv.
-    `origin`: ``commit`` of the jobs that made it, ``code_sha256`` and ``data_sha256`` of all that they read of the program and
-    of the campaign, ``environment``.
+    was asked for, as if there were no regression. `origin`: ``commit`` of the jobs that made it, ``code_sha256`` and
+    ``data_sha256`` of all that they read of the program and of the campaign, ``environment``.
     """
 
     name: str
     case: Case
     calibrated: CalibratedRobot
     verdict: dict[str, Any]
-    errors: pd.DataFrame
     origin: dict[str, Any]
 
 
@@ -98,14 +94,7 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, top: str | Pat
         "data_sha256": configuration_sha256(sorted(data)),
         "environment": {name: _listed(job.environment.get(name, "none") for job in jobs) for name in jobs[-1].environment},
     }
-    return Diagnosed(
-        name,
-        case,
-        set_form(calibrated, form, contradicted),
-        verdict,
-        pd.read_csv(stated / ERRORS),
-        origin,
-    )
+    return Diagnosed(name, case, set_form(calibrated, form, contradicted), verdict, origin)
 
 
 def _data_of(jobs: Sequence[JobRecord], results: str) -> set[tuple[str, str]]:

@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.diagnosis.confounding import angles_between, nearest_angles
 from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
 from elastocal.diagnosis.next_experiment import facts_of, propose, table_of
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.verdict import mechanisms_of_models
 from elastocal.fitting.case import case_from, noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import Estimate
@@ -22,7 +20,7 @@ from elastocal.fitting.parameters import parameters
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
-from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, CORRELATIONS, MODELS, STEPS, measurements
+from elastocal.loop.schemas import CANDIDATES, CORRELATIONS, STEPS, measurements
 from elastocal.mechanics.robot_file import joint_count
 from elastocal.random_streams import stream
 
@@ -51,13 +49,8 @@ def diagnose_campaign(job: Any) -> None:
     write_json(job.output.diagnosis, diagnosis_facts(found))
     origin = provenance(job.params, **job.wildcards)
     write_table(job.output.steps, STEPS, step_blocks(found), origin)
-    for path, schema, columns in (
-        (job.output.correlations, CORRELATIONS, correlation_columns(found.final)),
-        (job.output.models, MODELS, model_columns(found)),
-        (job.output.candidates, CANDIDATES, candidate_columns(found)),
-        (job.output.confounding, CONFOUNDING, confounding_columns(found)),
-    ):
-        write_table(path, schema, [columns], origin)
+    write_table(job.output.correlations, CORRELATIONS, [correlation_columns(found.final)], origin)
+    write_table(job.output.candidates, CANDIDATES, [candidate_columns(found)], origin)
 
 
 def load_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:
@@ -77,14 +70,10 @@ def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[st
 
 def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
     """What diagnosis.json holds."""
+    fits = [(step, step.fitted.model.effects) for step in diagnosis.steps]
     steps = [
-        {
-            "name": step.name,
-            "kind": step.kind,
-            "noise": noise_facts(step.fitted.noise),
-            "effects": [effect.key for effect in step.fitted.model.effects],
-        }
-        for step in diagnosis.steps
+        {"name": s.name, "kind": s.kind, "noise": noise_facts(s.fitted.noise), "effects": [effect.key for effect in effects]}
+        for s, effects in fits
     ]
     return {"document": diagnosis.document, "steps": steps}
 
@@ -139,25 +128,11 @@ def step_model(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.nd
     return model, estimate_from(mine, model, np.unique(case.observations.states.session))
 
 
-def model_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
-    """Columns of the models table."""
-    if not diagnosis.evidence:
-        return {column.name: np.zeros(0) for column in MODELS.columns}
-    found, problem = diagnosis.evidence.posterior, diagnosis.evidence.linearized.problem
-    return {
-        "model": np.arange(len(found.models)),
-        "probability": found.probabilities,
-        "log_odds": np.array([model.log_odds for model in found.models]),
-        "mechanisms": [" + ".join(names) or "nothing" for names in mechanisms_of_models(problem, found)],
-        "units": ["; ".join(problem.units[number].key for number in model.units) for model in found.models],
-        "pose_error_rad": np.array([model.pose_error_rad for model in found.models]),
-    }
-
-
 def candidate_columns(diagnosis: Diagnosis) -> dict[str, list[Any]]:
     """Columns of the candidates table: those tested by falling Bayes factor, then the others with the reason."""
     evidence, candidates = diagnosis.evidence, diagnosis.case.candidates
-    rows, untestable = [], dict.fromkeys(candidates, "the measurements are at fault")
+    rows: list[tuple[Any, ...]] = []
+    untestable = dict.fromkeys(candidates, "the measurements are at fault")
     if evidence:
         problem, untestable = evidence.linearized.problem, evidence.linearized.untestable
         factors = initial_screening(problem)[1]
@@ -166,43 +141,18 @@ def candidate_columns(diagnosis: Diagnosis) -> dict[str, list[Any]]:
             inclusion[list(model.units)] += probability
         best = evidence.conclusion.best
         chosen = set(evidence.posterior.models[best.model].units) if best.named else set()
-        angles = nearest_angles(problem, [number for number in chosen if problem.units[number].candidate])
         for number in np.argsort(-factors):
             unit = problem.units[number]
             if unit.candidate:
-                gram = problem.statistics.gram[0][np.ix_(unit.columns, unit.columns)]
-                figures = {
-                    "shape": unit.shapes[0] if unit.shapes else np.nan,
-                    "log_bayes_factor": factors[number],
-                    "probability": inclusion[number],
-                    "noncentrality": np.linalg.eigvalsh(gram)[-1],
-                    "angle_deg": angles[number],
-                    "chosen": number in chosen,
-                }
-                rows.append(_candidate(unit.candidate) | figures)
-    tested = {row["candidate"] for row in rows}
-    rows += [_candidate(candidate) | {"note": untestable[key]} for key, candidate in candidates.items() if key not in tested]
-    return {column.name: [row[column.name] for row in rows] for column in CANDIDATES.columns}
-
-
-def _candidate(candidate: Candidate) -> dict[str, Any]:
-    """A row of the candidates table of one that was not tested."""
-    unknown = dict.fromkeys(("shape", "log_bayes_factor", "probability", "noncentrality", "angle_deg"), np.nan)
-    named = {"candidate": candidate.key, "effect": candidate.effect, "family": candidate.family}
-    joints = {"joints": "+".join(map(str, candidate.joints)), "parameters": len(candidate.parameters)}
-    return named | joints | unknown | {"chosen": False, "note": ""}
-
-
-def confounding_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
-    """Columns of the confounding table: every pair of tested candidates once."""
-    if not diagnosis.evidence:
-        return {"one": [], "other": [], "angle_deg": np.zeros(0)}
-    problem = diagnosis.evidence.linearized.problem
-    numbers = [number for number, unit in enumerate(problem.units) if unit.candidate]
-    rows, columns = np.tril_indices(len(numbers), -1)
-    angles = angles_between(problem, numbers)
-    names = [problem.units[n].key for n in numbers]
-    return {"one": [names[r] for r in rows], "other": [names[c] for c in columns], "angle_deg": angles[rows, columns]}
+                shape = unit.shapes[0] if unit.shapes else np.nan
+                rows.append((unit.candidate, shape, factors[number], inclusion[number], number in chosen, ""))
+    tested = {row[0].key for row in rows}
+    rows += [(candidates[key], np.nan, np.nan, np.nan, False, untestable[key]) for key in candidates if key not in tested]
+    listed = [
+        (each.key, each.effect, each.family, "+".join(map(str, each.joints)), shape, len(each.parameters), *figures)
+        for each, shape, *figures in rows
+    ]
+    return {column.name: [row[place] for row in listed] for place, column in enumerate(CANDIDATES.columns)}
 
 
 def _with_priors(effect: Candidate, columns: Mapping[str, np.ndarray]) -> Candidate:

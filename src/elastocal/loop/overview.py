@@ -155,10 +155,9 @@ def _compliances(declared: Fit) -> tuple[list[dict[str, float | None]], list[str
 
 
 def _testable(part: Kept) -> dict[str, Any]:
-    case = part.case
-    found = linearized(part.declared, part.searched, list(case.candidates.values()), Settings())
-    reasons = Counter(found.untestable.values()).most_common()
-    return {"testable": len(case.candidates) - len(found.untestable), "untestable": dict(reasons)}
+    candidates = list(part.case.candidates.values())
+    untestable = linearized(part.declared, part.searched, candidates, Settings()).untestable
+    return {"testable": len(candidates) - len(untestable), "untestable": dict(Counter(untestable.values()).most_common())}
 
 
 def _suspicious(campaign: Campaign, facts: dict[str, Any], case: Case, settings: Settings) -> list[str]:

@@ -77,18 +77,6 @@ CORRELATIONS = TableSchema(
     ),
 )
 
-MODELS = TableSchema(
-    "models",
-    (
-        Column("model", "int32", "", "rank of the model, 0 the most probable", minimum=0),
-        Column("probability", "float64", "", "posterior probability"),
-        Column("log_odds", "float64", "", "posterior log odds against the declared model"),
-        Column("mechanisms", "text", "", "which it says act, joined by +; nothing, and other, are mechanisms here"),
-        Column("units", "text", "", "its candidates with shape values, joined by ;, whether or not it says that they act"),
-        Column("pose_error_rad", "float64", "rad", "most probable error of a joint common to the measurements of a pose"),
-    ),
-)
-
 CANDIDATES = TableSchema(
     "candidates",
     (
@@ -102,19 +90,8 @@ CANDIDATES = TableSchema(
             "log_bayes_factor", "float64", "", "of it alone against the declared model, averaged over its size", missing=True
         ),
         Column("probability", "float64", "", "posterior probability that it is in the model", missing=True),
-        Column("noncentrality", "float64", "", "of a test for it if it had its plausible size", missing=True),
-        Column("angle_deg", "float64", "deg", "angle of its sensitivities to the nearest effect found", missing=True),
         Column("chosen", "bool", "", "whether the most probable model has it"),
         Column("note", "text", "", "why it was not tested"),
-    ),
-)
-
-CONFOUNDING = TableSchema(
-    "confounding",
-    (
-        Column("one", "text", "", "candidate"),
-        Column("other", "text", "", "candidate"),
-        Column("angle_deg", "float64", "deg", "smallest angle between their sensitivities beyond the declared model"),
     ),
 )
 

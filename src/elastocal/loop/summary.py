@@ -54,11 +54,8 @@ def campaign_rows(
 
 
 def _effects(verdict: Mapping[str, Any]) -> str:
-    names = []
-    for effect in verdict["effects"]:
-        joints = ", ".join(map(str, effect["joints"]))
-        names.append(f"{effect['name']} (joint {joints})" if joints else effect["name"])
-    return " + ".join(names) or "none"
+    at = [(effect["name"], ", ".join(map(str, effect["joints"]))) for effect in verdict["effects"]]
+    return " + ".join(f"{name} (joint {joints})" if joints else name for name, joints in at) or "none"
 
 
 def _counted(counts: pd.Series, total: int) -> str:

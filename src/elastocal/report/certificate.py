@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.counting import counted
 from elastocal.report import words as say
-from elastocal.report.loop_facts import TITLES
+from elastocal.report.loop_facts import title_of
 from elastocal.report.typesetting import compile_document, sentences
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _SHARES = {
 }
 # Below the digits of any tracker.
 _NOTHING_M = 1e-7
-_LISTS = ("misplaced", "identity", "steps", "data")
+_LISTS = ("misplaced", "identity", "data")
 
 
 def write_certificate(path: str | Path, facts: Mapping[str, Any], figures: Iterable[str]) -> None:
@@ -44,7 +44,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
 
     `document`: of `loop.certificate.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
-    spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": TITLES[document["verdict"]]}
+    spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": title_of(document)}
     stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken)
     return {
         **{name: lines if name in _LISTS else " ".join(lines) for name, lines in stated.items()},
@@ -53,7 +53,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "decision": document["conformity"]["decision"],
         "errors": document["errors"],
         "floor": say.length(document["noise_floor_rms_m"]),
-        "budget": [[share_name(line["name"]), *_share(line)] for line in document["budget"]],
+        "budget": [[share_name(line["name"]), _share(line)] for line in document["budget"]],
         "budget_states": counted(document["budget_states"], "state"),
     }
 
@@ -63,10 +63,9 @@ def share_name(name: str) -> str:
     return _SHARES.get(name) or say.physical_name(name)
 
 
-def _share(line: Mapping[str, Any]) -> list[str]:
-    """A line of the error budget: RMS and its interval."""
-    rms, known = line["rms_m"], line["low_m"] is not None and line["rms_m"] >= _NOTHING_M
-    limits = f"{say.length(line['low_m'])} to {say.length(line['high_m'])}" if known else "–"
+def _share(line: Mapping[str, Any]) -> str:
+    """A line of the error budget: its RMS."""
+    rms = line["rms_m"]
     if 0.0 < rms < _NOTHING_M:
-        return [f"below {say.length(_NOTHING_M, 1)}", limits]
-    return ["hidden by the tracker's noise" if line["name"] == "repeatability" and not rms else say.length(rms), limits]
+        return f"below {say.length(_NOTHING_M, 1)}"
+    return "hidden by the tracker's noise" if line["name"] == "repeatability" and not rms else say.length(rms)

@@ -26,21 +26,16 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 4000
 # Poses in which the robot can be drawn.
 _POSES = 40
-# Candidates that a page lists.
-_LEADING = 15
 # Arrows of the middle length are this share of the width of what they are drawn in.
 _ARROW = 0.03
 
 
-def loop_page(
-    facts: Mapping[str, Any], table: Mapping[str, np.ndarray], candidates: Mapping[str, np.ndarray], robot: Robot
-) -> tuple[dict[str, Any], dict[str, Any]]:
+def loop_page(facts: Mapping[str, Any], table: Mapping[str, np.ndarray], robot: Robot) -> tuple[dict[str, Any], dict[str, Any]]:
     """What the page of a campaign says, and what it draws.
 
-    `facts`: from `loop_facts.loop_facts`. `table` (N,): columns of the residuals; joint
-    angles are the model's, as in a campaign, not the controller's. `candidates` (K,): columns of the candidates table. `robot`:
-    as declared. Returns `page`: texts and tables, worded; `data`: JSON-serialisable: positions (m), residuals (µm), what they
-    may be drawn against, corners, joints and axes of the robot (m).
+    `facts`: from `loop_facts.loop_facts`. `table` (N,): columns of the residuals; joint angles are the model's, as in a
+    campaign, not the controller's. `robot`: as declared. Returns `page`: texts and tables, worded; `data`: JSON-serialisable:
+    positions (m), residuals (µm), what they may be drawn against, corners, joints and axes of the robot (m).
     """
     count = len(table["x"])
     shown = _spread(count, _MOST_SHOWN)
@@ -73,7 +68,7 @@ def loop_page(
         "usual_factor": float(_ARROW * np.ptp(position, axis=0).max() / max(middle, 1e-9)),
         "changed": not np.allclose(off["before"], off["after"], rtol=0, atol=0.01),
     }
-    page = {**facts, "candidates": _candidates(candidates), "changed": data["changed"]}
+    page = {**facts, "changed": data["changed"]}
     page["shown"] = [] if len(shown) == count else [len(shown), count]
     return page, data
 
@@ -88,26 +83,6 @@ def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str
     numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
     text = template("loop.html", say.FILTERS).render(page=page, origin=origin, data=Markup(numbers), script=Markup(script))
     write_text(path, text)
-
-
-def _candidates(table: Mapping[str, np.ndarray]) -> list[dict[str, str]]:
-    """The leading candidates, worded; of one that was tried in several shapes the best, and the probability of them all."""
-    keys, of_key = np.unique(table["candidate"].astype(str), return_inverse=True)
-    best, probability, chosen = np.full(len(keys), -np.inf), np.zeros(len(keys)), np.zeros(len(keys), bool)
-    np.fmax.at(best, of_key, table["log_bayes_factor"])
-    # A model holds one shape of a candidate at most: their probabilities add up.
-    np.add.at(probability, of_key, np.nan_to_num(table["probability"]))
-    np.logical_or.at(chosen, of_key, np.asarray(table["chosen"], bool))
-    return [
-        {
-            "name": say.capital(say.candidate_words(keys[key])),
-            "factor": say.minus(f"{best[key]:.1f}"),
-            "words": say.probability_words(probability[key]),
-            "chosen": "yes" if chosen[key] else "",
-        }
-        for key in np.argsort(-best, kind="stable")[:_LEADING]
-        if np.isfinite(best[key])
-    ]
 
 
 def _targets(some: Mapping[str, np.ndarray], rows: np.ndarray) -> list[int]:

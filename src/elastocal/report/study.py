@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +12,7 @@ from elastocal.study.designs import TEST_POSE
 from elastocal.study.ladder import CHOSEN
 from elastocal.study.printed import LEVEL
 from elastocal.study.tables import column_head, list_rows, merge_errors, word_value
-from elastocal.study.uses import REFERENCE
+from elastocal.study.uses import METRICS, REFERENCE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,21 +21,8 @@ if TYPE_CHECKING:
 
 # The repeatability that the paper names for both robots, in µm.
 REPEATABILITY_UM = 60.0
-# In the order in which they are shown.
-METRIC_NAMES = {
-    REFERENCE: "RMS of one data set",
-    "mean_um": "mean of one data set",
-    "p95_um": "p95 of one data set",
-    "pooled_p95_um": "p95 pooled over data sets",
-    "iso_9283_um": "largest at the ISO 9283 poses",
-    "path_rms_um": "RMS on a milling path",
-    "path_max_um": "largest on a milling path",
-    "dev_um": "dev (equation 15)",
-    "k_sigma_percent": "k_Σ of all joints",
-    "k_sigma_percent_fixed_joints": "k_Σ of the fixed joints",
-}
-# Designs in the order of the tables, and numbers of configurations that count as few.
-_DESIGNS, _FEW = ("random", "D", "A", "I", TEST_POSE), (2, 3, 4, 6, 8, 10)
+# Designs in the order of the tables.
+_DESIGNS = ("random", "D", "A", "I", TEST_POSE)
 # Beyond so many configurations nothing is known of a length.
 _LONGEST = 1000
 _CONTINUED = "†"
@@ -68,20 +53,11 @@ def study_facts(
     Returns rows and paragraphs of `study.txt` under its headings, strings ready to print.
     """
     length, titles, accuracy = settings["length"], [names[robot] for robot in robots], settings["accuracy_um"]
-    whole = {name: frame.assign(robot=frame.robot.map(names)) if "robot" in frame else frame for name, frame in tables.items()}
-    # These have rows of robots with links, too.
-    linked = ("ladder", "tubes", "extended", "comparison", "expectations", "solvers", "table2")
-    of = {
-        name: frame[frame.robot.isin(titles)] if "robot" in frame and name not in linked else frame
-        for name, frame in whole.items()
-    }
+    of = {name: frame.assign(robot=frame.robot.map(names)) if "robot" in frame else frame for name, frame in tables.items()}
     judged, pairs = of["comparison"][of["comparison"].p_holm.notna()], of["score_pairs"]
     of |= {
-        "claims": of["claims"].assign(found=_found(of["claims"], names)),
         "outside": judged[judged.p_value < LEVEL],
         "printed": of["comparison"][of["comparison"].table == "2"],
-        "expectations": of["expectations"][of["expectations"].paper.notna()],
-        "kinds": of["kinds"].assign(apart=(of["kinds"].scalars - 6 * length).abs()),
         "turned": pairs[pairs.reversed & (pairs.metric != REFERENCE)].assign(
             size=lambda frame: (frame.ratio / frame.rms_ratio).abs()
         ),
@@ -97,41 +73,28 @@ def study_facts(
         found = of[table][np.logical_and.reduce([of[table][name] == value for name, value in keys.items()])]
         return next(iter(_records(found)), None)
 
-    extended = merge_errors(of["extended"].drop(columns="robot")).to_numpy().tolist()
     facts = {
         "titles": titles,
         "classical": settings["classical"],
-        "metric_count": len(METRIC_NAMES),
+        "metric_count": len(METRICS),
         "repeatability_um": f"{REPEATABILITY_UM:g}",
         **{name: f"{settings[name]:g}" for name in ("noise_um", "length", "accuracy_um")},
-        "stated": {
-            name: ", ".join(f"{value:g}" for value in np.atleast_1d(values)) for name, values in settings["stated"].items()
-        },
+        "stated": {name: f"{value:g}" for name, value in settings["stated"].items()},
         "cells": str(len(judged)),
         "differ": str(int((judged.p_holm < LEVEL).sum())),
-        "studies": str(int(of["expectations"].studies.max())) if len(of["expectations"]) else "0",
-        "extended": extended,
+        "studies": str(int(of["joint"].studies.max())),
+        "extended": merge_errors(of["extended"].drop(columns="robot")).to_numpy().tolist(),
         "strategies": [_stages(strategy) for strategy in settings["strategies"]],
-        "few": _few(of["few"]),
-        "few_heads": [str(size) for size in _FEW if size in set(of["few"].configurations)],
     }
     helpers = {"word_value": word_value, "column_head": column_head, "ratio": ratio_words, "each": each, "at": at}
-    constants = {"infinity": np.inf, "metrics": METRIC_NAMES, "chosen": CHOSEN, "designs": _DESIGNS, "reference": REFERENCE}
-    chosen = {
-        "titles": titles,
-        "size": length,
-        "accuracy": accuracy,
-        "classical": settings["classical"],
-        "favoured": settings["best"],
-    }
+    constants = {"infinity": np.inf, "metrics": METRICS, "chosen": CHOSEN, "designs": _DESIGNS, "reference": REFERENCE}
+    chosen = {"titles": titles, "size": length, "accuracy": accuracy, "favoured": settings["best"]}
     more = {
         "measured": _measured(of["studies"], settings["configurations"]),
         "figures": _figures(of["studies"]),
-        "costs": {title: cheapest(of["costs"][of["costs"].robot == title]) for title in titles},
-        "summaries": _summaries(tables["ladder"], tables["pairs"]),
         "t": {name: _records(frame) for name, frame in of.items()},
     }
-    return sentences("study.txt", **helpers, **constants, **chosen, **more) | facts
+    return sentences("study.txt", classical=settings["classical"], **helpers, **constants, **chosen, **more) | facts
 
 
 def paper_rows(beside: pd.DataFrame, names: Mapping[str, str], configurations: int) -> list[dict[str, str]]:
@@ -177,10 +140,9 @@ def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
     return rows
 
 
-def ratio_words(row: Mapping[str, Any], name: str = "ratio", digits: int = 3) -> str:
+def ratio_words(row: Mapping[str, Any]) -> str:
     """A ratio of a row with its interval."""
-    value, low, high = (f"{row[name + end]:.{digits}f}" for end in ("", "_low", "_high"))
-    return f"{value} ({low} to {high})"
+    return f"{row['ratio']:.3f} ({row['ratio_low']:.3f} to {row['ratio_high']:.3f})"
 
 
 def _continued(quantity: str, value: float, error: float, configurations: int, longest: float = np.inf) -> str:
@@ -193,25 +155,18 @@ def _continued(quantity: str, value: float, error: float, configurations: int, l
     return text + (_CONTINUED if np.isfinite(value) and value > configurations else "")
 
 
-def _found(claims: pd.DataFrame, names: Mapping[str, str]) -> list[str]:
-    """What studies find of each claim, once where both counts of joints say the same, and with names for the keys of robots."""
-    both = [a if a == b else f"all joints: {a}; fixed joints: {b}" for a, b in zip(claims.literal, claims.ours, strict=True)]
-    key = re.compile(rf"\b({'|'.join(map(re.escape, names))})\b")
-    return [key.sub(lambda match: names[match[0]], text) for text in both]
-
-
 def _measured(table: pd.DataFrame, configurations: int) -> list[dict[str, Any]]:
     """Table 4 over studies, a row for each estimator on each robot.
 
-    Returns robot, strategy and the four figures of Table 4 under (measured, average), those of k_sigma over the fixed joints
-    under "fixed".
+    Returns robot, strategy and the four figures of Table 4 by what is averaged, those of k_sigma over the fixed joints under
+    "fixed".
     """
     rows, seen = [], set()
+    figures = _figures(table)[:4]
+    fixed = [name.replace("k_sigma_", "k_sigma_fixed_joints_") for name in figures[:2]]
     for (robot, strategy), cells in table.groupby(["robot", "strategy"], sort=False):
-        by = {(row["measured"], row["average"]): row for row in _records(cells)}
-        figures = _figures(table)[:4]
-        fixed = [name.replace("k_sigma_", "k_sigma_fixed_joints_") for name in figures[:2]]
-        usual = by["pose", "stiffness"]
+        by = {row["average"]: row for row in _records(cells)}
+        usual = by["stiffness"]
         # One estimator under another name; the fixed joints of its last stage are fewer, perhaps.
         key = (robot, f"{usual[figures[2]]:.6g}")
         if key in seen and usual[fixed[0]] == usual[figures[0]]:
@@ -221,8 +176,8 @@ def _measured(table: pd.DataFrame, configurations: int) -> list[dict[str, Any]]:
         def cell(row: Mapping[str, Any], name: str) -> str:
             return _continued(name, row[name], row[f"{name}_std"], configurations, _LONGEST)
 
-        kinds = {f"{what} {average}": [cell(row, name) for name in figures] for (what, average), row in by.items()}
-        rows.append({"robot": robot, "strategy": strategy, **kinds, "fixed": [cell(usual, name) for name in fixed]})
+        found = {average: [cell(row, name) for name in figures] for average, row in by.items()}
+        rows.append({"robot": robot, "strategy": strategy, **found, "fixed": [cell(usual, name) for name in fixed]})
     return rows
 
 
@@ -237,9 +192,8 @@ def _stages(strategy: Strategy) -> list[str]:
     """What a strategy does, stage by stage: its name, and points measured → compliances identified."""
 
     def springs(joints: Sequence[int]) -> str:
-        numbers = [joint + 1 for joint in joints]
-        whole = len(numbers) > 1 and numbers == [*range(numbers[0], numbers[-1] + 1)]
-        return f"c{numbers[0]}–c{numbers[-1]}" if whole else ", ".join(f"c{number}" for number in numbers)
+        whole = len(joints) > 1 and [*joints] == [*range(joints[0], joints[-1] + 1)]
+        return f"c{joints[0] + 1}–c{joints[-1] + 1}" if whole else ", ".join(f"c{joint + 1}" for joint in joints)
 
     stages = [
         f"{' and '.join(stage.points)} → {springs(stage.identified)}"
@@ -247,54 +201,3 @@ def _stages(strategy: Strategy) -> list[str]:
         for stage in strategy.stages
     ]
     return [strategy.name, "; then ".join(stages)]
-
-
-def cheapest(costs: pd.DataFrame) -> list[tuple[str, float]]:
-    """Sets of points of one robot, each with the cost of a configuration from which on it is the cheapest.
-
-    `costs`: from `costs.cost_table`. A cost is linear in that of a configuration: sets that follow each other on the grid meet
-    where their lines do.
-    """
-    lines = {}
-    for points, cell in costs.groupby("points"):
-        cell = cell.sort_values("configuration_cost")
-        first, last = cell.iloc[0], cell.iloc[-1]
-        slope = (last.cost - first.cost) / (last.configuration_cost - first.configuration_cost)
-        lines[points] = (slope, first.cost - slope * first.configuration_cost)
-    best = costs[costs.cheapest].sort_values("configuration_cost").points
-    order = list(dict.fromkeys(best))
-    meet = [(lines[b][1] - lines[a][1]) / (lines[a][0] - lines[b][0]) for a, b in pairwise(order)]
-    return list(zip(order, [0.0, *meet], strict=True))
-
-
-def _few(table: pd.DataFrame) -> list[list[str]]:
-    """RMS error from few configurations: robot, strategy, error of the nominal values in percent, and the errors.
-
-    Strategies without a prior do not depend on the nominal values and have one row.
-    """
-    shown = table[table.configurations.isin(_FEW)]
-    wide = shown.pivot_table(
-        index=["robot", "strategy", "nominal_error_percent"], columns="configurations", values="rms_um", sort=False
-    )
-    rows = [
-        [*map(str, key[:2]), f"{key[2]:g}", *(f"{value:.0f}" for value in values)]
-        for key, values in zip(wide.index, wide.to_numpy(), strict=True)
-    ]
-    alike: dict[tuple[str, ...], list[str]] = {}
-    for row in rows:
-        alike.setdefault((*row[:2], *row[3:]), row)
-    often = [(row[0], row[1]) for row in alike.values()]
-    return [[*row[:2], "any" if often.count((row[0], row[1])) == 1 else row[2], *row[3:]] for row in alike.values()]
-
-
-def _summaries(ladder: pd.DataFrame, pairs: pd.DataFrame) -> dict[str, Any]:
-    """Percent by which cross-validation's choice leaves more than the best number of link springs; ratios of sets of points."""
-    chosen, groups = ladder.link_springs == CHOSEN, ["robot", "noise_um", "length"]
-    excess = 100 * (ladder[chosen].groupby(groups).rms_um.first() / ladder[~chosen].groupby(groups).rms_um.min() - 1)
-    ratios = {
-        "worse": int((pairs.ratio_low > 1).sum()),
-        "sets": len(pairs),
-        "least": pairs.ratio.min(),
-        "largest": pairs.ratio.max(),
-    }
-    return {"median": excess.median(), "most": excess.max(), **ratios}

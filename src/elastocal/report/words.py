@@ -145,23 +145,24 @@ def hypotheses_words(sets: Sequence[Mapping[str, Any]]) -> list[str]:
     `sets`: as in verdict.json, the most probable first. `OTHER` alone is something that the catalogue does not have; beside a
     mechanism, that a related one may act.
     """
-
-    def of(names: Iterable[str], locations: Mapping[str, Iterable[str]]) -> str:
-        named = [effect_words(name, locations.get(name, ())) for name in names if name != OTHER]
-        return " with ".join(named) + (f" or {RELATED}" if named and OTHER in names else "" if named else UNKNOWN)
-
     first, found = set(sets[0]["mechanisms"]) if sets else set(), []
     for entry in sets:
         names = set(entry["mechanisms"])
         if not names:
             found.append(NOTHING)
         elif not first or not first < names:
-            found.append(of(entry["mechanisms"], entry["locations"]))
+            found.append(mechanisms_words(entry["mechanisms"], entry["locations"]))
         elif names - first == {OTHER}:
             found.append(f"the same or {RELATED}")
         else:
-            found.append("the same with " + of(sorted(names - first), entry["locations"]))
+            found.append("the same with " + mechanisms_words(sorted(names - first), entry["locations"]))
     return found
+
+
+def mechanisms_words(names: Collection[str], locations: Mapping[str, Iterable[str]] = {}) -> str:
+    """A set of mechanisms with their locations, where these are stated."""
+    named = [effect_words(name, locations.get(name, ())) for name in names if name != OTHER]
+    return " with ".join(named) + (f" or {RELATED}" if named and OTHER in names else "" if named else UNKNOWN)
 
 
 def alternative_words(name: str) -> str:

@@ -23,14 +23,13 @@ class Study:
     """A configuration that holds together.
 
     `robots`, `strategies`: documents by the names of their files. `points`: measuring points that each strategy reads.
-    `end_effectors`: last measuring point of each robot. `few`: documents of the strategies from few configurations.
+    `end_effectors`: last measuring point of each robot.
     """
 
     robots: dict[str, dict[str, Any]]
     strategies: dict[str, dict[str, Any]]
     points: dict[str, tuple[str, ...]]
     end_effectors: dict[str, str]
-    few: list[dict[str, Any]]
 
 
 def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> Study:
@@ -58,14 +57,6 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
     points = {}
     for name, document in strategies.items():
         strategy = strategy_from_document(document)
-        if strategy.prior_std is not None:
-            place = document_path(folder, "strategies", name)
-            raise InputError(
-                place,
-                "prior_std",
-                f"{strategy.prior_std:g}",
-                "one of questions.few.strategies only: it has no scores of equation 11",
-            )
         points[name] = strategy.points
         for chain in chains.values():
             check_strategy(strategy, chain, document_path(folder, "strategies", name))
@@ -86,9 +77,8 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
             known = sorted({point for file in files for point in _POINT.findall(file.read_text("utf-8"))})
             if name not in known:
                 raise InputError(source, f"questions.point_sets.{label}", repr(name), ", ".join(known))
-    few = [named_document(folder, "strategies", "strategy", name, source) for name in config["questions"]["few"]["strategies"]]
     _check_cells(config, source)
-    return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()}, few)
+    return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
 
 
 def override(config: Mapping[str, Any], entries: Iterable[str]) -> dict[str, Any]:
@@ -120,14 +110,11 @@ def _check_cells(config: Mapping[str, Any], source: str) -> None:
     for level in config["noise_um"]:
         if levels.setdefault(f"{level:g}", level) != level:
             raise InputError(source, "noise_um", f"{levels[f'{level:g}']} and {level}", "levels that differ in 6 digits")
-    lengths = config["evaluation"]["lengths"]
-    for index, length in enumerate(lengths):
-        if length > longest:
-            raise InputError(source, f"evaluation.lengths[{index}]", str(length), f"up to configurations = {longest}")
     for key, name, allowed in (
         ("classical_strategy", "strategies", config["strategies"]),
         ("noise_um", "noise_um", config["noise_um"]),
-        ("length", "evaluation.lengths", lengths),
     ):
         if tables[key] not in allowed:
             raise InputError(source, f"tables.{key}", repr(tables[key]), f"one of {name} {allowed}")
+    if tables["length"] > longest:
+        raise InputError(source, "tables.length", str(tables["length"]), f"up to configurations = {longest}")

@@ -18,7 +18,6 @@ Observability indices are numbers of the singular values s_1 >= ... >= s_m of th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,12 +33,9 @@ from elastocal.application.planning.designs import (
     mean_squares,
 )
 from elastocal.random_streams import stream
-from elastocal.study.columns import ON_TESTS, SET, real, table, text, whole
-from elastocal.study.equation_11 import estimate_compliance, prefix_information
 from elastocal.study.in_memory import ask
-from elastocal.study.jobs import MICRO, below, rows_as_frame, tabulate
-from elastocal.study.metrics import make_judge, mean_square_errors, squared_error_bounds
-from elastocal.study.strategies import all_at_once
+from elastocal.study.jobs import MICRO, below, real, table, tabulate, text, whole
+from elastocal.study.metrics import make_judge, mean_square_errors
 from elastocal.study.uses import iso_9283
 
 if TYPE_CHECKING:
@@ -51,7 +47,6 @@ if TYPE_CHECKING:
     from elastocal.study.in_memory import StudyInMemory
 
 RANDOM, CONTINUOUS, TEST_POSE = "random", "bound", "test pose"
-INDICES = ("O1", "O2", "O3", "O4", "O5")
 DESIGNS = table(
     "designs",
     text("joint_range", "of candidates and validation configurations: full_turn or limits"),
@@ -70,13 +65,6 @@ SIMULATED_DESIGNS = table(
     real("rms", "m", "RMS end-effector error over simulated data sets on test configurations"),
     real("std_error", "m", "Monte Carlo standard error of the same"),
     real("there", "m", "RMS end-effector error at the test pose"),
-)
-OBSERVABILITY = table(
-    "observability",
-    SET,
-    *(real(index, "", f"observability index {index}") for index in INDICES),
-    real("bound", "m^2", "Cramér-Rao bound of the mean square end-effector error"),
-    real("mean_square", "m^2", ON_TESTS),
 )
 # Interpretation R3 both ways: a robot on the floor cannot turn its joints fully.
 _JOINT_RANGES = ("full_turn", "limits")
@@ -218,39 +206,6 @@ def _simulate(study: StudyInMemory, candidates: Candidates, designs: np.ndarray)
     return float(rms), float(groups.std(ddof=1) / np.sqrt(len(groups)) / (2 * rms)), float(np.sqrt(there.mean()))
 
 
-def observability(information: np.ndarray, configurations: int) -> dict[str, np.ndarray]:
-    """Observability indices (...) of identification Jacobians, by their products J'J (..., m, m) in any units."""
-    values = np.sqrt(np.clip(np.linalg.eigvalsh(information), np.finfo(float).tiny, None))
-    smallest, largest = values[..., 0], values[..., -1]
-    every = (
-        np.exp(np.log(values).mean(axis=-1)) / np.sqrt(configurations),
-        smallest / largest,
-        smallest,
-        smallest**2 / largest,
-        1.0 / (1.0 / values).sum(axis=-1),
-    )
-    return dict(zip(INDICES, every, strict=True))
-
-
-def observability_columns(study: StudyInMemory) -> dict[str, np.ndarray]:
-    """Observability indices of each data set beside its bound and its error, by measurements of the end-effector.
-
-    Compliances are in units of their true values, so that an index does not depend on the units of measurement.
-    """
-    robot, sets, judge = study.robot, np.arange(study.size.data_sets), study.judge()
-    point, n = robot.chain.end_effector.name, robot.joints
-    measurements = study.measure(sets, (point,))
-    compliance = estimate_compliance(all_at_once((point,), n), measurements, n)[0][-1]
-    information = prefix_information(measurements[point].regressor)[-1:]
-    scaled = information[0] * np.outer(robot.compliance, robot.compliance)
-    return {
-        "data_set": sets,
-        **observability(scaled, study.size.configurations),
-        "bound": study.size.noise**2 * squared_error_bounds(information, judge.form[:-1, :-1])[0],
-        "mean_square": judge.mean_square(compliance),
-    }
-
-
 def designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Random against optimal configurations; low_um and high_um: 5 and 95 % of random designs."""
     frame = below(found)
@@ -272,26 +227,6 @@ def simulated_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return part.assign(gain=part.join(random, on=size).random / part.rms_um)
 
 
-def observability_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """How well an index of random configurations, or their bound, tells their worth, by rank correlation.
-
-    -1 where a larger index always means a smaller error; standard errors by a normal approximation.
-    """
-    from scipy.stats import spearmanr
-
-    rows = []
-    for (robot, frame), index in product(found.items(), (*INDICES, "bound")):
-        row: dict[str, Any] = {"robot": robot, "index": index}
-        for name, against in (("bound", "bound"), ("error", "mean_square")):
-            rank = float(spearmanr(frame[index], frame[against]).statistic)
-            row[f"rank_correlation_with_{name}"] = rank
-            row[f"rank_correlation_with_{name}_std_error"] = (1 - rank**2) / np.sqrt(len(frame) - 1)
-        rows.append(row)
-    return rows_as_frame(rows)
-
-
 choose_designs, tabulate_designs = ask(DESIGNS, design_columns), tabulate(DESIGNS, designs_table)
 simulate_designs = ask(SIMULATED_DESIGNS, simulated_design_blocks)
 tabulate_simulated_designs = tabulate(SIMULATED_DESIGNS, simulated_designs_table)
-index_observability = ask(OBSERVABILITY, observability_columns)
-tabulate_observability = tabulate(OBSERVABILITY, observability_table)

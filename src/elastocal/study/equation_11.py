@@ -7,14 +7,35 @@ forming them, so that prefixes of one or two configurations keep their digits.
 Equations and triangles have the data sets on their last axis, so that one step of the algebra runs over all of them.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.study.strategies import Stage, Strategy, drop_forgotten_stages
+from elastocal.io.storage import TableSchema, read_blocks
+from elastocal.mechanics.elastostatics import generalized_forces, loaded_point, regressor
+from elastocal.mechanics.kinematics import jacobians
+from elastocal.study.jobs import LENGTH, SET, Job, real, table
+from elastocal.study.simulation import (
+    DEFLECTION_COLUMNS,
+    DEFLECTIONS,
+    Experiments,
+    data_sets,
+    experiments,
+    prefix_index_columns,
+    to_deflections,
+    to_experiments,
+)
 
+if TYPE_CHECKING:
+    from elastocal.mechanics.chain import Chain
+    from elastocal.study.strategies import Stage, Strategy
+
+# Columns of one pass through the experiments and, for each measuring point, the deflections.
+Blocks = Iterable[tuple[Mapping[str, np.ndarray], Mapping[str, Mapping[str, np.ndarray]]]]
 # Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
 # the measurements do not determine the compliances.
 LARGEST_CONDITION = 1e7
@@ -32,25 +53,6 @@ class Measurements:
     deflection: np.ndarray
 
 
-@dataclass(frozen=True)
-class Prior:
-    """Compliances that are known beforehand, as from a data sheet.
-
-    `nominal` (n, sets): rad/(N m). `std` (n, sets): their standard deviations over that of the measurements.
-    """
-
-    nominal: np.ndarray
-    std: np.ndarray
-
-    def triangle(self, stage: Stage) -> np.ndarray:
-        """The equations c / std = nominal / std of the joints that a stage identifies, (pivots, columns, sets)."""
-        mine, pivots = list(stage.identified), len(stage.identified)
-        found = np.zeros((pivots, pivots + len(stage.fixed) + 1, self.nominal.shape[1]))
-        found[range(pivots), range(pivots)] = 1.0 / self.std[mine]
-        found[:, -1] = self.nominal[mine] / self.std[mine]
-        return found
-
-
 def first_solvable_length(strategy: Strategy, rows: int) -> int:
     """Smallest number of configurations with at least as many measurements as unknowns in every stage.
 
@@ -59,41 +61,21 @@ def first_solvable_length(strategy: Strategy, rows: int) -> int:
     return max(-(-len(stage.identified) // (rows * len(stage.points))) for stage in strategy.stages)
 
 
-def identify(
-    strategy: Strategy, measurements: Mapping[str, Measurements], joints: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compliances by a strategy for every prefix length of every data set, with covariance and condition number.
-
-    `measurements`: of each measuring point of the strategy. `joints`: n. Returns `compliance` (configurations, n, sets):
-    rad/(N m), not a number where the measurements of the prefix do not determine them; `covariance` and `condition_numbers`.
-    """
-    compliance, triangles = estimate_compliance(strategy, measurements, joints)
-    spread = covariance(strategy, measurements, triangles)
-    condition = condition_numbers(strategy, measurements, triangles)
-    hidden = np.isnan(condition)
-    np.moveaxis(compliance, 1, -1)[hidden] = np.nan
-    spread[hidden] = np.nan
-    return compliance, spread, condition
-
-
 def estimate_compliance(
-    strategy: Strategy, measurements: Mapping[str, Measurements], joints: int, prior: Prior | None = None
+    strategy: Strategy, measurements: Mapping[str, Measurements], joints: int
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Solve the stages of a strategy one after the other (equation 11).
 
-    `strategy`, `measurements`, `joints`: as in `identify`. `prior`: what is known beforehand, as further measurements of each
-    stage (ridge regression towards it [1]). Returns `compliance` (configurations, n, sets): rad/(N m); meaningless where a
-    prefix is too short, see `first_solvable_length`; `triangles` (configurations, pivots, columns, sets): triangular factor of
-    each stage; columns: joints identified, joints fixed, right-hand side.
-
-    [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
+    `measurements`: of each measuring point of the strategy. `joints`: n. Returns `compliance` (configurations, n, sets):
+    rad/(N m); meaningless where a prefix is too short, see `first_solvable_length`; `triangles` (configurations, pivots,
+    columns, sets): triangular factor of each stage; columns: joints identified, joints fixed, right-hand side.
     """
     *_, configurations, sets = next(iter(measurements.values())).regressor.shape
     compliance = np.full((configurations, joints, sets), np.nan)
     triangles = []
     for stage in strategy.stages:
         pivots = len(stage.identified)
-        start = np.zeros((pivots, pivots + len(stage.fixed) + 1, sets)) if prior is None else prior.triangle(stage)
+        start = np.zeros((pivots, pivots + len(stage.fixed) + 1, sets))
         triangle = prefix_triangles(_equations(stage, measurements), start)
         right = triangle[:, :, -1] - np.einsum("kpfs,kfs->kps", triangle[:, :, pivots:-1], compliance[:, list(stage.fixed)])
         compliance[:, list(stage.identified)] = _solve(triangle[:, :, :pivots], right[:, :, None])[:, :, 0]
@@ -101,74 +83,16 @@ def estimate_compliance(
     return compliance, triangles
 
 
-def covariance(strategy: Strategy, measurements: Mapping[str, Measurements], triangles: Sequence[np.ndarray]) -> np.ndarray:
-    """Covariance (configurations, sets, n, n) of the estimates for measurements of unit variance, through all stages.
+def undetermined(strategy: Strategy, rows: int, triangles: Iterable[np.ndarray]) -> np.ndarray:
+    """Prefixes (configurations, sets) that do not determine the compliances: too few measurements, or not the right ones.
 
-    That of a multi-step estimator, whose later stages take over what earlier ones have estimated [1]; exact here, since every
-    stage is linear. A stage with triangle R solves R_II c_I = z - R_IH c_H, I the joints identified and H those fixed, where
-    the reduced measurements z = Q^T y have unit covariance. So the estimates are linear in the z of all stages, and what is
-    left is the covariance of the z of two stages that share points: R_s^-T (sum of A_s^T A_t over the shared measurements)
-    R_t^-1.
-
-    `triangles`: from `estimate_compliance`.
-
-    [1] Murphy, K. M. and Topel, R. H., Estimation and inference in two-step econometric models, Journal of Business & Economic
-        Statistics 3, 1985.
-    """
-    joints = next(iter(measurements.values())).regressor.shape[1]
-    stages = drop_forgotten_stages(strategy, joints).stages
-    gains: list[np.ndarray] = []
-    inverses: list[np.ndarray] = []
-    for stage, triangle in zip(stages, triangles[-len(stages) :], strict=True):
-        pivots, size = list(stage.identified), len(stage.identified)
-        unit = np.broadcast_to(np.eye(size)[..., None], triangle[:, :, :size].shape)
-        inverse = _matrices(_solve(triangle[:, :, :size], unit))
-        back = inverse @ _matrices(triangle[:, :, size:-1])
-        for gain in gains:
-            gain[..., pivots, :] = -back @ gain[..., list(stage.fixed), :]
-        gains.append(np.zeros((*inverse.shape[:2], joints, size)))
-        gains[-1][..., pivots, :] = inverse
-        inverses.append(inverse)
-    total = sum(gain @ np.swapaxes(gain, -1, -2) for gain in gains)
-    for (s, earlier), (t, later) in combinations(enumerate(stages), 2):
-        if shared := set(earlier.points) & set(later.points):
-            information = sum((prefix_information(measurements[name].regressor) for name in sorted(shared)), np.zeros(()))
-            products = information[..., list(earlier.identified), :][..., list(later.identified)]
-            between = np.swapaxes(inverses[s], -1, -2) @ products @ inverses[t]
-            cross = gains[s] @ between @ np.swapaxes(gains[t], -1, -2)
-            total += cross + np.swapaxes(cross, -1, -2)
-    return total
-
-
-def condition_numbers(
-    strategy: Strategy, measurements: Mapping[str, Measurements], triangles: Iterable[np.ndarray]
-) -> np.ndarray:
-    """2-norm condition number of the identification Jacobian, the largest of the stages.
-
-    Its inverse is an observability index of calibration [1].
-
-    `triangles`: from `estimate_compliance`; their singular values are those of the regressor. Returns (configurations, sets):
-    not a number where the measurements of a prefix do not determine the compliances: too few of them, or not the right ones.
+    `triangles`: from `estimate_compliance`; their condition number is that of the identification Jacobian, whose inverse is an
+    observability index of calibration [1]. Almost all are far below the largest that is allowed, which an upper bound from
+    determinant and Frobenius norm shows [2]; only the others are decomposed.
 
     [1] Driels, M. R. and Pathre, U. S., Significance of observation strategy on the design of robot calibration experiments,
         Journal of Robotic Systems 7, 1990.
-    """
-    largest: np.ndarray = np.ones(())
-    for stage, triangle in zip(strategy.stages, triangles, strict=True):
-        largest = np.maximum(largest, _condition(_matrices(triangle[:, :, : len(stage.identified)])))
-    rows = next(iter(measurements.values())).regressor.shape[0]
-    condition = np.where(largest < LARGEST_CONDITION, largest, np.nan)
-    condition[: first_solvable_length(strategy, rows) - 1] = np.nan
-    return condition
-
-
-def undetermined(strategy: Strategy, rows: int, triangles: Iterable[np.ndarray]) -> np.ndarray:
-    """Prefixes whose `condition_numbers` are not a number, (configurations, sets) of bool.
-
-    Almost all have a condition far below the largest that is allowed, which an upper bound from determinant and Frobenius norm
-    shows [1]; only the others are decomposed.
-
-    [1] Guggenheimer, H. W., Edelman, A. S. and Johnson, C. R., A simple estimate of the condition number of a linear system,
+    [2] Guggenheimer, H. W., Edelman, A. S. and Johnson, C. R., A simple estimate of the condition number of a linear system,
         College Mathematics Journal 26, 1995.
     """
     found: np.ndarray = np.zeros((), bool)
@@ -255,6 +179,77 @@ def _condition(matrices: np.ndarray) -> np.ndarray:
         return np.sqrt(eigenvalues[..., -1] / np.maximum(eigenvalues[..., 0], 0.0))
 
 
-def _matrices(stacked: np.ndarray) -> np.ndarray:
-    """From (configurations, rows, columns, sets) to (configurations, sets, rows, columns), as numpy multiplies matrices."""
-    return np.ascontiguousarray(np.moveaxis(stacked, -1, 1))
+def identified(joints: int) -> TableSchema:
+    """What a strategy identified; one row for each data set and length."""
+    compliances = [
+        real(f"compliance_{j}", "rad/(N m)", f"identified compliance of joint {j}", missing=True) for j in range(1, joints + 1)
+    ]
+    return table("identified", SET, LENGTH, *compliances)
+
+
+def regressors_of(
+    experiments: Experiments, chain: Chain, points: Collection[str], rows: int, wrench_at: str
+) -> dict[str, np.ndarray]:
+    """Matrices A of equation 10 (rows, n, configurations, sets) of each measuring point, configuration before data set."""
+    joint_angles, wrench = configuration_first(experiments.joint_angles), configuration_first(experiments.wrench)
+    loaded = {name: loaded_point(chain, chain.point(name), wrench_at) for name in points}
+    measured = {name: chain.point(name) for name in points}
+    movements = {point: jacobians(chain, joint_angles, point) for point in {*loaded.values(), *measured.values()}}
+    forces = {point: generalized_forces(movements[point], wrench) for point in {*loaded.values()}}
+    # Nothing else needs the Jacobian of a measured point: its regressor takes its place in memory.
+    return {
+        name: np.moveaxis(regressor(movements[point], forces[loaded[name]], out=movements[point]), (-2, -1), (0, 1))[:rows]
+        for name, point in measured.items()
+    }
+
+
+def configuration_first(array: np.ndarray) -> np.ndarray:
+    """(sets, configurations, k) to (configurations, sets, k) with memory in the order k, configurations, sets."""
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, (2, 1, 0), (0, 1, 2))), 0, -1)
+
+
+def stacked(matrix: np.ndarray, deflections: np.ndarray) -> Measurements:
+    """A point's matrix A (rows, n, configurations, sets) with its deflections (sets, configurations, 3 or 6)."""
+    return Measurements(matrix, np.moveaxis(configuration_first(deflections)[..., : len(matrix)], -1, 0))
+
+
+def measurements_of(
+    experiments: Mapping[str, np.ndarray],
+    deflections: Mapping[str, Mapping[str, np.ndarray]],
+    chain: Chain,
+    strategy: Strategy,
+    rows: int,
+    wrench_at: str,
+) -> dict[str, Measurements]:
+    """What each measuring point of a strategy contributes, from a block of the experiments and those of the deflections."""
+    regressors = regressors_of(to_experiments(experiments), chain, strategy.points, rows, wrench_at)
+    return {name: stacked(regressors[name], to_deflections(deflections[name])) for name in strategy.points}
+
+
+def identified_blocks(
+    blocks: Blocks, chain: Chain, strategy: Strategy, rows: int, wrench_at: str
+) -> Iterator[dict[str, np.ndarray]]:
+    """Compliances, columns of the identified table; not a number where a prefix does not determine them.
+
+    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: interpretation R6.
+    """
+    for block, deflections in blocks:
+        measurements = measurements_of(block, deflections, chain, strategy, rows, wrench_at)
+        compliance, triangles = estimate_compliance(strategy, measurements, chain.coordinates)
+        np.moveaxis(compliance, 1, -1)[undetermined(strategy, rows, triangles)] = np.nan
+        columns = prefix_index_columns(data_sets(block), len(compliance))
+        yield columns | {f"compliance_{j + 1}": compliance[:, j].T.ravel() for j in range(chain.coordinates)}
+
+
+def read_measured(job: Job, joints: int, points: Iterable[str]) -> Blocks:
+    """Blocks of the experiments of a job with those of what is measured of the same data sets."""
+    found = {name: read_blocks(job.input.measured, DEFLECTIONS, DEFLECTION_COLUMNS, point=name) for name in points}
+    return paired_blocks(read_blocks(job.input.experiments, experiments(joints)), found)
+
+
+def paired_blocks(
+    experiments: Iterable[Mapping[str, np.ndarray]], deflections: Mapping[str, Iterable[Mapping[str, np.ndarray]]]
+) -> Blocks:
+    """Blocks of the experiments with those of each measuring point."""
+    for block, *measured in zip(experiments, *deflections.values(), strict=True):
+        yield block, dict(zip(deflections, measured, strict=True))

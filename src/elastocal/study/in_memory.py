@@ -12,11 +12,10 @@ import numpy as np
 
 from elastocal.io.storage import write_table
 from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regressor
-from elastocal.mechanics.kinematics import jacobians, poses
+from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.robot import Robot, with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.equation_11 import Measurements, estimate_compliance, first_solvable_length
-from elastocal.study.identify import Design, configuration_first
+from elastocal.study.equation_11 import Measurements, estimate_compliance, first_solvable_length, regressors_of, stacked
 from elastocal.study.jobs import origin, settings_of, strategies_of
 from elastocal.study.metrics import Judge, make_judge
 from elastocal.study.simulation import (
@@ -42,22 +41,14 @@ if TYPE_CHECKING:
 class Interpretation:
     """How the paper is read; see `interpretations` in config.yaml.
 
-    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: R6. `average`, `deviation_of`: R7 and R8, see
-    `evaluation.average`. `reflectors_m`: from each measuring point, in its frame, to the reflectors whose positions are
-    measured there; without, the target of the robot itself is measured.
+    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: R6. `average`: R7, see
+    `evaluation.average`.
     """
 
     loading: Loading
     rows: int
     wrench_at: str
     average: str
-    deviation_of: str
-    reflectors_m: tuple[tuple[float, ...], ...] = ()
-
-    @property
-    def independent_rows(self) -> int:
-        """Independent measurements of one point in one configuration: a rigid body moves in six ways."""
-        return min(6, self.rows * max(1, len(self.reflectors_m)))
 
 
 @dataclass(frozen=True)
@@ -130,32 +121,23 @@ class StudyInMemory:
         tests = self.tests(number)
         return make_judge(self.robot, tests, self.deflections(tests), self.interpretation.wrench_at)
 
-    def measure(
-        self, sets: np.ndarray, points: Sequence[str], repeat: str = "", drawn: Experiments | None = None
-    ) -> dict[str, Measurements]:
+    def measure(self, sets: np.ndarray, points: Sequence[str], repeat: str = "") -> dict[str, Measurements]:
         """What each measuring point contributes to some data sets.
 
         `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`: part of the name of the noise's stream,
-        by which measurements of the same configurations differ. `drawn`: other configurations and loads than those of the
-        study, as many of them.
+        by which measurements of the same configurations differ.
         """
-        drawn, read = drawn or self.experiments(sets), self.interpretation
-        rows = 6 if read.reflectors_m else read.rows
-        regressors = Design(drawn, self.robot.chain, points, rows, read.wrench_at).regressors
-        found = {}
-        for name in points:
-            deflection = self.deflections(drawn, name)
-            if read.reflectors_m:
-                found[name] = self._reflectors(sets, name, repeat, drawn, regressors[name], deflection)
-            else:
-                deflection = deflection + self.size.noise * self.noise(sets, name + repeat)
-                found[name] = Measurements(regressors[name], np.moveaxis(configuration_first(deflection)[..., :rows], -1, 0))
-        return found
+        drawn, read = self.experiments(sets), self.interpretation
+        regressors = regressors_of(drawn, self.robot.chain, points, read.rows, read.wrench_at)
+        return {
+            name: stacked(regressors[name], self.deflections(drawn, name) + self.size.noise * self.noise(sets, name + repeat))
+            for name in points
+        }
 
     def estimate(self, strategy: Strategy, measurements: Mapping[str, Measurements]) -> np.ndarray:
         """Compliances (lengths, n, sets), rad/(N m), not a number where a length does not determine them."""
         compliance = estimate_compliance(strategy, measurements, self.robot.joints)[0]
-        compliance[: first_solvable_length(strategy, self.interpretation.independent_rows) - 1] = np.nan
+        compliance[: first_solvable_length(strategy, self.interpretation.rows) - 1] = np.nan
         return compliance
 
     def estimates(self, strategies: Sequence[Strategy], number: int = 0) -> dict[str, list[np.ndarray]]:
@@ -172,24 +154,6 @@ class StudyInMemory:
                 compliance = self.estimate(Strategy("", estimator), measurements)
                 found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
         return {name: found[estimator] for name, estimator in stages.items()}
-
-    def _reflectors(
-        self, sets: np.ndarray, name: str, repeat: str, drawn: Experiments, regressor: np.ndarray, deflection: np.ndarray
-    ) -> Measurements:
-        """Positions of the reflectors at a point, whose pose they move with as a rigid body."""
-        from scipy.spatial.transform import Rotation
-
-        turned = poses(self.robot.chain, drawn.joint_angles, self._point(name))[1]
-        loaded = Rotation.from_rotvec(deflection[..., 3:].reshape(-1, 3)).as_matrix().reshape(turned.shape)
-        matrices, measured = [], []
-        for number, offset in enumerate(self.interpretation.reflectors_m, 1):
-            lever = turned @ np.array(offset, float)
-            noise = self.noise(sets, f"{name}{repeat}/reflector {number}")[..., :3]
-            moved = deflection[..., :3] + (loaded @ lever[..., None])[..., 0] - lever + self.size.noise * noise
-            across = np.moveaxis(configuration_first(lever), -1, 0)[:, None]
-            matrices.append(regressor[:3] + np.cross(regressor[3:], across, axis=0))
-            measured.append(np.moveaxis(configuration_first(moved), -1, 0))
-        return Measurements(np.concatenate(matrices), np.concatenate(measured))
 
     def _point(self, name: str | None) -> MeasuringPoint:
         return self.robot.chain.point(name) if name else self.robot.chain.end_effector

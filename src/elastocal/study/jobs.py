@@ -1,15 +1,14 @@
-"""What jobs of the study share: the robot of a rule, tables of every robot in frames, and rows in one.
+"""What questions of the study share: how they declare tables, the robot of a rule, tables of every robot in frames.
 
 Pandas is imported where a frame is made: most jobs make none.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from elastocal.io.provenance import SOURCES_DIGEST, STEP, provenance
-from elastocal.mechanics.chain import parse_chain
+from elastocal.io.storage import Column, TableSchema
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.strategies import strategy_from_document
@@ -19,12 +18,43 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from elastocal.io.storage import TableSchema
-    from elastocal.mechanics.chain import Chain
     from elastocal.mechanics.robot import Robot
     from elastocal.study.strategies import Strategy
 
 MICRO, MILLI = 1e6, 1e3
+
+
+def table(name: str, *columns: Column) -> TableSchema:
+    """A table: its name and its columns with units and meanings, written down beside the function that fills it."""
+    return TableSchema(name, columns)
+
+
+def real(name: str, unit: str, meaning: str, missing: bool = False, minimum: float | None = None) -> Column:
+    """Numbers; `missing`: some may be not a number or infinite."""
+    return Column(name, "float64", unit, meaning, missing, minimum)
+
+
+def whole(name: str, meaning: str, minimum: int | None = None) -> Column:
+    """Counts and numbers of things."""
+    return Column(name, "int32", "", meaning, minimum=minimum)
+
+
+def group(name: str, meaning: str) -> Column:
+    """A word that is the same in a whole row group."""
+    return Column(name, "string", "", meaning)
+
+
+def text(name: str, meaning: str) -> Column:
+    """A word of its own in each row."""
+    return Column(name, "text", "", meaning)
+
+
+SET = whole("data_set", "number of the data set, from 0", 0)
+CONFIGURATION = whole("configuration", "number of the configuration in its data set, from 0", 0)
+LENGTH = whole("length", "data set length ds: how many configurations, from the first, were used", 1)
+STRATEGY = group("strategy", "name of the strategy; a row group holds one")
+ON_TESTS = "mean square end-effector error on test configurations"
+ERROR = real("mean_square", "m^2", ON_TESTS, missing=True)
 
 
 class Job(Protocol):
@@ -44,12 +74,6 @@ def origin(job: Job) -> dict[str, Any]:
 def robot_of(job: Job) -> Robot:
     """The robot of a rule with the offset of its targets (interpretation R5)."""
     return with_target_offset(robot_from_document(job.params.robot), job.params.tool_offset_m)
-
-
-def chain_of(job: Job) -> Chain:
-    """The chain of a rule that needs no more of its robot."""
-    chain = parse_chain(job.params.chain, job.params.lengths_m, job.wildcards.robot)
-    return replace(chain, points=tuple(replace(p, offset_m=tuple(job.params.tool_offset_m)) for p in chain.points))
 
 
 def strategies_of(job: Job) -> list[Strategy]:
@@ -76,6 +100,13 @@ def rows_as_frame(rows: Sequence[Any], columns: Sequence[str] = ()) -> pd.DataFr
     import pandas as pd
 
     return pd.DataFrame(rows, columns=[*columns] or None)
+
+
+def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
+    """A table with the names of the strategies' files, `slugs` by the names of strategies, behind these."""
+    found = frame.copy()
+    found.insert([*frame.columns].index("strategy") + 1, "strategy_file", frame.strategy.map(slugs))
+    return found
 
 
 def settings_of(job: Job, *others: str) -> dict[str, Any]:

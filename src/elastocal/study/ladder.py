@@ -20,9 +20,8 @@ import numpy as np
 from elastocal.io.storage import Column
 from elastocal.mechanics.elastostatics import beam_axes, extended_chain, generalized_forces
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.study.columns import LENGTH, ON_TESTS, SET, real, table, whole
 from elastocal.study.in_memory import ask
-from elastocal.study.jobs import MICRO, rows_as_frame, tabulate
+from elastocal.study.jobs import LENGTH, MICRO, ON_TESTS, SET, real, rows_as_frame, table, tabulate, whole
 from elastocal.study.points import root_mean
 
 if TYPE_CHECKING:

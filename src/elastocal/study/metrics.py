@@ -28,28 +28,20 @@ class Judge:
 
     `reference` (n,): compliances about which the prediction is linear, rad/(N m). `quadratic_forms` (tests, (n + 1)(n + 2) /
     2): squared position error at each test configuration as a quadratic form in (c - reference, 1). `initial_errors` (tests,):
-    position error without any elastostatic model: the deflection itself, m. `mean_rows` (3, n + 1): mean over the test
-    configurations of the position error as a linear form in (c - reference, 1).
+    position error without any elastostatic model: the deflection itself, m.
     """
 
     reference: np.ndarray
     quadratic_forms: np.ndarray
     initial_errors: np.ndarray
-    mean_rows: np.ndarray
-
-    @cached_property
-    def forms(self) -> np.ndarray:
-        """Matrices (tests, n + 1, n + 1) of the quadratic forms."""
-        size = len(self.reference) + 1
-        first, second = np.triu_indices(size)
-        forms = np.zeros((len(self.quadratic_forms), size, size))
-        forms[:, first, second] = self.quadratic_forms / 2
-        return forms + forms.swapaxes(1, 2)
 
     @cached_property
     def form(self) -> np.ndarray:
-        """Their mean over the test configurations; but for the last row and column that of A^T A, m^2 per (rad/(N m))^2."""
-        return self.forms.mean(axis=0)
+        """Their mean as a matrix; but for the last row and column that of A^T A, m^2 per (rad/(N m))^2."""
+        size = len(self.reference) + 1
+        half = np.zeros((size, size))
+        half[np.triu_indices(size)] = self.quadratic_forms.mean(axis=0) / 2
+        return half + half.T
 
     def mean_square(self, compliance: np.ndarray) -> np.ndarray:
         """Mean squared position error (..., models) over the test configurations, m^2, of compliances (..., n, models)."""
@@ -82,22 +74,7 @@ def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarr
     first, second = np.triu_indices(robot.joints + 1)
     forms = (rows[..., first] * rows[..., second]).sum(axis=1) * np.where(first == second, 1.0, 2.0)
     initial = np.linalg.norm(true_deflection[..., :3], axis=-1).ravel()
-    return Judge(robot.compliance, forms, initial, rows.mean(axis=0))
-
-
-def signed_deviation(judge: Judge, compliance: np.ndarray) -> np.ndarray:
-    """Equation 15 without a norm: the position error with its sign, m, mean over test configurations and coordinates.
-
-    `compliance` (models, n): rad/(N m). Returns (models,).
-    """
-    error = np.column_stack([compliance - judge.reference, np.ones(len(compliance))])
-    return error @ judge.mean_rows.mean(axis=0)
-
-
-def split_models(groups: int, models: int) -> list[slice]:
-    """Slices of groups of so many models each, small enough for the errors of one to stay in the cache."""
-    size = max(1, MODELS_AT_A_TIME // models)
-    return [slice(start, start + size) for start in range(0, groups, size)]
+    return Judge(robot.compliance, forms, initial)
 
 
 def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
@@ -108,17 +85,15 @@ def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(squares, 0.0, out=squares), out=squares)
 
 
-def mean_deviation(judge: Judge, compliance: np.ndarray, test_weights: np.ndarray | None = None) -> np.ndarray:
+def mean_deviation(judge: Judge, compliance: np.ndarray, test_weights: np.ndarray) -> np.ndarray:
     """Equation 15: position error of models, mean over the test configurations.
 
     `compliance` (groups, models, n). `test_weights` (groups, tests): how often each test configuration counts for a group of
-    models; once without. Returns (groups, models): m.
+    models. Returns (groups, models): m.
     """
-    if test_weights is None:
-        test_weights = np.ones((len(compliance), len(judge.initial_errors)))
     groups, models, joints = compliance.shape
-    means = np.empty((groups, models))
-    for part in split_models(groups, models):
+    means, size = np.empty((groups, models)), max(1, MODELS_AT_A_TIME // models)
+    for part in (slice(start, start + size) for start in range(0, groups, size)):
         errors = position_errors(judge, compliance[part].reshape(-1, joints)).reshape(-1, models, test_weights.shape[1])
         means[part] = (errors @ test_weights[part, :, None])[..., 0]
     return means / test_weights.sum(axis=1, keepdims=True)

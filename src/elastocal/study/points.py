@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.study.columns import ERROR, LENGTH, SET, group, real, table
 from elastocal.study.equation_11 import prefix_information
 from elastocal.study.in_memory import ask
-from elastocal.study.jobs import MICRO, Job, frames, rows_as_frame, write_csvs
+from elastocal.study.jobs import ERROR, LENGTH, MICRO, SET, Job, frames, group, real, rows_as_frame, table, write_csvs
 from elastocal.study.metrics import squared_error_bounds
 from elastocal.study.simulation import bootstrap_weights, prefix_index_columns
 from elastocal.study.strategies import all_at_once

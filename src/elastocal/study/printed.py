@@ -1,9 +1,8 @@
 """The paper's printed figures beside ours, against how studies of the same size scatter, and all at once.
 
 The paper is one study. Where k studies of one size have a mean m and a standard deviation s, a further one lies at
-m + s sqrt(1 + 1/k) t, with t of Student's distribution with k - 1 degrees of freedom [1]: its density at a printed figure is
-how well an interpretation predicts it, and its tails are the p value of the difference. Many figures are judged at once by
-Holm's procedure [2].
+m + s sqrt(1 + 1/k) t, with t of Student's distribution with k - 1 degrees of freedom [1]; its tails are the p value of the
+difference. Many figures are judged at once by Holm's procedure [2].
 
 Figures of one study move together, so that neither how many lie outside nor the product of their p values has a known
 distribution. Each further study is therefore judged by all others as the paper is by all: by how many figures have p below the
@@ -145,25 +144,14 @@ class Predicted:
 
     def p_value(self, printed: float) -> float:
         """Two-sided, of a further study that lies so far out."""
-        standard, _ = self._standardize(printed)
-        return float(2 * stdtr(len(self.values) - 1, -abs(standard)))
-
-    def log_density(self, printed: float) -> float:
-        """Log predictive density of the printed figure; of lengths, of their logarithm."""
-        from scipy.stats import t as student
-
-        standard, scale = self._standardize(printed)
-        return float(student.logpdf(standard, len(self.values) - 1) - np.log(scale))
+        digit, value = (self.digit / printed, np.log(printed)) if self.logarithmic else (self.digit, printed)
+        count = len(self.values)
+        variance = self.values.var(ddof=1) * (1 + 1 / count) + digit**2 / 12
+        return float(2 * stdtr(count - 1, -abs((value - self.values.mean()) / np.sqrt(variance))))
 
     def leave_out_each(self) -> list[Predicted]:
         """The same by all studies but one, for each of them."""
         return [replace(self, values=np.delete(self.values, place)) for place in range(len(self.values))]
-
-    def _standardize(self, printed: float) -> tuple[float, float]:
-        digit, value = (self.digit / printed, np.log(printed)) if self.logarithmic else (self.digit, printed)
-        count = len(self.values)
-        variance = self.values.var(ddof=1) * (1 + 1 / count) + digit**2 / 12
-        return float((value - self.values.mean()) / np.sqrt(variance)), float(np.sqrt(variance))
 
 
 def predict_scatter(
@@ -193,13 +181,13 @@ def predict_scatter(
 
 def predicted_cells(
     printed: pd.DataFrame, studies: pd.DataFrame, length: int, fixed_joints: bool
-) -> Iterator[tuple[Predicted, float, str]]:
-    """The figures of Tables 3 and 4 that the studies have: how they scatter, what is printed, the quantity."""
+) -> Iterator[tuple[Predicted, float]]:
+    """The figures of Tables 3 and 4 that the studies have: how they scatter, and what is printed."""
     figure: Any
     for figure in printed[printed.table.isin(["3", "4"])].itertuples():
         found = predict_scatter(studies, figure.robot, figure.strategy, figure.quantity, length, fixed_joints)
         if found is not None:
-            yield found, figure.value, figure.quantity
+            yield found, figure.value
 
 
 def holm(p_values: np.ndarray) -> np.ndarray:
@@ -249,7 +237,7 @@ def joint_table(studies: pd.DataFrame, reference: pd.DataFrame, length: int) -> 
 
 def _joint_row(studies: pd.DataFrame, printed: pd.DataFrame, length: int, fixed_joints: bool) -> dict[str, Any]:
     found = [*predicted_cells(printed, studies, length, fixed_joints)]
-    paper = np.array([scatter.p_value(value) for scatter, value, _ in found])
+    paper = np.array([scatter.p_value(value) for scatter, value in found])
     others = np.array([_judge_by_others(scatter) for scatter, *_ in found]).T
     row: dict[str, Any] = {"joints": "fixed joints" if fixed_joints else "all joints", "cells": len(paper)}
     if not found:
@@ -280,7 +268,8 @@ def compare_with_paper(job: Job) -> None:
 
 
 def compare_with_studies(job: Job) -> None:
-    """Every printed figure among further studies."""
+    """Every printed figure among further studies, and all at once."""
     beside, initial = pd.read_csv(job.input.beside, dtype={"table": str}), frames(job, job.input.initial, INITIAL)
     studies = read_studies(job.input.studies, repeated)
-    write_csvs(job, table=comparison_table(beside, studies, initial, job.params.length))
+    joint = joint_table(studies, read_reference(job.input.reference), job.params.length)
+    write_csvs(job, table=comparison_table(beside, studies, initial, job.params.length), joint=joint)

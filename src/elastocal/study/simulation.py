@@ -25,8 +25,7 @@ from elastocal.mechanics.elastostatics import (
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot_file import joint_limits
 from elastocal.random_streams import draw
-from elastocal.study.columns import CONFIGURATION, SET, group, real, table, whole
-from elastocal.study.jobs import Job, origin, robot_of
+from elastocal.study.jobs import CONFIGURATION, SET, Job, group, origin, real, robot_of, table, whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -18,7 +18,7 @@ class Stage:
     """One least-squares problem of a strategy.
 
     `points`: measuring points whose measurements it uses, with equal weight. `identified`: joint indices, from 0, that it
-    estimates; estimates of an earlier stage are where an iterative solver starts. `fixed`: joint indices whose estimates it
+    estimates. `fixed`: joint indices whose estimates it
     takes over from earlier stages.
     """
 
@@ -31,13 +31,11 @@ class Stage:
 class Strategy:
     """A named sequence of stages that together estimate every joint.
 
-    `name`: as printed in the paper. `prior_std`: relative standard deviation of the nominal compliances, towards which the
-    estimates are shrunk; None where nothing is known beforehand.
+    `name`: as printed in the paper.
     """
 
     name: str
     stages: tuple[Stage, ...]
-    prior_std: float | None = None
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -66,14 +64,11 @@ def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
         return tuple(joint - 1 for joint in stage.get(key, ()))
 
     stages = [Stage(tuple(each["points"]), joints(each, "joints"), joints(each, "held")) for each in document["stages"]]
-    return Strategy(document["name"], tuple(stages), document.get("prior_std"))
+    return Strategy(document["name"], tuple(stages))
 
 
 def drop_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:
-    """What of a strategy the solution of equation 11 depends on: a stage that identifies every joint forgets those before it.
-
-    An iterative solver needs all stages, to start from.
-    """
+    """What of a strategy equation 11 depends on: a stage that identifies every joint forgets those before it."""
     first = max([0, *(index for index, stage in enumerate(strategy.stages) if len(stage.identified) == joints)])
     return replace(strategy, stages=strategy.stages[first:])
 

@@ -15,8 +15,8 @@ import pandas as pd
 
 from elastocal.io.data_frames import read_long
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.evaluation import BOUNDS, REPLICATES, accuracy, find_length, metrics
-from elastocal.study.jobs import MICRO, MILLI, Job, frames, write_csvs
+from elastocal.study.evaluation import REPLICATES, find_length, metrics
+from elastocal.study.jobs import MICRO, MILLI, Job, add_slugs, frames, write_csvs
 from elastocal.study.simulation import INITIAL, bootstrap_weights, find_statistics
 
 if TYPE_CHECKING:
@@ -155,38 +155,6 @@ def deviation_ratio(
     return float(values[0] / values[1]), float(np.std(drawn[0] / drawn[1], ddof=1))
 
 
-def per_dataset_table(
-    accuracy: pd.DataFrame, bounds: Mapping[str, pd.DataFrame], points: Mapping[str, Iterable[str]]
-) -> pd.DataFrame:
-    """What one data set gives: accuracy on test configurations beside the Cramér-Rao bound of the same measurements.
-
-    `accuracy`: long. `bounds`: the bounds table of each robot. `points`: measuring points that each strategy, by its name,
-    reads. The efficiency is (crlb_rms / rms)^2: at most one for an unbiased estimator, empty without noise.
-    """
-    frame = accuracy.copy()
-    limits = pd.concat([bound.assign(robot=robot) for robot, bound in bounds.items()])
-    frame["points"] = frame.strategy.map({strategy: "+".join(sorted(names)) for strategy, names in points.items()})
-    frame = frame.merge(limits, on=["robot", "points", "length"], how="left", validate="many_to_one")
-    result = frame[["strategy", "robot", "noise_um", "length"]].copy()
-    for name in ("mean", "rms", "p95", "max"):
-        result[f"{name}_um"] = MICRO * frame[name]
-    result["crlb_rms_um"] = frame.rms_per_noise * frame.noise_um
-    result["efficiency"] = (result.crlb_rms_um / result.rms_um).where(result.noise_um > 0) ** 2
-    for name in ("mean", "rms", "p95", "max"):
-        result[f"{name}_um_std_error"] = MICRO * frame[f"{name}_std_error"]
-    result["efficiency_std_error"] = 2 * result.efficiency * result.rms_um_std_error / result.rms_um
-    relative = [column for column in frame.columns if column.startswith("relative_error_")]
-    percent = frame[relative].add_suffix("_percent")
-    return result.join(percent.rename(columns=lambda name: name.replace("_std_error_percent", "_percent_std_error")))
-
-
-def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
-    """A table with the names of the strategies' files, `slugs` by the names of strategies, behind these."""
-    found = frame.copy()
-    found.insert([*frame.columns].index("strategy") + 1, "strategy_file", frame.strategy.map(slugs))
-    return found
-
-
 def merge_errors(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
     """The same table for people: each value with its standard error behind a ± sign, an infinite length as "not reached".
 
@@ -292,13 +260,6 @@ def tabulate_extended(job: Job) -> None:
     """Robots with elastic links."""
     asked, long = job.params, (read_long(job.input.metrics, metrics), read_replicates(job))
     write_csvs(job, table=extended_table(*long, asked.robots, asked.strategies, asked.noise_um, asked.length))
-
-
-def tabulate_accuracy(job: Job) -> None:
-    """What one data set gives."""
-    bounds = frames(job, job.input.bounds, BOUNDS)
-    table = per_dataset_table(read_long(job.input.accuracy, accuracy), bounds, job.params.points)
-    write_csvs(job, table=add_slugs(table, job.params.slugs))
 
 
 def read_replicates(job: Job) -> pd.DataFrame:

@@ -22,10 +22,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits
-from elastocal.study.columns import SET, STRATEGY, real, table
 from elastocal.study.evaluation import REPLICATES, metrics
 from elastocal.study.in_memory import ask
-from elastocal.study.jobs import MICRO, Job, frames, rows_as_frame, write_csvs
+from elastocal.study.jobs import MICRO, SET, STRATEGY, Job, frames, real, rows_as_frame, table, write_csvs
 from elastocal.study.metrics import make_judge, position_errors
 from elastocal.study.points import QUANTILE
 from elastocal.study.simulation import Experiments
@@ -56,6 +55,19 @@ USES = table(
     real("path_max", "m", "largest error along the milling path", missing=True),
 )
 REFERENCE = "rms_um"
+# What is shown of each, in this order.
+METRICS = {
+    REFERENCE: "RMS of one data set",
+    "mean_um": "mean of one data set",
+    "p95_um": "p95 of one data set",
+    "pooled_p95_um": "p95 pooled over data sets",
+    "iso_9283_um": "largest at the ISO 9283 poses",
+    "path_rms_um": "RMS on a milling path",
+    "path_max_um": "largest on a milling path",
+    "dev_um": "dev (equation 15)",
+    "k_sigma_percent": "k_Σ of all joints",
+    "k_sigma_percent_fixed_joints": "k_Σ of the fixed joints",
+}
 # Of single data sets: column and whether the score is the root of its mean.
 _SINGLE = {
     REFERENCE: ("mean_square", True),

@@ -19,9 +19,8 @@ from elastocal_proof.blind.folders import write_blind_campaign, write_truth
 from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
 from elastocal_proof.plant.bad_rows import possible_kinds, with_bad_rows
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.defects import Defect, drawn_defect, truth_of, with_defects
 from elastocal_proof.plant.instruments import Tracker, misplaced_base
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
 from elastocal_proof.plant.physical_robot import PhysicalRobot, specimen
 from elastocal_proof.plant.random_numbers import stream
 from elastocal_proof.plant.sizing import Yardstick, size_for
@@ -43,6 +42,8 @@ FOREIGN = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
 # What hides the weight of the links from the analyst: a robot file that declares none, of an arm that has no other weight.
 WEIGHT = "link_weight"
 SEVERAL_JOINTS, GEAR_GRAVITY, MOVED, UNDECLARED = "several_joints", "gear_gravity", "moved", "undeclared"
+# Errors that are smooth functions of two joints' angles, far beyond the noise: something repeatable remains, whatever is named.
+REMAINS, _OF_TWO_ANGLES, _REMAINING = "remains", (OUTSIDE + "cable_pull", OUTSIDE + "two_angles"), 1e4
 # Mechanisms that come at several joints at once, as a bad mastering or one make of gears does.
 WIDESPREAD = (
     *("bearing_runout", "hysteresis", "joint_dependent_stiffness", "joint_offset", "joint_tilt", "link_elasticity"),
@@ -69,8 +70,7 @@ class Case:
     `key`: what it is; sealed. `group`: such as "none", "single", "pair" or "moved". `robot`: robot file in config/robots.
     `robots`: `PROOF` or `TUNED`. `effects`: keys of `KINDS`. `levels`: non-centrality of each effect alone, on the poses that
     are not held out, after the compliances and the weights have absorbed theirs; of one mechanism at several joints that of all
-    together. `setting`: its name, and `changes`, what is other than usual in it, as in the plan. `alternative`: in a sweep the
-    near relative of the effect; otherwise empty.
+    together. `setting`: its name, and `changes`, what is other than usual in it, as in the plan.
     """
 
     key: str
@@ -80,7 +80,6 @@ class Case:
     levels: tuple[float, ...]
     setting: str
     seed: int
-    alternative: str = ""
     robots: str = PROOF
     changes: dict[str, Any] = field(default_factory=dict)
 
@@ -140,15 +139,13 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
     found = []
     for part in plan["sizes"][size]["parts"]:
         for robot in part["robots"]:
-            for group, effects, levels, setting, number, alternative in _listed(plan, part, robot, seed):
-                if {*effects, alternative} & set(absent_on(plan, robot)):
+            for group, effects, levels, setting, number in _listed(plan, part, robot, seed):
+                if set(effects) & set(absent_on(plan, robot)):
                     continue
-                words = [group, robot, *effects, *(f"{level:g}" for level in levels), setting, str(number)]
-                key = "/".join(words + [alternative] * bool(alternative))
+                key = "/".join([group, robot, *effects, *(f"{level:g}" for level in levels), setting, str(number)])
                 drawn = int.from_bytes(hashlib.sha256(f"{purpose}/{seed}/{key}".encode()).digest()[:6], "little")
-                changes = (plan["sweep"]["designs"] if group == "sweep" else plan["settings"])[setting]
                 robots = TUNED if robot in plan["tuned"] else PROOF
-                found.append(Case(key, group, robot, effects, levels, setting, drawn, alternative, robots, changes))
+                found.append(Case(key, group, robot, effects, levels, setting, drawn, robots, plan["settings"][setting]))
     return sorted(found, key=lambda case: case.name)
 
 
@@ -163,13 +160,13 @@ def block_of(cases: list[Case], number: int, of: int) -> list[Case]:
 
 
 def _listed(plan: Plan, part: Mapping[str, Any], robot: str, seed: int) -> Iterator[tuple[Any, ...]]:
-    """Group, effects, levels, setting, number and alternative of each case of a part of a benchmark on one robot."""
+    """Group, effects, levels, setting and number of each case of a part of a benchmark on one robot."""
 
     def each(name: str) -> range:
         return range(part.get(name, 0))
 
     for number in each("none"):
-        yield "none", (), (), "usual", number, ""
+        yield "none", (), (), "usual", number
     for group, effects, levels in (
         ("single", NAMED, part.get("levels", _LEVELS)),
         ("outside", FOREIGN, part.get("outside_levels", _FAR_LEVELS)),
@@ -177,25 +174,24 @@ def _listed(plan: Plan, part: Mapping[str, Any], robot: str, seed: int) -> Itera
         (GEAR_GRAVITY, OF_GEARS, (_HIGH,)),
     ):
         for effect, level, number in product(effects, levels, each(group)):
-            yield group, (effect,), (level,), "usual", number, ""
+            yield group, (effect,), (level,), "usual", number
     for setting, level, number in product(("usual", "without_time_and_temperature"), (_HIGH, _KNOCKED), each(MOVED)):
-        yield MOVED, ("setup_step",), (level,), setting, number, ""
+        yield MOVED, ("setup_step",), (level,), setting, number
     for number in each(UNDECLARED):
-        yield UNDECLARED, (WEIGHT,), (_HEAVY,), "usual", number, ""
+        yield UNDECLARED, (WEIGHT,), (_HEAVY,), "usual", number
     for level, number in product(part.get("pair_levels", _PAIR_LEVELS), each("pair")):
-        yield "pair", _drawn_pair(plan, seed, robot, level, number), (level, level), "usual", number, ""
+        yield "pair", _drawn_pair(plan, seed, robot, level, number), (level, level), "usual", number
     for setting, changes in plan["settings"].items():
         hidden = changes.get("hides", ())
         if setting != "usual" and not hidden:
             for number in range(max(part.get("setting", 0), part.get("hard", 0) if changes.get("hard") else 0)):
-                yield "setting", (), (), setting, number, ""
+                yield "setting", (), (), setting, number
             for number in each("setting"):
-                yield "setting", _drawn_pair(plan, seed, robot, setting, number)[:1], (_MIDDLE,), setting, number, ""
+                yield "setting", _drawn_pair(plan, seed, robot, setting, number)[:1], (_MIDDLE,), setting, number
         for number, effect in product(each("setting"), hidden):
-            yield "setting", (effect,), (_HIGH,), setting, number, ""
-    swept = [pair[::sense] for sense in (1, -1) for pair in plan["sweep"]["pairs"]]
-    for (effect, alternative), design, number in product(swept, plan["sweep"]["designs"], each("sweep")):
-        yield "sweep", (effect,), (plan["sweep"]["level"],), design, number, alternative
+            yield "setting", (effect,), (_HIGH,), setting, number
+    for effect, number in product(_OF_TWO_ANGLES, each(REMAINS)):
+        yield REMAINS, (effect,), (_REMAINING,), "many_poses", number
 
 
 def _drawn_pair(plan: Plan, seed: int, robot: str, level: float | str, number: int) -> tuple[str, str]:
@@ -211,10 +207,10 @@ def defects_of(case: Case, robot: PhysicalRobot, yardstick: Yardstick) -> list[S
     `robot`: faultless; `yardstick`: of it. Returns (Defect, dict): each with its size as in the ground truth: target, quantity,
     signal, which draw. Of one mechanism at several joints each has its own signal; the target is that of all together.
 
-    Where a location has no size of the wanted non-centrality, or one beyond three times the plausible, the next one is
-    drawn; of eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the
-    raw non-centrality is taken instead, and the ground truth states so: nothing can find that. Where even that is less at the
-    largest size that means anything, it is that size.
+    Where a location has no size of the wanted non-centrality at which the arm finds rest, or one beyond three times the
+    plausible, the next one is drawn; of eight that are all implausible the least is taken. Where none has a size at all, as
+    with a wrong force scale, the raw non-centrality is taken instead, and the ground truth states so: nothing can find that.
+    Where even that is less at the largest size that means anything, it is that size.
     """
     found: list[Sized] = []
     for order, (effect, level) in enumerate(zip(case.effects, case.levels, strict=True)):
@@ -272,7 +268,8 @@ def _first_plausible(
         largest = min(KINDS[defect.effect].largest / defect.size for defect in defects)
         try:
             factor = size_for(yardstick, robot_of, 1.0, level, quantity, largest)
-        except ValueError:
+        except (ValueError, RuntimeError):
+            # No size has it, or on the way to it the arm finds no rest.
             continue
         share = max(_share_of_plausible(robot, defect) for defect in times(factor))
         if least is None or share < least[0]:
@@ -298,20 +295,6 @@ def _share_of_plausible(robot: PhysicalRobot, defect: Defect) -> float:
     return defect.size / KINDS[defect.effect].plausible_on(robot.arm)
 
 
-def angle_to_alternative(case: Case, robot: PhysicalRobot, yardstick: Yardstick, bad: PhysicalRobot) -> float:
-    """Smallest angle between the contributions of a case's defects and of its alternative at any location, degrees.
-
-    `robot`, `bad`: without and with the defects.
-    """
-    kind = KINDS[case.alternative]
-    size, angles = kind.plausible_on(robot.arm), []
-    for location in kind.locations(robot.arm):
-        # Alternatives whose details differ and which together span what there is at a location.
-        defects = [Defect(case.alternative, location, size, case.seed + draw) for draw in range(_DRAWS)]
-        angles.append(yardstick.angle_deg(bad, [with_defects(robot, [defect]) for defect in defects]))
-    return min(angles)
-
-
 def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, robots_folder: str | Path) -> str:
     """Make the campaign and the ground truth of a case.
 
@@ -334,9 +317,6 @@ def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, r
     truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | sizing for defect, sizing in sized]}
     if misplaced := robot.tracker.misplaced:
         truth["misplaced"] = {"shift_m": list(misplaced.shift_m), "turn_rad": list(misplaced.turn_rad)}
-    if case.alternative and yardstick:
-        angle = angle_to_alternative(case, robot, yardstick, bad)
-        truth["alternative"] = {"effect": case.alternative, "angle_deg": angle}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
 
 

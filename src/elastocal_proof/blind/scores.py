@@ -114,7 +114,8 @@ def outcome(plan: Plan, truth: Document, verdict: Document) -> dict[str, Any]:
 
     Returns ``exact``: the names found are the true ones; ``named_right``: so, and the verdict states no other name beside it;
     ``holds_truth``: as many effects were found as were made, and each true one is the name of another of them or among its
-    alternatives, which is an assignment problem [1]; ``wrong_name``: one wrong name is stated alone.
+    alternatives, which is an assignment problem [1]; ``wrong_name``: one wrong name is stated alone; ``remains``: something
+    repeatable is said to remain.
 
     [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
     """
@@ -139,6 +140,7 @@ def outcome(plan: Plan, truth: Document, verdict: Document) -> dict[str, Any]:
         "named_right": right and kind == NAMED,
         "holds_truth": claims and len(true) == len(names) and bool(held[linear_sum_assignment(~held)].all()),
         "wrong_name": kind == NAMED and names != true,
+        "remains": bool((verdict.get("repeatable") or {}).get("remains")),
     }
 
 

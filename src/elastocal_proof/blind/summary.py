@@ -8,17 +8,15 @@ import numpy as np
 import pandas as pd
 from scipy.stats import bootstrap
 
-from elastocal.diagnosis.verdict import CLASS
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 from elastocal.random_streams import stream
-from elastocal_proof.blind.cases import GEAR_GRAVITY, PROOF, SEVERAL_JOINTS, TUNED, UNDECLARED
+from elastocal_proof.blind.cases import PROOF, TUNED
 from elastocal_proof.blind.folders import load_ground_truth
-from elastocal_proof.blind.scores import NONE, headed, intervals_of, leading, outcome, rate, score
-from elastocal_proof.blind.verdicts import ARMS, POSES
+from elastocal_proof.blind.scores import headed, intervals_of, leading, rate, score
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping
 
     from elastocal_proof.blind.cases import Plan
 
@@ -30,16 +28,6 @@ _RESAMPLES, _SEVERAL_AT_ONCE = 2000, 200
 WITHIN = 1.05
 _BINS = 10
 BY_THE_BEST, OVER_THE_BEST = ", by the best analyst", ", over the best analyst's, on the same cases"
-# Non-centrality at which nine of ten experiments resolve two alternatives at odds of 19 to 1.
-PROMISE = 16.0
-_COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "promised", "arm", "poses_added"]
-_COLUMNS += ["verdict", "found", "named_right", "holds_truth", "wrong_name"]
-# A single name can be right for one effect of the catalogue that measurements can show.
-_ONE_EFFECT = ("single", "setting", "sweep", SEVERAL_JOINTS, GEAR_GRAVITY, UNDECLARED)
-# What may come of a case of the sweep: the right name, a class that contains it, a wrong single name, or anything else.
-OUTCOMES = ("right", "class", "wrong", "other")
-# Upper ends of the bins of the angle between near relatives, degrees.
-_ANGLES = (5.0, 10.0, 20.0, 40.0, 90.0)
 _RELIABILITY = ["robots", "group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
 _COUNTED = ("detected", "holds_truth", "named_right", "wrong_name", "oracle_detected")
 _SIZES = ("signal_rms_m", "signal_over_noise", "times_plausible")
@@ -254,88 +242,6 @@ def rates(cases: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
-def swept(cases: pd.DataFrame, truths: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    """How an effect is named against the angle at which its near relative stands to it, on the plant.
-
-    `truths`: sealed documents by the name of the case. Returns shares of `OUTCOMES` in each bin of the angle, with their
-    intervals, for each pair and for all.
-    """
-    rows = cases[cases.group == "sweep"]
-    relatives = [truths[name]["alternative"] for name in rows.case]
-    pair = [" / ".join(sorted((true, each["effect"]))) for true, each in zip(rows.truth, relatives, strict=True)]
-    angle = np.array([each["angle_deg"] for each in relatives], float)
-    of_class = (rows.verdict == "class") & rows.holds_truth
-    found = np.select([of_class, rows.named_right, rows.wrong_name], ["class", "right", "wrong"], "other")
-    bins = np.array(_ANGLES)[np.minimum(np.searchsorted(_ANGLES, angle), len(_ANGLES) - 1)]
-    table = pd.DataFrame({"pair": pair, "angle_up_to_deg": bins, "outcome": found})
-    shares = []
-    for (name, end), part in pd.concat([table.assign(pair="all"), table]).groupby(["pair", "angle_up_to_deg"], sort=False):
-        row: dict[str, Any] = {"pair": name, "angle_up_to_deg": end, "cases": len(part)}
-        for each in OUTCOMES:
-            row |= headed(each, part.outcome == each)
-        shares.append(row)
-    columns = ["pair", "angle_up_to_deg", "cases", *(f"{name}{end}" for name in OUTCOMES for end in ("", "_low", "_high"))]
-    return pd.DataFrame(shares, columns=columns).sort_values(["pair", "angle_up_to_deg"], ignore_index=True)
-
-
-def followed(
-    plan: Plan,
-    truths: Mapping[str, Mapping[str, Any]],
-    first: Mapping[str, Mapping[str, Any]],
-    anew: Sequence[Mapping[str, Any]],
-    proposals: pd.DataFrame,
-) -> pd.DataFrame:
-    """Score of the verdict on each case followed up, after each number of poses.
-
-    `truths`, `first`: sealed documents, and verdicts on the campaigns as they were, by the name of the case. `anew`: of
-    `diagnosed_anew`. `proposals`: as they were made; ``promised`` is the separation from the nearest alternative that one
-    promises with all its poses, none where it leaves alternatives aside. Returns one row for each case, arm and number of
-    poses, 0 among them. After a single name no more is measured, and it stands.
-    """
-    promised: dict[str, float] = {}
-    if "separation" in proposals:
-        whole = proposals["indistinguishable"].fillna("") == ""
-        nearest = proposals["separation"].where(whole, 0.0).groupby(proposals["case"]).max()
-        promised = {str(case): float(separation) for case, separation in nearest.items()}
-    verdicts = {(entry["campaign"], entry["arm"], entry["poses"]): entry["verdict"] for entry in anew}
-    rows = []
-    for name in sorted({entry["campaign"] for entry in anew}):
-        for arm in ARMS:
-            verdict = first[name]
-            for poses in (0, *POSES):
-                verdict = verdicts.get((name, arm, poses), verdict)
-                row = {"arm": arm, "poses_added": poses, "promised": promised[name]}
-                rows.append(row | outcome(plan, truths[name], verdict))
-    return pd.DataFrame(rows, columns=_COLUMNS)
-
-
-def follow_up_rates(cases: pd.DataFrame) -> pd.DataFrame:
-    """How often the name is right, with its interval, for each kind of robots, cases, arm and number of poses.
-
-    `cases`: of `followed`. ``of``: cases with one effect; those of them whose proposal promises as much separation as the
-    verdict asks for, the others being aliases, exact ones or nearly so; and all others. Columns right_name to high are
-    shares of the cases, the others counts.
-    """
-    one = cases["group"].isin(_ONE_EFFECT) & ~cases["truth"].isin((NONE, "force_scale"))
-    kinds = {"one effect": one, "promising": one & (cases["promised"] >= PROMISE), "other": ~one}
-    rows = []
-    for of, chosen in kinds.items():
-        for (robots, arm, poses), part in cases[chosen].groupby(["robots", "arm", "poses_added"]):
-            right, still, wrong = rate(part["named_right"]), (part["verdict"] == CLASS).sum(), part["wrong_name"].sum()
-            row = {
-                "robots": robots,
-                "of": of,
-                "arm": arm,
-                "poses_added": poses,
-                "cases": len(part),
-                "right_name": right["rate"],
-            }
-            row |= {"low": right["low"], "high": right["high"], "still_class": still, "wrong_name": wrong}
-            rows.append(row | {"other_verdict": len(part) - right["hits"] - still - wrong})
-    columns = ["robots", "of", "arm", "poses_added", "cases", "right_name", "low", "high"]
-    return pd.DataFrame(rows, columns=[*columns, "still_class", "wrong_name", "other_verdict"])
-
-
 def score_cases(job: Any) -> None:
     """The sealed ground truth against the verdicts."""
     plan, truths = job.params.plan, load_ground_truth(job.input.sealed, job.input.manifest)
@@ -348,15 +254,3 @@ def score_cases(job: Any) -> None:
     write_csv(job.output.rates, rates(cases))
     write_csv(job.output.reliability, reliability(cases))
     write_csv(job.output.summary, summarize(plan, cases, intervals, job.params.seed))
-    write_csv(job.output.sweep, swept(cases, truths))
-
-
-def score_follow_ups(job: Any) -> None:
-    """How often the name is right after further poses: the sealed ground truth against the verdict then."""
-    truths = load_ground_truth(job.input.sealed, job.input.manifest)
-    first = {verdict["campaign"]: verdict for path in job.input.first for verdict in read_json(path)}
-    anew = [entry for path in job.input.anew for entry in read_json(path)]
-    proposals = pd.concat([pd.read_csv(path) for path in job.input.proposals], ignore_index=True)
-    cases = followed(job.params.plan, truths, first, anew, proposals)
-    write_csv(job.output.cases, cases)
-    write_csv(job.output.rates, follow_up_rates(cases))

@@ -28,7 +28,7 @@ _PARTS = {"unloaded": "unloaded", "loaded": "under loads", "milling": "milling p
 def closed_loop(table: pd.DataFrame) -> Figure:
     """Measured position errors, a panel for each part, a marker for each robot and model.
 
-    `table`: of `closed_loop_summary.summary`.
+    `table`: of `closed_loop.summary`.
     """
     robots = [robot for robot in dict.fromkeys(table["robot"]) if robot != "all"]
     figure, axes = panels(1, len(_PARTS), 62, sharey=True, sharex=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,9 +17,8 @@ from elastocal.io.origin import Origin
 from elastocal.report.words import physical_name
 from elastocal_proof.league.folds import RANDOM
 from elastocal_proof.league.methods import Method
-from elastocal_proof.league.pages import league_page
 from elastocal_proof.league.schemas import ENTRIES, MECHANISMS
-from elastocal_proof.league.table import cost_table, league_table, mechanism_table
+from elastocal_proof.league.table import league_page, league_table, mechanism_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -114,23 +112,18 @@ def _with_size(table: pd.DataFrame, name: str) -> str:
 
 
 def tabulate_league(job: Any) -> None:
-    """The league as tables, a page and pictures: errors, costs, and which mechanisms real robots have."""
+    """The league as tables, a page and pictures: errors, and which mechanisms real robots have."""
     asked, output, origin = job.params, job.output, Origin(**job.config["origin"])
     methods = {name: Method(**described) for name, described in asked.methods.items()}
-    keys, rounds = ([tuple(key) for key in each] for each in (asked.entered, asked.rounds))
+    keys = [tuple(key) for key in asked.entered]
     entries = {key: read_frame(path, ENTRIES) for key, path in zip(keys, job.input.entries, strict=True)}
-    steps = [("enter_league", key) for key in keys] + [("diagnose_league_folds", key) for key in rounds]
-    timings: Any = {
-        key: pd.read_csv(Path(asked.timings, step, *key).with_suffix(".tsv"), sep="\t").iloc[0] for step, key in steps
-    }
-    folds = {key[:2]: int(part["fold"].max()) for key, part in entries.items()}
-    random = [data for data, split in rounds if split == RANDOM]
+    random = [data for data, split in asked.rounds if split == RANDOM]
     found = {data: read_frame(path, MECHANISMS) for data, path in zip(random, job.input.mechanisms, strict=True)}
-    table, costs = league_table(entries, asked.robots, asked.reference, asked.seed), cost_table(timings, folds, methods)
+    table = league_table(entries, asked.robots, asked.reference, asked.seed)
     mechanisms = mechanism_table(found, asked.robots, asked.folds)
-    for path, one in ((output.league, table), (output.costs, costs), (output.mechanisms, mechanisms)):
+    for path, one in ((output.league, table), (output.mechanisms, mechanisms)):
         write_csv(path, one)
-    page = league_page(table, costs, mechanisms, pd.read_csv(job.input.published), methods, asked.missing)
+    page = league_page(table, mechanisms, pd.read_csv(job.input.published), methods, asked.missing)
     write_text(output.page, page)
     for name, file in asked.missing.items():
         print(f"left out of the league: {name}, as {file} is missing in ELASTOCAL_DATA", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""The table of the league: errors of every method on poses that it has not seen, with intervals, and what they cost."""
+"""The league as tables, with intervals, and as a page of text: errors of every method on poses that it has not seen."""
 
 from __future__ import annotations
 
@@ -8,21 +8,34 @@ import numpy as np
 import pandas as pd
 
 from elastocal.campaigns.groups import groups_of
+from elastocal.counting import counted
 from elastocal.random_streams import stream
 from elastocal.remainder.tuning import NORMAL_WIDTH
 from elastocal.validation.held_out import Errors, intervals, share_below_largest, summary
+from elastocal_proof.league.folds import BLOCKS, RANDOM, SESSION
 from elastocal_proof.league.methods import DIAGNOSIS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from elastocal_proof.league.methods import Method
 
     # Rows of the entries table by data set, split and method.
+    Row = Mapping[Any, Any]
     Entries = Mapping[tuple[str, str, str], pd.DataFrame]
 
 _REPLICATES = 1000
 _POSE = ["set", "session", "pose"]
+_TITLES = {
+    RANDOM: "Random poses held out",
+    BLOCKS: "Blocks of joint space held out",
+    SESSION: "Fitted to one data set, tested on another session of the same robot",
+}
+_ERRORS = "RMS in mm with 95 % intervals over poses, then the maximum; the smallest RMS of each row in bold."
+_COVERED = "Share of coordinates inside the 95 % intervals that a method states."
+_FOUND = "Mean over the folds of the random split, the least and the largest in brackets."
+# Mechanisms that are less probable in every fold are not listed.
+_LEAST_PROBABLE = 0.05
 
 
 def league_table(entries: Entries, robots: Mapping[str, Sequence[str]], reference: str, seed: int) -> pd.DataFrame:
@@ -63,24 +76,6 @@ def league_table(entries: Entries, robots: Mapping[str, Sequence[str]], referenc
     return pd.DataFrame(rows)
 
 
-def cost_table(
-    timings: Mapping[tuple[str, ...], Mapping[str, float]], folds: Mapping[tuple[str, str], int], methods: Mapping[str, Method]
-) -> pd.DataFrame:
-    """What each method costs; one that builds on a diagnosis bears its cost too.
-
-    `timings`: by data set, split and method, and of the diagnoses by data set and split: ``cpu_time``, seconds of a core, and
-    ``max_rss``, MB at most, for all folds. `folds`: of a data set and split. Returns ``data, split, method, seconds_per_fold,
-    memory_MB``; tuning of a method included.
-    """
-    rows = []
-    for data, split, method in (key for key in timings if len(key) == 3):
-        parts = [timings[data, split, method]] + [timings[data, split]] * (methods[method].physics == DIAGNOSIS)
-        seconds = sum(part["cpu_time"] for part in parts) / folds[data, split]
-        row = {"data": data, "split": split, "method": method, "seconds_per_fold": seconds}
-        rows.append(row | {"memory_MB": max(part["max_rss"] for part in parts)})
-    return pd.DataFrame(rows)
-
-
 def mechanism_table(found: Mapping[str, pd.DataFrame], robots: Mapping[str, Sequence[str]], folds: int) -> pd.DataFrame:
     """Mechanisms of each data set over the diagnoses of its folds.
 
@@ -108,3 +103,117 @@ def _errors(entries: pd.DataFrame) -> Errors:
 def _covered(entries: pd.DataFrame) -> float:
     off, stated = np.abs(entries[["dx", "dy", "dz"]].to_numpy()), entries[["std_x", "std_y", "std_z"]].to_numpy()
     return float((off < NORMAL_WIDTH * stated).mean()) if np.isfinite(stated).all() else float("nan")
+
+
+def league_page(
+    table: pd.DataFrame,
+    mechanisms: pd.DataFrame,
+    published: pd.DataFrame,
+    methods: Mapping[str, Method],
+    missing: Mapping[str, str],
+) -> str:
+    """Tables of the league as Markdown.
+
+    `published`: Figures of other people: ``data, rms_mm, what, source, why``. `missing`: data sets that were left out, with the
+    file that each lacks.
+    """
+    words = {name: method.words or name for name, method in methods.items()}
+    table = table.assign(best=table.groupby(["data", "split"])["rms_mm"].transform("min"))
+
+    def error(each: Row) -> str:
+        rms, low, high, most = (_shown(each[key], each["rms_mm"]) for key in ("rms_mm", "rms_low_mm", "rms_high_mm", "max_mm"))
+        return f"{f'**{rms}**' if each['rms_mm'] == each['best'] else rms} ({low}–{high}), {most}"
+
+    def covered(each: Row) -> str:
+        return f"{100 * each['covered']:.1f} %"
+
+    parts = [f"Left out: {_words(name)}, as {file} is missing." for name, file in missing.items()]
+    parts.append(_lead(table, {name for name, method in methods.items() if method.physics == DIAGNOSIS}))
+    for split, title in _TITLES.items():
+        mine = table[table["split"] == split]
+        if len(mine):
+            counts = mine.loc[mine.groupby("data")["rms_mm"].idxmin(), "method"].map(words).value_counts()
+            each = ", ".join(f"{name} {count}" for name, count in counts.items())
+            winners = f"Smallest RMS error of {counted(int(counts.sum()), 'data set')}: {each}."
+            parts += [f"## {title}", winners, folded(_ERRORS, _wide(mine, ["data", "poses"], words, error))]
+    stated = table.dropna(subset="covered")
+    parts += ["## Intervals", _coverage_sentence(stated, words)]
+    parts += [folded(_COVERED, _wide(stated, ["data", "split"], words, covered))]
+    parts += ["## Published figures", _published(published, table)]
+    parts += ["## Mechanisms", folded(_FOUND, _mechanisms(mechanisms))]
+    return "\n\n".join(parts) + "\n"
+
+
+def folded(title: str, table: str) -> str:
+    """A table that a reader opens, under a title, as the Markdown of GitHub and of MyST."""
+    return f"<details><summary>{title}</summary>\n\n{table}\n\n</details>"
+
+
+def markdown(rows: list[dict[str, Any]]) -> str:
+    """A table of which each row has its cells by the heads of their columns."""
+    return pd.DataFrame(rows).fillna("").to_markdown(index=False, disable_numparse=True) if rows else "None."
+
+
+def _wide(table: pd.DataFrame, heads: list[str], words: Mapping[str, str], cell: Callable[[Row], str]) -> str:
+    """A row for each of `heads`, a column for each method."""
+    rows: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for each in table.to_dict("records"):
+        key = tuple(each[head] for head in heads)
+        named = {head: _words(each[head]) if head == "data" else each[head] for head in heads}
+        rows.setdefault(key, named)[words[each["method"]]] = cell(each)
+    return markdown([*rows.values()])
+
+
+def _lead(table: pd.DataFrame, ours: set[str]) -> str:
+    """In how many rows of all tables the best method rests on a diagnosis, and in how many it does not."""
+    ahead: dict[bool, list[bool]] = {True: [], False: []}
+    for _, part in table.groupby(["split", "data"]):
+        diagnosed = part["method"].isin(ours).to_numpy()
+        wins = bool(diagnosed[part["rms_mm"].argmin()])
+        ahead[wins].append(bool((part["ratio_to_best_low"][diagnosed != wins] > 1.0).all()))
+    won, lost = ahead[True], ahead[False]
+    return (
+        f"A method that diagnoses has the smallest RMS error in {len(won)} of {len(won) + len(lost)} rows, in {sum(won)} with"
+        f" 95 % confidence against each other method; another has it in {len(lost)}, in {sum(lost)} with that confidence."
+    )
+
+
+def _coverage_sentence(stated: pd.DataFrame, words: Mapping[str, str]) -> str:
+    """The middle of the coverages of each method, and their range."""
+    each = [
+        f"{words[str(name)]} {100 * part.median():.0f} % (from {100 * part.min():.0f} to {100 * part.max():.0f})"
+        for name, part in stated.groupby("method", sort=False)["covered"]
+    ]
+    return f"Median over data sets and splits: {'; '.join(each)}."
+
+
+def _published(published: pd.DataFrame, table: pd.DataFrame) -> str:
+    ours = table[table["split"] == RANDOM].groupby("data")["rms_mm"].min().to_dict()
+    rows = []
+    for each in published[published["data"].isin(list(ours))].to_dict("records"):
+        best = ours[each["data"]]
+        row = {"data": _words(each["data"]), "published, mm": each["rms_mm"], "what": each["what"], "source": each["source"]}
+        rows.append(row | {"best here, RMS of unseen poses, mm": _shown(best, best), "why": each["why"]})
+    return markdown(rows)
+
+
+def _mechanisms(table: pd.DataFrame) -> str:
+    place = {name: number for number, name in enumerate(dict.fromkeys(table["data"]))}
+    shown = table[table["probability_high"] >= _LEAST_PROBABLE].sort_values("share", ascending=False)
+    shown = shown.sort_values("data", key=lambda data: data.map(place), kind="stable")
+    rows = []
+    for each in shown.to_dict("records"):
+        share, low, high = (100 * each[key] for key in ("share", "share_low", "share_high"))
+        row = {"data": _words(each["data"]), "mechanism": _words(each["mechanism"])}
+        row["probability"] = f"{each['probability']:.2f} ({each['probability_low']:.2f}–{each['probability_high']:.2f})"
+        rows.append(row | {"share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"})
+    return markdown(rows)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _shown(value: float, scale: float) -> str:
+    """A figure in mm with the decimals that show three significant digits of another, at most four."""
+    return f"{value:.{int(np.clip(2 - np.floor(np.log10(scale)), 0, 4)) if scale > 0 else 3}f}"

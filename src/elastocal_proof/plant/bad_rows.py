@@ -1,8 +1,7 @@
 """Rows of a measured table that went wrong: what a lost beam, a slipped decimal point or a muddled sheet leave of a few rows.
 
-Sizes are in standard deviations of the tracker: by how much a row contradicts the robot that was measured, its position, or
-its orientation where that contradicts more. Of a wrong angle or load it is how far the robot would have stood from where it was
-read had it been as the row says.
+How far off they are is drawn in standard deviations of the tracker. Of a wrong angle or load it is how far the robot would have
+stood, in the median row, from where it was read had it been as the row says.
 """
 
 from __future__ import annotations
@@ -37,15 +36,10 @@ _XYZ, _TURN = ("x", "y", "z"), ("rx", "ry", "rz")
 
 @dataclass(frozen=True)
 class BadReading:
-    """One slip.
-
-    `rows`: of the table, from 0, in which something wrong stands. `sizes`: of each row; a target that a wrong angle does not
-    move has none.
-    """
+    """One slip; `rows`: of the table, from 0, in which something wrong stands."""
 
     kind: str
     rows: tuple[int, ...]
-    sizes: tuple[float, ...]
 
 
 def possible_kinds(table: Table) -> tuple[str, ...]:
@@ -65,12 +59,13 @@ def with_bad_rows(
     mixed = draws.permutation(some)
     first = np.sort(np.unique(table["pose"][mixed], return_index=True)[1])[: 2 if kind == SWAPPED else count]
     rows = sorted(int(row) for row in mixed[first])
-    if kind == JOINT_ANGLE:
-        return _with_wrong_angles(table, _Truth(table, robot, schedule), rows, draws)
-    if kind == LOAD:
-        return _with_wrong_loads(table, _Truth(table, robot, schedule), rows, draws)
+    bad = {name: column.copy() for name, column in table.items()}
+    # How far off each row is, in standard deviations.
+    sizes = SMALLEST * (LARGEST / SMALLEST) ** draws.random(len(rows))
+    if kind in (JOINT_ANGLE, LOAD):
+        wrong = _wrong_angles if kind == JOINT_ANGLE else _wrong_loads
+        return bad, [BadReading(kind, found) for found in wrong(bad, table, robot, schedule, rows, sizes, draws)]
     read, tracker = [name for name in (*_XYZ, *_TURN) if name in table], robot.tracker
-    bad, sizes, found = _copied(table), _drawn_sizes(len(rows), draws), []
     for row, other, size in zip(rows, rows[::-1], sizes, strict=True):
         if kind == POSITION:
             _put(bad, _XYZ, row, _at(table, _XYZ, row) + size * tracker.sigma_m * direction(draws))
@@ -81,64 +76,38 @@ def with_bad_rows(
             _put(bad, read, row, np.zeros(len(read)))
         else:
             _put(bad, read, row, _at(table, read, row - 1 if kind == HELD_POINT else other))
-        poses = ((_at(each, _XYZ, row), turned(_at(each, _TURN, row)) if "rx" in each else np.eye(3)) for each in (bad, table))
-        found.append(BadReading(kind, (row,), (float(_apart(robot, *poses)),)))
-    return bad, found
+    return bad, [BadReading(kind, (row,)) for row in rows]
 
 
-@dataclass(frozen=True)
-class _Truth:
-    """The plant behind a table: states of one target follow each other, and poses are those of a tracker without noise."""
-
-    table: Table
-    robot: PhysicalRobot
-    schedule: Schedule
-
-    def at(self, rows: Sequence[int] | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
-        """State and measuring point of rows."""
-        targets = self.table["target"]
-        points = np.array([self.robot.arm.points.index(name) for name in targets])
-        return (np.arange(len(targets)) // len(np.unique(targets)))[rows], points[rows]
-
-    def seen(self, **changes: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Poses of each row."""
-        states, points = self.at()
-        position, rotation = seen_poses(self.robot, replace(self.schedule, **changes))
-        return position[states, points], rotation[states, points]
-
-    def seen_at(self, rows: Sequence[int], angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Poses of some rows had the robot stood at other angles (n,)."""
-        states, points = self.at(rows)
-        arrays: dict[str, Any] = {
-            name: value[states] for name, value in vars(self.schedule).items() if isinstance(value, np.ndarray)
-        }
-        arrays |= {"previous": np.full(len(states), -1), "angle": np.broadcast_to(angle, (len(states), len(angle)))}
-        position, rotation = seen_poses(self.robot, replace(self.schedule, **arrays))
-        number = np.arange(len(states))
-        return position[number, points], rotation[number, points]
-
-    def apart(self, there: tuple[np.ndarray, ...], before: tuple[np.ndarray, ...]) -> np.ndarray:
-        """Sizes of rows, of which the orientation counts where it was read."""
-        sizes = _apart(self.robot, there, before if "rx" in self.table else (before[0], there[1]))
-        return np.asarray(sizes)
+def _seen(table: Table, robot: PhysicalRobot, schedule: Schedule, **changes: Any) -> np.ndarray:
+    """Where a tracker without noise sees each row's target, had the schedule been another."""
+    targets = table["target"]
+    points = np.array([robot.arm.points.index(name) for name in targets])
+    states = np.arange(len(targets)) // len(np.unique(targets))
+    return seen_poses(robot, replace(schedule, **changes))[0][states, points]
 
 
-def _with_wrong_angles(
-    table: Table, true: _Truth, rows: Sequence[int], draws: np.random.Generator
-) -> tuple[Table, list[BadReading]]:
-    arm, names = true.robot.arm, [f"q{joint}" for joint in range(1, true.robot.arm.joints + 1)]
-    before, bad, found = true.seen(), _copied(table), []
-    levers: dict[int, float] = {}
-    for row, size in zip(rows, _drawn_sizes(len(rows), draws), strict=True):
+def _wrong_angles(
+    bad: Table,
+    table: Table,
+    robot: PhysicalRobot,
+    schedule: Schedule,
+    rows: Sequence[int],
+    sizes: np.ndarray,
+    draws: np.random.Generator,
+) -> list[tuple[int, ...]]:
+    arm, names, found = robot.arm, [f"q{joint}" for joint in range(1, robot.arm.joints + 1)], []
+    before, levers = _seen(table, robot, schedule), dict[int, float]()
+    for row, size in zip(rows, sizes, strict=True):
         for joint in draws.permutation(arm.joints):
             if joint not in levers:
                 # By how much the joint, as the controller shows it, moves a measured point in the median row.
                 step = arm.reported_matrix[:, joint] * _STEP_RAD
-                moved = np.linalg.norm(true.seen(angle=true.schedule.angle + step)[0] - before[0], axis=1)
+                moved = np.linalg.norm(_seen(table, robot, schedule, angle=schedule.angle + step) - before, axis=1)
                 levers[joint] = float(np.median(moved)) / _STEP_RAD
             if levers[joint] > _LEVER_M:
                 break
-        off = min(size * true.robot.tracker.sigma_m / levers[joint], np.pi) * draws.choice([-1.0, 1.0])
+        off = min(size * robot.tracker.sigma_m / levers[joint], np.pi) * draws.choice([-1.0, 1.0])
         shown, turn = _at(table, names, row), (np.arange(arm.joints) == joint).astype(float)
         # Or its opposite, or as much as leaves the joints within their limits: a controller shows no others.
         for share in (1.0, -1.0, *(sign * 2.0**-power for power in range(1, 40) for sign in (1.0, -1.0))):
@@ -146,39 +115,31 @@ def _with_wrong_angles(
             if ((angles >= arm.limits[:, 0]) & (angles <= arm.limits[:, 1])).all():
                 break
         off = share * off
-        wrong = list(_rows_of_slip(table, row, abs(off) > _OF_ONE_ROW_RAD, draws))
-        bad[names[joint]][wrong] += off
-        sizes = true.apart(true.seen_at(wrong, angles), tuple(part[wrong] for part in before))
-        found.append(BadReading(JOINT_ANGLE, tuple(wrong), tuple(sizes.tolist())))
-    return bad, found
+        found.append(_rows_of_slip(table, row, abs(off) > _OF_ONE_ROW_RAD, draws))
+        bad[names[joint]][list(found[-1])] += off
+    return found
 
 
-def _with_wrong_loads(
-    table: Table, true: _Truth, rows: Sequence[int], draws: np.random.Generator
-) -> tuple[Table, list[BadReading]]:
+def _wrong_loads(
+    bad: Table,
+    table: Table,
+    robot: PhysicalRobot,
+    schedule: Schedule,
+    rows: Sequence[int],
+    sizes: np.ndarray,
+    draws: np.random.Generator,
+) -> list[tuple[int, ...]]:
     """Loads of the same line and another size, as by a slipped decimal point or a wrong unit."""
-    before, without = true.seen(), true.seen(force=np.zeros_like(true.schedule.force))
-    force, sigma = np.linalg.norm(true.schedule.force, axis=1), true.robot.tracker.sigma_m
-    usual_m = float(np.median(np.linalg.norm(before[0] - without[0], axis=1)[table["load"] != 0]))
-    bad, found = _copied(table), []
-    for row, size in zip(rows, _drawn_sizes(len(rows), draws), strict=True):
-        most = _LARGEST_LOAD * force.max() / force[true.at([row])[0][0]]
-        share = min(size * sigma / usual_m, most) * draws.choice([-1.0, 1.0])
-        wrong = list(_rows_of_slip(table, row, False, draws))
+    force, targets, found = np.linalg.norm(schedule.force, axis=1), len(np.unique(table["target"])), []
+    without = _seen(table, robot, schedule, force=np.zeros_like(schedule.force))
+    usual_m = float(np.median(np.linalg.norm(_seen(table, robot, schedule) - without, axis=1)[table["load"] != 0]))
+    for row, size in zip(rows, sizes, strict=True):
+        most = _LARGEST_LOAD * force.max() / force[row // targets]
+        share = min(size * robot.tracker.sigma_m / usual_m, most) * draws.choice([-1.0, 1.0])
+        found.append(_rows_of_slip(table, row, False, draws))
         for name in WRENCH:
-            bad[name][wrong] *= 1.0 + share
-        # To first order: no arm would stand under the largest of these.
-        sizes = abs(share) * true.apart(tuple(part[wrong] for part in without), tuple(part[wrong] for part in before))
-        found.append(BadReading(LOAD, tuple(wrong), tuple(sizes.tolist())))
-    return bad, found
-
-
-def _copied(table: Table) -> Table:
-    return {name: column.copy() for name, column in table.items()}
-
-
-def _drawn_sizes(count: int, draws: np.random.Generator) -> np.ndarray:
-    return SMALLEST * (LARGEST / SMALLEST) ** draws.random(count)
+            bad[name][list(found[-1])] *= 1.0 + share
+    return found
 
 
 def _at(table: Table, names: Sequence[str], row: int) -> np.ndarray:
@@ -188,13 +149,6 @@ def _at(table: Table, names: Sequence[str], row: int) -> np.ndarray:
 def _put(table: Table, names: Sequence[str], row: int, values: np.ndarray) -> None:
     for name, value in zip(names, values, strict=True):
         table[name][row] = value
-
-
-def _apart(robot: PhysicalRobot, there: tuple[np.ndarray, ...], before: tuple[np.ndarray, ...]) -> np.ndarray:
-    """How far poses, positions (..., 3) and rotations (..., 3, 3), are from others, (...), in standard deviations."""
-    away = np.linalg.norm(there[0] - before[0], axis=-1) / robot.tracker.sigma_m
-    turn = rotation_vector(there[1] @ np.swapaxes(before[1], -1, -2))
-    return np.maximum(away, np.linalg.norm(turn, axis=-1) / robot.tracker.sigma_rad)
 
 
 def _rows_of_slip(table: Table, row: int, whole_pose: bool, draws: np.random.Generator) -> tuple[int, ...]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +12,6 @@ from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, read_p
 from elastocal_proof.plant.random_numbers import stream
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from elastocal_proof.plant.arm import Arm
 
     Table = dict[str, np.ndarray]
@@ -23,8 +21,6 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 # Stands for the last measuring point of any arm.
 FLANGE = "flange"
 SECONDS_PER_STATE = 25.0
-# Of further poses, how long after the last state the first one comes.
-_PAUSE_S = 3600.0
 # On arms of such a reach a lever of half a metre is usual.
 _LONG_M = 2.5
 # Waves of each joint's path in the tracker's dynamic mode: how many, and between which periods.
@@ -121,34 +117,6 @@ def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
         training=pose < design.poses - design.held_out,
         seed=int(seed),
     )
-
-
-def continued(schedule: Schedule, angle: np.ndarray, wrench: np.ndarray, ladder: Sequence[float]) -> Schedule:
-    """A schedule with further poses after it, such as a proposed experiment; nothing of what was done before changes.
-
-    `angle` (E, n): rad, each another pose. `wrench` (E, 6): as it shall be shown, N, N m at the flange, base axes; the moment
-    is that of the force at a lever. `ladder`: shares of its load at which each pose is read, 0 first. Each further state is
-    approached afresh and none is held out.
-    """
-    draws = stream(schedule.seed, f"continued after {len(schedule.pose)} states")
-    rungs = [range(len(ladder) if loaded else 1) for loaded in np.any(wrench, axis=1).tolist()]
-    row, load = (np.array(column) for column in zip(*((n, rung) for n, each in enumerate(rungs) for rung in each), strict=True))
-    count = np.arange(1, len(row) + 1)
-    further: dict[str, Any] = {
-        "angle": angle[row],
-        "force": np.array(ladder)[load, None] * wrench[row, :3],
-        "lever": lever_of(wrench)[row],
-        "pose": int(schedule.pose.max()) + 1 + row,
-        "load": load,
-        "repeat": 0 * row,
-        "approach": schedule.approach.max() + count,
-        "sense": draws.choice([-1, 1], (len(row), angle.shape[1])),
-        "previous": 0 * row - 1,
-        "time_s": schedule.time_s[-1] + _PAUSE_S + SECONDS_PER_STATE * count,
-        "training": row >= 0,
-    }
-    further = {name: np.concatenate([getattr(schedule, name), new]) for name, new in further.items()}
-    return replace(schedule, **further)
 
 
 def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> tuple[Table, list[tuple[int, str]]]:

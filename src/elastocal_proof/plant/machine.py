@@ -12,8 +12,9 @@ under its force is the plant's own law, so the model itself has no joint stiffne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -312,21 +313,6 @@ def _indexed(arm: Arm, tree: _Tree) -> Machine:
 
 
 @dataclass(frozen=True)
-class Loading:
-    """What acts on the arm in S states.
-
-    `drive` (S, n): angles at which the drives really stand, rad. `wrench` (S, 6): that the flange really feels, at its
-    deflected origin, base axes; N, N m. `growth` (S, n + 1): relative growth of all lengths of each stretch. `offsets` (S,): by
-    which structural coordinates are off beside what their springs do, rad or m.
-    """
-
-    drive: np.ndarray
-    wrench: np.ndarray
-    growth: np.ndarray
-    offsets: dict[int, np.ndarray] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
 class Equilibrium:
     """Where an arm came to rest, in S states.
 
@@ -343,12 +329,19 @@ class Equilibrium:
 
 def equilibrium(
     machine: Machine,
-    loading: Loading,
+    drive: np.ndarray,
+    wrench: np.ndarray,
+    growth: np.ndarray,
     gear_deflection: Callable[[np.ndarray, np.ndarray], np.ndarray],
     structure_laws: Iterable[StructureLaw] = (),
+    offsets: Mapping[int, np.ndarray] = MappingProxyType({}),
     start: np.ndarray | None = None,
 ) -> Equilibrium:
-    """Where the arm comes to rest, by fixed-point iteration.
+    """Where the arm comes to rest in S states, by fixed-point iteration.
+
+    `drive` (S, n): angles at which the drives really stand, rad. `wrench` (S, 6): that the flange really feels, at its
+    deflected origin, base axes; N, N m. `growth` (S, n + 1): relative growth of all lengths of each stretch. `offsets` (S,): by
+    which structural coordinates are off beside what their springs do, rad or m.
 
     The forces depend on the deflections only through the geometry, by the share (force times arm) / stiffness, a thousandth or
     so, so that each sweep gains about three digits. With linear springs it is the modified Newton method with their stiffness
@@ -360,19 +353,19 @@ def equilibrium(
     """
     gear = machine.gear
     extra = [(index, law) for start, law in structure_laws for name, index in machine.springs.items() if name.startswith(start)]
-    coordinates = np.zeros((len(loading.drive), machine.model.nq))
-    coordinates[:, machine.drive] = loading.drive
-    unloaded = machine.forces(coordinates, loading.growth)[0][:, gear]
+    coordinates = np.zeros((len(drive), machine.model.nq))
+    coordinates[:, machine.drive] = drive
+    unloaded = machine.forces(coordinates, growth)[0][:, gear]
     if start is not None:
         coordinates[:, gear] = start
     for sweep in range(1, _SWEEPS + 1):
-        force, position, rotation = machine.forces(coordinates, loading.growth, loading.wrench)
+        force, position, rotation = machine.forces(coordinates, growth, wrench)
         following = force * machine.compliance
-        following[:, machine.drive] = loading.drive
+        following[:, machine.drive] = drive
         following[:, gear] = gear_deflection(force[:, gear], unloaded)
         for index, law in extra:
             following[:, index] += law(force[:, index])
-        for index, offset in loading.offsets.items():
+        for index, offset in offsets.items():
             following[:, index] += offset
         change, size = np.abs(following - coordinates), np.abs(following)
         change[:, machine.drive] = size[:, machine.drive] = 0.0

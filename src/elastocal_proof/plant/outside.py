@@ -36,6 +36,13 @@ def cable_pull(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> A
     return driven(robot, joint, lambda done: size * done.angle[:, joint - 1] * done.angle[:, joint]), {}
 
 
+@kind(OUTSIDE + "two_angles", "rad", 2e-4, lambda arm: [(j,) for j in range(2, arm.joints)])
+def two_angles(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+    """A gear whose wave goes once round as its own joint and the one behind it turn, in step or against each other."""
+    sense, phase = sign(draws), draws.uniform(0, TURN)
+    return driven(robot, joint, lambda done: size * np.sin(done.angle[:, joint] + sense * done.angle[:, joint + 1] + phase)), {}
+
+
 @kind(OUTSIDE + "cable_transmission", "rad/(N m)", 1e-7, lambda arm: [(j,) for j in range(2, arm.joints)], scale=(1.0, 0.0))
 def cable_transmission(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
     """Cables from the motor over the joint before: theta = s (tau (1 + f q / pi) + tau_o / 2).

@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal_proof.plant.arm import Arm
 from elastocal_proof.plant.instruments import LoadCell, Tracker
-from elastocal_proof.plant.machine import Equilibrium, Loading, Machine, Structure, StructureLaw, equilibrium, machine_of
+from elastocal_proof.plant.machine import Equilibrium, Machine, Structure, StructureLaw, equilibrium, machine_of
 from elastocal_proof.plant.random_numbers import stream
 from elastocal_proof.plant.weights import declared_masses, off_the_line, on_stretches, true_masses
 
@@ -145,7 +145,7 @@ def at_rest(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None =
         coordinates = np.zeros((len(drive), machine.model.nq))
         coordinates[:, machine.drive] = drive
         facing = machine.forces(coordinates, growth)[2][:, -1]
-    loading = Loading(drive, robot.cell.felt(schedule.force, schedule.lever, facing), growth, offsets)
+    wrench = robot.cell.felt(schedule.force, schedule.lever, facing)
 
     def gear_deflection(torque: np.ndarray, unloaded: np.ndarray) -> np.ndarray:
         turn = robot.compliance * torque
@@ -153,7 +153,7 @@ def at_rest(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None =
             turn[:, joint] += law(schedule, torque, unloaded)
         return turn
 
-    return machine, equilibrium(machine, loading, gear_deflection, robot.structure_laws, start)
+    return machine, equilibrium(machine, drive, wrench, growth, gear_deflection, robot.structure_laws, offsets, start)
 
 
 def driven(robot: PhysicalRobot, schedule: Schedule, machine: Machine) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from elastocal_proof.plant.machine import Machine
 
 _ROUNDS = 12
-# Below this share of the largest a direction is second order and rounding.
-_SAME = 0.02
 
 
 @dataclass(frozen=True)
@@ -110,23 +108,6 @@ class Yardstick:
         seen, left = self._with_left(apart)
         rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in np.split(apart, 2, axis=-1)]
         return Signal(float(seen @ seen), float(left @ left), *rms)
-
-    def angle_deg(self, robot: PhysicalRobot, others: Iterable[PhysicalRobot]) -> float:
-        """Principal angle [1] between what is left of a robot and all that others make together, in any proportion.
-
-        `others`: one that is left with nothing adds no direction: a gear that stiffens at a torque that no load of these
-        reaches. Returns 90 where all others are left with nothing.
-
-        [1] Björck, Å. and Golub, G. H., Numerical methods for computing angles between linear subspaces, Mathematics of
-            Computation 27, 1973.
-        """
-        mine, theirs = self.seen_and_left(robot)[1], np.array([self.seen_and_left(other)[1] for other in others])
-        theirs = theirs[theirs.any(axis=1)]
-        if not len(theirs):
-            return 90.0
-        _, size, directions = np.linalg.svd(theirs / np.linalg.norm(theirs, axis=1, keepdims=True), full_matrices=False)
-        share = float(np.linalg.norm(directions[size > _SAME * size[0]] @ mine) / np.linalg.norm(mine))
-        return float(np.degrees(np.arccos(min(share, 1.0))))
 
     def _apart(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
         """Difference of poses of all points to those of the faultless robot, (S, targets, 6), m and rad."""

@@ -14,7 +14,7 @@ from elastocal.report.words import plain
 from elastocal_proof.blind.cases import PROOF
 from elastocal_proof.blind.scores import leading
 from elastocal_proof.blind.summary import BY_THE_BEST, OVER_THE_BEST, of_each_robot, rows_of, with_target
-from elastocal_proof.league.pages import markdown
+from elastocal_proof.league.table import markdown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

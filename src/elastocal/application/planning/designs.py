@@ -72,7 +72,7 @@ class Criterion:
 
 
 def criterion(kind: str, accuracy_rows: np.ndarray) -> Criterion:
-    """One of `CRITERIA`, over sensitivities (N, 3, P) as by `survey.accuracy_rows`."""
+    """One of `CRITERIA`, over sensitivities (N, 3, P) as by `plan.accuracy_rows`."""
     if kind == "D":
         return Criterion(None)
     return Criterion(np.eye(accuracy_rows.shape[2]) / accuracy_rows.shape[2] if kind == "A" else mean_squares(accuracy_rows))

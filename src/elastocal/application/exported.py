@@ -1,0 +1,149 @@
+"""The calibrated robot as files.
+
+A robot file can say offsets and ratios of the joints, in what the controller's angles mean, q = M r + o; errors of a link, as
+six elementary transforms at its far end in the order in which the fit moved it there; compliances and masses. What it cannot
+say, such as a gear's harmonics, stands in a sidecar; a regression on the remainder stands in neither.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal import __version__
+from elastocal.application.accuracy import accuracy_sentence
+from elastocal.application.calibrated import forward, without
+from elastocal.effects.conditions import MASS_PARAMETERS
+from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
+
+if TYPE_CHECKING:
+    from elastocal.application.accuracy import Accuracy
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.mechanics.robot import Robot
+
+_SPRINGS = "joint_compliance"
+_CONVENTIONS = {
+    "base": "poses are in the robot's base frame: the frame of the chain before its first transform, as the fit placed it",
+    "joint_angles": "q = matrix * reported + offset of the robot file, rad; reported angles are the controller's",
+    "links": "errors of link k act at its far end, before joint k + 1: Tx Ty Tz Rx Ry Rz in the frame of the chain there",
+    "wrench": "external force and moment on the robot at the last measuring point's origin, base axes, N and N m",
+    "joint_compliance": "a joint turns by its compliance (rad/(N m)) times the torque of wrench and weight about it",
+    "dh": "a row is Rz(theta) Tz(d) Tx(a) Rx(alpha) Ty(b) Ry(beta) from frame k - 1, about whose z axis joint k turns, to "
+    "frame k; the first row is from the base, the last to the end effector; b and beta only where axes are nominally parallel; "
+    "theta is what the controller's angle is added to",
+    "effects": "added to joints and links at the commanded angles; laws by name in the catalogue, elastocal.effects",
+}
+
+
+def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accuracy) -> dict[str, Any]:
+    """What goes beside a robot file. `name`: of the campaign. `date`: ISO 8601. `accuracy`: of the corrected robot."""
+    deviations = np.sqrt(np.diag(calibrated.covariance))
+    kept = fold_effects(calibrated).left_out
+    entries, springs, start = [], [], 0
+    for number, effect in enumerate(calibrated.model.effects):
+        values = np.concatenate([calibrated.estimate.coefficients[number], calibrated.estimate.shapes[number]])
+        mine = deviations[start : start + len(values)]
+        start += len(values)
+        described = [*((p.name, p.unit) for p in effect.parameters), *((s.name, s.unit) for s in effect.shapes)]
+        listed = [
+            # Held, not known: no error is not an error of 0.
+            {"name": label, "unit": unit, "value": float(value), "std_error": float(error) or None}
+            for (label, unit), value, error in zip(described, values, mine, strict=True)
+        ]
+        if effect.effect == _SPRINGS:
+            springs = listed
+        elif number in kept:
+            entries.append({"key": effect.key, "effect": effect.effect, "joints": list(effect.joints), "parameters": listed})
+    return {
+        "campaign": name,
+        "robot": calibrated.robot.name,
+        "date": date,
+        "elastocal_version": __version__,
+        "conventions": _CONVENTIONS,
+        "accuracy": accuracy.document() | {"words": accuracy_sentence(accuracy)},
+        "joint_compliance": springs,
+        "effects": entries,
+    }
+
+
+def find_left_out_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
+    """How far the effects that a robot file cannot hold move the end effector, ndarray (N,), m; as in `forward`."""
+    bare = without(calibrated, set(fold_effects(calibrated).left_out))
+    positions = [forward(each, reported_angles, operating)[0] for each in (calibrated, bare)]
+    return np.linalg.norm(positions[0] - positions[1], axis=1)
+
+
+@dataclass(frozen=True)
+class Folded:
+    """A calibrated robot as a robot file has it, rigid or with its springs, under its weight; and what that leaves out.
+
+    `left_out`: places in the model of the effects that it does not have. Without them its poses are those of the calibrated
+    robot, exactly.
+    """
+
+    robot: Robot
+    left_out: tuple[int, ...]
+
+
+def fold_effects(calibrated: CalibratedRobot) -> Folded:
+    """Put into the robot what its file can say."""
+    robot, model, estimate = calibrated.robot, calibrated.model, calibrated.estimate
+    offset, ratio = np.zeros(robot.joints), np.eye(robot.joints)
+    at_ends: dict[int, np.ndarray] = {}
+    left_out = []
+    for number, (effect, values) in enumerate(zip(model.effects, estimate.coefficients, strict=True)):
+        joint = effect.joints[0] - 1 if effect.joints else 0
+        match effect.effect:
+            case "joint_offset":
+                offset[joint] += values[0]
+            case "transmission_ratio":
+                for parameter, value in zip(effect.parameters, values, strict=True):
+                    ratio[joint, int(parameter.name.removeprefix("per_q")) - 1] += value
+            case "link_geometry":
+                at_ends[joint + 1] = at_ends.get(joint + 1, np.zeros(6)) + values
+            case "joint_compliance":
+                robot = replace(robot, compliance=values.copy(), compliance_known=True)
+            case "declared_weight":
+                robot = _reweigh(robot, values)
+            case _:
+                left_out.append(number)
+    matrix, zeros = ratio @ robot.reported_matrix, ratio @ robot.reported_offset + offset
+    chain = _add_link_errors(robot.chain, at_ends)
+    return Folded(replace(robot, chain=chain, links=(), reported_matrix=matrix, reported_offset=zeros), tuple(left_out))
+
+
+def _reweigh(robot: Robot, corrections: np.ndarray) -> Robot:
+    """A robot whose masses and first moments are those that were found."""
+    masses = []
+    for mass, (heavier, *moment) in zip(robot.masses, corrections.reshape(-1, MASS_PARAMETERS), strict=True):
+        total = mass.mass_kg + heavier
+        centre = np.array(mass.centre_m) + np.array(moment) / total
+        masses.append(replace(mass, mass_kg=float(total), centre_m=tuple(centre.tolist())))
+    return replace(robot, masses=tuple(masses))
+
+
+def _add_link_errors(chain: Chain, at_ends: dict[int, np.ndarray]) -> Chain:
+    """A chain with small transforms at the far ends of links, 1 for that behind the first joint."""
+    transforms: list[Transform] = []
+    moved: dict[int, int] = {}
+    seen = 0
+    for place in range(len(chain.transforms) + 1):
+        transform = chain.transforms[place] if place < len(chain.transforms) else None
+        ends = transform is None or transform.coordinate is not None
+        if ends and seen in at_ends and not (transform is not None and chain.is_passive(place) and _has_ended(chain, place)):
+            error = at_ends.pop(seen)
+            transforms += [Transform("TR"[axis // 3], axis % 3, float(value)) for axis, value in enumerate(error)]
+        moved[place] = len(transforms)
+        if transform is not None:
+            transforms.append(transform)
+            seen += transform.coordinate is not None and not chain.is_passive(place)
+    points = tuple(MeasuringPoint(p.name, moved[p.after], p.offset_m) for p in chain.points)
+    return Chain(tuple(transforms), points, chain.coordinates)
+
+
+def _has_ended(chain: Chain, place: int) -> bool:
+    """Whether the link before a place has ended before it, at an earlier passive joint."""
+    before = [p for p in range(place) if chain.transforms[p].coordinate is not None]
+    return bool(before) and chain.is_passive(before[-1])

@@ -1,0 +1,306 @@
+"""Public data: only contents of the known digest are used, each format comes back as a campaign, faults are one line."""
+
+import hashlib
+import http.server
+import os
+import threading
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+from made_fanuc_sources import POSES, REPEATS, assert_holds, cpa_source, static_source
+from scipy.spatial.transform import Rotation
+from support import homogeneous, refused
+
+from elastocal.campaigns import importers
+from elastocal.campaigns.importers import (
+    FOLDER_VARIABLE,
+    PublicFile,
+    fetch,
+    find_missing,
+    importer,
+    pose_and_repeat,
+    read_importers,
+    read_mat,
+)
+from elastocal.campaigns.reading import read_campaign, read_robot
+from elastocal.io.documents import read_document
+from elastocal.mechanics.kinematics import poses
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+ROBOTS, BOX = CONFIG / "robots", CONFIG.parent / "data" / "measured"
+ALL = read_importers(CONFIG / "public_data.yaml")
+BOXED, CONTENTS = "jacobi_ur5_every_seventh", b"0 1 2\n"
+MINE = PublicFile("owner/name", "c0ffee", "data/values.csv", hashlib.sha256(CONTENTS).hexdigest(), "mine/values.csv", "MIT")
+
+
+@pytest.fixture
+def place(monkeypatch, tmp_path):
+    """Fetches and looks for MINE, or for a file of FILES, on a machine without other data."""
+    monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
+    return {"folder": tmp_path / "cache", "box": tmp_path / "box"}
+
+
+@pytest.fixture
+def served(monkeypatch, tmp_path):
+    """Folder that a server on this machine offers in place of the public one."""
+    folder = tmp_path / "served"
+    (folder / "data").mkdir(parents=True)
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_):
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=folder))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    monkeypatch.setattr(PublicFile, "address", f"http://127.0.0.1:{server.server_port}/{MINE.path}")
+    yield folder / "data" / "values.csv"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_a_file_of_the_given_folder_is_used_where_it_lies_and_refused_with_other_contents(place, monkeypatch, tmp_path):
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+    assert find_missing(["mine"], {"mine": MINE}, place["folder"], place["box"]) == MINE.local
+    given = tmp_path / MINE.local
+    given.parent.mkdir()
+    given.write_bytes(CONTENTS)
+    assert fetch("mine", {"mine": MINE}, **place) == given and not place["folder"].exists()
+    assert find_missing(["mine"], {"mine": MINE}, place["folder"], place["box"]) is None
+    given.write_bytes(CONTENTS + b"\n")
+    with refused(given, "", "SHA-256", MINE.sha256, MINE.address):
+        fetch("mine", {"mine": MINE}, **place)
+    with refused("public data", "", "'yours'", "mine"):
+        fetch("yours", {"mine": MINE}, **place)
+
+
+def test_what_no_folder_has_is_downloaded_once_with_the_known_contents(place, served, monkeypatch, tmp_path):
+    assert find_missing(["mine"], {"mine": MINE}, place["folder"], place["box"]) is None
+    with refused(PublicFile.address, "", "404", FOLDER_VARIABLE, MINE.local):
+        fetch("mine", {"mine": MINE}, **place)
+    served.write_bytes(b"something else")
+    with refused(PublicFile.address, "", "other contents", "SHA-256"):
+        fetch("mine", {"mine": MINE}, **place)
+    assert list(place["folder"].iterdir()) == []
+    served.write_bytes(CONTENTS)
+    kept = fetch("mine", {"mine": MINE}, **place)
+    assert kept.parent == place["folder"] and kept.read_bytes() == CONTENTS
+    served.unlink()
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "empty"))
+    assert fetch("mine", {"mine": MINE}, **place) == kept
+    assert find_missing(["mine"], {"mine": MINE}, place["folder"], place["box"]) is None
+
+
+def test_what_comes_with_the_project_is_used_stated_and_not_looked_for_in_the_network(place):
+    files = ALL["jacobi"].files
+    file, page = files[BOXED], (BOX / "README.md").read_text(encoding="utf-8")
+    assert fetch(BOXED, files, place["folder"], BOX) == BOX / file.local
+    with refused(place["box"] / file.local, "", "no such file"):
+        fetch(BOXED, files, **place)
+    assert "MIT License" in (BOX / file.local).with_name("LICENSE").read_text(encoding="utf-8")
+    whole = files["jacobi_ur5_grid"]
+    assert all(said in page for said in (file.repository, file.commit, file.path, file.sha256, whole.sha256, file.licence))
+    public = Path(os.environ.get(FOLDER_VARIABLE, "")) / whole.local
+    if public.is_file():
+        header, *rows = public.read_text(encoding="utf-8").splitlines()
+        assert (BOX / file.local).read_text(encoding="utf-8").splitlines() == [header, *rows[::7]]
+
+
+def test_importers_have_whole_digests_and_robots_and_campaigns_name_their_files():
+    for each in ALL.values():
+        assert all((ROBOTS / f"{robot}.yaml").is_file() for robot in each.all_robots)
+    public = [
+        document for path in (CONFIG / "campaigns").glob("*.yaml") if (document := read_document(path))["source"] == "public"
+    ]
+    assert {document["importer"] for document in public} == set(ALL)
+    assert all(set(document["files"]) <= set(ALL[document["importer"]].files) for document in public)
+    with refused("mine.yaml", "importer", "'nobody'", ", ".join(ALL)):
+        importer("nobody", CONFIG, "mine.yaml")
+
+
+def made(tmp_path, name, path, *others):
+    ALL[name].write_campaign([path, *others], tmp_path / "campaign", ROBOTS, name)
+    return read_campaign(tmp_path / "campaign", ROBOTS)
+
+
+def text(path, columns, separator=",", decimal="."):
+    cells = [[name, *(str(cell).replace(".", decimal) for cell in column)] for name, column in columns.items()]
+    path.write_text("".join(separator.join(row) + "\r\n" for row in zip(*cells, strict=True)), encoding="utf-8")
+    return path
+
+
+def test_sessions_of_the_fanuc_are_campaigns_alone_and_one_of_one_robot_together(fanuc, tmp_path):
+    static, cpa = static_source(fanuc, tmp_path), cpa_source(fanuc, tmp_path)
+    for name, source, letters in (("fanuc_static", static, "ABC"), ("fanuc_cpa", cpa, "DEF")):
+        campaign = made(tmp_path, name, source[0])
+        assert [(t.name, t.point, t.offset_m) for t in campaign.targets] == [(letter, "6DoF", None) for letter in letters]
+        assert (campaign.name, campaign.measured, campaign.frame, campaign.noise) == (
+            name,
+            "position",
+            "tracker",
+            ALL[name].noise,
+        )
+        assert (campaign.compliance, campaign.declared) == ("nominal", ("joint_offset", "link_geometry"))
+        assert_holds(campaign.measurements, *source[1:])
+        assert campaign.robot.chain == fanuc.chain
+    both = made(tmp_path, "fanuc_joint", static[0], cpa[0])
+    assert both.robot.chain == fanuc.chain
+    counted = [np.arange(POSES).repeat(3 * REPEATS), np.arange(POSES).repeat(3)]
+    for session, (_, angles, positions) in enumerate((static, cpa)):
+        measurements = both.measurements.select(both.measurements.session == session)
+        assert_holds(measurements, angles, positions)
+        np.testing.assert_array_equal(measurements.pose, counted[session])
+        assert {both.targets[index].name for index in measurements.target} == set(("ABC", "DEF")[session])
+        assert measurements.repeat.max() == (REPEATS - 1, 0)[session]
+
+
+@pytest.mark.parametrize(("joints", "robot"), [(6, "ur5"), (7, "wam")])
+def test_commanded_positions_and_differences_are_measured_positions(tmp_path, joints, robot):
+    rng = np.random.default_rng(1)
+    degrees, wanted = rng.uniform(-49, 70, (9, joints)), rng.uniform(-600, 600, (9, 3))
+    measured = (wanted + rng.normal(0, 2, (9, 3))).round(6)
+    columns = {f"{axis}_t": wanted[:, i] for i, axis in enumerate("xyz")}
+    columns |= {f"{axis}_dif": (measured - wanted)[:, i] for i, axis in enumerate("xyz")}
+    columns |= {f"joint_{j + 1}": degrees[:, j] for j in range(joints)}
+    campaign = made(tmp_path, "jacobi", text(tmp_path / "grid.csv", columns))
+    assert campaign.robot.name == read_robot(ROBOTS / f"{robot}.yaml").name and campaign.targets[0].point == f"{joints}DoF"
+    np.testing.assert_allclose(campaign.measurements.joint_angles, np.radians(degrees), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(campaign.measurements.position, 1e-3 * measured, rtol=0, atol=1e-12)
+    for gone, left in (("z_dif", "no column 'z_dif'"), ("joint_3", "joint_3")):
+        path = text(tmp_path / "other.csv", {name: column for name, column in columns.items() if name != gone})
+        with refused(path, "header", left):
+            ALL["jacobi"].read(path)
+
+
+def series(tmp_path, **changes):
+    """A file of the UR10's format, of which poses 2 and 5 are approached again, as near as the controller comes."""
+    rng = np.random.default_rng(6)
+    angles = rng.uniform(-3, 3, (9, 6)).round(9)
+    angles = np.vstack([angles, angles[[2, 5]] + 4e-5])
+    position, degrees = rng.uniform(-3000, 3000, (11, 3)).round(5), rng.uniform(-89, 89, (11, 3)).round(6)
+    joints = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+    columns = {"Timestamp": [f"2020071416{39 + i // 6}{10 * (i % 6):02d}" for i in range(11)], "other": np.zeros(11)}
+    columns |= {f"{name}_joint": column for name, column in zip(joints, angles.T, strict=True)}
+    columns |= {f"measurement_{axis}": position[:, i] for i, axis in enumerate("xyz")}
+    columns |= {f"measurement_r{axis}": degrees[:, i] for i, axis in enumerate("xyz")}
+    columns |= {"measurement_temperature": 20 + 0.25 * np.arange(11)} | changes
+    kept = {name: column for name, column in columns.items() if column is not None}
+    return text(tmp_path / "series.csv", kept, ";", ","), angles, position, degrees
+
+
+def test_series_of_the_ur10_become_campaigns_of_poses_with_time_and_temperature(tmp_path):
+    path, angles, position, degrees = series(tmp_path)
+    campaign = made(tmp_path, "ur10_ipa", path)
+    found = campaign.measurements
+    assert (campaign.measured, campaign.noise) == ("pose", {"position_m": 2.1e-5, "orientation_rad": 3.0e-5})
+    np.testing.assert_allclose(found.joint_angles, angles, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found.position, 1e-3 * position, rtol=0, atol=1e-15)
+    turned = Rotation.from_euler("XYZ", degrees, degrees=True)
+    np.testing.assert_allclose((Rotation.from_rotvec(found.rotation_vector) * turned.inv()).magnitude(), 0, atol=1e-12)
+    np.testing.assert_array_equal(found.temperature_c, 20 + 0.25 * np.arange(11))
+    np.testing.assert_array_equal(found.time_s, 10.0 * np.arange(11))
+    assert found.pose.tolist() == [*range(9), 2, 5] and found.repeat.tolist() == 9 * [0] + [1, 1]
+    cut = series(tmp_path, Timestamp=11 * ["2,02011E+13"])[0]
+    assert made(tmp_path, "ur10_ipa", cut).measurements.time_s is None
+
+
+@pytest.mark.parametrize(
+    ("contents", "key", "words"),
+    [
+        (b"", "", ["no row of data"]),
+        (b"a;b\n1;2\n\n1\n", "row 2", ["1 cell", "2, one for each column"]),
+        (b"a;b\n1;\xff\n", "line 2", ["not UTF-8"]),
+        (b'a;b\n"1;2\n', "", ["columns separated by ;"]),
+        (b"a;b\n1;2\n", "header", ["no column 'shoulder_pan_joint'", "ipa-robot-accuracy"]),
+        ("1 2", "row 2, column elbow_joint", ["'1 2'", "decimal comma"]),
+        ("nan", "row 2, column elbow_joint", ["'nan'", "not infinite"]),
+    ],
+)
+def test_text_that_is_no_such_table_is_refused(tmp_path, contents, key, words):
+    path = tmp_path / "series.csv"
+    if isinstance(contents, str):
+        series(tmp_path, elbow_joint=[1, contents, *range(9)])
+    else:
+        path.write_bytes(contents)
+    with refused(path, key, *words):
+        ALL["ur10_ipa"].read(path)
+
+
+def test_each_pose_of_the_motoman_counts_once_and_those_that_nobody_saw_not_at_all(tmp_path):
+    draws, path = np.random.default_rng(1), tmp_path / "some.mat"
+
+    def write(poses, images, **changes):
+        each = draws.uniform(-0.5, 0.5, (poses, 26))
+        each[:, 0], each[:, 6] = np.arange(1, poses + 1), changes.get("turntable", 1e-4)
+        values = draws.permutation(np.repeat(each, images, axis=0))
+        values[values[:, 0] == changes.get("unseen"), 19:] = np.nan
+        scipy.io.savemat(path, {"dataset": values[:, : changes.get("columns", 26)]})
+        return each
+
+    each = np.delete(write(9, 3, unseen=4), 3, axis=0)
+    measurements = made(tmp_path, "motoman", path).measurements
+    np.testing.assert_array_equal(measurements.joint_angles, each[:, 7:13])
+    np.testing.assert_array_equal(measurements.position, each[:, 19:22])
+    # The source's own reader leaves out the 13th of the larger file.
+    np.testing.assert_array_equal(ALL["motoman"].read(path := tmp_path / "some.mat").angles, each[:, 7:13])
+    each = write(587, 1)
+    np.testing.assert_array_equal(ALL["motoman"].read(path).angles, np.delete(each, 12, axis=0)[:, 7:13])
+    for changes, found in (({"columns": 20}, "shape"), ({"turntable": 0.5}, "a turntable at 0.5 rad")):
+        write(9, 1, **changes)
+        with refused(path, "dataset", found):
+            ALL["motoman"].read(path)
+
+
+def test_a_mat_file_that_is_none_or_damaged_is_one_line(tmp_path, monkeypatch):
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"q": np.arange(60.0).reshape(10, 6), "p": np.ones((9, 3))})
+    whole = path.read_bytes()
+    np.testing.assert_array_equal(read_mat(path, q=6)["q"], np.arange(60.0).reshape(10, 6))
+    for shapes, key, found in (({"q": 5}, "q", "(10, 6)"), ({"q": 6, "p": 3}, "p", "(9, 3)"), ({"x": 6}, "x", "nothing")):
+        with refused(path, key, found, "numbers"):
+            read_mat(path, **shapes)
+    for content in (b"", b"text", whole[:200], whole[:400], whole[:128] + b"\xff" * 400):
+        path.write_bytes(content)
+        with refused(path, "", f"damaged ({len(content)} bytes)", "a MAT file of version 5"):
+            read_mat(path, q=6)
+    with refused(tmp_path, "", "a folder"):
+        read_mat(tmp_path, q=6)
+    monkeypatch.setattr(importers, "LARGEST_BYTES", 100)
+    path.write_bytes(whole)
+    with refused(path, "", "more than 100 bytes"):
+        read_mat(path, q=6)
+
+
+def test_poses_are_numbered_as_they_first_come_in_chains_of_rows_within_the_tolerance():
+    a, b, c = [0.1, 0.2], [0.3, -0.2], [-1.0, 2.0]
+    pose, repeat = pose_and_repeat(np.array([c, a, c, b, a, c]))
+    assert pose.tolist() == [0, 1, 0, 2, 1, 0] and repeat.tolist() == [0, 0, 1, 0, 1, 2]
+    assert pose_and_repeat(np.array([[0.0], [2.0], [1.0], [5.0]]), 1.5)[0].tolist() == [0, 0, 0, 1]
+
+
+# Rows of offset of theta (deg), d, a (m), alpha (deg), as makers or sources state them. The Motoman's turntable stands still.
+TABLES = {
+    "ur5": "0 0.089159 0 90, 0 0 -0.425 0, 0 0 -0.39225 0, 0 0.10915 0 90, 0 0.09465 0 -90, 0 0.0823 0 0",
+    "ur10": "0 0.1273 0 90, 0 0 -0.612 0, 0 0 -0.5723 0, 0 0.163941 0 90, 0 0.1157 0 -90, 0 0.0922 0 0",
+    "wam": "0 0 0 -90, 0 0 0 90, 0 0.55 0.045 -90, 0 0 -0.045 90, 0 0.3 0 -90, 0 0 0 90, 0 0.06 0 0",
+    "motoman_right_arm": (
+        "-90 -0.263 0 15, 0 1.4159 0.15 -90, -90 0 0.614 180, 0 0 0.2 -90, 0 -0.64 0 90, -90 0 0.03 90, 0 0.2 0 0"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_the_chain_of_a_source_is_that_of_its_table(name):
+    robot, rows = read_robot(ROBOTS / f"{name}.yaml"), [[*map(float, row.split())] for row in TABLES[name].split(",")]
+    for angles in np.random.default_rng(7).uniform(-np.pi, np.pi, (5, robot.joints)):
+        expected = np.eye(4)
+        for angle, (offset, d, a, alpha) in zip([0.0, *angles][-len(rows) :], rows, strict=True):
+            expected = expected @ homogeneous("R", 2, angle + np.radians(offset)) @ homogeneous("T", 2, d)
+            expected = expected @ homogeneous("T", 0, a) @ homogeneous("R", 0, np.radians(alpha))
+        position, rotation = poses(robot.chain, angles[None], robot.chain.end_effector)
+        np.testing.assert_allclose(position[0], expected[:3, 3], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(rotation[0], expected[:3, :3], rtol=0, atol=1e-14)
