@@ -12,8 +12,8 @@ from made_folders import made_folder, made_table
 from study_folder import Study
 from typer.testing import CliRunner
 
-from elastocal.command.pipeline import diagnosed_campaign
 from elastocal.command.main import app
+from elastocal.command.pipeline import diagnosed_campaign
 from elastocal.errors import InputError
 
 CELL = "cells/made"
