@@ -78,7 +78,10 @@ def test_a_sheet_without_a_reading_is_filled_and_one_with_a_reading_stays_unless
     assert len(sheet.read_text().splitlines()) == 3
 
 
-@pytest.mark.parametrize("option", [("--column", "q1"), ("--unit", "=mm"), ("--angles", "gon"), ("--target", "A")])
+@pytest.mark.parametrize(
+    "option",
+    [("--column", "q1"), ("--unit", "=mm"), ("--angles", "gon"), ("--target", "A"), ("--unit", "x=mm", "--unit", "x=m")],
+)
 def test_bad_options_leave_nothing_behind(refusal, words, tmp_path, option):
     assert refusal(*words(*OPTIONS, *option))
     assert not (tmp_path / "cell").exists()

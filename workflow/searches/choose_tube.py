@@ -7,10 +7,10 @@ Its answer, rounded to 0.1 mm, stands in config/robots/kuka_extended.yaml; nothi
 from dataclasses import replace
 
 import numpy as np
-from elastocal.mechanics.links import with_tube
 from scipy.optimize import brentq
 
 from elastocal.io.documents import read_document
+from elastocal.mechanics.elastostatics import with_tube
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.simulation import Experiments, Loading, random_experiments, true_deflections
