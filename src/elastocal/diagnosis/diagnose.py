@@ -57,6 +57,7 @@ if TYPE_CHECKING:
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.data_checks.protocol import Fault
+    from elastocal.diagnosis.gross_errors import Yardstick
     from elastocal.diagnosis.kept_rows import Kept
     from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.verdict import Hypothesis
@@ -68,6 +69,8 @@ if TYPE_CHECKING:
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
+# Standard errors by which parameters move where nothing else is found: they change a log likelihood by 0.03 each.
+_HARDLY = 0.25
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,8 @@ class Diagnosis:
     """What training poses say of a campaign.
 
     `steps`: the last is the final model. `document`: contents of verdict.json, but for what held-out poses say. `left_out`:
-    gross errors, which are no part of the case.
+    gross errors, which are no part of the case. `yardstick`: by which the training rows were judged; None where they were not
+    all judged by the final model.
     """
 
     case: Case
@@ -96,6 +100,7 @@ class Diagnosis:
     evidence: Evidence | None
     document: dict[str, Any] = field(repr=False)
     left_out: Measurements
+    yardstick: Yardstick | None = None
 
     @property
     def declared(self) -> Fit:
@@ -151,7 +156,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
         # The model found looks at all rows once more, without these, before another search is made.
-        some = sample_of(case.select(remaining).observations, settings.searched_observations)
+        like = None if (remaining & ~part.kept).any() else part.searched
+        some = sample_of(case.select(remaining).observations, settings.searched_observations, like)
         about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
         errors = gross_errors(about, part.noise, case.campaign.measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
@@ -159,16 +165,19 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         if part is last:
             break
         tell(f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without")
-        if noise_facts(part.noise) == noise_facts(last.noise) and (again := _hardly_moved(about, part.searched)):
-            # Rows of so little weight that the search would find the same.
-            about = again
-            continue
+        if noise_facts(part.noise) == noise_facts(last.noise) and explained:
+            again = fit(explained.model, part.searched, about.noise, about.estimate, True, ON_THE_WAY)
+            if _near(again, explained):
+                # Rows of so little weight that the search would find the same.
+                about = again
+                continue
         # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
         near = (about, found.conclusion.best.named) if relinearized else None
         most_pose_error_rad = found.linearized.most_pose_error_rad
         # Its statistics make room for those of the next search.
         found = None
+    yardstick = errors.yardstick if part.kept.all() else None
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared_to_all()
     final = about if found else declared
@@ -209,7 +218,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     warnings = [*document["warnings"], *warnings_of(left_out)]
     document |= {"contradictions": contradicting, "gross_errors": left_out, "warnings": warnings}
     document["repeatable"] = repeatable and asdict(repeatable)
-    return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
+    yardstick = yardstick if kept is about else None
+    return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross), yardstick)
 
 
 def _with_noise_left(case: Case, declared: Fit, found: Evidence) -> Fit:
@@ -308,11 +318,10 @@ def _explained(
     return Evidence(problem, found, alarm, conclusion, adopted, settled), about, tested
 
 
-def _hardly_moved(fitted: Fit, observations: Observations) -> Fit | None:
-    """A fit to fewer observations, where no parameter moves by more than fits on the way are exact to; None where one does."""
-    found = fit(fitted.model, observations, fitted.noise, fitted.estimate, True, ON_THE_WAY)
-    moved = parameter_values(found.model, found.estimate) - parameter_values(fitted.model, fitted.estimate)
-    return found if (np.abs(moved) <= ON_THE_WAY * np.sqrt(np.diag(fitted.covariance))).all() else None
+def _near(fitted: Fit, other: Fit) -> bool:
+    """Whether no parameter of a model moved by more than `_HARDLY` from one fit to another."""
+    moved = parameter_values(fitted.model, fitted.estimate) - parameter_values(other.model, other.estimate)
+    return bool((np.abs(moved) <= _HARDLY * np.sqrt(np.diag(other.covariance))).all())
 
 
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:
