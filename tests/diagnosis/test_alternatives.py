@@ -111,21 +111,6 @@ def test_entropy_of_fixed_models_is_that_of_their_bhattacharyya_coefficients():
     assert separation.min() < 2 < separation.max()
 
 
-def test_entropy_of_fixed_models_is_that_of_their_bhattacharyya_coefficients():
-    """Of known coefficients: sum of w_i ln (1 + w_j / w_i exp(-separation / 8)), with the separation d'G d."""
-    models, half = (
-        made(["h0", "h1"], seed=4, certain=1e12, weights=(0.7, 0.3)),
-        np.random.default_rng(6).standard_normal((5, 5)),
-    )
-    information = np.array([scale * half @ half.T for scale in (0.1, 1.0, 4.0)])
-    apart = models[0].mean - models[1].mean
-    separation = np.einsum("i,nij,j->n", apart, information, apart)
-    close = np.exp(-separation / 8)
-    expected = 0.7 * np.log1p(0.3 / 0.7 * close) + 0.3 * np.log1p(0.7 / 0.3 * close)
-    np.testing.assert_allclose(Criterion(models, np.random.default_rng(5)).left(information), expected, rtol=1e-4)
-    assert separation.min() < 2 < separation.max()
-
-
 def fixed(*means, weights=(0.5, 0.5), names=("h0", "h1"), seed=0):
     """The promise of models whose coefficients are as good as known."""
     known = [alternative([0, 1], m, 1e12 * np.eye(2), n, w) for m, w, n in zip(means, weights, names, strict=True)]

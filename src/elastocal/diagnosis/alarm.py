@@ -86,7 +86,7 @@ def _average_bayes_factors(
             unit = tested[number]
             first = max(unit.smallest - 1, 0)
             variances = grid.scales[first:, None] ** 2
-            weights = grid.of(replace(unit, smallest=first))[first:]
+            weights = grid.between(first, unit.largest)[first:]
             widened = 1.0 + variances * values[:, None, place]
             left = squares[:, None] - (variances / widened) @ turned
             known = weights + start - 0.5 * np.log(widened).sum(axis=2)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Model, Posterior, Problem
+    from elastocal.diagnosis.statistics import Statistics
 
 # Models that hold less than this move no digit that is reported.
 _LEAST_PROBABILITY = 0.002
@@ -54,12 +55,16 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
     sizes = {model.pose_error_rad for model, _ in likely}
     equations = {tau: normal_equations(linearized.products, tau)[0] for tau in sizes}
     # Sizes of the pose error that the best model makes likely, and those of the models that count.
-    kept = np.arange(len(problem.log_pose))
+    some, base = problem.statistics, problem.statistics.log_likelihood + problem.log_pose
     if best.units:
-        density = _joint(problem, best, kept).by_pose_error
-        of_models = np.isin(problem.statistics.pose_error_rad, list(sizes))
+        density = _joint(problem, best, some, base).by_pose_error
+        of_models = np.isin(some.pose_error_rad, list(sizes))
         kept = np.flatnonzero((density > density.max() + UNLIKELY) | of_models)
-    each = [(p, _moments(linearized, model, equations[model.pose_error_rad], owners, kept)) for model, p in likely]
+        some, base = some.at(kept), base[kept]
+    each = [
+        (p, _moments(linearized, model, equations[model.pose_error_rad], owners, _joint(problem, model, some, base)))
+        for model, p in likely
+    ]
     exact = next(found for (model, _), (_, found) in zip(likely, each, strict=True) if model is best)
     shift: dict[tuple[str, str], float] = {}
     std_error: dict[tuple[str, str], float] = {}
@@ -157,7 +162,7 @@ def _predicted(problem: Problem, model: Model) -> np.ndarray:
 
 
 def _moments(
-    linearized: Linearized, model: Model, equations: np.ndarray, owners: Sequence[tuple[str, str]], kept: np.ndarray
+    linearized: Linearized, model: Model, equations: np.ndarray, owners: Sequence[tuple[str, str]], joint: Joint
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Mean and variance of every parameter of one model, by owner and name; declared ones up to a constant in the mean."""
     products, problem = linearized.products, linearized.problem
@@ -172,7 +177,7 @@ def _moments(
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)
     variance = ((back @ covariance) * back).sum(axis=1)
     found = dict(zip(owners, zip(back @ mean, variance, strict=True), strict=True))
-    for number, (value, spread) in zip(model.units, _joint(problem, model, kept).moments(), strict=True):
+    for number, (value, spread) in zip(model.units, joint.moments(), strict=True):
         unit = problem.units[number]
         if unit.candidate:
             names = [(unit.candidate.key, parameter.name) for parameter in unit.candidate.parameters]
@@ -180,8 +185,7 @@ def _moments(
     return found
 
 
-def _joint(problem: Problem, model: Model, kept: np.ndarray) -> Joint:
-    """Density under a model, at some sizes of the pose error."""
+def _joint(problem: Problem, model: Model, statistics: Statistics, base: np.ndarray) -> Joint:
+    """Density under a model, at some sizes of the pose error with what each contributes alone."""
     places, units = np.searchsorted(problem.grid.scales, model.scales), [problem.units[number] for number in model.units]
-    base = (problem.statistics.log_likelihood + problem.log_pose)[kept]
-    return Joint(problem.statistics.at(kept), units, problem.grid, base, places)
+    return Joint(statistics, units, problem.grid, base, places)

@@ -18,7 +18,15 @@ from elastocal.diagnosis.findings import Evidence
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
-from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
+from elastocal.diagnosis.refit import (
+    fit_with_sizes,
+    mean_square,
+    mean_square_left,
+    noise_beside,
+    remaining_noise,
+    selected,
+    with_shapes_of,
+)
 from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import (
     ADEQUATE,
@@ -38,6 +46,8 @@ from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.observations import sample_of
+from elastocal.fitting.parameters import parameter_values
+from elastocal.fitting.robust import SETTLED
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import repeatable_part
@@ -48,6 +58,7 @@ if TYPE_CHECKING:
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.data_checks.protocol import Fault
+    from elastocal.diagnosis.gross_errors import Yardstick
     from elastocal.diagnosis.kept_rows import Kept
     from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.verdict import Hypothesis
@@ -55,9 +66,12 @@ if TYPE_CHECKING:
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
+    from elastocal.remainder.repeatable import Repeatable
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
+# Standard errors by which parameters move where nothing else is found: they change a log likelihood by 0.03 each.
+_HARDLY = 0.25
 
 
 @dataclass(frozen=True)
@@ -78,7 +92,8 @@ class Diagnosis:
     """What training poses say of a campaign.
 
     `steps`: the last is the final model. `document`: contents of verdict.json, but for what held-out poses say. `left_out`:
-    gross errors, which are no part of the case.
+    gross errors, which are no part of the case. `yardstick`: by which the training rows were judged; None where they were not
+    all judged by the final model.
     """
 
     case: Case
@@ -86,6 +101,7 @@ class Diagnosis:
     evidence: Evidence | None
     document: dict[str, Any] = field(repr=False)
     left_out: Measurements
+    yardstick: Yardstick | None = None
 
     @property
     def declared(self) -> Fit:
@@ -129,10 +145,14 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
     found: Evidence | None = None
     about, near, most_pose_error_rad = part.declared, None, np.inf
+    explained: Fit | None = None
+    tested: tuple[Fit, Repeatable | None] | None = None
     errors = Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
-        found, about = _explained(part, settings, seed, tell, near, most_pose_error_rad)
+        if not found:
+            found, about, tested = _explained(part, settings, seed, tell, near, most_pose_error_rad)
+            explained = about
         errors = gross_errors(about, part.noise, case.campaign.measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
@@ -140,7 +160,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
         # The model found looks at all rows once more, without these, before another search is made.
-        some = sample_of(case.select(remaining).observations, settings.searched_observations)
+        like = None if (remaining & ~part.kept).any() else part.searched
+        some = sample_of(case.select(remaining).observations, settings.searched_observations, like)
         about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
         errors = gross_errors(about, part.noise, case.campaign.measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
@@ -148,15 +169,24 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         if part is last:
             break
         tell(f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without")
+        if noise_facts(part.noise) == noise_facts(last.noise) and explained:
+            again = fit(explained.model, part.searched, about.noise, about.estimate, True, ON_THE_WAY)
+            if _near(again, explained):
+                # Rows of so little weight that the search would find the same.
+                about = again
+                continue
         # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
         near = (about, found.conclusion.best.named) if relinearized else None
         most_pose_error_rad = found.linearized.most_pose_error_rad
         # Its statistics make room for those of the next search.
         found = None
+    yardstick = errors.yardstick if part.kept.all() else None
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared_to_all()
-    final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True) if found else declared
+    final = about if found else declared
+    if found and (about is not explained or part.searched is not case.observations):
+        final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True)
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     lost: list[str] = []
@@ -174,7 +204,9 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
             kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
             steps.append(Step("frames and targets, kept", "kept", kept))
     kept = steps[-1].fitted
-    repeatable = repeatable_part(kept, case.observations, seed) if found else None
+    repeatable = (
+        tested[1] if tested and tested[0] is kept else repeatable_part(kept, case.observations, seed) if found else None
+    )
     unnamed, contradicting = remainder_sentences(repeatable), list[str]()
     if found and found.conclusion.verdict == ADEQUATE:
         contradicting = unnamed or contradictions(final, noise, settings)
@@ -190,7 +222,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     warnings = [*document["warnings"], *warnings_of(left_out)]
     document |= {"contradictions": contradicting, "gross_errors": left_out, "warnings": warnings}
     document["repeatable"] = repeatable and asdict(repeatable)
-    return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
+    yardstick = yardstick if kept is about else None
+    return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross), yardstick)
 
 
 def _with_noise_left(case: Case, declared: Fit, found: Evidence) -> Fit:
@@ -227,17 +260,20 @@ def _explained(
     tell: Callable[[str], None],
     start: tuple[Fit, tuple[str, ...]] | None,
     most_pose_error_rad: float,
-) -> tuple[Evidence, Fit]:
+) -> tuple[Evidence, Fit, tuple[Fit, Repeatable | None] | None]:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
 
     At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. With it
-    the fit of the model found to what the search looks at. What an error common to the measurements of a pose takes beyond
-    what robots repeat to must be chance: where it is a function of the joints no more of it is thought of. And where what is
-    left is one, the search goes on about each model that is new.
+    the fit of the model found to what the search looks at; and the last fit of which it was asked what it leaves, with that.
+    What an error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function
+    of the joints no more of it is thought of. And where what is left is one, the search goes on about each model that is new.
     """
     candidates, searched = list(part.case.candidates.values()), part.searched
     about = declared = part.declared
     before, settled = None, True
+    tested: tuple[Fit, Repeatable | None] | None = None
+    # The fit to all measurements starts where that to some ends.
+    enough = SETTLED if searched is part.case.observations else ON_THE_WAY
     if start:
         found_before, before = start
         about = fit(found_before.model, searched, found_before.noise, found_before.estimate, True, ON_THE_WAY)
@@ -260,15 +296,22 @@ def _explained(
         leading = " with ".join(words) or "nothing is missing"
         tell(f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}")
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
-        about = fit_with_sizes(declared, searched, noise, selected(problem, model), near, settled=ON_THE_WAY)
+        about = fit_with_sizes(declared, searched, noise, selected(problem, model), near, settled=enough)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
-        if not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit):
-            # About a model that is new the problem is another one, and what is a function of the joints is no error of poses.
-            new = named not in (before, ()) or model.pose_error_rad > settings.pose_repeatability_rad
-            if not new or not _remains(about, searched, seed):
-                break
+        ends = not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit)
+        # What is a function of the joints is no error of poses, and about a model that is new the problem is another one.
+        large = model.pose_error_rad > settings.pose_repeatability_rad
+        if large or (ends and named not in (before, ())):
+            tested = about, repeatable_part(about, searched, seed)
+        remains = tested is not None and tested[0] is about and tested[1] is not None and tested[1].remains
+        if ends and not remains:
+            break
+        if remains:
             most_pose_error_rad = settings.pose_repeatability_rad
+            if large:
+                noise = noise_beside(about, searched, most_pose_error_rad)
+                about = fit(about.model, searched, noise, about.estimate, True, enough)
         before = named
         if round_number + 1 < settings.linearizations:
             # The next problem takes the room of this one.
@@ -276,13 +319,13 @@ def _explained(
     else:
         settled = False
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
-    return Evidence(problem, found, alarm, conclusion, adopted, settled), about
+    return Evidence(problem, found, alarm, conclusion, adopted, settled), about, tested
 
 
-def _remains(fitted: Fit, observations: Observations, seed: int) -> bool:
-    """Whether what a model leaves is a function of the joints."""
-    found = repeatable_part(fitted, observations, seed)
-    return found is not None and found.remains
+def _near(fitted: Fit, other: Fit) -> bool:
+    """Whether no parameter of a model moved by more than `_HARDLY` from one fit to another."""
+    moved = parameter_values(fitted.model, fitted.estimate) - parameter_values(other.model, other.estimate)
+    return bool((np.abs(moved) <= _HARDLY * np.sqrt(np.diag(other.covariance))).all())
 
 
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:

@@ -67,7 +67,11 @@ class Grid:
 
     def of(self, unit: Unit) -> np.ndarray:
         """Logarithms of the weights for one unit: sizes from its smallest to its largest share them, ndarray (S,)."""
-        return self._between[unit.smallest, unit.largest]
+        return self.between(unit.smallest, unit.largest)
+
+    def between(self, smallest: int, largest: int) -> np.ndarray:
+        """The same by the places of both sizes."""
+        return self._between[smallest, largest]
 
     def root_mean_square(self, unit: Unit) -> float:
         """Standard deviation of a coefficient of a unit before the measurements, over all its sizes, in plausible sizes."""

@@ -57,12 +57,13 @@ class Deviations:
     """Rows beside a model.
 
     `residual` (N, rows): m and rad, base axes. `distance` (N,): from what the other rows predict, in robust standard
-    deviations. `gross` (N,) of bool.
+    deviations. `gross` (N,) of bool. `yardstick`: by which they were judged, where they are those of a fit.
     """
 
     residual: np.ndarray
     distance: np.ndarray
     gross: np.ndarray
+    yardstick: Yardstick | None = None
 
     @classmethod
     def none(cls, count: int, rows: int) -> Deviations:
@@ -211,8 +212,9 @@ def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = n
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
     rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
-    distance = rows.distances(rows.yardstick(fitted, noise, kept), kept)
-    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
+    yardstick = rows.yardstick(fitted, noise, kept)
+    distance = rows.distances(yardstick, kept)
+    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings), yardstick)
 
 
 def held_out_gross_errors(

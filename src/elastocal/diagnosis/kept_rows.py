@@ -11,6 +11,7 @@ from scipy.linalg import lapack, solve_triangular
 from elastocal.diagnosis.evidence import scale_weights
 from elastocal.diagnosis.gross_errors import beyond_chance, gross_errors, most_by_chance
 from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.statistics import mirror
 from elastocal.fitting.least_squares import evaluated, fit
 from elastocal.fitting.observations import measured_in, sample_of, select_states, spread_poses, without_outlying_repeats
 from elastocal.fitting.tolerances import estimated_noise, fit_declared
@@ -54,7 +55,9 @@ def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | Non
         return last
     part = case.select(kept)
     noise, warnings = estimated_noise(part)
-    searched = sample_of(part.observations, settings.searched_observations)
+    # Where rows only leave, the rest of the last sample.
+    like = last.searched if last is not None and not (kept & ~last.kept).any() else None
+    searched = sample_of(part.observations, settings.searched_observations, like)
     return Kept(part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched)
 
 
@@ -141,7 +144,7 @@ def _precision(covariance: np.ndarray, declared: np.ndarray) -> np.ndarray:
     root = np.linalg.cholesky(covariance)
     basis, _ = _declared_basis(root, declared)
     inverse = lapack.dpotri(root, lower=1)[0]
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    mirror(inverse)
     beside = solve_triangular(root, basis, lower=True, trans="T")
     return inverse - beside @ beside.T
 

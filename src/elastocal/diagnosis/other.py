@@ -163,16 +163,16 @@ def _principal(
     slope = (angle - center) @ random / squares if straight and squares > _ROUNDING else np.zeros_like(mean)
     largest = max(np.abs(_load(campaign, location)).max(initial=0.0), _ROUNDING)
 
-    def waves(around: Conditions) -> np.ndarray:
-        found = size * np.cos(inputs.of(around) @ frequency + phase) - mean
+    def waves(around: Conditions, random: np.ndarray) -> np.ndarray:
+        found = random - mean
         if straight:
             found -= np.outer(around.joint_angles[:, inputs.coordinate] - center, slope)
         return found * (_load(around, location) / largest)[:, None] if loaded else found
 
-    seen = waves(campaign)
+    seen = waves(campaign, random)
     _, vectors = np.linalg.eigh(seen.T @ seen)
     axes = vectors[:, ::-1][:, :count]
-    return lambda around: waves(around) @ axes
+    return lambda around: waves(around, size * np.cos(inputs.of(around) @ frequency + phase)) @ axes
 
 
 def _fourier(inputs: int, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -18,6 +18,10 @@ import numpy as np
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.parameters import parameter_values
 from elastocal.fitting.tolerances import with_prior
+from elastocal.fitting.whitening import whitening
+
+# Of the mean square; each step leaves what the error common to a pose makes of it, which does not grow.
+_NOISE_STEPS, _NOISE_SETTLED = 20, 0.02
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.linearize import Linearized
@@ -85,6 +89,18 @@ def mean_square(fitted: Fit) -> float:
     white = fitted.whitened(fitted.residual)
     squares = (white**2).sum() + ((parameter_values(fitted.model, fitted.estimate) / fitted.prior_std) ** 2).sum()
     return float(squares / (white.size - (np.isinf(fitted.prior_std) & ~fitted.held).sum()))
+
+
+def noise_beside(fitted: Fit, observations: Observations, pose_rad: float) -> Noise:
+    """Noise of measurements that a fit leaves if those of a pose have no more in common: by it the mean square stays."""
+    noise = replace(fitted.noise, pose_rad=min(fitted.noise.pose_rad, pose_rad))
+    usual, residual = (fitted.whitened(fitted.residual) ** 2).mean(), fitted.residual * np.sqrt(fitted.weights)[:, None]
+    for _ in range(_NOISE_STEPS if fitted.joint_jacobian is not None else 0):
+        over = (whitening(observations, fitted.joint_jacobian, noise).apply(residual) ** 2).mean() / usual
+        noise = noise.scaled(float(np.sqrt(over)))
+        if over < 1.0 + _NOISE_SETTLED:
+            break
+    return noise
 
 
 def remaining_noise(problem: Problem, model: Model, taken: Noise, least: Noise) -> Noise:

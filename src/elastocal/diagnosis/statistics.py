@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import blas, solve_triangular
 
 from elastocal.fitting.observations import groups_by_size
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 # Products of one pose with all columns that are in memory at once.
 _AT_ONCE = 1_000_000
+# Rows that are mirrored at once, which stay in the processor's cache.
+_MIRRORED = 64
 # Of a square from which another one was taken, less than this share is rounding.
 _INSIDE = 1e-12
 
@@ -187,7 +189,9 @@ class Statistics:
     freedom: int
 
     def at(self, chosen: np.ndarray | slice) -> Statistics:
-        """The same at some of the sizes of the pose error only; a slice copies nothing."""
+        """The same at some of the sizes of the pose error only; those beside each other are not copied."""
+        if not isinstance(chosen, slice) and len(chosen) and np.ptp(chosen) == len(chosen) - 1:
+            chosen = slice(int(chosen[0]), int(chosen[-1]) + 1)
         some = {name: values[chosen] for name, values in vars(self).items() if name != "freedom"}
         return Statistics(**some, freedom=self.freedom)
 
@@ -198,15 +202,26 @@ class Statistics:
 
 def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
     """Sufficient statistics at some sizes of the pose error (T,)."""
-    count, (totals, log_dets) = products.declared, _at(products, pose_error_rad)
-    factors = np.linalg.cholesky(totals[:, :count, :count])
-    for tau, total, factor, log_det in zip(pose_error_rad, totals, factors, log_dets, strict=True):
-        taken = solve_triangular(factor, total[:count, count:], lower=True)
-        total[count:, count:] -= taken.T @ taken
-        products.met[float(tau)] = factor, taken, total[count:, count:], float(log_det)
-    rest = totals[:, count:, count:]
+    count, sizes = products.declared, np.asarray(pose_error_rad)
+    # Without a pose error declared columns are orthonormal, and the others have nothing in them.
+    above = np.tile(products.gram[:count], (len(sizes), 1, 1))
+    rest = np.tile(products.gram[count:, count:], (len(sizes), 1, 1))
+    log_dets = np.zeros(len(sizes))
+    for _, _, rows, values in products.by_pose() if sizes.any() else ():
+        for number in np.flatnonzero(sizes):
+            tau = sizes[number]
+            taken = (rows * (tau / np.sqrt(1.0 + tau**2 * values))[..., None]).reshape(-1, rows.shape[2])
+            above[number] -= taken[:, :count].T @ taken
+            _less_squares(rest[number], taken[:, count:])
+            log_dets[number] += np.log1p(tau**2 * values).sum()
+    factors = np.linalg.cholesky(above[:, :, :count])
+    for tau, total, factor, beside, log_det in zip(sizes, rest, factors, above[:, :, count:], log_dets, strict=True):
+        taken = solve_triangular(factor, beside, lower=True) if tau else beside
+        if tau:
+            _less_squares(total, taken)
+            mirror(total)
+        products.met[float(tau)] = factor, taken, total, float(log_det)
     logs = -0.5 * log_dets - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-    sizes = np.asarray(pose_error_rad)
     return Statistics(sizes, rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom)
 
 
@@ -219,16 +234,17 @@ def normal_equations(products: Products, tau: float) -> tuple[np.ndarray, float]
     return np.block([[factor @ factor.T, across], [across.T, rest + taken.T @ taken]]), log_det
 
 
-def _at(products: Products, pose_error_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Z'Sigma(tau)^-1 Z (T, P + K + 1, P + K + 1), and ln |Sigma| beyond that of white noise (T,)."""
-    totals, log_dets = np.tile(products.gram, (len(pose_error_rad), 1, 1)), np.zeros(len(pose_error_rad))
-    for _, _, rows, values in products.by_pose() if np.any(pose_error_rad) else ():
-        for number, tau in enumerate(pose_error_rad):
-            if tau:
-                taken = (rows * (tau / np.sqrt(1.0 + tau**2 * values))[..., None]).reshape(-1, rows.shape[2])
-                totals[number] -= taken.T @ taken
-                log_dets[number] += np.log1p(tau**2 * values).sum()
-    return totals, log_dets
+def _less_squares(matrix: np.ndarray, rows: np.ndarray) -> None:
+    """Take the products of some rows' columns off the lower triangle of a symmetric matrix, in place."""
+    blas.dsyrk(-1.0, np.ascontiguousarray(rows).T, 1.0, matrix.T, overwrite_c=True)
+
+
+def mirror(matrix: np.ndarray) -> None:
+    """Copy the lower triangle of a square matrix to the upper one, in place, a few rows at a time."""
+    for start in range(0, len(matrix), _MIRRORED):
+        part = slice(start, start + _MIRRORED)
+        matrix[part, part] = np.tril(matrix[part, part]) + np.tril(matrix[part, part], -1).T
+        matrix[part, start + _MIRRORED :] = matrix[start + _MIRRORED :, part].T
 
 
 def null_draws(

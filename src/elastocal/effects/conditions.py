@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.mechanics.elastostatics import generalized_forces
-from elastocal.mechanics.kinematics import Motion, motion
+from elastocal.mechanics.kinematics import Motion, cross, motion
 from elastocal.mechanics.sites import Sites
 
 if TYPE_CHECKING:
@@ -87,7 +87,9 @@ class Conditions:
 
         N on translations, N m on rotations.
         """
-        force, moment = self.wrench.T[:3], self.wrench.T[3:] + np.cross(self.motion.position[0], self.wrench.T[:3], axis=0)
+        force, moment = self.wrench.T[:3], np.empty((3, len(self.wrench)))
+        cross(self.motion.position[0], force, moment)
+        moment += self.wrench.T[3:]
         return self.motion.generalized_forces(self.sites.followed[0].after, force, moment).T
 
     @cached_property
@@ -148,8 +150,17 @@ class Conditions:
     @cached_property
     def mass_torques(self) -> np.ndarray:
         """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m, S, n)."""
-        numbers = range(MASS_PARAMETERS * len(self.sites.masses))
-        return np.array([self._weighing(*self._correction(number)) for number in numbers])
+        moved, bodies, centres = self.motion, self._body_rotation, np.array([mass.centre_m for mass in self.sites.masses])
+        chosen = slice(np.searchsorted(moved.coordinate, self.sites.joints))
+        falling, turning = self._falling
+        first = np.empty((len(bodies), MASS_PARAMETERS, *bodies.shape[1:2], bodies.shape[-1]))
+        first[:, 1:] = bodies.swapaxes(1, 2)
+        first[:, 0] = self._body_position + (bodies * centres[:, None, :, None]).sum(axis=2)
+        on_each = sum(turning[i][chosen] * first[:, :, i, None] for i in range(3))
+        on_each[:, 0] += falling[chosen]
+        on_each *= self._behind[chosen].T[:, None, :, None]
+        found = moved.by_coordinate(on_each)
+        return found.reshape(-1, *found.shape[2:]).swapaxes(1, 2)
 
     @cached_property
     def weight(self) -> np.ndarray:

@@ -119,13 +119,13 @@ class Factored:
         return [(members, rows[members].reshape(len(members), members.shape[1] * height, len(used))) for members in groups]
 
     def _products_by_state(self, right: np.ndarray | None = None) -> np.ndarray:
-        """J' times some rows (M, rows, q), or times J itself, summed over each state: ndarray (C', S, q)."""
+        """J' times some rows (M, rows, q), or times J itself, summed over each state: ndarray (S, C', q)."""
         spans, states = self.displacements.spans, self.displacements.values.shape[1]
         width = len(spans) if right is None else right.shape[2]
-        found = np.zeros((len(spans), states, width))
+        found = np.zeros((states, len(spans), width))
         for members, rows in self._by_state:
             other = rows if right is None else right[members].reshape(*rows.shape[:2], width)
-            found[:, self.state[members[:, 0]]] = (rows.transpose(0, 2, 1) @ other).transpose(1, 0, 2)
+            found[self.state[members[:, 0]]] = rows.transpose(0, 2, 1) @ other
         return found
 
     def gram(self) -> np.ndarray:
@@ -148,7 +148,7 @@ class Factored:
 
     def _gram_of_entries(self) -> np.ndarray:
         values, spans = self.displacements.values, self.displacements.spans
-        pairs = np.ascontiguousarray(self._products_by_state().transpose(0, 2, 1))
+        pairs = np.ascontiguousarray(self._products_by_state().transpose(1, 2, 0))
         place = np.repeat(np.arange(len(spans)), [span.stop - span.start for _, span in spans])
         found = np.empty((len(values), len(values)))
         large = sum(span.stop - span.start >= _MANY_ENTRIES for _, span in spans)
@@ -171,7 +171,7 @@ class Factored:
         for chosen, part in self._parts(right.shape[2]):
             seen = part._products_by_state(right[chosen])
             for number, (_, span) in enumerate(self.displacements.spans):
-                found[span] += part.displacements.values[span] @ seen[number]
+                found[span] += part.displacements.values[span] @ seen[:, number]
         return self.displacements.folded(found)
 
     def times_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
@@ -190,7 +190,7 @@ class Factored:
             at = of_state[mine[:, 0]]
             for number, (_, span) in enumerate(self.displacements.spans):
                 some = values[span][:, mine].transpose(1, 0, 2)
-                found[span, at] = (some @ seen[number][mine]).transpose(1, 0, 2)
+                found[span, at] = (some @ seen[mine, number]).transpose(1, 0, 2)
         folded = self.displacements.folded(found.reshape(len(values), poses * right.shape[2]))
         return np.ascontiguousarray(folded.T).reshape(poses, right.shape[2], self.columns)
 

@@ -165,20 +165,26 @@ class Parts:
         kept = self.around[number]
         if kept is not None:
             return kept
-        states, coordinates = self.parts[number].states, None
-        if number in self.coordinates:
-            moved, displaced = self.coordinates[number]
-            coordinates = np.zeros((len(states), self.model.sites.chain.coordinates))
-            coordinates[:, moved] = displaced
-        return conditions(self.model, estimate or self.estimate, states, coordinates)
+        states, estimate = self.parts[number].states, estimate or self.estimate
+        if number not in self.coordinates:
+            around = conditions(self.model, estimate, states)
+            self._keep_coordinates(number, estimate, around)
+            return around
+        moved, displaced = self.coordinates[number]
+        coordinates = np.zeros((len(states), self.model.sites.chain.coordinates))
+        coordinates[:, moved] = displaced
+        return conditions(self.model, estimate, states, coordinates)
+
+    def _keep_coordinates(self, number: int, estimate: Estimate, around: Conditions) -> None:
+        displaced = displaced_coordinates(self.model, estimate, around)
+        moved = np.flatnonzero(displaced.any(axis=0))
+        self.coordinates[number] = moved, displaced[:, moved]
 
     def _linearized(self, number: int, part: Observations) -> Linearization:
         around = self._around(number)
         line = linearize(self.model, self.estimate, part, around)
         if self.around[number] is None:
-            displaced = displaced_coordinates(self.model, self.estimate, around)
-            moved = np.flatnonzero(displaced.any(axis=0))
-            self.coordinates[number] = moved, displaced[:, moved]
+            self._keep_coordinates(number, self.estimate, around)
         else:
             self.around[number] = line.conditions
         jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]

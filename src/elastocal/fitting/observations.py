@@ -276,11 +276,17 @@ def spread_poses(observations: Observations, most: int) -> np.ndarray:
     return chosen[pose]
 
 
-def sample_of(observations: Observations, most: int) -> Observations:
-    """About so many observations at poses spread over a campaign, or all where the sample would miss a session or a target."""
+def sample_of(observations: Observations, most: int, like: Observations | None = None) -> Observations:
+    """About so many observations at poses spread over a campaign, or all where the sample would miss a session or a target.
+
+    `like`: a sample of the same campaign, of whose states they are to be.
+    """
     if len(observations) <= most:
         return observations
-    some = select_states(observations, spread_poses(observations, most))
+    chosen = spread_poses(observations, most)
+    if like is not None:
+        chosen = np.isin(np.arange(len(chosen)), observations.state[measured_in(observations, like, np.ones(len(like), bool))])
+    some = select_states(observations, chosen)
     sessions = np.isin(observations.states.session, some.states.session).all()
     return some if sessions and np.isin(observations.target, some.target).all() else observations
 
