@@ -198,7 +198,7 @@ class Motion:
         """
         twist = self.twist[..., chosen]
         angular, moved = twist[3:], np.empty_like(twist[:rows])
-        _cross(angular, position, moved[:3])
+        cross(angular, position, moved[:3])
         moved[:3] += twist[:3]
         moved[3:] = angular[: rows - 3]
         return self._behind_none(moved, after)
@@ -351,12 +351,12 @@ def _store_twist(transform: Transform, frame: Frame, target: np.ndarray | None, 
         linear[:], angular[:] = 0.0, axis
     else:
         angular[:] = axis
-        _cross(axis, target - frame[1], linear)
+        cross(axis, target - frame[1], linear)
     if transform.sign < 0:
         twist *= -1.0
 
 
-def _cross(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
+def cross(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
     """Vector products, component first: (3, ...)."""
     product = np.empty_like(out[0])
     for i in range(3):
