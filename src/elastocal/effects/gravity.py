@@ -136,7 +136,7 @@ def declared_masses(own: Effect, sites: Sites) -> Candidates:
 
     def alike(around: Conditions) -> Displacements:
         each = law(around)
-        return [{joint: sum(turns[joint] for turns in each) for joint in range(sites.joints)}]
+        return [{joint: np.sum([turns[joint] for turns in each], axis=0) for joint in range(sites.joints)}]
 
     options: Mapping[str, Any] = {"needs": {"external load"}, "location_name": "arm"}
     yield own.candidate((), own.parameters("share", ["share"], "1", sites), alike, detail="all alike", **options)
