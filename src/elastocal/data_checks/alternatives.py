@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.data_checks.hypotheses import IN_SESSION, POSES, hypotheses, measured_otherwise, shifts, with_unknown
+from elastocal.data_checks.hypotheses import IN_SESSION, POSES, Change, hypotheses, measured_otherwise, shifts, with_unknown
 from elastocal.data_checks.placement import (
     FAR_BETTER,
     IMPLAUSIBLE_M,
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements, Target
-    from elastocal.data_checks.hypotheses import Change
     from elastocal.data_checks.placement import Placement
     from elastocal.fitting.model import Estimate
 
@@ -51,6 +50,8 @@ _MOST_ALIKE = 5
 # A base that stands less far off than this may be the zero of the first joint or the height of the column: for physics to
 # tell, and a warning here. Ten times what geometric errors of industrial robots reach.
 _NEAR_M, _NEAR_RAD = 0.05, 0.05
+# The file as it stands.
+_NONE = Change("", "", lambda campaign: campaign)
 # Faults that are mended one after the other.
 _ROUNDS = 3
 
@@ -75,9 +76,9 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Reading:
-    """A campaign read with a change, or as written, and where it then lies beside the nominal robot."""
+    """A campaign read with a change, and where it then lies beside the nominal robot."""
 
-    change: Change | None
+    change: Change
     campaign: Campaign
     placement: Placement
 
@@ -134,7 +135,7 @@ def _slightly_turned(campaign: Campaign) -> list[Fault]:
 
 def _mended(campaign: Campaign, tried: tuple[Sequence[Change], Sequence[Change]]) -> tuple[list[Fault], Campaign]:
     """Fault of the hypothesis that mends the measurements, and the campaign as it is then read; `tried`: as `hypotheses`."""
-    written = Reading(None, campaign, robustly_placed(campaign, campaign.measurements))
+    written = Reading(_NONE, campaign, robustly_placed(campaign, campaign.measurements))
     # All measurements but a few, or all: a joint may move in a few poses only.
     measures = [measure for measure in (trimmed_rms, rms) if written.misfit(measure).implausible]
     readings = [[_read(campaign, change) for change in part] for part in tried] if measures else []
@@ -170,7 +171,7 @@ def _best(tried: Sequence[Reading], before: Misfit, measure: Callable[[np.ndarra
         after = best.misfit(measure)
         if evidence := _evidence(before, after, best):
             others = [tried[n].change for n in alike[1 : 1 + _MOST_ALIKE]]
-            return best, after, evidence, tuple(change.detail for change in others if change and change.detail)
+            return best, after, evidence, tuple(change.detail for change in others if change.detail)
     return None
 
 
