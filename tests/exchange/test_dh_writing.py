@@ -10,7 +10,7 @@ from support import refused, robot_of
 
 from elastocal.application.exported import fold_effects
 from elastocal.exchange.dh import robot_from_dh
-from elastocal.exchange.dh_writing import PARAMETERS, dh_deltas, dh_frames, dh_rows, dh_table
+from elastocal.exchange.dh_writing import PARAMETERS, dh_deltas, dh_rows, dh_table
 from elastocal.mechanics.kinematics import poses
 
 NAMES = sorted(path.stem for path in ROBOTS.glob("*.yaml"))
@@ -67,16 +67,6 @@ def test_angles_are_the_controllers_where_it_counts_each_joint_by_itself(tmp_pat
     assert_same(turned, read_back(turned, tmp_path))
     coupled = replace(robot, reported_matrix=np.array([[1.0, 0.0], [1.0, 1.0]]))
     np.testing.assert_array_equal(dh_rows(coupled), dh_rows(robot))
-
-
-def test_frames_have_their_z_axes_on_the_joints_and_end_at_the_flange(kuka):
-    frames = dh_frames(kuka)
-    assert len(frames) == 8
-    position, rotation = flange(kuka, np.zeros((1, 6)))
-    np.testing.assert_allclose(frames[-1][:3, 3], position[0], atol=1e-12)
-    np.testing.assert_allclose(frames[-1][:3, :3], rotation[0], atol=1e-12)
-    # Turning joint 2 by a little leaves points on its axis where they are.
-    np.testing.assert_allclose(np.abs(frames[0][:3, 2]), [0, 0, 1], atol=1e-12)
 
 
 @pytest.mark.parametrize("chain", ["Tz(q1) Ry(q2) [tip]", "Ry(q1) Tx(0.5) Ry(q2) Tx(0.2) Ry(-q2) [tip]"])

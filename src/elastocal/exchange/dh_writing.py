@@ -36,14 +36,6 @@ def dh_rows(robot: Robot) -> np.ndarray:
     return _describe(robot, None, robot.counts_each_joint)[0]
 
 
-def dh_frames(robot: Robot) -> np.ndarray:
-    """Frames of the rows in base axes where the controller reports zero, ndarray (n + 2, 4, 4): F_0 before joint 1 first."""
-    frames = [np.eye(4)]
-    for row in dh_rows(robot):
-        frames.append(frames[-1] @ _transform(row))
-    return np.array(frames[1:])
-
-
 def dh_table(robot: Robot, nominal: Robot | None = None) -> pd.DataFrame:
     """Rows as `elastocal import dh` reads them: ``Ty(b) Ry(beta)`` becomes a fixed row of its own.
 
