@@ -156,7 +156,9 @@ class Conditions:
         first = np.empty((len(bodies), MASS_PARAMETERS, *bodies.shape[1:2], bodies.shape[-1]))
         first[:, 1:] = bodies.swapaxes(1, 2)
         first[:, 0] = self._body_position + (bodies * centres[:, None, :, None]).sum(axis=2)
-        on_each = np.sum([turning[i][chosen] * first[:, :, i, None] for i in range(3)], axis=0)
+        on_each = turning[0][chosen] * first[:, :, 0, None]
+        for i in (1, 2):
+            on_each += turning[i][chosen] * first[:, :, i, None]
         on_each[:, 0] += falling[chosen]
         on_each *= self._behind[chosen].T[:, None, :, None]
         found = moved.by_coordinate(on_each)
