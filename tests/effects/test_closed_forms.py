@@ -18,13 +18,18 @@ from elastocal.effects.conditions import conditions_of
 from elastocal.effects.elastic import joint_compliance
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.robot import Mass
 
 CHAINS = {"fanuc": None, "track": TRACK} | {name: OTHER_CHAINS[name] for name in ("fixed rotations", "seven joints", "ur10")}
 STATES, GRAVITY = 4, np.array([0.0, 0.0, -9.80665])
 # Nodes of an integral along a link.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 LONG_M = 0.05
+# Of a robot whose file says what its links weigh.
+MASSES = (Mass(2, 40.0, (0.1, -0.02, 0.3), 0.1), Mass(3, 15.0, (-0.05, 0.1, 0.02), 0.1))
 EYE = np.eye(3)
+# Arms under loads anywhere, in a pull, and with declared masses.
+PLAIN, PULLED, WEIGHED = "plain", "pulled", "weighed"
 
 
 class Arm:
@@ -171,6 +176,17 @@ def link_weight(arm, law, name):
     return arm.of_joint(law.joints[0], torque[:, law.joints[0] - 1]) if law.joints else arm.turned(torque * arm.compliance)
 
 
+def declared_masses(arm, law, name):
+    """Of all the masses that the sites declare, or of the one that the name counts."""
+    torques = []
+    for mass in MASSES:
+        after = arm.places[mass.link - 1] + 1
+        along = [part * weight(arm, after, f"moment_{axis}") for part, axis in zip(mass.centre_m, "xyz", strict=True)]
+        torques.append(mass.mass_kg * (weight(arm, after, "") + sum(along)))
+    torque = sum(torques) if name == "share" else torques[int(name.rsplit("_", 1)[1])]
+    return arm.turned(torque * arm.compliance)
+
+
 def payload(arm, law, name):
     return arm.turned(weight(arm, arm.end, name) * arm.compliance)
 
@@ -308,6 +324,7 @@ CLOSED_FORMS = {
     "tracker_scale": lambda arm, law, name: scaled(arm, 1.0),
     "link_weight": link_weight,
     "payload": payload,
+    "declared_masses": declared_masses,
     "compensator_torque": of_the_joint(lambda arm, law, name: wave(name, joint_angle(arm, law))),
     "transmission_harmonic": of_the_joint(lambda arm, law, name: wave(name, joint_angle(arm, law))),
     "transmission_ratio": of_the_joint(lambda arm, law, name: arm.states.joint_angles[:, int(name.removeprefix("per_q")) - 1]),
@@ -340,17 +357,17 @@ CLOSED_FORMS = {
 
 @pytest.fixture(scope="module")
 def arms(fanuc):
-    """Each chain, under loads anywhere and in a pull, with conditions and the Jacobian of the chain with all its sites."""
+    """Each chain of each kind, with conditions and the Jacobian of the chain with all its sites."""
     found = {}
     for name, text in CHAINS.items():
         chain = fanuc.chain if text is None else chain_of(text)
-        for pulled in (False, True):
-            arm, sites = Arm(chain, pulled), equipped(chain)
+        for kind in PLAIN, PULLED, WEIGHED:
+            arm, sites = Arm(chain, kind == PULLED), replace(equipped(chain), masses=MASSES if kind == WEIGHED else ())
             at = np.zeros((STATES, sites.chain.coordinates))
             at[:, : arm.joints] = arm.states.joint_angles
             points = [replace(point, offset_m=(0.0, 0.0, 0.0)) for point in sites.chain.points]
             jacobian = np.stack([poses_and_jacobians(sites.chain, at, point)[2] for point in points], axis=1)
-            found[name, pulled] = arm, conditions_of(sites, arm.compliance, arm.states), jacobian
+            found[name, kind] = arm, conditions_of(sites, arm.compliance, arm.states), jacobian
     return found
 
 
@@ -364,8 +381,9 @@ def shapes_of(law):
 
 def compared(arms, chain, laws, closed):
     """Key, name, dense displacement, what it makes of the points, and what it should, for each parameter of each law."""
-    for law in laws(arms[chain, False][1].sites):
-        arm, around, jacobian = arms[chain, law.detail.endswith("in the pull")]
+    kind = PLAIN if laws(arms[chain, PLAIN][1].sites) else WEIGHED
+    for law in laws(arms[chain, kind][1].sites):
+        arm, around, jacobian = arms[chain, PULLED if law.detail.endswith("in the pull") else kind]
         for shapes in shapes_of(law):
             made = displacements(law, around, *shapes)
             for parameter, each in zip(law.parameters, made, strict=True):

@@ -13,7 +13,8 @@ def arm():
     return analysed("gp180")
 
 
-@pytest.mark.parametrize("name", effects())
+# The robot of the figures declares no masses.
+@pytest.mark.parametrize("name", sorted({*effects()} - {"declared_masses"}))
 def test_every_effect_of_the_catalogue_displaces_the_reflector_somewhere(name, arm):
     shown = signature(name, arm)
     moved = shown.moved.values()

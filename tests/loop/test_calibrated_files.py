@@ -40,7 +40,10 @@ def test_the_robot_is_that_of_the_final_fit(checkout):
     assert [e.key for e in found.calibrated.model.effects] == ["joint_compliance", "joint_offset@3"]
     for mine, theirs in zip(found.calibrated.estimate.coefficients, expected.estimate.coefficients, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=1e-6)
-    np.testing.assert_allclose(found.calibrated.covariance, expected.covariance, rtol=1e-3)
+    # What hardly varies together may be off by more than its own thousandth: measured beside the standard errors.
+    errors = np.sqrt(np.diag(expected.covariance))
+    off = np.abs(found.calibrated.covariance - expected.covariance)
+    assert (off <= 1e-3 * np.abs(expected.covariance) + 1e-6 * np.outer(errors, errors)).all()
     assert (found.calibrated.noise.joint_rad >= expected.noise.joint_rad).all()
     assert found.calibrated.scope.frame == ("robot" if found.case.model.fitted_frames else "base")
     assert found.verdict["campaign"] == found.name == "made"

@@ -138,10 +138,10 @@ def _mended(campaign: Campaign, tried: tuple[Sequence[Change], Sequence[Change]]
     written = Reading(_NONE, campaign, robustly_placed(campaign, campaign.measurements))
     # All measurements but a few, or all: a joint may move in a few poses only.
     measures = [measure for measure in (trimmed_rms, rms) if written.misfit(measure).implausible]
-    readings = [[_read(campaign, change) for change in part] for part in tried] if measures else []
+    each_part = [[_read(campaign, change) for change in part] for part in tried] if measures else []
     for measure in measures:
         before, best = written.misfit(measure), None
-        for part in readings:
+        for part in each_part:
             winner = _best(part, before, measure) if part else None
             if winner and (best is None or winner[1].together < best[1].together / FAR_BETTER):
                 best = winner

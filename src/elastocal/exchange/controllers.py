@@ -172,7 +172,8 @@ def axes_of(controller: Controller, prismatic: Sequence[bool], stated: str) -> t
         found = f"{counted(len(prismatic) - shifts, 'joint that turns', 'joints that turn')} and {shifts} that shift"
         allowed = f"--axes with what {controller.words} calls each of q1 to q{len(prismatic)}: {', '.join(known)}"
         if not controller.external:
-            allowed = f"{len(controller.axes)} joints that turn, which is all that {controller.words} has"
+            axes = counted(len(controller.axes), "joint that turns", "joints that turn")
+            allowed = f"{axes}, which is all that {controller.words} has"
         raise InputError("--format", controller.name, found, allowed)
     turning, shifting = iter(controller.axes), iter(controller.external)
     return tuple(next(shifting if shift else turning) for shift in prismatic)

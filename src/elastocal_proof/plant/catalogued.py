@@ -90,6 +90,14 @@ def link_weight(robot: PhysicalRobot, size: float, draws: Draws, *joints: int) -
     return built(robot, masses=(*old, *(replace(mass, mass_kg=size * mass.mass_kg / total) for mass in masses))), {}
 
 
+@kind("declared_masses", "1", 0.3, nowhere)
+def heavier_than_declared(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    """All links behind the column heavier by one share than the robot file says."""
+    declared = [mass for mass in on_stretches(declared_masses(robot.arm), robot.arm) if mass.stretch]
+    more = tuple(replace(mass, mass_kg=size * mass.mass_kg) for mass in declared)
+    return built(robot, masses=(*robot.structure.masses, *more)), {"share": size}
+
+
 @kind("payload", "kg", 25.0, nowhere, scale=(0.0, 1.0))
 def payload(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
     centre = 0.15 * direction(draws)
