@@ -179,3 +179,9 @@ def test_what_is_missing_ambiguous_or_wrong_is_said_with_the_option_that_helps(t
     source = words[0] if words[0].startswith("--") else (tmp_path / "t.csv").as_posix()
     with refused(source, "", *words):
         table(tmp_path, text, options)
+
+
+@pytest.mark.parametrize("name", ["=cmd", "+1", "-1", "@x", "a\u202eb"])
+def test_a_target_whose_name_would_be_a_formula_or_turn_letters_is_refused(tmp_path, name):
+    with refused("", "", ""):
+        table(tmp_path, f"q1,x,y,z,target\n1,1,2,3,{name}\n", replace(PLAIN, target=None))
