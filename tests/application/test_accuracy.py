@@ -12,7 +12,6 @@ from scipy.stats import chi, norm
 from synthetic import made_states
 
 from elastocal.application.accuracy import (
-    accuracy_from,
     accuracy_sentence,
     before_m,
     calibrate_on_case,
@@ -107,11 +106,6 @@ def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_know
     np.testing.assert_allclose(known, 1e-3 * np.linalg.norm(position[:, :2], axis=1), rtol=1e-2)
     # What is left are springs, of which `off` knows nothing.
     assert np.sqrt((unknown**2).mean()) < np.sqrt((known**2).mean())
-
-
-def test_statements_come_back_from_json(turned):
-    accuracy = predict_errors(set_scope(turned, True), np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
-    assert accuracy_from(accuracy.document()) == accuracy
 
 
 def test_quantiles_are_those_of_one_and_of_three_directions_and_hold_between():

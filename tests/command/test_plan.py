@@ -49,11 +49,6 @@ def test_a_plan_is_a_folder_to_fill_in_with_its_pages(planned, elastocal, refusa
     assert elastocal("check", tmp_path / "cell").exit_code == 0
 
 
-def test_the_floor_is_where_it_is_said_to_be(planned):
-    """A third of all configurations of this arm has its tip below the base."""
-    assert heights(planned("--floor", "0.3")[2]).min() > 0.3
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [

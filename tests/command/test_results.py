@@ -10,19 +10,15 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 from certified import record_jobs
-from made_calibrated import made_calibrated
-from made_urdf import joint, link, written
+from made_urdf import joint, link
 from made_urdf import robot as made
 from scipy.spatial.transform import Rotation
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence, error_rows
 from elastocal.application.calibrated import nominal_forward
-from elastocal.application.exported import fold_effects
 from elastocal.campaigns.reading import campaign_files, read_robot
-from elastocal.command.results import _drop_in
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.exchange.urdf_writing import write_calibrated_origins
 from elastocal.mechanics.kinematics import poses
 
 CERTIFICATE, VERDICT = Path("reports/loop/made/certificate.json"), Path("reports/loop/made/verdict.json")
@@ -176,19 +172,3 @@ def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_i
         assert where in refusal("export", "made", "--urdf", other, "--output", tmp_path / "none")
     assert "would be replaced" in refusal("export", "made", "--urdf", output / "robot.urdf", "--output", output)
     assert not (tmp_path / "none").exists() and (output / "robot.urdf").read_text() == text
-
-
-def test_what_a_urdf_has_no_place_for_is_stated_in_millimetres(tmp_path):
-    """No fixed joint stands behind the last one, whose link's own error turns with it; and ratios are no joint origins."""
-    path = written(tmp_path, link("a"), link("b"), link("c"), joint("one", "a", "b"), joint("two", "b", "c", xyz=(0.5, 0, 0)))
-    nominal, output = robot_from_urdf(path, "a", "c").robot, tmp_path / "robot.urdf"
-
-    def lines(*keys):
-        robot = fold_effects(made_calibrated(nominal, *keys, identified=False)).robot
-        drop_in = write_calibrated_origins(path, nominal, robot)
-        output.write_bytes(drop_in.content)
-        return _drop_in(drop_in, output, nominal, robot, np.array([[0.4, -0.3], [1.0, 0.2]]))
-
-    assert len(lines("joint_offset@1", "joint_offset@2", "link_geometry@1")) == 1
-    for key in ("link_geometry@2", "transmission_ratio@1"):
-        assert re.search(r"cannot hold .*: up to 0\.[0-9]*[1-9][0-9]* mm", lines("link_geometry@1", key)[1])

@@ -1,16 +1,12 @@
 """Quantities need their unit, lists their count; what is printed does not steer a terminal."""
 
 import io
-from typing import get_args
 
 import pytest
-import typer
 from rich.console import Console
 from support import refused
-from typer.testing import CliRunner
 
-from elastocal.command.main import app
-from elastocal.command.terminal import angle_rad, length_m, numbers, print_lines
+from elastocal.command.terminal import angle_rad, length_m, print_lines
 
 
 @pytest.mark.parametrize(
@@ -29,34 +25,6 @@ def test_a_quantity_without_a_unit_or_of_no_sense_is_refused(text):
     for read in (length_m, angle_rad):
         with refused("--tolerance", "", "with its unit"):
             read("--tolerance", text)
-
-
-def test_numbers_are_counted():
-    assert numbers("--tracker", "1,2.5,-3", 3).tolist() == [1.0, 2.5, -3.0]
-    for text in ("1,2", "1,2,x", "1,2,nan", "1,2,inf", "1,2,1e300"):
-        with refused("--tracker", "", "3 numbers"):
-            numbers("--tracker", text, 3)
-
-
-def numeric_options(command, words=()):
-    """Of every subcommand: its words with its arguments, and each of its options that is a number."""
-    for name, inner in getattr(command, "commands", {}).items():
-        yield from numeric_options(inner, (*words, name))
-    arguments = [p.name for p in command.params if p.param_type_name == "argument"]
-    for option in command.params:
-        if {int, float} & {option.type_descriptor.annotation, *get_args(option.type_descriptor.annotation)}:
-            yield (*words, *arguments), option.opts[0]
-
-
-@pytest.mark.parametrize("value", ["nan", "inf", "-1e300", "99999999999999999999"])
-def test_every_option_that_is_a_number_has_a_range(value):
-    """Whatever else is missing, the last line says which option is wrong."""
-    found = set()
-    for words, option in numeric_options(typer.main.get_command(app)):
-        result = CliRunner().invoke(app, [*words, option, value])
-        assert result.exit_code == 2 and f"'{option}'" in result.output.splitlines()[-1], (words, result.output)
-        found.add(option)
-    assert found == {"--force", "--risk", "--seed", "--poses", "--held-out", "--candidates", "--header", "--cores", "--floor"}
 
 
 def test_lines_are_printed_as_they_are_but_for_what_would_steer_a_terminal():

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels, texts_in_axes
+from drawn_figures import row_labels, texts_in_axes
 
 from elastocal_proof.figures.blind import power_map, rates_and_targets, reliability_diagram
 
@@ -27,17 +27,6 @@ def test_targets_have_a_dot_with_its_interval_and_the_range_of_the_target():
     assert [list(line.get_xdata()) for line in ratios.lines] == [pytest.approx([0.0, 30.0]), pytest.approx([10.0])]
     low, high = ratios.get_xlim()
     assert low == -high and high > 30
-
-
-def test_robots_of_the_proof_and_of_the_tuning_stand_side_by_side_in_one_row():
-    rows = [summary_row("detected at 50", rate, 0.1, 0.9, (0.97, 1.0), kind) for kind, rate in (("tuned", 0.4), ("proof", 0.5))]
-    nothing = summary_row("detected at 200", np.nan, 0.0, 1.0, (0.97, 1.0))
-    figure = rates_and_targets(pd.DataFrame([*rows, nothing, summary_row(MEAN, 1.0, 0.9, 1.1, (0.0, 1.05))]))
-    dots = {line.get_marker(): line.get_xydata().tolist()[0] for line in figure.axes[0].lines if len(line.get_xdata()) == 1}
-    assert dots == {"o": [50.0, -0.16], "D": [40.0, 0.16]}
-    assert "no cases" in texts_in_axes(figure)
-    assert legend_entries(figure) == ["robots of the proof", "robots on which it was developed", "target"]
-    assert_nothing_cut_off(figure)
 
 
 def power_rows(effect, level, share, level_of="retained", robots="proof"):

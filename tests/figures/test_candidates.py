@@ -1,13 +1,12 @@
 """Hypotheses, and candidates one by one: what is drawn is what the tables hold."""
 
-import numpy as np
 import pytest
 from drawn_figures import texts
 from made_loop_facts import plainly
 from made_loop_tables import candidate_table
 from made_loop_tables import probabilities as stated
 
-from elastocal.figures.candidates import probabilities, rank_candidates
+from elastocal.figures.candidates import probabilities
 
 
 def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
@@ -31,21 +30,6 @@ def test_of_many_hypotheses_the_leading_have_bars_and_the_rest_has_one():
     sets = [({f"effect_{number}": []}, 0.1) for number in range(10)]
     axis = probabilities(stated(sets), candidate_table()).axes[0]
     assert [bar.get_width() for bar in axis.patches] == pytest.approx([10] * 8 + [20])
-
-
-def test_factors_below_and_above_one_stand_on_both_sides_of_zero():
-    table = candidate_table(count=15, chosen=0)
-    table["log_bayes_factor"][:15] = np.linspace(3, -6, 15)
-    axis = probabilities(stated([({}, 1.0)]), table).axes[1]
-    low, high = axis.get_xlim()
-    assert low < -6 and high > 3 and 0 in axis.get_xticks() and min(axis.get_xticks()) < 0
-
-
-def test_each_candidate_stands_once_at_its_best_shape():
-    table = candidate_table()
-    table["candidate"][3] = table["candidate"][1]
-    assert 3 not in rank_candidates(table) and 1 in rank_candidates(table)
-    assert rank_candidates(table)[0] == 0
 
 
 def test_where_nothing_can_be_tested_the_figure_says_so():

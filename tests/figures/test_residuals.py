@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from drawn_figures import row_labels, texts
+from drawn_figures import row_labels
 from made_loop_tables import residual_table, step_rows
 from matplotlib.quiver import Quiver, QuiverKey
 
@@ -12,12 +12,6 @@ from elastocal.figures.residuals import METRICS, arrows, before_after, campaign_
 
 def quivers(axis):
     return [artist for artist in axis.get_children() if isinstance(artist, Quiver)]
-
-
-def test_large_campaigns_draw_one_state_of_each_cell():
-    figure = arrows(residual_table(poses=500))
-    assert max(len(quiver.X) for quiver in quivers(figure.axes[0])) < 500
-    assert any("one state of each cell" in text for text in texts(figure))
 
 
 def state_means(table):
@@ -74,15 +68,6 @@ def test_an_interval_reaches_from_end_to_end_is_open_above_or_is_not_drawn():
     for step, (_, end), (arrow,) in zip(steps, lines_of(p95, "interval"), lines_of(p95, "open interval"), strict=True):
         assert end[0] == arrow[0] == pytest.approx(1e6 * step["heldout_p95_m"])
     assert np.isnan([x for line in lines_of(largest, "interval") for x, _ in line]).all()
-
-
-@pytest.mark.parametrize("floor_m, scale", [(1.3e-5, "linear"), (None, "linear"), (1.1e-5, "log")])
-def test_the_axis_is_logarithmic_where_the_smallest_would_be_lost_beside_the_largest(floor_m, scale):
-    for axis in before_after(step_rows(effects=()), floor_m).axes:
-        assert axis.get_xscale() == scale
-        low, high = axis.get_xlim()
-        drawn = [bar.get_width() for bar in axis.patches] + ([1e6 * floor_m] if floor_m else [])
-        assert low < min(drawn) and high > max(drawn)
 
 
 TABLE = pd.DataFrame(

@@ -1,6 +1,5 @@
 """Figures of the study: lines, bands, bars and marks are where the tables have them, in their units."""
 
-import made_study_tables as made
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,7 +7,7 @@ from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
 from made_study_tables import TITLES, comparison
 from matplotlib.colors import to_hex
 
-from elastocal.figures.study import costs, designs, ladder, noise_impact, scores, stiffness_errors
+from elastocal.figures.study import noise_impact, scores, stiffness_errors
 from elastocal.figures.style import PALETTE
 
 LENGTHS = np.arange(1, 6)
@@ -102,36 +101,3 @@ def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
     assert find_points(k_sigma, "D") == [(1.5, 0.0, True)] and find_points(dev, "D") == [(1.0, 0.0, False)]
     assert [x for x, *_ in find_points(dev, "o")] == [1.2]
     assert find_points(figure.axes[5], "D") == [(30.0, 0.0, False)]
-
-
-def test_the_ladder_has_a_line_for_each_length_in_the_panel_of_its_noise():
-    table = pd.concat([made.ladder(), made.ladder().assign(length=40), made.ladder().assign(noise_um=50.0)])
-    figure = ladder(table)
-    assert [axis.get_title() for axis in figure.axes] == ["noise 200 µm and µrad", "noise 50 µm and µrad"]
-    first, second = figure.axes
-    assert len(first.lines) == 2 and len(second.lines) == 1
-    np.testing.assert_array_equal(first.lines[0].get_xydata(), [[0, 40], [1, 20]])
-    assert legend_entries(figure) == ["20", "40"]
-    assert_nothing_cut_off(figure)
-
-
-@pytest.mark.parametrize("robot", [0, 1])
-def test_designs_have_a_line_each_and_the_wanted_accuracy(robot):
-    figure = designs(made.designs(), TITLES, 60.0, "limits")
-    axis = figure.axes[robot]
-    by = {line.get_label(): line.get_ydata() for line in axis.lines}
-    assert list(by["random"]) == [200.0, 80.0] and list(by["I-optimal"]) == [88.0, 40.0]
-    assert [line.get_ydata()[0] for line in axis.lines if line.get_label().startswith("_")] == [60.0]
-    assert legend_entries(figure) == ["random", "A-optimal", "D-optimal", "I-optimal", "bound of all designs"]
-    assert_nothing_cut_off(figure)
-
-
-def test_costs_have_a_line_for_each_set_of_points_over_the_first():
-    figure = costs(made.costs(), made.break_even(), TITLES, 60.0)
-    kuka = figure.axes[0]
-    assert kuka.get_title() == "Kuka" and "60 µm over that of 6DoF" in kuka.get_ylabel()
-    # Where a set costs what the first does, as the table of break-even has it.
-    assert [line.get_xydata().tolist() for line in kuka.lines if line.get_gid() == "even"] == [[[0.35, 1.0]]]
-    np.testing.assert_allclose(kuka.lines[0].get_xydata(), [[0.1, 1.0], [1.0, 1.0]])
-    assert legend_entries(figure) == ["6DoF", "3+6DoF"]
-    assert_nothing_cut_off(figure)

@@ -1,13 +1,12 @@
 """Files that appear whole or not at all."""
 
-import os
 from pathlib import Path
 
 import pytest
 from support import refused
 
 from elastocal.io import atomic_writes
-from elastocal.io.atomic_writes import atomic_write, check_folder, check_places, remove_partials, write_text, write_together
+from elastocal.io.atomic_writes import atomic_write, check_places, remove_partials, write_text, write_together
 
 
 @pytest.mark.parametrize("before", [None, "much longer than what follows"])
@@ -48,32 +47,6 @@ def test_names_on_the_way_are_random_and_opened_exclusively(tmp_path, monkeypatc
     with pytest.raises(FileExistsError), write_together(tmp_path, ["one.txt"]):
         raise AssertionError("never written")
     assert (tmp_path / "victim").read_text() == "mine"
-
-
-def stands_there(path, kind):
-    if kind == "link":
-        path.symlink_to(path.parent / "victim")
-    elif kind == "pipe":
-        os.mkfifo(path)
-    else:
-        path.mkdir()
-
-
-@pytest.mark.parametrize("kind", ["link", "pipe", "folder"])
-def test_what_is_no_file_is_neither_replaced_nor_written_through(tmp_path, kind):
-    place = tmp_path / "deep"
-    place.mkdir()
-    (place / "victim").write_text("mine")
-    check_folder(tmp_path)
-    stands_there(place / "one.txt", kind)
-    with refused(place / "one.txt", "", f"found a {kind}; allowed: a place for a file"):
-        write_text(place / "one.txt", "x")
-    with refused(place / "one.txt", "", f"found a {kind}"), write_together(place, ["two.txt", "one.txt"]):
-        raise AssertionError("never written")
-    assert (place / "victim").read_text() == "mine" and len(list(place.iterdir())) == 2
-    if kind != "folder":
-        with refused(place / "one.txt", "", f"found a {kind}"):
-            check_folder(tmp_path)
 
 
 def test_a_folder_below_the_one_that_the_user_named_is_no_link(tmp_path):

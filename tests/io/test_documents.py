@@ -13,7 +13,6 @@ from elastocal.io.documents import (
     MOST_VALUES,
     check_document,
     named_document,
-    one_line,
     read_document,
     read_schema,
 )
@@ -94,12 +93,6 @@ def test_a_faulty_robot_or_strategy_is_refused_in_one_line(path, value, key, wor
 def test_a_urdf_for_a_document_is_told_how_it_is_imported(tmp_path, start):
     with refused(tmp_path / "a.yaml", "", "XML", "elastocal import urdf"):
         read(tmp_path, start)
-
-
-@pytest.mark.parametrize("value", ["a: b", "# a", 6e-5, [1, [2.5, None]], {"ü": "x" * 300}, "", True])
-def test_a_value_on_one_line_reads_back(value):
-    text = one_line(value)
-    assert "\n" not in text and yaml.safe_load(f"key: {text}") == {"key": value}
 
 
 # Each alias stands for so many values.
@@ -183,18 +176,3 @@ def test_what_a_schema_refuses_is_named_with_its_line(tmp_path, text, key, allow
     path = tmp_path / "a.yaml"
     with refused(path, key, allowed):
         check_document(read(tmp_path, text), "strategy", path.as_posix())
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "words"),
-    [
-        ("serial_number", " ", ["text that matches", "on one line"]),
-        ("serial_number", "47\u202811", ["text that matches", "on one line"]),
-        ("measured_on", "2026-02-30", ["a date such as 2026-11-20"]),
-        ("measured_on", "2026-11-20\n", ["a date such as 2026-11-20"]),
-    ],
-)
-def test_what_reports_print_stands_on_one_line_and_dates_are_of_the_calendar(key, value, words):
-    check_document(CAMPAIGN | {"serial_number": "KR 270-7", "measured_on": "2024-02-29"}, "campaign", "a.yaml")
-    with refused("a.yaml", key, *words):
-        check_document(CAMPAIGN | {key: value}, "campaign", "a.yaml")

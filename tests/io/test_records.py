@@ -12,7 +12,6 @@ from elastocal.errors import InputError
 from elastocal.io.origin import Origin
 from elastocal.io.records import (
     JobRecord,
-    check_sources,
     checksum,
     files_of,
     input_digests,
@@ -59,14 +58,6 @@ def test_a_file_leads_back_to_every_job_behind_it_and_to_no_other(jobs):
     assert [job.name for job in jobs] == ["measure kuka", "fit kuka", "draw kuka"]
 
 
-def test_records_stand_beside_what_the_pipeline_makes_and_nowhere_else(tmp_path):
-    assert sorted(record_of("").parent.rglob("*.json")) == sorted(
-        map(record_of, [MEASURED, FITTED, TABLE, DRAWN, "results/other.csv"])
-    )
-    write("elsewhere", 5, [], ["own/a.csv", "data/../a.csv", f"{tmp_path}/data/a.csv"])
-    assert len(list(record_of("").parent.rglob("*.json"))) == 5
-
-
 @pytest.mark.parametrize("place", [0, 30, -1])
 @pytest.mark.parametrize("output", ALTERED)
 def test_any_altered_byte_is_found_by_the_next_job_and_by_all_who_follow(output, place):
@@ -96,16 +87,6 @@ def test_a_file_that_was_made_again_since_another_read_it_is_found(jobs):
     write_records(jobs[1])
     with refused(FITTED, "", "not what draw kuka read"):
         jobs_behind([DRAWN])
-
-
-def test_other_code_than_made_the_results_is_found(jobs):
-    check_sources(jobs, "", "a rerun")
-    Path(CODE).write_text("edited", encoding="utf-8")
-    with refused(CODE, "", "not what measure kuka was made with", "a rerun"):
-        check_sources(jobs, "", "a rerun")
-    Path(CODE).unlink()
-    with refused(CODE, "", "not what measure kuka was made with", "a rerun"):
-        check_sources(jobs, "", "a rerun")
 
 
 def test_any_altered_character_of_a_record_is_found():

@@ -64,14 +64,6 @@ def test_what_is_written_comes_back(path):
     assert [table[c.name].dtype for c in SCHEMA.columns[1:]] == ["int32", "float64", "float32", "bool"]
 
 
-def test_large_blocks_stay_one_row_group(new):
-    # pyarrow cuts row groups at 2^20 rows unless told otherwise.
-    rows = 2**20 + 5
-    schema = TableSchema("large", (Column("number", "int32", "", "a number"),))
-    write_table(new, schema, [{"number": np.arange(rows)}], {})
-    assert [len(b["number"]) for b in read_blocks(new, schema)] == [rows]
-
-
 def test_only_row_groups_with_the_value_asked_for_are_read(path):
     assert [b["number"].tolist() for b in read_blocks(path, SCHEMA, kind="a")] == [[0, 1, 2], [5, 6, 7]]
     assert read_table(path, SCHEMA, ["number"], kind="b")["number"].tolist() == [3, 4]
@@ -91,19 +83,6 @@ def test_faulty_values_are_not_written(new, changes, key, words):
     with refused(new, key, *words):
         write_table(new, SCHEMA, [block("a", 0), block("a", 3, **changes)], {})
     assert not Path(new).exists()
-
-
-def broken_after(blocks):
-    yield from blocks
-    raise RuntimeError("the blocks ran dry")
-
-
-def test_an_older_file_survives_a_block_that_fails_and_no_other_is_left_behind(path):
-    before = Path(path).read_bytes()
-    with pytest.raises(RuntimeError, match="ran dry"):
-        write_table(path, SCHEMA, broken_after([block("b", 9)]), {})
-    assert Path(path).read_bytes() == before
-    assert [p.name for p in Path(path).parent.iterdir()] == ["things.parquet"]
 
 
 def test_a_file_that_is_cut_off_or_has_another_column_or_is_somebody_elses_is_refused(path, new):

@@ -109,19 +109,6 @@ def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(ch
         load_diagnosed(tmp_path / "changed", ROBOTS, checkout)
 
 
-def test_a_robot_file_that_has_changed_since_is_refused(checkout, tmp_path):
-    shutil.copytree(ROBOTS, tmp_path / "robots")
-    with open(tmp_path / "robots/kuka.yaml", "a", encoding="utf-8") as file:
-        file.write("# edited\n")
-    with refused(checkout / "made", "", "changes since its diagnosis", "elastocal diagnose"):
-        load_diagnosed(checkout / "made", tmp_path / "robots", checkout)
-
-
-def test_a_campaign_that_was_never_diagnosed_is_refused(checkout, tmp_path):
-    with refused(checkout / "made", "", "no diagnosis of it in ", tmp_path.as_posix(), "elastocal diagnose"):
-        load_diagnosed(checkout / "made", ROBOTS, tmp_path)
-
-
 def test_results_of_another_engine_are_refused(changed):
     (changed / ENGINE).write_text("VERSION = 2\n", encoding="utf-8")
     with refused(changed / ENGINE, "", "not what read_campaign made was made with", f"elastocal diagnose {changed}/made"):

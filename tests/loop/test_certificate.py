@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.loop.certificate import Wanted, certificate
 
@@ -22,16 +21,6 @@ def found(checkout, diagnosed):
     return certificate(checkout / "made", ROBOTS, diagnosed, WANTED)
 
 
-def test_one_accuracy_stands_in_headline_budget_and_report(found, diagnosed):
-    document, verdict = found, diagnosed.verdict
-    assert accuracy_sentence(accuracy_from(verdict["accuracy"])) == accuracy_sentence(accuracy_from(document["accuracy"]))
-    assert document["accuracy"]["kind"] == "predicted"
-    left = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded")
-    squares = sum(line["rms_m"] ** 2 for line in document["budget"] if line["name"] in left)
-    assert squares == pytest.approx(document["accuracy"]["rms_m"] ** 2, rel=1e-9)
-    assert document["validation_rms_m"]["corrected"] == verdict["heldout"]["delivered"]["rms_m"]
-
-
 def test_a_certificate_passes_below_and_fails_above_what_is_predicted(found, checkout, diagnosed):
     for share, decision in ((0.2, "fail"), (2.0, "pass")):
         wanted = replace(WANTED, tolerance_m=share * found["accuracy"]["rms_m"])
@@ -43,10 +32,3 @@ def test_a_robot_that_few_configurations_judge_does_not_pass(found, checkout, di
     wanted = replace(WANTED, tolerance_m=2.0 * found["accuracy"]["rms_m"])
     conformity = certificate(checkout / "made", ROBOTS, few, wanted)["conformity"]
     assert conformity["decision"] == "undecided" and conformity["shortfalls"][0].startswith("too few: 3 configurations")
-
-
-def test_the_worst_pose_is_the_one_of_the_largest_predicted_error(found):
-    document = found
-    # The largest of many random errors is larger than what any one pose is expected to have.
-    assert 0.0 < document["worst_pose"]["error_m"] <= document["accuracy"]["worst_m"]
-    assert {joint["unit"] for joint in document["worst_pose"]["joints"]} == {"rad"}

@@ -1,6 +1,5 @@
 """What is said of a campaign before it is diagnosed."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -20,14 +19,6 @@ def overview_of(folder):
 @pytest.fixture(scope="module")
 def facts(kuka, tmp_path_factory):
     return overview_of(made_folder(tmp_path_factory.mktemp("o") / "made", kuka))
-
-
-def test_what_was_read_is_counted(facts):
-    assert facts["training"]["poses"] + facts["held_out"]["poses"] == 14
-    assert facts["targets"] == ["3DoF", "6DoF"] and facts["joints"] == 6
-    assert facts["loads"] == [0, 1] and facts["repeats"] == 2
-    assert facts["largest_force_N"] == pytest.approx(800.0)
-    json.dumps(facts)
 
 
 def test_springs_have_their_errors_and_candidates_their_reasons(facts):
@@ -56,21 +47,6 @@ def test_a_decisive_fault_is_said_and_the_campaign_is_not_diagnosable(kuka, tmp_
     facts = overview_of(made_folder(tmp_path / "made", kuka, table=table))
     assert not facts["diagnosable"]
     assert any(fault["decisive"] and "joint 3" in fault["sentence"] for fault in facts["faults"])
-
-
-@pytest.mark.parametrize(
-    ("many", "said"), [(4, "all 4 validation poses repeat"), (2, "2 of 4 validation poses repeat"), (0, "")]
-)
-def test_poses_held_out_that_repeat_those_fitted_are_suspicious(kuka, tmp_path, many, said):
-    """Whatever they are measured at says nothing of other poses."""
-    table, document = made_table(kuka, "made"), {"poses": [10, 11, 12, 13]}
-    for pose in range(many):
-        for joint in range(1, 7):
-            angles = table[f"q{joint}"]
-            angles[table["pose"] == 10 + pose] = angles[table["pose"] == pose][0] + 1e-4
-    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table, holdout=document))
-    found = [sentence for sentence in facts["suspicious"] if "repeat configurations that were fitted" in sentence]
-    assert len(found) == bool(said) and all(said in sentence and "nothing of other poses" in sentence for sentence in found)
 
 
 def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_takes(tmp_path, facts):

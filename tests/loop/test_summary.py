@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import t as student
 
 from elastocal.loop.summary import campaign_rows
 
@@ -58,13 +57,3 @@ def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verd
     assert folded.verdict == "2 of 3: named; 1 of 3: class"
     assert folded.effects == "2 of 3: joint_offset (joint 3); 1 of 3: joint_offset (joint 3) + payload"
     assert (table.verdict["alone"], table.effects["alone"]) == ("adequate", "none")
-
-
-def test_with_three_poses_the_interval_of_the_rms_is_students_on_the_logarithm():
-    # Mean squares 1, 4, 9 of the poses; the error of the logarithm of their mean by leaving out one pose.
-    row = rows_of(one=errors([1.0, 2.0, 3.0])).iloc[0]
-    left = np.log([13 / 2, 10 / 2, 5 / 2])
-    error = np.sqrt(2 / 3 * ((left - left.mean()) ** 2).sum())
-    reach = np.exp(0.5 * student.ppf(0.975, 2) * error)
-    rms = np.sqrt(14 / 3)
-    assert (row.before_rms_low_mm, row.before_rms_high_mm) == pytest.approx((rms / reach, rms * reach))

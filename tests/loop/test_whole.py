@@ -125,17 +125,6 @@ def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp
     assert different <= {"heldout", "effects", "warnings"}
 
 
-WATCHED = """
-import sys
-opened = []
-sys.addaudithook(lambda event, details: opened.append(str(details[0])) if event == "open" else None)
-from elastocal.loop.whole import diagnosed
-from elastocal.report.loop_facts import campaign_sentences
-diagnosed(*sys.argv[1:3], 1)
-print("\\n".join(opened))
-"""
-
-
 @pytest.mark.slow
 def test_a_calibration_by_few_poses_is_no_worse_than_none(tmp_path):
     """Without priors these end at 1.12 times the error of frames alone."""

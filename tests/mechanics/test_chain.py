@@ -27,18 +27,6 @@ def test_each_token_becomes_one_transform():
     assert [(p.name, p.after) for p in chain.points] == [("EE", 8)]
 
 
-def test_points_stand_where_they_are_written_and_the_last_is_the_end_effector():
-    chain = chain_of("[base] Rz(q1) Tx(1) [A] Ry(q2) [B] [C]")
-    assert [(p.name, p.after) for p in chain.points] == [("base", 0), ("A", 2), ("B", 3), ("C", 3)]
-    assert chain.end_effector == chain.point("C")
-    assert [chain.moved_by(p) for p in chain.points] == [(), (0,), (0, 1), (0, 1)]
-
-
-def test_unknown_point_names_those_of_the_chain():
-    with pytest.raises(KeyError, match=r"'C'.*A, B"):
-        chain_of("Rz(q1) [A] Ry(q2) [B]").point("C")
-
-
 @st.composite
 def written_chains(draw):
     """(text, transforms) of a chain of random tokens."""

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from support import homogeneous, random_loads
+from support import random_loads
 
 from elastocal.mechanics.elastostatics import (
     exact_deflections,
-    extended_chain,
     generalized_forces,
     joint_torques,
     regressor,
@@ -131,31 +130,6 @@ def test_every_link_adds_its_block(kuka_extended):
     for number, link in enumerate(kuka_extended.links):
         expected[6 + 6 * number : 12 + 6 * number, 6 + 6 * number : 12 + 6 * number] = integrated_beam(link.tube, link.vector_m)
     np.testing.assert_allclose(compliance, expected, rtol=0, atol=1e-12 * compliance.max())
-
-
-def test_extended_pose_is_the_product_with_equation_5_behind_each_link(kuka_extended):
-    rng = np.random.default_rng(2)
-    q, theta = rng.uniform(-np.pi, np.pi, 6), rng.uniform(-0.2, 0.2, (5, 6))
-
-    def spring(number):
-        kinds = zip("TTTRRR", (0, 1, 2, 0, 1, 2), theta[number], strict=True)
-        product = np.eye(4)
-        for kind, axis, amount in kinds:
-            product = product @ homogeneous(kind, axis, amount)
-        return product
-
-    x, y, z = range(3)
-    base = homogeneous("T", z, 0.675) @ spring(0) @ homogeneous("R", z, q[0])
-    t_2 = base @ homogeneous("T", x, 0.35) @ spring(1) @ homogeneous("R", y, q[1]) @ homogeneous("T", x, 1.15) @ spring(2)
-    t_3 = t_2 @ homogeneous("R", y, q[2]) @ homogeneous("T", z, -0.041) @ homogeneous("T", x, 1.2) @ spring(3)
-    t_4 = t_3 @ homogeneous("R", x, q[3])
-    t_full = t_4 @ homogeneous("R", y, q[4]) @ homogeneous("R", x, q[5]) @ homogeneous("T", x, 0.24) @ spring(4)
-    chain = extended_chain(kuka_extended)
-    coordinates = np.concatenate([q, theta.ravel()])
-    for point, expected in zip(chain.points, (t_2, t_3, t_4, t_full), strict=True):
-        position, rotation = poses(chain, coordinates, point)
-        np.testing.assert_allclose(position, expected[:3, 3], rtol=0, atol=1e-14)
-        np.testing.assert_allclose(rotation, expected[:3, :3], rtol=0, atol=1e-14)
 
 
 def test_extended_deflection_is_that_of_joints_and_beams_added_up(kuka_extended):

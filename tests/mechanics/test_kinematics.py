@@ -17,19 +17,14 @@ from support import (
 )
 
 from elastocal.mechanics import kinematics
-from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import (
-    corners,
     jacobians,
-    joint_axes,
     motion,
     pose_differences,
     poses,
     poses_and_jacobians,
-    poses_of_points,
     rotation_vectors,
 )
-from elastocal.mechanics.robot import with_target_offset
 
 # Metres and radians of order one through a dozen products: some tens of roundings of 1e-16.
 ROUNDING = 2e-14
@@ -146,15 +141,6 @@ def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size)
     np.testing.assert_allclose(jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole[2], rtol=0, atol=ROUNDING)
 
 
-def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka):
-    points = [*kuka.chain.points[::-1], with_target_offset(kuka, (0.1, -0.2, 0.3)).chain.end_effector, kuka.chain.points[0]]
-    angles = random_angles(np.random.default_rng(3), kuka.chain, 2, 3)
-    together = poses_of_points(kuka.chain, angles, points)
-    for number, point in enumerate(points):
-        for found, wanted in zip(together, poses(kuka.chain, angles, point), strict=True):
-            np.testing.assert_allclose(found[number], wanted, rtol=0, atol=1e-15)
-
-
 @pytest.mark.parametrize("name", ODD_CHAINS)
 def test_joints_that_shift_or_move_several_transforms_have_the_slopes_of_central_differences(name, chain_called):
     chain = chain_called(name)
@@ -165,19 +151,6 @@ def test_joints_that_shift_or_move_several_transforms_have_the_slopes_of_central
             step = 1e-6 * np.eye(chain.coordinates)[coordinate]
             slope = pose_differences(*poses(chain, q + step, point), *poses(chain, q - step, point)) / 2e-6
             np.testing.assert_allclose(jacobian[..., coordinate], slope, rtol=0, atol=1e-9)
-
-
-def test_corners_go_from_the_base_to_the_last_point():
-    chain = parse_chain("Tz(h) Rz(q1) Tx(a) Rz(q2) Tx(b) [end]", {"h": 0.5, "a": 1.0, "b": 0.5}, "test")
-    found = corners(chain, np.array([[0.0, np.pi / 2]]))
-    np.testing.assert_allclose(found[:, 0], [[0, 0, 0], [0, 0, 0.5], [1, 0, 0.5], [1, 0.5, 0.5]], atol=1e-12)
-
-
-def test_joints_stand_at_their_places_along_their_axes():
-    chain = parse_chain("Tz(h) Rz(q1) Tx(a) Ry(q2) Tx(b) [end]", {"h": 0.5, "a": 1.0, "b": 0.5}, "test")
-    place, axis = joint_axes(chain, np.array([[np.pi / 2, 0.3]])).swapaxes(0, 1)
-    np.testing.assert_allclose(place[:, 0], [[0, 0, 0.5], [0, 1, 0.5]], atol=1e-12)
-    np.testing.assert_allclose(axis[:, 0], [[0, 0, 1], [-1, 0, 0]], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["kuka", *OTHER_CHAINS, *ODD_CHAINS])
@@ -207,12 +180,3 @@ def test_rotation_vectors_agree_with_scipy(direction, angle):
     rotation = Rotation.from_rotvec(vector)
     # sin(angle) near pi - 1e-3 keeps 13 of 16 digits.
     np.testing.assert_allclose(rotation_vectors(rotation.as_matrix()), rotation.as_rotvec(), rtol=0, atol=1e-12)
-
-
-def test_pose_difference_is_the_displacement_and_the_rotation_in_base_axes():
-    rng = np.random.default_rng(12)
-    start, turn = Rotation.random(20, rng=rng), Rotation.from_rotvec(rng.uniform(-1, 1, (20, 3)))
-    position, move = rng.uniform(-2, 2, (20, 3)), rng.uniform(-1, 1, (20, 3))
-    found = pose_differences(position + move, (turn * start).as_matrix(), position, start.as_matrix())
-    np.testing.assert_allclose(found[..., :3], move, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(found[..., 3:], turn.as_rotvec(), rtol=0, atol=1e-13)

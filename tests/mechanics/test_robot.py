@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import chain_of, robot_of
+from support import robot_of
 
 from elastocal.io.documents import read_document
-from elastocal.mechanics.robot import Mass, usual_compliance, usual_payload_kg, with_rigid_joints
+from elastocal.mechanics.robot import usual_compliance
 from elastocal.mechanics.robot_file import robot_from_document
 
 
@@ -21,23 +21,8 @@ def test_reported_angles_are_converted_both_ways():
     np.testing.assert_allclose(robot.model_angles(reported[0]), angles[0], rtol=1e-12)
 
 
-def test_rigid_joints_yield_to_nothing():
-    robot = replace(robot_of("Rz(q1) Tx(1) Ry(q2) [A]"), masses=(Mass(2, 1.0, (0.1, 0.0, 0.0), 0.1),))
-    rigid = with_rigid_joints(robot)
-    assert not rigid.compliance.any() and rigid.masses == () and not rigid.compliance_known
-    assert rigid.chain == robot.chain
-
-
 @pytest.mark.parametrize("name", ["kuka", "fanuc", "fanuc_measured"])
 def test_published_compliances_are_within_a_factor_of_five_of_the_usual_ones(name, config_folder):
     robot = robot_from_document(read_document(config_folder / "robots" / f"{name}.yaml"))
     ratio = robot.compliance / usual_compliance(robot.chain, robot.payload_kg)
     assert (np.maximum(ratio, 1 / ratio) < 5).all()
-
-
-def test_a_gear_winds_up_by_two_milliradians_under_the_rated_load_at_the_longest_lever():
-    chain = chain_of("Tz(9) Rz(q1) Tx(1.5) Ry(90deg) Ry(q2) Tz(-0.5) Rx(q3) Tx(0.1) [E]")
-    expected = 2e-3 / (10 * 9.80665 * np.array([2.1, 0.6, 0.2]))
-    np.testing.assert_allclose(usual_compliance(chain, 10.0), expected, rtol=1e-12)
-    assert usual_payload_kg(chain) == pytest.approx(8 * 2.1**3)
-    np.testing.assert_allclose(usual_compliance(chain), usual_compliance(chain, 8 * 2.1**3), rtol=1e-12)

@@ -29,22 +29,6 @@ def test_decisions_come_with_their_criterion_and_risk(decision, changed, words):
     assert ("too much to pass" in text) == (changed["risk_above"] == 0.4)
 
 
-def test_what_is_predicted_is_called_so():
-    facts = certificate_facts(made_document())
-    assert facts["title"] == "Pass, as predicted: corrected by physics alone"
-    assert facts["worst"].endswith("at the command −28.6°, 250.0 mm")
-    assert "is predicted to keep" in facts["now"]
-    assert "0.120 mm at validation poses is the tracker against the model" in facts["whose"]
-    assert facts["verdict"] == "One mechanism is missing in the declared model: lost motion (backlash)."
-
-
-def test_what_has_no_name_is_in_the_title_and_in_the_verdict():
-    left = {"remains": True, "rms_m": 5e-5, "rms_std_error_m": 1e-5}
-    facts = certificate_facts(made_document() | {"regression": "Gaussian process", "repeatable": left})
-    assert facts["title"] == "Pass, as predicted: corrected by physics with a regression"
-    assert "more is missing that has no name" in facts["verdict"]
-
-
 def test_a_correction_that_makes_validation_poses_worse_is_advised_against():
     document = made_document()
     document["validation_rms_m"]["corrected"] = 2e-3

@@ -8,11 +8,8 @@ import pytest
 from compiled_pages import assert_within_margins, pages_of
 from made_loop_facts import CAMPAIGNS, HARMONICS, WAVES, facts_of, plainly
 from made_loop_tables import (
-    campaign_descriptions,
     effect_entry,
     experiment_rows,
-    parameter_table,
-    remainder_facts,
     step_rows,
     verdict_document,
 )
@@ -22,15 +19,12 @@ from elastocal.diagnosis.verdict import NAMED
 from elastocal.figures.residuals import before_after
 from elastocal.figures.style import save
 from elastocal.report.loop_facts import (
-    AND_MORE,
     AT_FAULT,
     campaign_sentences,
     cause_rows,
     compliance_rows,
     cost_words,
     effect_facts,
-    held_rows,
-    untestable_rows,
     write_loop_report,
 )
 from elastocal.report.loop_facts import step_rows as table_rows
@@ -60,23 +54,6 @@ def test_facts_are_json_and_the_verdict_is_said_in_plain_words(campaign):
     assert "{{" not in said and "{%" not in said
 
 
-@pytest.mark.parametrize(
-    ("campaign", "said"),
-    [
-        ("named", "lacks lost motion (backlash) of joint 3 (94 %), and more than that."),
-        ("class", "lacks at least one mechanism, most probably"),
-        ("several", "lacks at least 2 mechanisms"),
-    ],
-)
-def test_what_is_left_and_is_a_function_of_the_joints_is_said_beside_what_was_found(campaign, said):
-    for remains in (True, False):
-        left = {"p_value": 0.003 if remains else 0.2, "remains": remains, "rms_m": 8.3e-5, "rms_std_error_m": 5.8e-6}
-        facts = facts_of(CAMPAIGNS[campaign] | {"repeatable": left})
-        words = plainly(" ".join(facts["sentences"]))
-        stated = "83.0 µm ± 5.80 µm RMS of what is left are a function of the joint angles and have no name."
-        assert (said in words, stated in words, facts["verdict"].endswith(AND_MORE)) == (remains, remains, remains)
-
-
 def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
     def now(verdict, experiment=()):
         return campaign_sentences(verdict, experiment=experiment)["now"]
@@ -92,18 +69,6 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
     assert "loose target" in now(CAMPAIGNS["unexplained"])[0]
     (advice,) = now(CAMPAIGNS["adequate"] | {"kept": "frames"})
     assert advice.startswith("Leave the robot as its file has it")
-
-
-def test_the_headline_has_the_robot_as_it_was_and_as_it_is_and_its_caption_what_lies_between():
-    said = campaign_sentences(CAMPAIGNS["named"])
-    assert said["headline_line"] == ["0.171 → 0.084 mm (noise 0.050), RMS position error on 10 validation poses"]
-    assert "The declared model, fitted, leaves 0.120 mm." in said["headline_caption"][0] and len(said["cost"]) == 1
-    regressed = verdict_document("named", [effect_entry()], remainder=remainder_facts())
-    assert campaign_sentences(regressed)["headline_line"] == [
-        "0.171 → 0.084 → 0.060 mm (noise 0.050), RMS position error on 10 validation poses: before, by physics, as delivered"
-    ]
-    assert "noise" not in campaign_sentences(CAMPAIGNS["noise not known"])["headline_line"][0]
-    assert campaign_sentences(CAMPAIGNS["fault of the data"])["headline_line"] == []
 
 
 @pytest.mark.parametrize(
@@ -133,19 +98,6 @@ def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities
         ("Nothing is missing", "4 %", ""),
     ]
     assert cause_rows(CAMPAIGNS["unexplained"])[0]["name"] == "Something that the catalogue does not have"
-
-
-@pytest.mark.parametrize("campaign", ["named, not adopted", "class, not adopted"])
-def test_an_effect_that_is_not_adopted_is_named_and_no_correction_is_spoken_of(campaign):
-    facts = facts_of(CAMPAIGNS[campaign])
-    assert "lost motion (backlash) of joint 3" in " ".join(facts["sentences"])
-    assert facts["now"][0].startswith("Use the declared model until more is known")
-    assert "off by 120 µm RMS" in plainly(facts["now"][0])
-    assert not any("corrected model" in advice or "trust the correction" in advice for advice in facts["now"])
-    assert facts["held_out"].startswith("On 10 poses that were not fitted the declared model leaves")
-    assert [effect["adopted"] for effect in facts["effects"]] == [False] and facts["effects"][0]["gain"] is None
-    assert [row["kind"] for row in facts["steps"]["rows"]] == ["frames", "declared"]
-    assert not facts["splits"]["changed"]
 
 
 def test_a_fault_of_the_data_is_no_effect():
@@ -202,60 +154,12 @@ def test_every_verdict_compiles_within_its_margins(campaign, pictures, pages, tm
     assert_within_margins(pages)
 
 
-def test_a_rerun_gives_the_same_bytes(pictures, tmp_path):
-    for run in "ab":
-        write_loop_report(str(tmp_path / f"{run}.pdf"), facts_of(CAMPAIGNS["class"], experiment=experiment_rows()), pictures)
-    assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
-
-
 def test_before_and_after_have_intervals_and_multiples():
     table = table_rows(step_rows(), 5e-5)
     assert table["unit"] == "µm" and [row["kind"] for row in table["rows"]] == ["frames", "declared", "effect"]
     cells = table["rows"][0]["cells"]
     assert cells[1:] == [["180", "[144, 216]", "3.60 × floor"], ["270", "≥ 216", "5.40 × floor"], ["300", "–", "6.00 × floor"]]
     assert table_rows(step_rows(largest_m=0.05), None)["rows"][0]["cells"][0] == ["25.000", "[20.000, 30.000]"]
-
-
-def test_the_next_experiment_is_in_degrees_and_says_what_it_brings():
-    facts = facts_of(CAMPAIGNS["class"], experiment=experiment_rows(count=3))["experiment"]
-    loads = ["fx N", "fy N", "fz N", "mx N·m", "my N·m", "mz N·m"]
-    # All states have one point, which the caption names.
-    assert facts["heads"] == [*(f"q{k} °" for k in range(1, 7)), *loads, "separation", "resolved"] and facts["points"] == "6DoF"
-    angles, wrench = ["−5.7", "−11.5", "−17.2", "−22.9", "−28.6", "−34.4"], ["910", "0", "−412", "−206", "0", "455"]
-    assert facts["rows"][2] == [*angles, *wrench, "12.0", "58\u00a0%"]
-    unloaded = [row | dict.fromkeys(("fx", "fy", "fz", "mx", "my", "mz"), 0.0) for row in experiment_rows()]
-    assert facts_of(CAMPAIGNS["class"], experiment=unloaded)["experiment"]["heads"][-3:-1] == ["q6 °", "separation"]
-
-
-def test_what_was_measured_is_stated_apart_for_fitted_and_held_out_poses():
-    facts = facts_of(CAMPAIGNS["named"], descriptions=campaign_descriptions(held_out="another"))
-    measured = {name: (training, held_out) for name, training, held_out in facts["measured"]}
-    assert measured["campaign"] == ("made_up", "another")
-    assert measured["poses"] == ("20 poses in 1 session", "10 poses in 1 session")
-    assert measured["loads"][0].startswith("1 load of 500 N on 50")
-    assert facts["method"]["held_out"] == "10 poses of another campaign (another)"
-
-
-def test_parameters_that_are_not_determined_are_gathered_by_owner_and_stand_apart():
-    rows = held_rows(["joint_offset@1 offset", "link_geometry@1 dz", "link_geometry@1 ry"])
-    assert rows == [["Zero offset of joint 1", "offset"], ["Geometric error of link 1", "shift along z, rotation about y"]]
-    left = "joint_offset@3 offset"
-    facts = facts_of(CAMPAIGNS["named"], parameters=parameter_table(["joint_offset@2 offset", left], by_prior=[left]))
-    assert facts["held"] == [["Zero offset of joint 3", "offset"]]
-
-
-def test_what_cannot_be_tested_is_gathered_by_effect_and_reason_and_long_lists_are_cut():
-    few = {f"lost_motion@{k}": "too few different angles of a joint" for k in (1, 2)}
-    many = {f"cross_compliance@{k}+{k + 1}": "no approach in the data" for k in range(1, 10)}
-    assert untestable_rows(few | many | {"payload": "no load"}) == [
-        [
-            "Elastic coupling",
-            "joints 1 and 2, of joints 2 and 3, of joints 3 and 4 and of joints 4 and 5 and 5 more",
-            "no direction of approach in the data",
-        ],
-        ["Weight of an undeclared payload", "–", "no load"],
-        ["Lost motion (backlash)", "joints 1 and 2", "too few different angles of a joint"],
-    ]
 
 
 def test_of_a_compliance_that_is_not_identifiable_no_number_is_stated_and_of_a_file_that_fits_none_all_are():

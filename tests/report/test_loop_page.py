@@ -67,19 +67,6 @@ def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_r
     np.testing.assert_allclose(data["outlines"][0], corners(kuka.chain, angles_of(table, 6)[:1])[:, 0], atol=1e-4)
 
 
-def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at_targets_of_the_drawn_pose(kuka):
-    """Both campaigns count their poses from nought."""
-    table, verdict = residual_table(poses=6), CAMPAIGNS["named"]
-    table |= {"held_out": table["pose"] >= 3, "pose": table["pose"] % 3}
-    _, data = loop_page(facts_of(verdict), table, kuka)
-    assert data["poses"] == ["0", "1", "2", "0, validation", "1, validation", "2, validation"]
-    joints = angles_of(table, 6)
-    for outline, rows in zip(data["outlines"], data["targets"], strict=True):
-        assert sorted(table["target"][rows]) == [0, 1]
-        for row in rows:
-            np.testing.assert_allclose(outline, corners(kuka.chain, joints[[row]])[:, 0], atol=1e-4)
-
-
 def test_texts_of_other_people_stay_texts(kuka, tmp_path):
     """A campaign may be called anything; what it is called is shown and never run."""
     page, data = page_of(kuka)

@@ -5,13 +5,10 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
-import typst
 from drawn_figures import empty_pictures
-from made_study_tables import comparison, facts, measured, simulated, tables
+from made_study_tables import comparison, facts
 
-from elastocal.report.study import brief_names, paper_rows, paper_tables
 from elastocal.report.typesetting import compile_document, template
 
 EVERY = facts()
@@ -59,42 +56,6 @@ def test_figures_that_differ_are_those_below_the_level_after_correction():
     assert facts(comparison=fitted)["one_set"][0][-1] == "fitted"
 
 
-def test_rows_that_say_the_same_are_listed_once_and_what_is_not_reached_is_said():
-    alike = measured().assign(dev_20_um=8.0, k_sigma_fixed_joints_20_percent=lambda frame: frame.k_sigma_20_percent)
-    assert [row[1] for row in facts(studies=alike)["table4"]] == ["6DoF", "6DoF"]
-    assert EVERY["needed"][1][2] == "more than all (90 to more than all)"
-    assert [row[2] for row in EVERY["simulated"]][:2] == ["none", "joint 1"]
-    assert facts(simulated=simulated().assign(rms_um=900.0))["smallest"][0] == ["Kuka", "more than all", ""]
-
-
-def test_sentences_state_counts_and_extremes():
-    (reversed_,) = EVERY["reversed"]
-    assert "Of 2 pairs" in reversed_ and "k_Σ of the fixed joints (1)." in reversed_
-    assert "of 6DoF on Kuka is 2.00 times (1.50 to 2.50) that of staged, its RMS 0.83 times" in reversed_
-    assert (
-        "2 of 2 other sets leave significantly more error (1.03 to 1.10 times)"
-        in facts(pairs=tables()["pairs"].assign(ratio_low=1.01))["equal"][0]
-    )
-
-
-def test_a_printed_figure_stands_beside_ours_and_lengths_beyond_a_data_set_are_marked():
-    columns = ["table", "robot", "strategy", "quantity", "paper", "ours", "mc_std", "z"]
-    rows = [("4", "kuka", "6DoF", "dev_20", 8.386, 9.03, 1.15, 0.56), ("1", "kuka", np.nan, "c1", 0.54, np.nan, 0.0, np.nan)]
-    rows += [("4", "kuka", "6DoF", "n_dev_2_um", 43.0, value, 20.0, 1.0) for value in (99.0, 120.0, np.inf)]
-    scored, without, inside, beyond, never = paper_rows(pd.DataFrame(rows, columns=columns), {"kuka": "KUKA"}, 100)
-    assert scored["ours"] == "9.0 ± 1.1" and scored["robot"] == "KUKA" and "differs" not in scored
-    assert (without["ours"], without["strategy"]) == ("not studied", "")
-    assert (inside["ours"], beyond["ours"], never["ours"]) == ("99 ± 20", "120 ± 20†", "not reached")
-    frame = pd.DataFrame({"robot": ["kuka"] * 3, "n_dev_2_um": [99.0, 120.0, np.inf], "n_dev_2_um_std_error": 20.0})
-    (_, *lines) = paper_tables({"table4": frame}, {"kuka": "KUKA"}, 100)["table4"]
-    assert lines == [["KUKA", "99 ± 20"], ["KUKA", "120 ± 20†"], ["KUKA", "not reached"]]
-
-
-def test_names_are_as_short_as_they_may_be():
-    titles = {"a": "KUKA KR 270", "b": "FANUC R-2000", "c": "KUKA KR 270 with elastic links"}
-    assert brief_names(titles) == {"a": "KUKA", "b": "FANUC", "c": "KUKA with elastic links"}
-
-
 def test_the_page_has_the_rows_of_each_table():
     def tables_of(stated):
         _, *parts = re.split(r"^## (.*)$", template("study_tables.md").render(stated), flags=re.MULTILINE)
@@ -127,16 +88,3 @@ def test_the_report_is_a_pdf_that_the_same_facts_give_again(pictures, tmp_path):
         write_report(tmp_path / f"{name}.pdf", EVERY, pictures)
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
     assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("missing", "stated", "figures"),
-    [
-        ("figure5d", EVERY, [*FIGURES, "figure5d"]),
-        ("smallest", {name: value for name, value in EVERY.items() if name != "smallest"}, FIGURES),
-    ],
-)
-def test_what_is_missing_is_an_error_and_no_blank(missing, stated, figures, pictures, tmp_path):
-    with pytest.raises(typst.TypstError, match=missing):
-        write_report(tmp_path / "study.pdf", stated, pictures, figures)
-    assert not list(tmp_path.iterdir())

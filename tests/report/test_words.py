@@ -1,19 +1,14 @@
 """Effects, locations, hypotheses, numbers and units stand as a robot engineer writes them."""
 
 import pytest
-from support import ODD_CHAINS, OTHER_CHAINS, chain_of
-from synthetic import equipped
 
-from elastocal.effects.catalogue import candidates_on, effects
-from elastocal.figures.candidates import short_name
+from elastocal.effects.catalogue import effects
 from elastocal.report.words import (
     UNKNOWN,
     alternative_words,
-    candidate_words,
     effect_words,
     hypotheses_words,
     in_common,
-    in_words,
     length,
     listed,
     millimetres,
@@ -28,13 +23,6 @@ def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind()
     assert all(named.values()) and len(set(named.values())) == len(named)
     assert not [words for words in named.values() if "_" in words or words != words.strip() or words[0].isupper()]
     assert all(in_common(name, []) for name in effects())
-
-
-@pytest.mark.parametrize("chain", [*OTHER_CHAINS.values(), *ODD_CHAINS.values()])
-def test_no_two_candidates_are_printed_alike(chain):
-    keys = list(candidates_on(equipped(chain_of(chain))))
-    for printed in (candidate_words, short_name):
-        assert len({printed(key) for key in keys}) == len(keys)
 
 
 @pytest.mark.parametrize(
@@ -73,15 +61,6 @@ def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is
     # Beside "nothing" all are stated in full.
     assert hypotheses_words([{"mechanisms": names, "locations": {}} for names in ([], ["joint_offset"])])[1] == "zero offset"
     assert (alternative_words("other"), alternative_words("payload"))[0] == "a related mechanism"
-
-
-def test_keys_in_a_sentence_become_words_and_common_words_stay():
-    said = in_words("link_weight@2: mass is 4 kg, beyond the rated payload of 3 kg; the step 'with joint_offset' raised it")
-    assert said.startswith("gravity sag of joint 2: mass is 4 kg, beyond the rated payload of 3 kg;")
-    assert said.endswith("; the step 'with zero offset' raised it")
-    assert in_words("payload: mass is -3 kg") == "weight of an undeclared payload: mass is -3 kg"
-    said = in_words("transmission_ratio@3: per_q3 is -0.0042 rad/rad, more than 3 times what such an effect reaches")
-    assert said.startswith("gear ratio or coupling error of joint 3: per movement of joint 3 is -0.0042 rad/rad, more than")
 
 
 @pytest.mark.parametrize(

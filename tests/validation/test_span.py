@@ -1,4 +1,4 @@
-"""What poses must span: how many configurations, which joints, and the use."""
+"""What poses must span: how many configurations, which joints."""
 
 from dataclasses import replace
 
@@ -35,13 +35,13 @@ def test_loads_and_repeats_of_a_pose_are_one_configuration(states):
 
 
 def test_fewer_configurations_than_a_judgement_needs_are_too_few(kuka, states):
-    (sentence,) = shortfalls(FEWEST_CONFIGURATIONS - 1, states, kuka, None)
+    (sentence,) = shortfalls(FEWEST_CONFIGURATIONS - 1, states, kuka)
     assert sentence == "too few: 7 configurations, where at least 8 must judge"
 
 
 @pytest.mark.parametrize(("share", "count"), [(0.9, 1), (1.1, 0)])
 def test_a_joint_that_hardly_turned_is_too_close(kuka, states, share, count):
-    found = shortfalls(FEWEST_CONFIGURATIONS, turned(states, 3, share * LEAST_TURN_RAD), kuka, None)
+    found = shortfalls(FEWEST_CONFIGURATIONS, turned(states, 3, share * LEAST_TURN_RAD), kuka)
     assert len(found) == count and all("joint 4 moved by 26°, and 29° are needed" in sentence for sentence in found)
 
 
@@ -50,7 +50,7 @@ def test_a_rail_needs_a_share_of_its_travel(kuka, states, share, count):
     rails = chain_of("Tx(q1) Ty(q2) Tz(q3) [hand]")
     gantry = replace(kuka, chain=rails, joint_limits=np.array([[0.0, 4.0]] * 3))
     moved = replace(states, joint_angles=np.linspace(0.0, [[share * LEAST_TRAVEL * 4.0, 2.0, 2.0]], len(states))[:, 0])
-    found = shortfalls(FEWEST_CONFIGURATIONS, moved, gantry, None)
+    found = shortfalls(FEWEST_CONFIGURATIONS, moved, gantry)
     assert len(found) == count and all("too close: joint 1 moved by 0.36 m, and 0.4 m are needed" in each for each in found)
 
 
@@ -59,13 +59,6 @@ def test_the_least_turn_is_that_over_which_a_sine_changes_by_half_its_amplitude(
     turn = np.linspace(-np.pi, np.pi, 100_001)
     change = np.abs(np.sin(turn + 0.5 * LEAST_TURN_RAD) - np.sin(turn - 0.5 * LEAST_TURN_RAD)).max()
     assert change == pytest.approx(0.5, abs=1e-6)
-
-
-def test_a_stated_use_counts_instead_of_the_joints(kuka, states):
-    still = turned(states, 3, 0.0)
-    assert shortfalls(FEWEST_CONFIGURATIONS, still, kuka, np.zeros(40, bool)) == []
-    (sentence,) = shortfalls(FEWEST_CONFIGURATIONS, still, kuka, np.arange(40) < 3)
-    assert sentence == "outside: 3 of 40 poses of the use lie beyond what was fitted"
 
 
 def test_joint_ranges_are_smallest_and_largest_angles_in_degrees(kuka, states):

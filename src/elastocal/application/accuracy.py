@@ -414,7 +414,8 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
     if accuracy.left_out:
         names = ", ".join(accuracy.left_out)
         text += f" {millimetres(accuracy.left_out_m)} of it stand for {names}, which no command contains."
-    if accuracy.form_m:
+    # What rounds to nothing is not said.
+    if round(accuracy.form_m, 6):
         why = "validation poses were missed by more than the fit says" if accuracy.contradicted else "other models fit as well"
         text += f" {millimetres(accuracy.form_m)} of it stand for the form of the model: {why}."
     return text

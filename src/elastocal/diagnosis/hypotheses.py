@@ -57,11 +57,6 @@ class Unit:
         return at_shapes(name, self.shapes)
 
     @property
-    def of_load_cell(self) -> bool:
-        """Whether it is an error of what a load cell shows, which a reference weight does not have."""
-        return self.candidate is not None and self.candidate.family == "load"
-
-    @property
     def place(self) -> tuple[str, tuple[int | str, ...], str]:
         """What no two units of a model share: variants at one location exclude each other, laws of `OTHER` do not."""
         return self.mechanism, self.location, self.law.name if self.law else ""

@@ -21,8 +21,8 @@ from elastocal.mechanics.robot import Robot
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
 _WRENCH = tuple(name for name, _, _ in WRENCH)
-# Of a corrected target, and where it is.
-OK, _STATUS = "ok", "status"
+# Of a corrected target.
+OK = "ok"
 # Of a corrected target whose error nothing bounds, before the reason.
 NO_BOUND = "no bound: "
 # A position farther from the base than any arm reaches is in other units.
@@ -95,28 +95,6 @@ def read_target_path_of(path: str | Path, robot: Robot) -> TargetPath:
         allowed = f"rad, of a joint that goes from {low:.2f} to {high:.2f} rad"
         raise InputError(path, f"line {wanted.lines[row]}", found, allowed)
     return wanted
-
-
-@dataclass(frozen=True)
-class CorrectedTargets:
-    """What `correct` wrote: wanted poses in base axes, m, the joint angles (N, n) to command, rad, and each one's status."""
-
-    position: np.ndarray
-    rotation: np.ndarray
-    joint_angles: np.ndarray
-    status: np.ndarray
-
-
-def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
-    """Read a file that `elastocal correct` wrote; other columns than those of `CorrectedTargets` do not matter."""
-    read = _cells(path)
-    angles = tuple(f"q{j}" for j in range(1, joints + 1))
-    for name in (*_POSE, *angles, _STATUS):
-        if name not in read.columns:
-            raise InputError(path, f"line {read.text.dialect.header}", f"no column {name!r}", "a file of elastocal correct")
-    commands = np.column_stack([read.numbers(name) for name in angles])
-    status = [OK if cell.startswith(NO_BOUND) else cell for cell in read.cells(_STATUS)]
-    return CorrectedTargets(*_poses(read), commands, np.array(status))
 
 
 def _cells(path: str | Path) -> CellReader:

@@ -50,7 +50,7 @@ def certificate(folder: str | Path, robots_folder: str | Path, found: Diagnosed,
     decision = predicted_conformity(prediction.rms_m, accuracy.poses, wanted.tolerance_m, wanted.accepted_risk)
     heldout = verdict["heldout"]
     judged = heldout["configurations"]
-    missing = shortfalls(judged, states, robot, None)
+    missing = shortfalls(judged, states, robot)
     if not accuracy.fitted:
         missing = ["nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted", *missing]
     if missing and decision.decision == PASS:

@@ -6,7 +6,7 @@ What it covers for as few poses as a campaign holds out: ``docs/held_out_interva
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
+from scipy.special import stdtrit
 
 # Student's t with the same standard error takes over where few poses make the bootstrap-t erratic (3: it holds 80 %, t 94 %;
 # 6: both hold the same), and where so many make both alike (300: widths differ by 3 %) and drawing costly.
@@ -50,27 +50,6 @@ def log_ratio_interval(
         farthest = stdtrit(_DEGREES_AT_LEAST, ends[1])
         reach = -np.quantile(_pivots(weights, over, under, value), ends[::-1]).clip(-farthest, farthest)
     return value + error * reach, error
-
-
-def risk_above(over: np.ndarray, under: np.ndarray, weights: np.ndarray | None, log_limit: float) -> float:
-    """How sure it is not that the logarithm of a ratio of totals stays below a limit.
-
-    The level at which the upper end of a one-sided interval is the limit.
-
-    `over`, `under`, `weights`: as in `log_ratio_interval`. Returns between 0 and 1; not a number with a single pose.
-    """
-    poses = len(over)
-    if poses < 2:
-        return float("nan")
-    value, error = (found[0] for found in _log_ratios(np.ones((1, poses)), over, under))
-    if error <= _ROUNDING:
-        return float(value > log_limit)
-    reach = (value - log_limit) / error
-    if weights is None:
-        return float(stdtr(poses - 1, reach))
-    pivots = _pivots(weights, over, under, value)
-    # One more than were drawn, so that no finite number of draws gives certainty.
-    return float((1.0 + (pivots <= reach).sum()) / (2.0 + len(pivots)))
 
 
 def _pivots(weights: np.ndarray, over: np.ndarray, under: np.ndarray, value: float) -> np.ndarray:

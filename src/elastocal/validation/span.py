@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.campaigns.joint_space import configurations
-from elastocal.counting import counted, grouped
+from elastocal.counting import counted
 from elastocal.fitting.observations import state_clusters
 
 if TYPE_CHECKING:
@@ -36,20 +36,11 @@ def joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
     return [{"low": float(low), "high": float(high), "unit": unit} for (low, high), unit in units]
 
 
-def shortfalls(judged: int, fitted: States, robot: Robot, outside_use: np.ndarray | None) -> list[str]:
-    """Why errors at some configurations say too little of a robot: these are too few, too close, or not where it is used.
-
-    ``outside_use`` says of each pose of the use whether it lies beyond the fitted poses and loads; where no use is stated,
-    every joint has to have moved.
-    """
+def shortfalls(judged: int, fitted: States, robot: Robot) -> list[str]:
+    """Why errors at some configurations say too little of a robot: they are too few, or a joint hardly moved."""
     found = []
     if judged < FEWEST_CONFIGURATIONS:
         found.append(f"too few: {counted(judged, 'configuration')}, where at least {FEWEST_CONFIGURATIONS} must judge")
-    if outside_use is not None:
-        if outside_use.any():
-            share = f"{grouped(outside_use.sum())} of {counted(len(outside_use), 'pose')} of the use"
-            found.append(f"outside: {share} lie beyond what was fitted")
-        return found
     moved = np.ptp(fitted.joint_angles, axis=0)
     rails = np.array(robot.chain.prismatic)
     least = np.where(rails, LEAST_TRAVEL * np.ptp(robot.joint_limits, axis=1), LEAST_TURN_RAD)

@@ -14,7 +14,6 @@ from elastocal.application.planning.designs import (
     criterion,
     exchange_candidates,
     matrix_of,
-    mean_squares,
 )
 
 ROWS = made_rows()
@@ -30,13 +29,6 @@ def test_slopes_are_derivatives_of_the_value(kind):
     rule, matrix, step = criterion(kind, PLACES), start(), 1e-6
     expected = [(rule.value(matrix + step * row.T.astype(float) @ row) - rule.value(matrix)) / step for row in ROWS]
     np.testing.assert_allclose(rule.slopes(ROWS, matrix), expected, rtol=1e-3)
-
-
-def test_the_value_of_i_is_the_mean_variance_over_the_places():
-    rule, matrix = criterion("I", PLACES), start()
-    variances = np.einsum("nki,ij,nkj->n", PLACES, np.linalg.inv(matrix), PLACES)
-    assert -rule.value(matrix) == pytest.approx(variances.mean())
-    np.testing.assert_allclose(mean_squares(PLACES), np.einsum("nki,nkj->ij", PLACES, PLACES) / 7)
 
 
 @pytest.mark.parametrize("kind", CRITERIA)

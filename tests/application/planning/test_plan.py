@@ -4,18 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
-from analysed_robots import ROBOTS
 from made_surveys import OPEN, PULL, made_candidates, made_survey
 
 from elastocal.application.planning.plan import (
     REPEATED_POSES,
     REPEATS,
-    SENSORS,
     Candidates,
     Loads,
     accuracy_rows,
-    campaign_document,
     choose_plan,
     find_allowed_candidates,
     information,
@@ -24,7 +20,6 @@ from elastocal.application.planning.plan import (
     sheet,
 )
 from elastocal.campaigns.campaign import Target
-from elastocal.campaigns.reading import read_campaign
 from elastocal.errors import InputError
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
@@ -32,7 +27,6 @@ from elastocal.fitting.noise import Noise
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.prediction import predict
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal_proof.blind.rehearsal import filled_sheet, hidden_robot
 
 
 @pytest.fixture(scope="module")
@@ -104,18 +98,6 @@ def test_each_state_of_each_pose_is_a_row_and_the_first_poses_are_repeated(plann
     np.testing.assert_allclose(table.loc[table["load"] == 0, ["fx", "fy", "fz"]], 0.0)
 
 
-def test_a_filled_sheet_is_a_campaign_that_holds_out_its_random_poses(planned, tmp_path):
-    survey, plan, table = planned
-    document = campaign_document("cell", "ur10", survey, plan)
-    (tmp_path / "campaign.yaml").write_text(yaml.safe_dump(document))
-    robot, _ = hidden_robot(ROBOTS / "ur10.yaml", 1, ["payload"])
-    filled_sheet(table, document, robot, 1).to_csv(tmp_path / "measurements.csv", index=False)
-    campaign = read_campaign(tmp_path, ROBOTS)
-    assert campaign.holdout["poses"] == [15, 16, 17, 18]
-    assert campaign.targets[0].offset_m is None
-    assert len(np.unique(campaign.measurements.pose)) == 18
-
-
 @pytest.mark.parametrize("measured", ["position", "pose"])
 def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measured):
     survey = made_survey(measured=measured)
@@ -157,12 +139,3 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
         # But for the load, which does not turn with it.
         assert (size[first] < 1e-2 * second) if unknown else (size[first] > 0.3 * second)
         assert not size[[number for number, (owner, _) in enumerate(names) if owner.startswith(("frame", "target"))]].any()
-
-
-@pytest.mark.parametrize("name", SENSORS)
-def test_a_sensor_has_a_source_and_noise_of_what_it_reads(name):
-    sensor = SENSORS[name]
-    assert "Leica" in sensor.words
-    assert 1e-8 <= sensor.position_m <= 0.1
-    assert (name == "pose") == (sensor.orientation_rad is not None)
-    assert sensor.orientation_rad is None or 1e-8 <= sensor.orientation_rad <= 0.2
