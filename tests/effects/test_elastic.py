@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import ODD_CHAINS, OTHER_CHAINS, chain_of, robot_of
-from synthetic import candidate_on, conditions_on, displacements, made_estimate, made_model, made_states
+from synthetic import conditions_on, displacements, made_estimate, made_model, made_states
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
@@ -31,17 +31,6 @@ def test_links_that_bend_are_those_with_a_length(name, fanuc):
     column = {"link_elasticity[column]"} if lengths[0] > 0.05 else set()
     together = f"link_elasticity@{'+'.join(map(str, long))}[one section]"
     assert found == {*(f"link_elasticity@{link}" for link in long), *column, together}
-
-
-def test_compensator_stiffens_the_shoulder_as_an_angle_dependent_stiffness_would_and_by_twice_the_angle(fanuc):
-    states = made_states(6, 5, seed=6)
-    around = conditions_on(fanuc.chain, states)
-    ours, alias = (candidate_on(fanuc.chain, f"{name}@2") for name in ("compensator_stiffness", "joint_dependent_stiffness"))
-    made = displacements(ours, around)
-    np.testing.assert_array_equal(made[:2], displacements(alias, around))
-    for column, wave in zip(made[2:, :, 1], (np.cos, np.sin), strict=True):
-        np.testing.assert_allclose(column, around.total[:, 1] * wave(2 * states.joint_angles[:, 1]), rtol=1e-12)
-    assert ours.key == "compensator_stiffness@2" and ours.family == "elastic"
 
 
 @pytest.mark.parametrize("effect", LINEAR)

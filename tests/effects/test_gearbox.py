@@ -5,18 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import chain_of
-from synthetic import candidate_on, conditions_on, displacements, equipped, made_states
+from synthetic import candidate_on, equipped
 
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.protocol import LOADED_JOINTS
-from elastocal.mechanics.sites import sites_of
-
-
-def test_stiffening_takes_half_of_the_compliance_of_a_gear(fanuc):
-    for joint, compliance in enumerate(fanuc.compliance, 1):
-        for detail in ("", "[two slopes]"):
-            (beyond,) = candidates_on(sites_of(fanuc))[f"stiffening@{joint}{detail}"].parameters
-            assert (beyond.plausible, beyond.sign) == (pytest.approx(0.5 * compliance), -1)
 
 
 def test_play_is_mostly_taken_up_before_the_slopes_of_a_stiffening_gear_meet(fanuc):
@@ -32,16 +24,6 @@ def test_play_is_mostly_taken_up_before_the_slopes_of_a_stiffening_gear_meet(fan
 
 # An arm of two metres that turns about the vertical; eight kilograms a cubic metre of reach suit it.
 TURNTABLE, FULL_NM = "Rz(q1) Tx(2) [hand]", 8.0 * 2.0**3 * 9.80665 * 2.0
-
-
-def under(torques, approach=None):
-    """Conditions in which the one joint of the turntable bears exactly these torques, N m."""
-    chain, torques = chain_of(TURNTABLE), np.asarray(torques, float)
-    states = made_states(1, len(torques), seed=3)
-    wrench = np.zeros((len(torques), 6))
-    wrench[:, 5] = torques
-    sense = states.approach if approach is None else np.asarray(approach, float)[:, None]
-    return conditions_on(chain, replace(states, wrench=wrench, approach=sense))
 
 
 @pytest.mark.parametrize(
@@ -78,9 +60,3 @@ def test_each_law_of_a_gear_has_one_parameter_of_known_size_and_sign(key, name, 
     assert (parameter.name, parameter.unit, parameter.sign) == (name, unit, sign)
     assert parameter.plausible == pytest.approx(plausible) and parameter.prior_std is None
     assert candidate.needs == needs and candidate.joints == (1,) and candidate.family == "gearbox"
-
-
-def test_hysteresis_has_the_sign_of_the_approach_and_is_nothing_where_a_joint_was_not_moved():
-    chain, senses = chain_of(TURNTABLE), [-1.0, 0.0, 1.0]
-    made = displacements(candidate_on(chain, "hysteresis@1"), under([100.0, -50.0, 0.0], senses))
-    np.testing.assert_array_equal(made[0, :, 0], senses)

@@ -197,23 +197,6 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
     assert not around.total[:, :6].any()
 
 
-def test_gears_of_an_arm_without_an_external_load_are_loaded_by_its_weight(fanuc):
-    robot, states = weighed(fanuc), made_states(6, 6, seed=8)
-    states.wrench[:] = 0.0
-    around, known = conditions_on(robot, states), candidates_on(sites_of(robot))
-    for key in (
-        "stiffening@2",
-        "lost_motion@3",
-        "joint_tilt@2",
-        "base_compliance",
-        "link_elasticity@2",
-        "cross_compliance@2+3",
-    ):
-        shapes = [shape.start for shape in known[key].shapes]
-        assert displacements(known[key], around, *shapes).any(), key
-    assert not displacements(known["force_scale"], around).any()
-
-
 @pytest.mark.parametrize("key", ["payload", "link_weight@1", "link_weight@2"])
 def test_weights_hang_along_the_gravity_of_the_robot_file(key, fanuc):
     """On a wall the weight of a robot is that of one on the floor whose foot is turned."""
@@ -228,23 +211,6 @@ def test_weights_hang_along_the_gravity_of_the_robot_file(key, fanuc):
     )
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
     assert found.any()
-
-
-def test_masses_beyond_what_is_declared_turn_the_joints_as_heavier_ones_do(fanuc):
-    """Central differences of the turns by the weight of all declared masses, and of each but the column's."""
-    robot = weighed(fanuc)
-    around = conditions_on(robot, made_states(6, 8, seed=11))
-    alike, each = (candidates_on(sites_of(robot))[f"declared_masses[{way}]"] for way in ("all alike", "each"))
-    turns = displacements(each, around)[..., :6]
-
-    def sag(share):
-        heavier = tuple(replace(mass, mass_kg=mass.mass_kg * (1.0 + share)) for mass in robot.masses)
-        other = conditions_on(replace(robot, masses=heavier), made_states(6, 8, seed=11))
-        return other.gravity[:, :6] * other.compliance
-
-    np.testing.assert_allclose(displacements(alike, around)[0][..., :6], sag(0.5) - sag(-0.5), rtol=0, atol=1e-12)
-    np.testing.assert_allclose(turns.sum(axis=0), displacements(alike, around)[0][..., :6], rtol=0, atol=1e-12)
-    assert len(turns) == 6 and "declared_masses[each]" not in candidates_on(sites_of(fanuc))
 
 
 def test_wrong_masses_are_borne_by_their_priors_and_gears_still_seen(fanuc):
@@ -299,27 +265,6 @@ def test_gravity_on_odd_robots_is_the_slope_of_their_potential(name):
         step = 1e-5 * np.eye(robot.joints)[joint]
         slope = (work(states.joint_angles + step) - work(states.joint_angles - step)) / 2e-5
         np.testing.assert_allclose(found[:, joint], slope, rtol=0, atol=1e-7)
-
-
-def test_link_weight_of_the_arm_may_be_that_of_all_links_with_a_length(fanuc):
-    whole = candidate_on(fanuc.chain, "link_weight[all links]")
-    masses = [int(p.name.split("_")[-1]) for p in whole.parameters if p.unit == "kg"]
-    moments = [p.name for p in whole.parameters if p.unit == "kg m"]
-    assert masses == [2, 3, 6] and whole.location == ("arm",)
-    assert moments == [f"moment_{name}" for name in ("z_of_link_2", "z_of_link_3", "y_of_link_6", "z_of_link_6")]
-    # One finding with that of two links: a model has one of these laws.
-    assert (
-        candidate_on(fanuc.chain, "link_weight").location
-        == whole.location
-        != candidate_on(fanuc.chain, "link_weight@2").location
-    )
-
-
-def test_payload_hangs_at_the_flange_whatever_target_sits_there(fanuc):
-    moved = replace(fanuc.chain, points=tuple(replace(p, offset_m=(0.2, 0.3, 0.4)) for p in fanuc.chain.points))
-    states = made_states(6, 5, seed=3)
-    ours, theirs = (displacements(candidate_on(c, "payload"), conditions_on(c, states)) for c in (moved, fanuc.chain))
-    np.testing.assert_array_equal(ours, theirs)
 
 
 @pytest.mark.parametrize(

@@ -23,18 +23,6 @@ from elastocal.fitting.least_squares import fit
 from elastocal.mechanics.sites import sites_of
 
 
-def test_motor_turns_the_joint_once_and_twice_per_turn_of_its_own(fanuc):
-    sites = replace(equipped(fanuc), gear_ratio=(None, 171.0, None, None, 80.5, None))
-    known = candidates_on(sites)
-    assert [key for key in known if key.startswith("motor_eccentricity")] == ["motor_eccentricity@2", "motor_eccentricity@5"]
-    states = made_states(6, 5, seed=2)
-    around = replace(conditions_on(fanuc, states), sites=sites)
-    made = displacements(known["motor_eccentricity@5"], around)
-    turn = 80.5 * states.joint_angles[:, 4]
-    np.testing.assert_allclose(made[:, :, 4], [np.cos(turn), np.sin(turn), np.cos(2 * turn), np.sin(2 * turn)], atol=1e-12)
-    assert not np.delete(made, 4, axis=2).any()
-
-
 def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
     known, states = candidates_on(equipped(fanuc)), made_states(6, 5, seed=3)
     bands = [c for c in known.values() if c.effect == "transmission_order" and c.joints == (3,)]
