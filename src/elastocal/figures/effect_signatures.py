@@ -79,7 +79,7 @@ def signature(name: str, robot: Robot) -> Signature:
         "by force, falling": (still, _FORCE_N, -1.0, middle),
         "by time": (still, 0 * pulled, 1.0, _TIME_H),
     }
-    around = _weightless(robot), robot.compliance
+    around = _sites(name, robot), robot.compliance
     return Signature(
         candidate, joint, angle, {name: _moved_mm(candidate, *around, *each) for name, each in experiments.items()}
     )
@@ -87,11 +87,14 @@ def signature(name: str, robot: Robot) -> Signature:
 
 def list_candidates(name: str, robot: Robot) -> list[Candidate]:
     """Every way in which an effect can act on the arm of the figures, see `signature`."""
-    return effects()[name].candidates(_weightless(robot))
+    return effects()[name].candidates(_sites(name, robot))
 
 
-def _weightless(robot: Robot) -> Sites:
-    return replace(sites_of(robot), masses=(), gear_ratio=(_GEAR_RATIO,) * robot.joints)
+def _sites(name: str, robot: Robot) -> Sites:
+    """Without the weight of links, but for an effect that there is only where their masses are declared."""
+    weighed = replace(sites_of(robot), gear_ratio=(_GEAR_RATIO,) * robot.joints)
+    weightless = replace(weighed, masses=())
+    return weightless if effects()[name].candidates(weightless) else weighed
 
 
 def _moved_mm(
