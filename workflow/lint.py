@@ -20,7 +20,7 @@ ROOMS = {
     "src/elastocal/diagnosis": 4730,
     "src/elastocal/effects": 1970,
     "src/elastocal/exchange": 2710,
-    "src/elastocal/figures": 1420,
+    "src/elastocal/figures": 1430,
     "src/elastocal/fitting": 2610,
     "src/elastocal/io": 1050,
     "src/elastocal/loop": 1060,

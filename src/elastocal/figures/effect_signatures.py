@@ -93,8 +93,8 @@ def list_candidates(name: str, robot: Robot) -> list[Candidate]:
 def _sites(name: str, robot: Robot) -> Sites:
     """Without the weight of links, but for an effect that there is only where their masses are declared."""
     weighed = replace(sites_of(robot), gear_ratio=(_GEAR_RATIO,) * robot.joints)
-    weightless = replace(weighed, masses=())
-    return weightless if effects()[name].candidates(weightless) else weighed
+    bare = replace(weighed, masses=())
+    return bare if effects()[name].candidates(bare) else weighed
 
 
 def _moved_mm(
