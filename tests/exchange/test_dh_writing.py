@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 from made_calibrated import USUAL, made_calibrated
@@ -10,7 +11,7 @@ from support import refused, robot_of
 
 from elastocal.application.exported import fold_effects
 from elastocal.exchange.dh import robot_from_dh
-from elastocal.exchange.dh_writing import PARAMETERS, dh_deltas, dh_rows, dh_table
+from elastocal.exchange.dh_writing import PARAMETERS, dh_deltas, dh_table
 from elastocal.mechanics.kinematics import poses
 
 NAMES = sorted(path.stem for path in ROBOTS.glob("*.yaml"))
@@ -66,10 +67,10 @@ def test_angles_are_the_controllers_where_it_counts_each_joint_by_itself(tmp_pat
     turned = replace(robot, reported_matrix=np.diag([-1.0, 1.0]), reported_offset=np.array([0.3, -0.2]))
     assert_same(turned, read_back(turned, tmp_path))
     coupled = replace(robot, reported_matrix=np.array([[1.0, 0.0], [1.0, 1.0]]))
-    np.testing.assert_array_equal(dh_rows(coupled), dh_rows(robot))
+    pd.testing.assert_frame_equal(dh_table(coupled), dh_table(robot), check_exact=True)
 
 
 @pytest.mark.parametrize("chain", ["Tz(q1) Ry(q2) [tip]", "Ry(q1) Tx(0.5) Ry(q2) Tx(0.2) Ry(-q2) [tip]"])
 def test_prismatic_and_passive_joints_are_refused(chain):
     with refused("", "chain", "revolute"):
-        dh_rows(robot_of(chain))
+        dh_table(robot_of(chain))

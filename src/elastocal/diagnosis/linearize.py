@@ -26,6 +26,7 @@ from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Any
 
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.settings import Settings
@@ -83,13 +84,15 @@ class Linearized:
         if not closer:
             return self
         tried = {key: (candidate, closer.get(key, shapes)) for key, (candidate, shapes) in self.tried.items()}
-        found = replace(self, tried=tried)
-        vars(found).update({"_fitted": self._fitted})
-        return found
+        return self._with_the_same_fit(tried=tried)
 
     def under(self, model: Model) -> Linearized:
         """The same under other priors of the declared parameters, those of a model that is alike in all else."""
-        found = replace(self, about=replace(self.about, model=model))
+        return self._with_the_same_fit(about=replace(self.about, model=model))
+
+    def _with_the_same_fit(self, **changes: Any) -> Linearized:
+        """The same but for what does not change the whitened rows of the fit, which are not made again."""
+        found = replace(self, **changes)
         vars(found).update({"_fitted": self._fitted})
         return found
 

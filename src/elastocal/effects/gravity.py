@@ -40,8 +40,7 @@ def declared_weight(sites: Sites) -> Candidate:
     """
 
     def law(around: Conditions) -> Displacements:
-        torques = around.mass_torques * around.compliance
-        return [{joint: of_joint for joint, of_joint in enumerate(columns.T) if of_joint.any()} for columns in torques]
+        return _by_joint(around.mass_torques * around.compliance)
 
     width = _WIDTH_OF_LENGTH * float(np.linalg.norm(sites.link_vectors_m, axis=1).sum())
     parameters: list[Parameter] = []
@@ -54,6 +53,11 @@ def declared_weight(sites: Sites) -> Candidate:
         parameters.append(Parameter(f"mass_error_of_link_{mass.link}", "kg", error, error))
         parameters += [Parameter(f"moment_error_{axis}_of_link_{mass.link}", "kg m", stated, moment) for axis in "xyz"]
     return Candidate(DECLARED_WEIGHT, "declared", (), "", tuple(parameters), law)
+
+
+def _by_joint(turns: np.ndarray) -> Displacements:
+    """Turns of the joints by each parameter, ndarray (P, S, n), without those joints that it does not turn."""
+    return [{joint: turn for joint, turn in enumerate(each.T) if turn.any()} for each in turns]
 
 
 @_effect(
@@ -130,17 +134,20 @@ def declared_masses(own: Effect, sites: Sites) -> Candidates:
         return
     names = [f"share_of_link_{mass.link}_from_mass_{number}" for number, mass in bodies]
 
-    def law(around: Conditions) -> Displacements:
-        torques = [sites.masses[number].mass_kg * around.mass_torques[MASS_PARAMETERS * number] for number, _ in bodies]
-        return [dict(enumerate((torque * around.compliance).T)) for torque in torques]
+    places, kilograms = [MASS_PARAMETERS * number for number, _ in bodies], np.array([mass.mass_kg for _, mass in bodies])
+
+    def turns(around: Conditions) -> np.ndarray:
+        return kilograms[:, None, None] * around.mass_torques[places] * around.compliance
 
     def alike(around: Conditions) -> Displacements:
-        each = law(around)
-        return [{joint: np.sum([turns[joint] for turns in each], axis=0) for joint in range(sites.joints)}]
+        return _by_joint(turns(around).sum(axis=0, keepdims=True))
+
+    def each(around: Conditions) -> Displacements:
+        return _by_joint(turns(around))
 
     options: Mapping[str, Any] = {"needs": {"external load"}, "location_name": "arm"}
     yield own.candidate((), own.parameters("share", ["share"], "1", sites), alike, detail="all alike", **options)
-    yield own.candidate((), own.parameters("share", names, "1", sites), law, detail="each", **options)
+    yield own.candidate((), own.parameters("share", names, "1", sites), each, detail="each", **options)
 
 
 # It hangs on the flange in tasks as in the campaign, until someone takes it off: that moves the robot.

@@ -27,20 +27,11 @@ PARAMETERS = ("theta_deg", "d_m", "a_m", "alpha_deg", "b_m", "beta_deg")
 _Kind = tuple[np.ndarray | None, float | None]
 
 
-def dh_rows(robot: Robot) -> np.ndarray:
-    """Rows of a robot: of its base, of each joint, and of the end effector's frame, ndarray (n + 2, 6).
-
-    Columns are `PARAMETERS`, in rad and m. Angles of joints are the controller's where it counts each joint by itself, else
-    those of the chain. Raises `InputError`: prismatic or passive joints.
-    """
-    return _describe(robot, None, robot.counts_each_joint)[0]
-
-
 def dh_table(robot: Robot, nominal: Robot | None = None) -> pd.DataFrame:
     """Rows as `elastocal import dh` reads them: ``Ty(b) Ry(beta)`` becomes a fixed row of its own.
 
     `nominal`: by which each pair of axes is described, see `dh_deltas`; the robot itself without. Returns of the angles that
-    the controller reports, where for both it counts each joint by itself.
+    the controller reports, where for both it counts each joint by itself. Raises `InputError`: prismatic or passive joints.
     """
     rows: list[dict[str, Any]] = []
     turned, like = 0.0, nominal or robot
@@ -78,7 +69,7 @@ def dh_deltas(nominal: Robot, calibrated: Robot) -> pd.DataFrame:
 
 
 def _rows(robot: Robot, nominal: Robot, own: bool) -> np.ndarray:
-    """Rows of a robot in the description of another one."""
+    """Rows of base, joints and end effector in the description of another robot, ndarray (n + 2, 6): `PARAMETERS` in rad, m."""
     return _describe(robot, _describe(nominal, None, own)[1], own)[0]
 
 

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
 # Two programs that do the same in double precision, in another order.
 ROUNDING = 1e-9
-# Columns kept in single precision.
-SINGLE = 1e-5
 
 
 @dataclass(frozen=True)
