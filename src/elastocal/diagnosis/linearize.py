@@ -180,8 +180,7 @@ class Linearized:
     @property
     def pose_errors_rad(self) -> np.ndarray:
         """Sizes of the pose error that are thought of, zero first."""
-        sizes = self.pose_std_error_rad * np.array(self.settings.pose_steps)
-        return np.unique(np.minimum(sizes, self.most_pose_error_rad))
+        return np.unique(np.minimum(self.pose_std_error_rad * np.array(self.settings.pose_steps), self.most_pose_error_rad))
 
     @cached_property
     def problem(self) -> Problem:

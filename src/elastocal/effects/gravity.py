@@ -133,21 +133,15 @@ def declared_masses(own: Effect, sites: Sites) -> Candidates:
     if not bodies:
         return
     names = [f"share_of_link_{mass.link}_from_mass_{number}" for number, mass in bodies]
-
     places, kilograms = [MASS_PARAMETERS * number for number, _ in bodies], np.array([mass.mass_kg for _, mass in bodies])
 
     def turns(around: Conditions) -> np.ndarray:
         return kilograms[:, None, None] * around.mass_torques[places] * around.compliance
 
-    def alike(around: Conditions) -> Displacements:
-        return _by_joint(turns(around).sum(axis=0, keepdims=True))
-
-    def each(around: Conditions) -> Displacements:
-        return _by_joint(turns(around))
-
     options: Mapping[str, Any] = {"needs": {"external load"}, "location_name": "arm"}
-    yield own.candidate((), own.parameters("share", ["share"], "1", sites), alike, detail="all alike", **options)
-    yield own.candidate((), own.parameters("share", names, "1", sites), each, detail="each", **options)
+    share, shares = (own.parameters("share", each, "1", sites) for each in (["share"], names))
+    yield own.candidate((), share, lambda at: _by_joint(turns(at).sum(axis=0, keepdims=True)), detail="all alike", **options)
+    yield own.candidate((), shares, lambda at: _by_joint(turns(at)), detail="each", **options)
 
 
 # It hangs on the flange in tasks as in the campaign, until someone takes it off: that moves the robot.
