@@ -10,9 +10,11 @@ from made_remainders import SMOOTH_M, smoothly_wrong_cases
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 import elastocal.remainder
+from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.prediction import target_points
+from elastocal.fitting.prediction import predict, target_points
 from elastocal.mechanics.kinematics import poses
 from elastocal.remainder.corrected import Plan, corrected, fitted_again, inputs_of, regressions, remainder_facts
 from elastocal.validation.held_out import position_errors
@@ -111,6 +113,28 @@ def test_the_jacobian_is_that_of_each_target_and_its_place_is_shown(fanuc):
             ends.append(poses(model.sites.chain, coordinates, point)[0])
         np.testing.assert_allclose(inputs.jacobian[mask, :, joint], (ends[1] - ends[0]) / (2 * step), atol=1e-8)
         np.testing.assert_array_equal(inputs.others[mask, -3:], np.tile(estimate.target_offset[number], (mask.sum(), 1)))
+
+
+def test_what_effects_of_the_model_do_may_be_taken_back_but_for_what_tasks_know_nothing_of(fanuc):
+    """Columns are the slopes of predictions in usual sizes; thermal growth has none, nor has what moves no robot."""
+    chosen = [("transmission_harmonic", (2,)), ("thermal_growth", ()), ("link_weight", (3,)), ("tracker_scale", ())]
+    plain = made_model(fanuc.chain, rows=3, compliance=fanuc.compliance)
+    known = {(each.effect, each.joints): each for each in candidates_on(plain.sites).values()}
+    model = plain.with_effects([known[key] for key in chosen])
+    estimate = made_estimate(plain, (0,), seed=3).with_effects(model.effects[-4:])
+    seen = seen_exactly(plain, made_estimate(plain, (0,), seed=3), made_states(6, 9, seed=4))
+    timed = replace(seen.states, time_s=np.arange(9.0), temperature_c=np.full(9, 21.0))
+    seen, slopes = replace(seen, states=timed), []
+    for number in (-4, -2):
+        for which, parameter in enumerate(model.effects[number].parameters):
+            values = [each.copy() for each in estimate.coefficients]
+            values[number][which] = 1e-3 * parameter.plausible
+            moved = replace(estimate, coefficients=tuple(values))
+            ends = [predict(model, each, seen, conditions(model, each, seen.states))[0] for each in (estimate, moved)]
+            slopes.append(1e3 * (ends[1] - ends[0]))
+    beside = inputs_of(model, estimate, seen).jacobian[:, :, plain.sites.chain.coordinates :]
+    size = np.abs(slopes).max()
+    np.testing.assert_allclose(beside, 1e3 * np.stack(slopes, axis=2), atol=1e3 * 0.02 * size)
 
 
 def test_a_correction_knows_neither_time_nor_temperature(fanuc):

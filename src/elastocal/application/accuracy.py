@@ -23,7 +23,6 @@ from elastocal.application.calibrated import (
     forward,
     inputs_at,
     move_to_end_effector,
-    moves_robot,
     nominal_forward,
     observations_of,
     pose_sensitivities,
@@ -31,6 +30,7 @@ from elastocal.application.calibrated import (
     square_root,
 )
 from elastocal.application.frames import BASE, FRAMES, ROBOT, Scope, find_absorbed, free_parts, placement
+from elastocal.effects.catalogue import moves_robot
 from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import hidden_repeatability

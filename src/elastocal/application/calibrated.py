@@ -15,7 +15,7 @@ import numpy as np
 
 from elastocal.application.frames import scope_in_base
 from elastocal.campaigns.campaign import Target
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import moves_robot
 from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import Observations, States
@@ -26,7 +26,6 @@ from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
 
 if TYPE_CHECKING:
     from elastocal.application.frames import Scope
-    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
@@ -138,12 +137,6 @@ def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estim
         target_rotation=np.eye(3)[None],
     )
     return replace(model, targets=(target,), fitted_frames=False, rows=6), values
-
-
-def moves_robot(effect: Candidate) -> bool:
-    """Whether an effect moves the robot, as it says; springs and declared weights, which are no missing effects, do."""
-    module = effects().get(effect.effect)
-    return not effect.of_setup and (module is None or module.moves_robot)
 
 
 def without(calibrated: CalibratedRobot, numbers: set[int]) -> CalibratedRobot:

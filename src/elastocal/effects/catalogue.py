@@ -37,6 +37,12 @@ def candidates_on(sites: Sites) -> dict[str, Candidate]:
     return {candidate.key: candidate for candidate in found}
 
 
+def moves_robot(candidate: Candidate) -> bool:
+    """Whether a candidate moves the robot, as its effect says; springs and declared weights, which are no effects, do."""
+    known = effects().get(candidate.effect)
+    return not candidate.of_setup and (known is None or known.moves_robot)
+
+
 def declared_candidates(names: Iterable[str], sites: Sites, source: str = "declared") -> list[Candidate]:
     """All candidates of the effects that a campaign declares.
 

@@ -11,7 +11,10 @@ import numpy as np
 import elastocal.remainder
 from elastocal.campaigns.campaign import BEST_REMAINDER
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
+from elastocal.effects.catalogue import effects, moves_robot
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit_frames
+from elastocal.fitting.linearization import effect_columns
 from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.fitting.prediction import target_points
 from elastocal.io.modules import modules_with
@@ -39,6 +42,10 @@ _FOLDS, _MOST_TO_CHOOSE, _REPLICATES = 5, 2_000, 1000
 # Share of a joint's fitted range beside it within which a regression is added too: no pose has neighbours that near, and of
 # poses drawn like 200 fitted ones some 3 % would go without for standing a hundredth beyond.
 _BESIDE = 0.05
+# A usual size of an effect is as easily taken back as so much of a joint is added.
+_RAD_OF_A_SIZE = 1e-3
+# A correction knows of no time or temperature, so that it takes back nothing of what goes by them.
+_UNKNOWN_OF_TASKS = {"time", "temperature"}
 
 
 @cache
@@ -142,13 +149,26 @@ def _folds(plan: Plan, fitted: Fit, observations: Observations) -> Folds:
 
 
 def inputs_of(model: Model, estimate: Estimate, observations: Observations) -> Inputs:
-    """Inputs of a regression, from the nominal chain and the places of the targets; `estimate` says where these sit."""
+    """Inputs of a regression, from the nominal chain and the places of the targets; `estimate` says where these sit.
+
+    What the model's effects do stands beside the Jacobian: an effect that was adopted wrongly has taken its part of an error
+    that no effect is, and a regression that cannot give it back has the rest of the error and the effect to make up for.
+    """
     states, chain = observations.states, model.sites.chain
     coordinates = chain.at(states.joint_angles)
     jacobian = np.empty((len(observations), 3, chain.coordinates))
     for number, point in enumerate(target_points(model, estimate)):
         mask = observations.target == number
         jacobian[mask] = poses_and_jacobians(chain, coordinates[observations.state[mask]], point)[2][:, :3]
+    found = [
+        (effect, shapes)
+        for effect, shapes in zip(model.effects, estimate.shapes, strict=True)
+        if effect.effect in effects() and moves_robot(effect) and _UNKNOWN_OF_TASKS.isdisjoint(effect.needs)
+    ]
+    if found:
+        sizes = np.array([parameter.plausible for effect, _ in found for parameter in effect.parameters])
+        columns = effect_columns(found, conditions(model, estimate, states), jacobian, observations.state)
+        jacobian = np.concatenate([jacobian, columns * sizes / _RAD_OF_A_SIZE], axis=2)
     others = np.hstack([states.wrench[observations.state], estimate.target_offset[observations.target]])
     return Inputs(states.joint_angles[observations.state], others, jacobian)
 

@@ -22,7 +22,8 @@ class Inputs:
 
     `joint_angles` (M, n): rad. `others` (M, k): wrench and place of the target in its measuring point; neither time nor
     temperature, of which a correction knows nothing. `jacobian` (M, 3, C): of the target's position with respect to the joints,
-    first, and whatever else of the chain may be displaced: base and links; base axes, m per rad or m.
+    first, and whatever else of the chain may be displaced: base and links; base axes, m per rad or m; then what effects of the
+    model do, see `corrected.inputs_of`.
     """
 
     joint_angles: np.ndarray
