@@ -37,8 +37,8 @@ ELEMENTS = (
     "<![CDATA[",
 )
 DH = (
-    "joint,theta_offset_deg,d_mm,a_m,alpha,type,lower_deg,upper_deg,mass_kg,cx,cy,cz_mm,point\n"
-    "A,0,162,0.1,90,R,-90,90,3,0.1,0,5,elbow\nB,-90,0,-0.4,0,F,,,,,,,\nC,0,0.1,0,pi/2,R,,,2,0,0,0,\n"
+    "joint,theta_offset_deg,d_mm,a_m,alpha,type\n"
+    "base,0,250,0,90,R\n,5,0,0,0,F\nelbow,-3.5,0,0.4,1,R\n"
 )
 ANGLE_CELLS = st.sampled_from(["pi/0", "1e9*pi", "-pi/2", "0*pi/0", "9" * 200 + "pi", "1e308", "P", "F", "-1e-320"])
 KINEMATICS = {"kinematics": {"hash": "a", "shoulder": {"x": 0, "y": 0.1, "z": "1e-05", "roll": 1.5, "pitch": 0, "yaw": -9e-06}}}

@@ -63,8 +63,8 @@ def dh(
 ) -> None:
     """Make a robot file of a Denavit-Hartenberg table.
 
-    The table has one row for each joint. Columns: theta_offset_deg, d_m, a_m, alpha_deg; optionally joint, type (R, P or F),
-    lower_deg, upper_deg, point. The first two rows of a UR5e, standard notation:
+    The table has one row for each joint. Columns: theta_offset_deg, d_m, a_m, alpha_deg; optionally joint and type (R,
+    or F of a fixed row). The first two rows of a UR5e, standard notation:
 
     joint, theta_offset_deg, d_m, a_m, alpha_deg, type
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
-ROBOT, URDF, SIDECAR, DH, DELTAS = _EXPORTED = "robot.yaml", "robot.urdf", "effects.json", "dh.csv", "dh_deltas.csv"
+ROBOT, URDF, SIDECAR, DELTAS = _EXPORTED = "robot.yaml", "robot.urdf", "effects.json", "dh_deltas.csv"
 _ROUNDING_MM = 1e-5
 
 
@@ -182,13 +182,12 @@ def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, a
 
 def _denavit_hartenberg(nominal: Robot, robot: Robot, partial: Path, output: Path) -> list[str]:
     """Write the DH parameters, and by how much they differ from the nominal ones; lines to print."""
-    from elastocal.exchange.dh_writing import dh_deltas, dh_table
+    from elastocal.exchange.dh_writing import dh_deltas
     from elastocal.io.data_frames import write_csv
 
     try:
-        table, deltas = dh_table(robot, nominal), dh_deltas(nominal, robot)
+        deltas = dh_deltas(nominal, robot)
     except InputError as error:
         return [f"no DH parameters: {error}"]
-    write_csv(partial / DH, table, digits=12)
     write_csv(partial / DELTAS, deltas)
-    return [str(output / DH), str(output / DELTAS)]
+    return [str(output / DELTAS)]

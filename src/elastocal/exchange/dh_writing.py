@@ -10,7 +10,6 @@ fixed and a and b are the offset. All parameters then change as little as the ro
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -27,50 +26,21 @@ PARAMETERS = ("theta_deg", "d_m", "a_m", "alpha_deg", "b_m", "beta_deg")
 _Kind = tuple[np.ndarray | None, float | None]
 
 
-def dh_table(robot: Robot, nominal: Robot | None = None) -> pd.DataFrame:
-    """Rows as `elastocal import dh` reads them: ``Ty(b) Ry(beta)`` becomes a fixed row of its own.
-
-    `nominal`: by which each pair of axes is described, see `dh_deltas`; the robot itself without. Returns of the angles that
-    the controller reports, where for both it counts each joint by itself. Raises `InputError`: prismatic or passive joints.
-    """
-    rows: list[dict[str, Any]] = []
-    turned, like = 0.0, nominal or robot
-
-    def write(kind: str, joint: int | None, theta: float, d: float, a: float, alpha: float) -> None:
-        head = {"joint": f"{joint or ''}", "type": kind, "theta_offset_deg": math.degrees(theta)}
-        rows.append(head | {"d_m": d, "a_m": a, "alpha_deg": math.degrees(alpha), "point": ""})
-
-    for number, row in enumerate(_rows(robot, like, robot.counts_each_joint and like.counts_each_joint)):
-        theta, d, a, alpha, b, beta = row.tolist()
-        joint = number if 1 <= number <= robot.joints else None
-        write("R" if joint else "F", joint, theta - turned, d, a, alpha)
-        # Ry is Rx between quarter turns, of which the next row takes back the second.
-        turned = 0.5 * math.pi if b or beta else 0.0
-        if turned:
-            write("F", None, turned, 0.0, b, beta)
-    if turned:
-        write("F", None, -turned, 0.0, 0.0, 0.0)
-    rows[-1]["point"] = robot.chain.end_effector.name
-    return pd.DataFrame(rows)
-
-
 def dh_deltas(nominal: Robot, calibrated: Robot) -> pd.DataFrame:
     """Parameters of both robots row by row, and their differences.
 
     Returns ``row`` (base, q1 .. qn, end effector), the calibrated `PARAMETERS`, then ``delta_..``: calibrated minus nominal.
+    Angles of joints are the controller's where for both robots it counts each joint by itself, else those of the chain. Raises
+    `InputError`: prismatic or passive joints.
     """
     own = nominal.counts_each_joint and calibrated.counts_each_joint
-    before, after = (_rows(robot, nominal, own) for robot in (nominal, calibrated))
+    before, kinds = _describe(nominal, None, own)
+    after, _ = _describe(calibrated, kinds, own)
     turns, delta = np.array([name.endswith("_deg") for name in PARAMETERS]), after - before
     delta[:, turns] = np.degrees((delta[:, turns] + math.pi) % (2.0 * math.pi) - math.pi)
     table = pd.DataFrame(np.where(turns, np.degrees(after), after) + 0.0, columns=list(PARAMETERS))
     table.insert(0, "row", ["base", *(f"q{joint}" for joint in range(1, nominal.joints + 1)), nominal.chain.end_effector.name])
     return pd.concat([table, pd.DataFrame(delta + 0.0, columns=[f"delta_{name}" for name in PARAMETERS])], axis=1)
-
-
-def _rows(robot: Robot, nominal: Robot, own: bool) -> np.ndarray:
-    """Rows of base, joints and end effector in the description of another robot, ndarray (n + 2, 6): `PARAMETERS` in rad, m."""
-    return _describe(robot, _describe(nominal, None, own)[1], own)[0]
 
 
 def _describe(robot: Robot, kinds: Sequence[_Kind] | None, own: bool) -> tuple[np.ndarray, list[_Kind]]:
