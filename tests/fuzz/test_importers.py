@@ -36,10 +36,7 @@ ELEMENTS = (
     '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="/etc/passwd"/>',
     "<![CDATA[",
 )
-DH = (
-    "joint,theta_offset_deg,d_mm,a_m,alpha,type\n"
-    "base,0,250,0,90,R\n,5,0,0,0,F\nelbow,-3.5,0,0.4,1,R\n"
-)
+DH = "joint,theta_offset_deg,d_mm,a_m,alpha,type\nbase,0,250,0,90,R\n,5,0,0,0,F\nelbow,-3.5,0,0.4,1,R\n"
 ANGLE_CELLS = st.sampled_from(["pi/0", "1e9*pi", "-pi/2", "0*pi/0", "9" * 200 + "pi", "1e308", "P", "F", "-1e-320"])
 KINEMATICS = {"kinematics": {"hash": "a", "shoulder": {"x": 0, "y": 0.1, "z": "1e-05", "roll": 1.5, "pitch": 0, "yaw": -9e-06}}}
 TRACKER = "Tracker 7;;\nPose;J1;J2 [deg];q3;X [mm];Y;Z;Target;qw;qx;qy;qz;fz [kN];time\n" + "".join(

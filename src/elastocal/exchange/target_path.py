@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.measurement_checks import find_degrees
 from elastocal.campaigns.measurements import FARTHEST_RAD
+from elastocal.campaigns.reading import find_degrees
 from elastocal.errors import InputError, closest_first
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.exchange.measurement_table import CellReader
