@@ -57,13 +57,13 @@ def assert_same_weight(arm, path, within=None):
 )
 def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(tmp_path, base, tip, names):
     path = written(tmp_path, *ARM)
-    result = robot_from_urdf(path, base, tip, relative_std=0.3)
+    result = robot_from_urdf(path, base, tip)
     arm = through_its_file(result)
     assert arm.joint_names == names and {mass.link for mass in arm.masses} == {*range(len(names) + 1)}
     assert_same_poses(arm, path, base, tip)
     assert assert_same_weight(arm, path) > 1.0
     # What a URDF does not say is not made up.
-    assert not arm.compliance_known and {mass.relative_std for mass in arm.masses} == {0.3}
+    assert not arm.compliance_known and {mass.relative_std for mass in arm.masses} == {0.2}
     assert any("no compliances" in note for note in result.notes) and any("30 %, by assumption" in n for n in result.notes)
 
 

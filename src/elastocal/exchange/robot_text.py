@@ -4,12 +4,10 @@ import hashlib
 import math
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from elastocal.counting import counted
 from elastocal.errors import InputError, reason_of
@@ -20,8 +18,6 @@ from elastocal.mechanics.robot_file import robot_from_document
 
 _WIDTH = 128
 _INDENT = "  "
-# Kilograms and metres to the nanometre.
-_DECIMALS = 9
 # Of what an import finds.
 _ORDER = ("name", "joint_names", "chain", "joint_limits_deg", "compliance_urad_per_Nm", "gravity_m_s2", "masses")
 # A joint may count any number of turns; a thousand are a mistake.
@@ -61,19 +57,6 @@ def check_imported(document: dict[str, Any], path: str | Path, options: str, not
 def point_name(link: str) -> str:
     """A link's name as that of a measuring point: blanks and brackets, which the notation needs, become underscores."""
     return re.sub(r"[\[\]\s]", "_", link)
-
-
-def mass_entries(moments: Mapping[int, np.ndarray], relative_std: float) -> list[dict[str, Any]]:
-    """``masses`` of a robot file.
-
-    `moments` (4,): of what each link carries the mass times its centre, m kg, and the mass, kg; by the number of the link.
-    """
-    entries = []
-    for link, (*moment, mass) in sorted(moments.items()):
-        centre = np.round(np.array(moment) / mass, _DECIMALS) + 0.0
-        entry = {"link": link, "mass_kg": round(float(mass), _DECIMALS), "centre_m": centre.tolist()}
-        entries.append(entry | {"relative_std": relative_std})
-    return entries
 
 
 def robot_text(result: Imported) -> str:

@@ -26,7 +26,6 @@ import numpy as np
 
 from elastocal.counting import first_names
 from elastocal.errors import InputError, closest_first
-from elastocal.exchange import URDF_MASS_STD
 from elastocal.exchange.fixed_transforms import (
     axis_rotation,
     displacement_words,
@@ -34,7 +33,7 @@ from elastocal.exchange.fixed_transforms import (
     homogeneous,
     origin_transform,
 )
-from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, mass_entries, point_name
+from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, point_name
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
 from elastocal.mechanics.robot import STANDARD_GRAVITY, UNLIMITED_DEG
 
@@ -56,8 +55,12 @@ _NUMBERS = {
     ("limit", "upper"): (1, "0"),
     ("mass", "value"): (1, ""),
 }
-# Limits to a billionth of a degree, or to a nanometre; gravity to so many m/s².
+# Limits to a billionth of a degree, or to a nanometre; gravity to so many m/s²; masses to so many kg.
 _DECIMALS = 9
+# How well masses are known, as a standard deviation over the value. A URDF does not say where they come from: of a drawing
+# without cables, grease and covers, or guessed; where dynamic parameters of robots were identified, masses and centres of such
+# models were off by a tenth to a third.
+_MASS_STD = 0.2
 # Two turns, and rounding; the limits of a joint in degrees are farther, and few joints turn so often.
 _FARTHEST_RAD = 4.0 * math.pi + 0.01
 # So many links of a robot never weigh the same; links and joints that a note names.
@@ -121,19 +124,18 @@ def robot_from_urdf(
     base: str,
     tip: str,
     points: Sequence[str] = (),
-    relative_std: float = URDF_MASS_STD,
     limits_in: str | None = None,
 ) -> Imported:
     """The robot between two links of a URDF.
 
     `base`, `tip`: links: the robot's base frame, and its last measuring point. `points`: links between them that become
-    measuring points too. `relative_std`: how well the masses are known. `limits_in`: unit of the limits of joints that turn;
+    measuring points too. `limits_in`: unit of the limits of joints that turn;
     asked for where one goes farther than joints do in rad. Limits of continuous joints are a turn either way. Raises
     `InputError`: as in `read_urdf` and `chain_between`; a prismatic joint without limits.
     """
     urdf, source = read_urdf(path), str(path)
     chain = chain_between(urdf, base, tip, points, source)
-    masses, notes = _weights(urdf, chain, relative_std)
+    masses, notes = _weights(urdf, chain)
     notes.insert(0, f"read: {', '.join(f'q{n} from {joint.name!r}' for n, joint in enumerate(chain.joints, 1))}")
     limits = [_limits(joint, limits_in, notes, source) for joint in chain.joints]
     if limits_in == "deg":
@@ -148,7 +150,7 @@ def robot_from_urdf(
         notes.append(f"gravity as at {base!r} where the root of the tree stands upright and the joints before it are at zero")
     if masses:
         document["masses"] = masses
-        notes.append(f"masses are known to {100 * relative_std:g} %, by assumption: a URDF does not say")
+        notes.append(f"masses are known to {100 * _MASS_STD:g} %, by assumption: a URDF does not say")
     if beside := [joint.name for joint in urdf.joints if joint.kind != "fixed" and joint.child not in chain.links]:
         notes.append(f"joints that are no part of the chain, left out: {', '.join(beside)}")
     return check_imported(document, path, f"the links from {base!r} to {tip!r}", notes)
@@ -375,7 +377,7 @@ def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
     return path
 
 
-def _weights(urdf: Urdf, chain: UrdfChain, relative_std: float) -> tuple[list[dict[str, Any]], list[str]]:
+def _weights(urdf: Urdf, chain: UrdfChain) -> tuple[list[dict[str, Any]], list[str]]:
     """Entries of ``masses`` of a robot file, see `mechanics.robot_file`, and what is to be said of them."""
     moments: dict[int, np.ndarray] = {}
     at_zero = set()
@@ -397,4 +399,9 @@ def _weights(urdf: Urdf, chain: UrdfChain, relative_std: float) -> tuple[list[di
     if at_zero:
         held = first_names(sorted(at_zero), _NAMED)
         notes.insert(0, f"joints beside the chain are held at zero for what they carry: {held}")
-    return mass_entries(moments, relative_std), notes
+    entries = []
+    for number, (*mass_times_centre, mass) in sorted(moments.items()):
+        centre = np.round(np.array(mass_times_centre) / mass, _DECIMALS) + 0.0
+        entry = {"link": number, "mass_kg": round(float(mass), _DECIMALS), "centre_m": centre.tolist()}
+        entries.append(entry | {"relative_std": _MASS_STD})
+    return entries, notes
