@@ -64,7 +64,7 @@ def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(
     assert assert_same_weight(arm, path) > 1.0
     # What a URDF does not say is not made up.
     assert not arm.compliance_known and {mass.relative_std for mass in arm.masses} == {0.2}
-    assert any("no compliances" in note for note in result.notes) and any("30 %, by assumption" in n for n in result.notes)
+    assert any("no compliances" in note for note in result.notes) and any("20 %, by assumption" in n for n in result.notes)
 
 
 @pytest.mark.parametrize("limits", [None, (-1e16, 1e16)])

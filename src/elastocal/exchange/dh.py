@@ -249,7 +249,7 @@ def _slid_words(rows: Sequence[DhRow], modified: bool) -> list[str]:
         here = elementary("T", 2, -slide) @ gap
         if number < len(gaps):
             # Of the points of the next axis the nearest one.
-            slide = -here[:3, 2] @ here[:3, 3]
+            slide = -float(here[:3, 2] @ here[:3, 3])
             here = here @ elementary("T", 2, slide)
         words += [*displacement_words(here), *([f"Rz(q{number})"] if number < len(gaps) else [])]
     return words
