@@ -209,21 +209,25 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     controller's servo error can differ: the leader algorithm (Hartigan, Clustering Algorithms, 1975). Poses along a path, each
     near the next, are several configurations.
     """
-    # Poses with the very same angles lead or follow together: a tree of a hundred thousand equal points takes minutes.
-    first, same = groups_of(means := _means(joint_angles, pose))
+    return number_alike(_means(joint_angles, pose), SAME_POSE_RAD)
+
+
+def number_alike(points: np.ndarray, within: float) -> np.ndarray:
+    """Number of each row (N, n), 0 for the first: one for rows that agree to `within` with the row that began it."""
+    # Equal rows lead or follow together: a tree of a hundred thousand equal points takes minutes.
+    first, same = groups_of(points)
     order = np.argsort(first)
-    mean = means[first[order]]
-    tree = _tree(mean)
+    different = points[first[order]]
+    tree = _tree(different)
     # What is farther from all others is not asked for its neighbours, and the neighbours of all are never held at once.
-    beyond = np.nextafter(SAME_POSE_RAD, 1.0)
-    nearest, _ = tree.query(mean, k=[2], p=np.inf, distance_upper_bound=beyond)
+    nearest, _ = tree.query(different, k=[2], p=np.inf, distance_upper_bound=np.nextafter(within, 1.0))
     alone = np.isinf(np.ravel(nearest))
-    found, count = np.full(len(mean), -1), 0
-    for leader in range(len(mean)):
+    found, count = np.full(len(different), -1), 0
+    for leader in range(len(different)):
         if found[leader] < 0:
             found[leader] = count
             if not alone[leader]:
-                near = np.array(tree.query_ball_point(mean[leader], SAME_POSE_RAD, p=np.inf))
+                near = np.array(tree.query_ball_point(different[leader], within, p=np.inf))
                 found[near[found[near] < 0]] = count
             count += 1
     return found[np.argsort(order)][same]

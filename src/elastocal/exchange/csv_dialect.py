@@ -18,13 +18,10 @@ from elastocal.io.texts import decoded, read_bytes
 SEPARATORS = {"tab": "\t", "semicolon": ";", "bar": "|", "comma": ",", "space": " "}
 DECIMALS = {"point": ".", "comma": ","}
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-# What Western spreadsheets and instruments write beyond ASCII. Another encoding that gives these alone is not to be expected:
-# that of Windows is taken where a file is no UTF-8, and asked for where anything else comes out.
-_WESTERN, _WESTERN_SIGNS = "cp1252", frozenset("°µ±²³·äöüÄÖÜßàâçèéêëîïôùûñÉ\u00a0")
 _COMMENTS = ("#", "%", "//")
 _DECIMAL = {name: re.compile(rf"[+-]?\d*[{mark}]\d+([eE][+-]?\d+)?", re.ASCII) for name, mark in DECIMALS.items()}
-# Three digits behind a comma, which may stand between thousands.
-_EITHER = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
+# Three digits behind a comma may stand between thousands; these do not.
+_SURE = re.compile(rf"(?![+-]?[1-9]\d{{0,2}},\d{{3}}$){_DECIMAL['comma'].pattern}", re.ASCII)
 # The whole of it is in memory, as text and as cells: some 2 GB at most.
 LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
 # Lines of a file with their numbers, from 1.
@@ -166,26 +163,18 @@ def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]
 
 
 def _decode(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, str]:
-    """Text of a file and its encoding, found out where it is not stated."""
-    if encoding is not None:
-        try:
-            return decoded(content, path, encoding).removeprefix("\ufeff"), encoding
-        except InputError:
-            raise
-        except (LookupError, ValueError) as error:
-            known = "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, shift_jis, gb18030 or utf-16-le"
-            raise InputError("--encoding", "", f"{encoding!r}: {error}", known) from None
-    found = next((name for mark, name in _MARKS if content.startswith(mark)), "")
+    """Text of a file and its encoding: the stated one, that of a byte order mark, or UTF-8."""
+    found = encoding or next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
     try:
-        return decoded(content, path, found or "utf-8"), found or "utf-8"
+        return decoded(content, path, found).removeprefix("\ufeff"), found
     except InputError as error:
-        western = content.decode(_WESTERN, errors="replace")
-        if found:
+        if found != "utf-8":
             raise
-        if all(character in _WESTERN_SIGNS for character in western if not character.isascii()):
-            return western, _WESTERN
         allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
         raise InputError(path, error.key, error.found, allowed) from None
+    except (LookupError, ValueError) as error:
+        known = "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, shift_jis, gb18030 or utf-16-le"
+        raise InputError("--encoding", "", f"{encoding!r}: {error}", known) from None
 
 
 def _find_header(
@@ -219,9 +208,7 @@ def _split_cells(line: str, separator: str, source: str = "", number: int = 0) -
     """
     mark = SEPARATORS[separator]
     if mark == " ":
-        if '"' not in line:
-            return line.split()
-        line = " ".join(line.split("\t")).strip()
+        return line.split()
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True, strict=True))
     except csv.Error as error:
@@ -233,20 +220,16 @@ def _split_cells(line: str, separator: str, source: str = "", number: int = 0) -
 
 def _find_decimal(columns: dict[str, tuple[str, ...]], lines: Sequence[int], separator: str, source: str) -> str:
     """The decimal mark that all numbers have; refused are numbers that may be read in two ways."""
-    seen: dict[str, tuple[int, str]] = {}
-    sure = False
-    for number, row in zip(lines, zip(*columns.values(), strict=True), strict=True):
-        for cell in row:
-            name = "comma" if "," in cell else "point" if "." in cell and "point" not in seen else ""
-            if name and _DECIMAL[name].fullmatch(cell):
-                seen.setdefault(name, (number, cell))
-                sure |= name == "comma" and not _EITHER.fullmatch(cell)
-        if len(seen) == 2:
-            (one, left), (other, right) = seen["point"], seen["comma"]
-            allowed = "one decimal mark, and none between thousands; --decimal point or comma says which"
-            raise InputError(source, "", f"{left!r} in line {one} and {right!r} in line {other}", allowed)
-    if "comma" in seen and (separator == "comma" or not sure):
-        number, cell = seen["comma"]
+
+    def first(pattern: re.Pattern[str], mark: str) -> tuple[int, str] | None:
+        rows = zip(lines, zip(*columns.values(), strict=True), strict=True)
+        return next(((number, cell) for number, row in rows for cell in row if mark in cell and pattern.fullmatch(cell)), None)
+
+    point, comma = (first(_DECIMAL[name], mark) for name, mark in DECIMALS.items())
+    if point and comma:
+        allowed = "one decimal mark, and none between thousands; --decimal point or comma says which"
+        raise InputError(source, "", f"{point[1]!r} in line {point[0]} and {comma[1]!r} in line {comma[0]}", allowed)
+    if comma and (separator == "comma" or not first(_SURE, ",")):
         allowed = "--decimal comma where the comma is the decimal mark, or numbers without marks between thousands"
-        raise InputError(source, f"line {number}", repr(cell), allowed)
-    return next(iter(seen), "point")
+        raise InputError(source, f"line {comma[0]}", repr(comma[1]), allowed)
+    return "comma" if comma else "point"

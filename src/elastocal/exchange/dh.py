@@ -1,22 +1,21 @@
 """A Denavit-Hartenberg table, checked cell by cell, to the contents of a robot file.
 
-One row for each joint, or for what is fixed before, between or behind joints::
+One row for each joint, all of which turn::
 
-    joint, theta_offset_deg, d_m,    a_m,     alpha_deg, type
-    1,     0,                0.1625, 0,       90,        R
-    2,     0,                0,      -0.425,  0,         R
+    joint, theta_offset_deg, d_m,    a_m,     alpha_deg
+    1,     0,                0.1625, 0,       90
+    2,     0,                0,      -0.425,  0
 
-begins a UR5e in the standard notation. ``type`` is R (revolute, also where the column is left out) or F (fixed). A column of
-angles or lengths ends in ``_deg``, ``_rad``, ``_m`` or ``_mm``, has ``[mm]`` behind its name or a row of units under the
-header; without, an option says which. Limits, prismatic joints and further measuring points are written in the robot file.
+begins a UR5e in the standard notation. A column of angles or lengths ends in its unit, has ``[mm]`` behind its name or a row of
+units under the header; without, an option says which. ``joint`` and a ``type`` of R may be left out.
 
 A row of the standard notation [1] is ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, one of Craig's modified notation [2]
 ``Rx(alpha) Tx(a) Rz(theta) Tz(d)`` with the alpha and a of its own row, which he calls alpha and a of i - 1. A joint's angle is
 added to theta.
 
 Joint frames may be moved along their own axes, which changes no pose behind them: a turn about z and a shift along z commute,
-``Tz(s) Rz(q) Tz(-s) = Rz(q)``. Where two axes are nearly parallel, their common normal is anywhere along
-them, and a calibrated table has lengths d of hundreds of metres that cancel [3]; the frames of a chain need not be there.
+``Tz(s) Rz(q) Tz(-s) = Rz(q)``. Where two axes are nearly parallel, their common normal is anywhere along them, and a calibrated
+table has lengths d of hundreds of metres that cancel [3]; the frames of a chain need not be there.
 
 The ROS drivers of Universal Robots write a calibrated arm as ``kinematics`` instead [4]: a fixed transform before each joint,
 ``{x, y, z, roll, pitch, yaw}`` (m, rad), as ``origin`` of a URDF; the joint turns about z. The base frame is that of the
@@ -31,7 +30,7 @@ controller (``base`` of ur_description, not ``base_link``).
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,15 +39,16 @@ import numpy as np
 
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
-from elastocal.exchange.column_names import read_units, split_unit
-from elastocal.exchange.csv_dialect import Dialect, TextTable, read_text_table
+from elastocal.exchange.column_names import ANGLE, LENGTH, UNITS, read_units, split_unit
+from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.exchange.fixed_transforms import displacement_words, elementary, origin_transform, word
+from elastocal.exchange.measurement_table import CellReader
 from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, point_name
 from elastocal.io.documents import read_document
-from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
+from elastocal.io.texts import A_NUMBER, plain_number
 
-_SCALES = {"deg": math.radians(1.0), "rad": 1.0, "m": 1.0, "mm": 1e-3}
-_ANGLES, _LENGTHS, _WORDS, _NEEDED = ("theta_offset", "alpha"), ("d", "a"), ("joint", "type"), ("d", "a", "alpha")
+_KINDS = {"theta_offset": ANGLE, "d": LENGTH, "a": LENGTH, "alpha": ANGLE}
+_NEEDED, _WORDS = ("d", "a", "alpha"), ("joint", "type")
 _USUAL = ("joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type")
 # The chain of more has no room in a robot file.
 _MOST_ROWS = 500
@@ -64,19 +64,7 @@ _JOINTS = {
     "forearm": "elbow_joint",
     **{f"wrist_{number}": f"wrist_{number}_joint" for number in (1, 2, 3)},
 }
-
-
-@dataclass(frozen=True)
-class DhRow:
-    """One row, rad and m: its line in words, the joint as the table calls it, if it does, and whether it is no joint at all."""
-
-    where: str
-    joint: str
-    fixed: bool
-    theta: float
-    d: float
-    a: float
-    alpha: float
+_LACKS = ["no masses: the weight of the links is not known", "no limits of any joint: a turn either way"]
 
 
 @dataclass(frozen=True)
@@ -101,27 +89,24 @@ def robot_from_dh(
 ) -> Imported:
     """The robot of a Denavit-Hartenberg table, or of a YAML file with the kinematics of a ROS driver.
 
-    `modified`: Craig's notation; else the standard one. `name`: of the robot; that of the file without. Raises `InputError`: as
-    in `read_dh_table`.
+    `modified`: Craig's notation; else the standard one. `name`: of the robot; that of the file without. An `InputError` names
+    file, line and column of what cannot be read, or a column whose unit nothing states.
     """
     source = Path(path).as_posix()
     if Path(path).suffix.lower() in (".yaml", ".yml"):
         if option := "--modified" if modified else "--ignore" if options.ignore else "":
             raise InputError(option, "", f"a file of {_KINEMATICS}, which is no table", f"the file without {option}")
         return _robot_from_kinematics(path, name)
-    rows, notes = read_dh_table(path, options)
-    joints = [row for row in rows if not row.fixed]
+    names, rows, notes = _read_table(path, options)
     document: dict[str, Any] = {"name": name or Path(path).stem}
-    names = [row.joint for row in joints]
     # Numbers alone only count the joints.
     if any(names) and not all(each.isdecimal() for each in names):
-        for row in joints:
-            if not row.joint or names.count(row.joint) > 1:
-                raise InputError(source, f"{row.where}, joint", repr(row.joint), "a name for every joint, each once")
+        if wrong := [each for each in names if not each or names.count(each) > 1]:
+            raise InputError(source, "column joint", repr(wrong[0]), "a name for every joint, each once")
         document["joint_names"] = names
     words, near = _words(rows, modified), _slid_words(rows, modified)
     written, short = (sum(abs(float(match[1])) for each in both if (match := _SHIFT.fullmatch(each))) for both in (words, near))
-    notes += ["no masses: the weight of the links is not known", "no limits of any joint: a turn either way"]
+    notes += _LACKS
     if short < _MUCH_SHORTER * written:
         words = near
         notes.append(
@@ -132,11 +117,8 @@ def robot_from_dh(
     return check_imported(document, path, f"{'modified' if modified else 'standard'} Denavit-Hartenberg parameters", notes)
 
 
-def read_dh_table(path: str | Path, options: DhOptions = _AS_STATED) -> tuple[list[DhRow], list[str]]:
-    """Rows of a Denavit-Hartenberg table, and notes how they were understood and what was left out.
-
-    An `InputError` names file, line and column of what cannot be read, or a column whose unit nothing states.
-    """
+def _read_table(path: str | Path, options: DhOptions) -> tuple[list[str], np.ndarray, list[str]]:
+    """Names of joints, rows (n, 4) of theta, d, a, alpha in rad and m, and notes how they were understood."""
     source = Path(path).as_posix()
     if Path(path).suffix.lower() != ".csv":
         raise InputError(source, "", f"a file that ends in {Path(path).suffix!r}", f".csv, or .yaml with {_KINEMATICS}")
@@ -148,101 +130,76 @@ def read_dh_table(path: str | Path, options: DhOptions = _AS_STATED) -> tuple[li
         "columns d, a and alpha, such as d_m or d_mm",
         read_units,
     )
-    # By names without their unit: header, and unit.
-    columns: dict[str, tuple[str, str]] = {}
+    headers: dict[str, str] = {}
+    units: dict[str, str] = {}
     for header in text.columns:
-        name, unit = _column(header, text.units.get(header, ""), options, source)
-        if name in columns:
+        name, stated = (header, None) if header in _WORDS else split_unit(header)
+        if name not in (*_KINDS, *_WORDS):
+            allowed = f"{closest_first(header, _USUAL)}; import dh --ignore {header!r} leaves it out"
+            raise InputError(source, "header", repr(header), allowed)
+        if name in headers:
             raise InputError(source, "header", f"{name} twice", "each column once")
-        columns[name] = header, unit
-    for name in _NEEDED:
-        if name not in columns:
-            raise InputError(source, "header", f"no column {name}", "theta_offset, d, a and alpha, such as d_m or d_mm")
+        headers[name] = header
+        if name in _KINDS:
+            units[name] = _unit(header, _KINDS[name], stated, text.units.get(header), options, source)
+    if missing := [name for name in _NEEDED if name not in headers]:
+        raise InputError(source, "header", f"no column {missing[0]}", "theta_offset, d, a and alpha, such as d_m or d_mm")
     if len(text.lines) > _MOST_ROWS:
         raise InputError(source, "", counted(len(text.lines), "row"), f"at most {_MOST_ROWS}, one for each joint")
-    rows = [_row(text, place, columns) for place in range(len(text.lines))]
-    if all(row.fixed for row in rows):
-        raise InputError(source, "", "no joint", "a row of type R for each joint")
-    understood = (f"{header!r} as {name}{f' in {unit}' if unit else ''}" for name, (header, unit) in columns.items())
-    return rows, [
+    read = CellReader(text, headers, {name: UNITS[_KINDS[name]][unit] for name, unit in units.items()})
+    for place, kind in enumerate(read.cells("type") if "type" in headers else ()):
+        if kind.upper()[:1] not in ("R", ""):
+            raise read.fault(place, "type", "R (revolute); what shifts or is fixed is written into the robot file")
+    rows = np.column_stack([read.numbers(name) if name in headers else np.zeros(len(text.lines)) for name in _KINDS])
+    for column, name in enumerate(_KINDS):
+        # 90 is in degrees, whatever is stated.
+        most = 2 if units.get(name) == "rad" else MOST_TURNS
+        wrong = np.abs(rows[:, column]) > 2.0 * math.pi * most
+        if _KINDS[name] == ANGLE and wrong.any():
+            allowed = f"a number, {most} turns at most{'; degrees are --angles deg' * (most == 2)}"
+            raise read.fault(int(np.argmax(wrong)), name, allowed)
+    understood = (f"{header!r} as {name}{f' in {units[name]}' if name in units else ''}" for name, header in headers.items())
+    notes = [
         f"read: {'; '.join(understood)}",
         f"file: names of columns in line {text.dialect.header}, separator {text.dialect.separator}, "
         f"decimal {text.dialect.decimal}, encoding {text.dialect.encoding}",
         *([f"not used: {', '.join(options.ignore)}"] if options.ignore else []),
         *text.left_out,
     ]
+    return read.cells("joint") if "joint" in headers else [], rows, notes
 
 
-def _column(header: str, below: str, options: DhOptions, source: str) -> tuple[str, str]:
-    """Name and unit of a column, by its header and the unit of the row under it."""
-    if header in _WORDS:
-        return header, ""
-    name, stated = split_unit(header)
-    stated, beneath = ("deg" if unit == "°" else unit or "" for unit in (stated, below))
-    if stated and beneath and stated != beneath:
+def _unit(header: str, kind: str, stated: str | None, below: str | None, options: DhOptions, source: str) -> str:
+    """Unit of a column: behind its name, in the row under it, or of an option."""
+    if stated and below and stated != below:
         raise InputError(source, "header", f"{header!r} and {below!r} in the row under it", "one unit")
-    if name not in (*_ANGLES, *_LENGTHS):
-        allowed = f"{closest_first(header, _USUAL)}; import dh --ignore {header!r} leaves it out"
-        raise InputError(source, "header", repr(header), allowed)
-    turns = name in _ANGLES
-    units, option, default = (("deg", "rad"), "angles", "deg") if turns else (("m", "mm"), "lengths", "mm")
-    unit = stated or beneath or getattr(options, option)
-    if not unit:
-        allowed = f"--{option} {' or '.join(units)}, or {name}_{default} and such"
-        raise InputError(source, "header", f"no unit of {header!r}", allowed)
-    if unit not in units:
-        raise InputError(source, "header", f"{header!r} in {unit}", ", ".join(units))
-    return name, unit
+    option, usual, given = ("--angles", "deg", options.angles) if kind == ANGLE else ("--lengths", "mm", options.lengths)
+    unit = stated or below or given
+    if unit not in UNITS[kind]:
+        found = f"{header!r} in {unit}" if unit else f"no unit of {header!r}"
+        raise InputError(source, "header", found, f"{option} {usual} or such, or {', '.join(UNITS[kind])} behind the name")
+    return unit
 
 
-def _row(text: TextTable, place: int, columns: Mapping[str, tuple[str, str]]) -> DhRow:
-    """A row of the table, its numbers in SI units."""
-    cells = {name: text.columns[header][place] for name, (header, _) in columns.items()}
-    source, where = text.path, f"line {text.lines[place]}"
-    kind = (cells.get("type") or "R").upper()[:1]
-    if kind not in "RF":
-        raise InputError(source, f"{where}, type", repr(cells["type"]), "R (revolute) or F (fixed)")
-
-    def number(name: str) -> float:
-        if name not in cells or (not cells[name] and name not in _NEEDED):
-            return 0.0
-        (header, unit), turns = columns[name], name in _ANGLES
-        value = plain_number(cells[name])
-        # 90 is in degrees, whatever is stated.
-        most = 2 if unit == "rad" else MOST_TURNS
-        if value is None or abs(value) > (most * (2.0 * math.pi if unit == "rad" else 360.0) if turns else LARGEST_NUMBER):
-            allowed = f"a number, {most} turns at most{'; degrees are --angles deg' * (most == 2)}" if turns else A_NUMBER
-            raise InputError(source, f"{where}, {header}", repr(cells[name]) if cells[name] else "nothing", allowed)
-        return value * _SCALES[unit]
-
-    return DhRow(where, cells.get("joint", ""), kind == "F", *(number(name) for name in ("theta_offset", "d", "a", "alpha")))
-
-
-def _words(rows: Sequence[DhRow], modified: bool) -> list[str]:
+def _words(rows: np.ndarray, modified: bool) -> list[str]:
     """A chain in words, row by row."""
     words: list[str] = []
-    joint = 0
-    for row in rows:
-        joint += not row.fixed
-        across = [word("Tx", row.a), word("Rx", row.alpha)]
-        along = [word("Rz", row.theta), "" if row.fixed else f"Rz(q{joint})", word("Tz", row.d)]
+    for joint, (theta, d, a, alpha) in enumerate(rows.tolist(), 1):
+        across, along = [word("Tx", a), word("Rx", alpha)], [word("Rz", theta), f"Rz(q{joint})", word("Tz", d)]
         words += [*across, *along] if modified else [*along, *across]
     return [each for each in words if each]
 
 
-def _slid_words(rows: Sequence[DhRow], modified: bool) -> list[str]:
+def _slid_words(rows: np.ndarray, modified: bool) -> list[str]:
     """A chain in words whose joints lie as near as their axes allow to the joint before."""
     # What stands before, between and behind the joints, which turn about z.
     gaps = [np.eye(4)]
-    for row in rows:
-        across = elementary("T", 0, row.a) @ elementary("R", 0, row.alpha)
-        turn, shift = elementary("R", 2, row.theta), elementary("T", 2, row.d)
+    for theta, d, a, alpha in rows:
+        across = elementary("T", 0, a) @ elementary("R", 0, alpha)
+        turn, shift = elementary("R", 2, theta), elementary("T", 2, d)
         before, behind = (across @ turn, shift) if modified else (turn, shift @ across)
         gaps[-1] = gaps[-1] @ before
-        if row.fixed:
-            gaps[-1] = gaps[-1] @ behind
-        else:
-            gaps.append(behind)
+        gaps.append(behind)
     words: list[str] = []
     slide = 0.0
     for number, gap in enumerate(gaps, 1):
@@ -289,8 +246,7 @@ def _robot_from_kinematics(path: str | Path, name: str | None) -> Imported:
     notes = [
         f"read: {', '.join(f'q{n} is {name} of {link!r}' for n, (name, link) in enumerate(zip(names, links, strict=True), 1))}",
         *(["not used: hash"] if "hash" in described else []),
-        "no masses: the weight of the links is not known",
-        "no limits of any joint: a turn either way",
+        *_LACKS,
         "base axes are the controller's (base, not base_link, which is turned half round)",
     ]
     return check_imported(contents, path, "the kinematics of a calibrated robot as ROS has them", notes)

@@ -1,4 +1,4 @@
-"""A robot file as text that a person reads: where it came from, keys in their usual order, a line for each joint's mass."""
+"""A robot file of a robot that was read of a file of another kind: checked, written, and summed up for a person."""
 
 import hashlib
 import math
@@ -17,9 +17,6 @@ from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
 _WIDTH = 128
-_INDENT = "  "
-# Of what an import finds.
-_ORDER = ("name", "joint_names", "chain", "joint_limits_deg", "compliance_urad_per_Nm", "gravity_m_s2", "masses")
 # A joint may count any number of turns; a thousand are a mistake.
 MOST_TURNS = 1000
 
@@ -66,8 +63,16 @@ def robot_text(result: Imported) -> str:
         # Whatever a file's name holds stays inside of a comment.
         plain = "".join(character if character.isprintable() else "?" for character in text)
         head += textwrap.wrap(plain, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
-    body = [line for key in _ORDER if key in result.document for line in _lines(key, result.document[key])]
-    return "\n".join([*head, *body]) + "\n"
+    body: list[str] = []
+    for key, value in result.document.items():
+        if key == "masses":
+            body += ["masses:", *(f"  - {one_line(entry)}" for entry in value)]
+        else:
+            # A name may have blanks that a break of the line would join.
+            width = _WIDTH if key in ("chain", "joint_limits_deg") else 10**6
+            line = f"{key}: {one_line(value)}"
+            body += textwrap.wrap(line, width, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False)
+    return "\n".join([*head, *body, ""])
 
 
 def write_robot(result: Imported, path: str | Path) -> None:
@@ -91,17 +96,6 @@ def summary(result: Imported) -> list[str]:
         f"measuring points: {', '.join(point.name for point in robot.chain.points)}",
         *(f"note: {note}" for note in result.notes),
     ]
-
-
-def _lines(key: str, value: Any) -> list[str]:
-    whole_words: dict[str, Any] = {"subsequent_indent": _INDENT, "break_on_hyphens": False, "break_long_words": False}
-    if key == "chain":
-        return ["chain: >-", *textwrap.wrap(value, _WIDTH, initial_indent=_INDENT, **whole_words)]
-    if key == "masses":
-        return ["masses:", *(f"{_INDENT}- {one_line(entry)}" for entry in value)]
-    if key == "joint_limits_deg":
-        return textwrap.wrap(f"{key}: {one_line(value)}", _WIDTH, **whole_words)
-    return [f"{key}: {one_line(value)}"]
 
 
 def refuse_existing(path: str | Path, force: bool) -> None:
