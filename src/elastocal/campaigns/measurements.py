@@ -1,38 +1,29 @@
 """Files of measurements: their columns, read cell by cell with the row of every fault, and written."""
 
-from __future__ import annotations
-
 import csv
 import math
-import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
 import pyarrow.parquet as pq
 
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, steering
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
-from elastocal.io.texts import LARGEST_NUMBER
+from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
 from elastocal.mechanics.components import WRENCH
-
-# Of each column the cells: numbers as an array, where all of them are numbers.
-Columns = dict[str, Sequence[Any] | np.ndarray]
 
 # A diagnosis of a million measurements takes ten minutes and 2 GB (docs, benchmarks); a tracker's stream is averaged before.
 MOST_MEASUREMENTS = 2_000_000
-# Forty columns of twenty digits are 1,000 characters.
-_LONGEST_LINE, _MOST_BYTES = 10_000, 1000 * MOST_MEASUREMENTS
+_LONGEST_LINE, _MOST_BYTES = 10_000, 500 * MOST_MEASUREMENTS
 _MOST_ROW_GROUPS = 2_000
-# Rows whose texts are in memory at a time; their numbers take a tenth of that.
-_ROWS_AT_A_TIME = 20_000
-_COMMENT = "#"
 # A file names no more.
 MOST_JOINTS = 99
 
@@ -110,7 +101,7 @@ def sheet_columns(joints: int) -> set[str]:
     return {TICK, *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in SHOWN)}
 
 
-def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFile:
+def read_measurements(folder: Path, joints: int, measured: str) -> "MeasurementFile":
     """Open the measurements of a campaign.
 
     `folder`: holds either `CSV` or `PARQUET`. `measured`: one of "position", "pose". Raises `InputError`: no file or two, a
@@ -121,13 +112,10 @@ def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFi
     if len(there) != 1:
         found = "both" if there else "neither"
         raise InputError(folder.as_posix(), "", f"{found} {CSV} {'and' if there else 'nor'} {PARQUET}", "one of them")
-    path = there[0].as_posix()
-    if (size := there[0].stat().st_size) > _MOST_BYTES:
-        raise InputError(path, "", counted(size, "byte"), f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements")
-    columns, rows, lines = (_read_csv if there[0].name == CSV else _read_parquet)(path, joints)
+    found_columns, rows, header_line = _read(there[0], joints)
     if len(rows) == 0:
-        raise InputError(path, "", "no row of data", "one row for each measurement of one target")
-    return MeasurementFile(path, columns, rows, lines, joints, measured)
+        raise InputError(there[0], "", "no row of data", "one row for each measurement of one target")
+    return MeasurementFile(there[0].as_posix(), found_columns, rows, header_line, joints, measured)
 
 
 def described_by(folder: Path) -> tuple[list[str], str]:
@@ -138,17 +126,19 @@ def described_by(folder: Path) -> tuple[list[str], str]:
     there = next((path for path in (folder / CSV, folder / PARQUET) if path.is_file()), None)
     if there is None:
         return [], "position"
-    columns = (_read_csv if there.name == CSV else _read_parquet)(there.as_posix(), MOST_JOINTS)[0]
-    names = dict.fromkeys(text for cell in columns.get("target", ()) if (text := str(cell).strip()))
+    columns = _read(there, MOST_JOINTS)[0]
+    names = dict.fromkeys(name for name in (_texts(columns["target"]) if "target" in columns else ()) if name)
     return list(names), "pose" if {"rx", "ry", "rz"} <= columns.keys() else "position"
 
 
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
-    """Refuse a column that the format does not have.
+    """Refuse a column that the format does not have, or that is there twice.
 
     `path`: named in errors. Raises `InputError`: the first such column.
     """
     known, beside = file_columns(joints), sheet_columns(joints)
+    if twice := next((name for place, name in enumerate(names) if name in [*names][:place]), None):
+        raise InputError(path, "header", f"column {twice!r} twice", "each column once")
     for name in names:
         if name not in known and name not in beside:
             # That q7 is unknown helps little where it is not stated how many joints the robot has.
@@ -167,146 +157,110 @@ def write_measurements(path: str | Path, table: Mapping[str, Sequence[Any] | np.
         (_write_csv if Path(path).name == CSV else _write_parquet)(partial, columns, table)
 
 
-def _read_csv(path: str, joints: int) -> tuple[Columns, np.ndarray, np.ndarray]:
-    """Columns, and of each row that is not blank its number and its line; a few thousand rows at a time."""
-    texts = {TICK, *(name for name, column in file_columns(joints).items() if column.type == "string")}
-    # A byte order mark is what spreadsheets write. Bytes that are no UTF-8 become what `_lines` refuses with the line.
+def _read(path: Path, joints: int) -> tuple[dict[str, pa.ChunkedArray], np.ndarray, int | None]:
+    """Columns by name; of each row that is not blank its number in the file, 1 for the first of data; line of the header."""
+    source = path.as_posix()
+    if (size := path.stat().st_size) > _MOST_BYTES:
+        allowed = f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements"
+        raise InputError(source, "", counted(size, "byte"), allowed)
+    table, rows, header_line = _read_csv(source, joints) if path.name == CSV else _read_parquet(source, joints)
+    if len(rows) > MOST_MEASUREMENTS:
+        raise _refuse_length(source, len(rows))
+    return dict(zip(table.column_names, table.columns, strict=True)), rows, header_line
+
+
+def _read_csv(path: str, joints: int) -> tuple[pa.Table, np.ndarray, int]:
+    header_line, header = _scan(path)
+    if not header:
+        raise InputError(path, "", "an empty file", "a header and one row for each measurement of one target")
+    names = [cell.strip() for cell in next(csv.reader([header], skipinitialspace=True))]
+    if len(names) == 1 and any(separator in names[0] for separator in ";\t"):
+        raise InputError(path, "header", repr(names[0][:40]), "columns separated by commas, decimals by a point")
+    check_column_names(names, joints, path)
+    other: list[pyarrow.csv.InvalidRow] = []
+
+    def leave_out(row: pyarrow.csv.InvalidRow) -> str:
+        other.append(row)
+        return "skip"
+
+    try:
+        table = pyarrow.csv.read_csv(
+            path,
+            # Without threads rows of another length come with the number of their line.
+            pyarrow.csv.ReadOptions(use_threads=False, skip_rows=header_line, column_names=names),
+            pyarrow.csv.ParseOptions(ignore_empty_lines=False, invalid_row_handler=leave_out),
+            pyarrow.csv.ConvertOptions(column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False),
+        )
+    except pa.ArrowInvalid as error:
+        # A header is all that there is.
+        if "Empty CSV file" not in str(error):
+            raise InputError(path, "", str(error), "comma-separated values, quotes in pairs") from None
+        table = pa.table({name: pa.array([], pa.string()) for name in names})
+    if wrong := next((row for row in other if row.text.replace(",", "").strip()), None):
+        where = f"row {wrong.number - header_line} (line {wrong.number})"
+        allowed = f"{len(names)}, one for each column of the header"
+        raise InputError(path, where, counted(wrong.actual_columns, "cell"), allowed)
+    table = pa.table({name: pc.utf8_trim_whitespace(table[name]) for name in names})
+    filled = np.any([pc.not_equal(column, "").to_numpy() for column in table.columns], axis=0)
+    rows = np.setdiff1d(np.arange(1, table.num_rows + len(other) + 1), [row.number - header_line for row in other])
+    return table.filter(pa.array(filled)), rows[filled].astype(np.int32), header_line
+
+
+def _scan(path: str) -> tuple[int, str]:
+    """Number and text of the line that is the header; a line that no table of measurements has is refused."""
+    header, text = 0, ""
+    # A byte order mark is what spreadsheets write. Bytes that are no UTF-8 become what is refused with the line.
     with open(path, encoding="utf-8-sig", errors="surrogateescape", newline="") as file:
-        source = _lines(file, path)
-        before, first = next(((number, line) for number, line in enumerate(source) if not _is_passed_over(line)), (0, ""))
-        header = [cell.strip() for cell in next(_split([first], path, before), (0, [""]))[1]]
-        if not first:
-            raise InputError(path, "", "an empty file", "a header and one row for each measurement of one target")
-        if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
-            raise InputError(path, "header", repr(header[0][:40]), "columns separated by commas, decimals by a point")
-        _check_header(path, header)
-        check_column_names(header, joints, path)
-        chunks: list[list[Any]] = [[] for _ in header]
-        rows: list[int] = []
-        lines: list[int] = []
-        numbered = enumerate(_split(source, path, before + 1), 1)
-        while block := list(islice(numbered, _ROWS_AT_A_TIME)):
-            kept = [(row, line, cells) for row, (line, cells) in block if any(cell.strip() for cell in cells)]
-            for row, line, cells in kept:
-                if len(cells) != len(header):
-                    allowed = f"{len(header)}, one for each column of the header"
-                    raise InputError(path, f"row {row} (line {line})", counted(len(cells), "cell"), allowed)
-            rows += [row for row, _, _ in kept]
-            lines += [line for _, line, _ in kept]
-            if len(rows) > MOST_MEASUREMENTS:
-                raise _refuse_length(path, "more")
-            for name, chunk, column in zip(header, chunks, zip(*(cells for _, _, cells in kept), strict=True), strict=False):
-                chunk.append([sys.intern(cell.strip()) for cell in column] if name in texts else _numbers(column))
-    columns = {name: _join(chunk) for name, chunk in zip(header, chunks, strict=True)}
-    return columns, np.array(rows, np.int32), np.array(lines, np.int32)
+        for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), ""), 1):
+            where = f"line {number}"
+            if len(line) == _LONGEST_LINE:
+                raise InputError(path, where, f"{_LONGEST_LINE} characters or more", "one measurement in a line")
+            if not line.isascii() and any("\ud800" <= character <= "\udfff" for character in line):
+                raise InputError(path, where, "text that is not UTF-8", "a UTF-8 file")
+            if character := steering(line.rstrip("\r\n").replace("\t", " ")):
+                raise InputError(path, where, f"the character {character!a}", "printable characters")
+            if header and line.count('"') % 2:
+                raise InputError(path, where, "a quote that is not closed", "comma-separated values, quotes in pairs")
+            if not header and line.strip() and not line.lstrip().startswith("#"):
+                header, text = number, line
+    return header, text
 
 
-def _lines(file: TextIO, path: str) -> Iterator[str]:
-    """Lines of a file, of bounded length each."""
-    for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), ""), 1):
-        if len(line) == _LONGEST_LINE:
-            raise InputError(path, f"line {number}", f"{_LONGEST_LINE} characters or more", "one measurement in a line")
-        if not line.isascii() and any("\ud800" <= character <= "\udfff" for character in line):
-            raise InputError(path, f"line {number}", "text that is not UTF-8", "a UTF-8 file")
-        if character := steering(line.rstrip("\r\n").replace("\t", " ")):
-            raise InputError(path, f"line {number}", f"the character {character!a}", "printable characters")
-        yield line
-
-
-def _is_passed_over(line: str) -> bool:
-    """Whether a line before the header is blank or a comment."""
-    return not line.strip() or line.lstrip().startswith(_COMMENT)
-
-
-def _split(lines: Iterable[str], path: str, before: int) -> Iterator[tuple[int, list[str]]]:
-    """Line in the file and cells of each row; `before` lines of the file are left out."""
-    reader = csv.reader(lines, skipinitialspace=True, strict=True)
-    ended = 0
-    try:
-        for cells in reader:
-            ended = reader.line_num
-            yield before + ended, cells
-    except csv.Error as error:
-        # A quote that is never closed is in the first of the lines that it swallows.
-        raise InputError(path, f"line {before + ended + 1}", str(error), "comma-separated values, quotes in pairs") from None
-
-
-def _numbers(cells: Sequence[str]) -> np.ndarray | list[str]:
-    """Cells as numbers where all of them are, else as they stand in the file."""
-    try:
-        values = _read_numbers(cells)
-    except ValueError:
-        return list(cells)
-    return values if np.isfinite(values).all() else list(cells)
-
-
-def _read_numbers(cells: Sequence[Any] | np.ndarray) -> np.ndarray:
-    """ndarray of float (N,); a ValueError or TypeError where a cell is none, such as 1_0 or other scripts' digits."""
-    if not isinstance(cells, np.ndarray) and any(isinstance(cell, str) and not _is_plain(cell) for cell in cells):
-        raise ValueError
-    return np.array(cells, float)
-
-
-def _is_plain(cell: str) -> bool:
-    return "_" not in cell and (cell.isascii() or cell.strip().isascii())
-
-
-def _join(chunks: Sequence[Any]) -> Sequence[Any] | np.ndarray:
-    if chunks and all(isinstance(chunk, np.ndarray) for chunk in chunks):
-        return np.concatenate(chunks)
-    return [cell for chunk in chunks for cell in chunk]
-
-
-def _read_parquet(path: str, joints: int) -> tuple[Columns, np.ndarray, None]:
-    texts = [name for name, column in file_columns(joints).items() if column.type == "string"]
+def _read_parquet(path: str, joints: int) -> tuple[pa.Table, np.ndarray, None]:
+    texts = {TICK, *(name for name, column in file_columns(joints).items() if column.type == "string")}
     try:
         # pyarrow's own complaint of a column that is there twice is a list of all columns.
         with pq.ParquetFile(path) as file:
             fields, count, groups = file.schema_arrow, file.metadata.num_rows, file.metadata.num_row_groups
-        names = fields.names
-        _check_header(path, names)
-        check_column_names(names, joints, path)
+        check_column_names(fields.names, joints, path)
         # A kilobyte may hold a list of a billion numbers; each row group takes memory of its own beside its rows.
-        if nested := next((field for field in fields if pa.types.is_nested(field.type)), None):
-            raise InputError(path, f"column {nested.name}", f"type {nested.type}", "numbers, or text")
+        for field in fields:
+            kind = field.type.value_type if pa.types.is_dictionary(field.type) else field.type
+            is_number = pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_null(kind)
+            if not (is_number or (pa.types.is_string(kind) and field.name in texts)):
+                allowed = "numbers, or text" if field.name in texts else "numbers"
+                raise InputError(path, f"column {field.name}", f"type {field.type}", allowed)
         if groups > _MOST_ROW_GROUPS:
             raise InputError(path, "", f"{groups} row groups", f"at most {_MOST_ROW_GROUPS}")
         if count > MOST_MEASUREMENTS:
-            raise _refuse_length(path, f"{count}")
+            raise _refuse_length(path, count)
         # As dictionaries texts take the memory that they take in the file.
-        table = pq.read_table(
-            path, read_dictionary=[name for name in texts if name in names], page_checksum_verification=True, partitioning=None
-        )
+        there = [name for name in fields.names if name in texts]
+        table = pq.read_table(path, read_dictionary=there, page_checksum_verification=True, partitioning=None)
         table.validate(full=True)
-        columns = {name: _cells(path, name, column) for name, column in zip(table.column_names, table.columns, strict=True)}
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
-    return columns, np.arange(1, table.num_rows + 1, dtype=np.int32), None
+    return table, np.arange(1, table.num_rows + 1, dtype=np.int32), None
 
 
-def _cells(path: str, name: str, column: pa.ChunkedArray) -> Sequence[Any] | np.ndarray:
-    """Cells of a column of Parquet: an array where all are numbers, which takes a fourth of the memory of a list."""
-    kind = column.type
-    if pa.types.is_dictionary(kind) and pa.types.is_string(kind.value_type):
-        whole = column.unify_dictionaries().combine_chunks()
-        words = [*map(sys.intern, whole.dictionary.to_pylist()), None]
-        return [words[code] for code in whole.indices.fill_null(len(words) - 1).to_pylist()]
-    if (pa.types.is_floating(kind) or pa.types.is_integer(kind)) and not column.null_count:
-        return column.to_numpy()
-    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_string(kind) or pa.types.is_null(kind)):
-        raise InputError(path, f"column {name}", f"type {kind}", "numbers, or text")
-    return column.to_pylist()
+def _texts(column: pa.ChunkedArray) -> list[str]:
+    encoded = column if pa.types.is_dictionary(column.type) else column.cast(pa.string()).dictionary_encode()
+    whole = encoded.unify_dictionaries().combine_chunks()
+    words = [str(word).strip() for word in whole.dictionary.to_pylist()]
+    return ["" if code is None else words[code] for code in whole.indices.to_pylist()]
 
 
-def _check_header(path: str, names: Sequence[str]) -> None:
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            raise InputError(path, "header", f"column {name!r} twice", "each column once")
-        seen.add(name)
-
-
-def _refuse_length(path: str, found: str) -> InputError:
+def _refuse_length(path: str, found: int) -> InputError:
     allowed = f"at most {MOST_MEASUREMENTS} (the mean of a tracker's stream at each pose is one measurement)"
     return InputError(path, "", f"{found} rows of data", allowed)
 
@@ -315,14 +269,20 @@ class MeasurementFile:
     """A file of measurements, whose columns are checked as they are asked for.
 
     `columns`: cells as they stand in the file. `rows` (N,): number in the file of each row that is not blank, 1 for the first
-    of data. `lines` (N,): line of the file that each row ends in, where the file is a text. `angles`, `wrench`, `approach`,
-    `orientation`: names of the columns that belong together; no orientation where positions are measured.
+    of data. `header_line`: line of the header, where the file is a text. `angles`, `wrench`, `approach`, `orientation`: names
+    of the columns that belong together; no orientation where positions are measured.
     """
 
     def __init__(
-        self, path: str, columns: Columns, rows: np.ndarray, lines: np.ndarray | None, joints: int, measured: str
+        self,
+        path: str,
+        columns: Mapping[str, pa.ChunkedArray],
+        rows: np.ndarray,
+        header_line: int | None,
+        joints: int,
+        measured: str,
     ) -> None:
-        self.path, self.columns, self.rows, self.lines = path, columns, rows, lines
+        self.path, self.columns, self.rows, self.header_line = path, columns, rows, header_line
         known = file_columns(joints)
         self.angles = [f"q{j}" for j in range(1, joints + 1)]
         self.approach = [f"approach{j}" for j in range(1, joints + 1)]
@@ -339,13 +299,6 @@ class MeasurementFile:
             for unit in SHOWN:
                 self._check_shown(name, f"{name}_{unit}", SHOWN[unit])
 
-    @property
-    def header_line(self) -> int | None:
-        """Line of the header, where every row of data is a line of a text."""
-        if self.lines is None or np.ptp(self.lines - self.rows):
-            return None
-        return int(self.lines[0] - self.rows[0])
-
     def fault(self, key: str, found: str, allowed: str) -> InputError:
         """InputError of this file."""
         return InputError(self.path, key, found, allowed)
@@ -353,7 +306,7 @@ class MeasurementFile:
     def cell_fault(self, index: int, name: str, found: str, allowed: str) -> InputError:
         """InputError of one cell, or without `name` of a row; `index` counts the measurements."""
         column = f", column {name}" if name else ""
-        line = "" if self.lines is None else f" (line {self.lines[index]})"
+        line = "" if self.header_line is None else f" (line {self.rows[index] + self.header_line})"
         return self.fault(f"row {self.rows[index]}{column}{line}", found, allowed)
 
     def has(self, names: Iterable[str]) -> bool:
@@ -375,10 +328,10 @@ class MeasurementFile:
 
     def texts(self, name: str) -> list[str]:
         """list of str (N,)."""
-        return [str(cell).strip() for cell in self.columns[name]]
+        return _texts(self.columns[name])
 
     def _value_fault(self, index: int, name: str, allowed: str) -> InputError:
-        return self.cell_fault(index, name, show_cell(self.columns[name][index]), allowed)
+        return self.cell_fault(index, name, show_cell(self.columns[name][index].as_py()), allowed)
 
     def _check_shown(self, name: str, beside: str, scale: float) -> None:
         """Refuse a row in which what the controller shows is not what the joint angle is."""
@@ -393,10 +346,13 @@ class MeasurementFile:
 
     def _column(self, name: str) -> np.ndarray:
         try:
-            values = _read_numbers(self.columns[name])
-        except (ValueError, TypeError):
-            index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
-            raise self._value_fault(index, name, "a number with a decimal point, in digits 0 to 9") from None
+            values = self.columns[name].cast(pa.float64()).to_numpy()
+        except pa.ArrowInvalid:
+            # A cell is none, or written as a spreadsheet does.
+            found = [plain_number(str(cell)) for cell in self.columns[name].to_pylist()]
+            if None in found:
+                raise self._value_fault(found.index(None), name, A_NUMBER) from None
+            values = np.array(found, float)
         # Not a number is no more than anything either.
         sound = np.abs(values) <= LARGEST_NUMBER
         if not sound.all():
@@ -404,14 +360,6 @@ class MeasurementFile:
         if (place := find_beyond(name, values)) is not None:
             raise self._value_fault(place, name, BOUNDS[name].allowed)
         return values
-
-
-def _is_number(cell: Any) -> bool:
-    try:
-        _read_numbers([cell])
-    except (ValueError, TypeError):
-        return False
-    return True
 
 
 def show_cell(cell: Any) -> str:
