@@ -1,9 +1,10 @@
 """Files of measurements: their columns, read cell by cell with the row of every fault, and written."""
 
 import csv
+import itertools
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from elastocal.errors import InputError, closest_first, steering
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
 from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
-from elastocal.mechanics.components import WRENCH
+from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
 
 # A diagnosis of a million measurements takes ten minutes and 2 GB (docs, benchmarks); a tracker's stream is averaged before.
 MOST_MEASUREMENTS = 2_000_000
@@ -28,6 +29,7 @@ _MOST_ROW_GROUPS = 2_000
 MOST_JOINTS = 99
 
 CSV, PARQUET = "measurements.csv", "measurements.parquet"
+ROTATION = ("rx", "ry", "rz")
 # Columns of a sheet for people: a place to tick, which is not read, and joint angles as controllers show them, q1_deg or q1_mm,
 # with the SI value of one unit. They must agree with q1 .. qn to what is shown.
 TICK = "done"
@@ -35,44 +37,22 @@ SHOWN = {"deg": math.radians(1.0), "mm": 1e-3}
 SHOWN_TO = 2e-3
 
 
-@dataclass(frozen=True)
-class Bound:
-    """Least and largest value of a column, in its unit, and the reason in words that follow "x to y"."""
-
-    least: float
-    largest: float
-    reason: str
-
-    @property
-    def allowed(self) -> str:
-        """What an error says."""
-        return f"{self.least:g} to {self.largest:g} {self.reason}"
-
-
 # A turn and a half, of a rotation vector; nor does a joint of a serial arm report more, unless its limits say so.
 FARTHEST_RAD = 3.0 * np.pi
-# Generous: whatever lies beyond is in another unit, or no reading of an instrument beside a robot.
-_FORCE = Bound(-1e6, 1e6, "N, the weight of a hundred tonnes")
-_MOMENT = Bound(-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")
-_PLACE = Bound(-2e7, 2e7, "m, half the circumference of the Earth")
-BOUNDS: Mapping[str, Bound] = {
+# Least and largest value of a column, in its unit, and why. Generous: whatever lies beyond is in another unit, or no reading of
+# an instrument beside a robot.
+_Bound = tuple[float, float, str]
+_FORCE: _Bound = (-1e6, 1e6, "N, the weight of a hundred tonnes")
+_MOMENT: _Bound = (-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")
+_PLACE: _Bound = (-2e7, 2e7, "m, half the circumference of the Earth")
+BOUNDS: Mapping[str, _Bound] = {
     **dict.fromkeys(("fx", "fy", "fz"), _FORCE),
     **dict.fromkeys(("mx", "my", "mz"), _MOMENT),
     **dict.fromkeys("xyz", _PLACE),
-    "time_s": Bound(-1e11, 1e11, "s, three thousand years either way: not milliseconds of a calendar"),
-    "temperature_c": Bound(-200.0, 200.0, "°C, in which arms work, not kelvin"),
-    "u95_m": Bound(1e-8, 0.1, "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by"),
+    "time_s": (-1e11, 1e11, "s, three thousand years either way: not milliseconds of a calendar"),
+    "temperature_c": (-200.0, 200.0, "°C, in which arms work, not kelvin"),
+    "u95_m": (1e-8, 0.1, "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by"),
 }
-
-
-def find_beyond(name: str, values: np.ndarray) -> int | None:
-    """First of the values of a column (N,) that physics does not allow; None where it allows all of them."""
-    bound = BOUNDS.get(name)
-    if bound is None:
-        return None
-    # Not a number is no more than anything either.
-    wrong = ~((values >= bound.least) & (values <= bound.largest))
-    return int(np.argmax(wrong)) if wrong.any() else None
 
 
 def file_columns(joints: int) -> dict[str, Column]:
@@ -101,21 +81,117 @@ def sheet_columns(joints: int) -> set[str]:
     return {TICK, *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in SHOWN)}
 
 
-def read_measurements(folder: Path, joints: int, measured: str) -> "MeasurementFile":
-    """Open the measurements of a campaign.
+@dataclass(frozen=True)
+class Cells:
+    """Columns of a table by name, as numbers in SI units or as texts; an `InputError` names the place of what is neither.
+
+    `columns`: cells as they stand in the file. `rows` (N,): number of each row in the file, 1 for the first of data.
+    `header_line`: line of the header, 0 where `rows` has lines, None where the file is no text. `headers`: what the file calls
+    columns, if otherwise. `scales`: SI values of their units, if not 1.
+    """
+
+    path: str
+    columns: Mapping[str, pa.ChunkedArray]
+    rows: np.ndarray
+    header_line: int | None = None
+    headers: Mapping[str, str] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
+
+    def fault(self, index: int, name: str, allowed: str, found: str | None = None) -> InputError:
+        """InputError of one cell, or without `name` of a row; `index` counts the rows."""
+        return InputError(
+            self.path,
+            f"{self.place(index)}{f', column {self.headers.get(name, name)}' if name else ''}",
+            _show(self.columns[name][index].as_py()) if found is None else found,
+            allowed,
+        )
+
+    def place(self, index: int) -> str:
+        """Where a row stands in the file."""
+        row = int(self.rows[index])
+        return f"row {row}" if self.header_line is None else f"line {row + self.header_line}"
+
+    def numbers(self, name: str) -> np.ndarray:
+        """ndarray (N,) of finite numbers."""
+        try:
+            values = self.columns[name].cast(pa.float64()).to_numpy()
+        except pa.ArrowInvalid:
+            # A cell is none, or written as a spreadsheet does.
+            found = [plain_number(str(cell)) for cell in self.columns[name].to_pylist()]
+            if None in found:
+                raise self.fault(found.index(None), name, A_NUMBER) from None
+            values = np.array(found, float)
+        # Not a number is no more than anything either.
+        sound = np.abs(values) <= LARGEST_NUMBER
+        if not sound.all():
+            raise self.fault(int(np.argmin(sound)), name, A_NUMBER)
+        return self.bounded(name, values * self.scales.get(name, 1.0))
+
+    def bounded(self, name: str, values: np.ndarray) -> np.ndarray:
+        """The same values (N,) of a column, all of which physics allows."""
+        least, largest, why = BOUNDS.get(name, (-np.inf, np.inf, ""))
+        wrong = ~((values >= least) & (values <= largest))
+        if wrong.any():
+            raise self.fault(int(np.argmax(wrong)), name, f"{least:g} to {largest:g} {why}")
+        return values
+
+    def matrix(self, names: Iterable[str]) -> np.ndarray:
+        """ndarray (N, len(names)) of finite numbers."""
+        return np.column_stack([self.numbers(name) for name in names])
+
+    def integers(self, name: str) -> np.ndarray:
+        """ndarray of int32 (N,)."""
+        values = self.numbers(name)
+        wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
+        if wrong.any():
+            raise self.fault(int(np.argmax(wrong)), name, f"an integer, up to {2**31 - 1}")
+        return values.astype(np.int32)
+
+    def texts(self, name: str) -> list[str]:
+        """list of str (N,)."""
+        column = self.columns[name]
+        encoded = column if pa.types.is_dictionary(column.type) else column.cast(pa.string()).dictionary_encode()
+        whole = encoded.unify_dictionaries().combine_chunks()
+        words = [str(word).strip() for word in whole.dictionary.to_pylist()]
+        return ["" if code is None else words[code] for code in whole.indices.to_pylist()]
+
+
+def _show(cell: Any) -> str:
+    text = "" if cell is None else str(cell).strip().removesuffix(".0")
+    return repr(text[:40]) if text else "nothing"
+
+
+def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
+    """The measurements of a campaign, with all columns that it needs.
 
     `folder`: holds either `CSV` or `PARQUET`. `measured`: one of "position", "pose". Raises `InputError`: no file or two, a
     file that cannot be read, a column that is missing, unknown or there twice, a row of another length, more than
-    `MOST_MEASUREMENTS` rows.
+    `MOST_MEASUREMENTS` rows, or angles that are others than those shown beside.
     """
     there = [path for path in (folder / CSV, folder / PARQUET) if path.is_file()]
     if len(there) != 1:
         found = "both" if there else "neither"
         raise InputError(folder.as_posix(), "", f"{found} {CSV} {'and' if there else 'nor'} {PARQUET}", "one of them")
-    found_columns, rows, header_line = _read(there[0], joints)
-    if len(rows) == 0:
+    table, known = _read(there[0], joints), file_columns(joints)
+    if len(table.rows) == 0:
         raise InputError(there[0], "", "no row of data", "one row for each measurement of one target")
-    return MeasurementFile(there[0].as_posix(), found_columns, rows, header_line, joints, measured)
+    angles, approach = ([f"{letter}{j}" for j in range(1, joints + 1)] for letter in ("q", "approach"))
+    required = ["pose", "load", "repeat", "target", *angles, "x", "y", "z", *(ROTATION if measured == "pose" else ())]
+    for group in (WRENCH_NAMES, approach):
+        required += group if any(name in table.columns for name in group) else []
+    for name in required:
+        if name not in table.columns:
+            unit = f" in {known[name].unit}" if known[name].unit else ""
+            raise InputError(table.path, "header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
+    for name, unit in itertools.product(angles, SHOWN):
+        if (beside := f"{name}_{unit}") in table.columns:
+            values = table.numbers(name) / SHOWN[unit]
+            wrong = np.abs(values - table.numbers(beside)) > SHOWN_TO
+            if wrong.any():
+                index = int(np.argmax(wrong))
+                allowed = f"{values[index]:.3f}, which is {name}, or a file without the column {beside}"
+                raise table.fault(index, beside, allowed)
+    return table
 
 
 def described_by(folder: Path) -> tuple[list[str], str]:
@@ -126,9 +202,9 @@ def described_by(folder: Path) -> tuple[list[str], str]:
     there = next((path for path in (folder / CSV, folder / PARQUET) if path.is_file()), None)
     if there is None:
         return [], "position"
-    columns = _read(there, MOST_JOINTS)[0]
-    names = dict.fromkeys(name for name in (_texts(columns["target"]) if "target" in columns else ()) if name)
-    return list(names), "pose" if {"rx", "ry", "rz"} <= columns.keys() else "position"
+    table = _read(there, MOST_JOINTS)
+    names = dict.fromkeys(name for name in (table.texts("target") if "target" in table.columns else ()) if name)
+    return list(names), "pose" if {*ROTATION} <= table.columns.keys() else "position"
 
 
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
@@ -157,19 +233,19 @@ def write_measurements(path: str | Path, table: Mapping[str, Sequence[Any] | np.
         (_write_csv if Path(path).name == CSV else _write_parquet)(partial, columns, table)
 
 
-def _read(path: Path, joints: int) -> tuple[dict[str, pa.ChunkedArray], np.ndarray, int | None]:
-    """Columns by name; of each row that is not blank its number in the file, 1 for the first of data; line of the header."""
+def _read(path: Path, joints: int) -> Cells:
     source = path.as_posix()
     if (size := path.stat().st_size) > _MOST_BYTES:
         allowed = f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements"
         raise InputError(source, "", counted(size, "byte"), allowed)
-    table, rows, header_line = _read_csv(source, joints) if path.name == CSV else _read_parquet(source, joints)
-    if len(rows) > MOST_MEASUREMENTS:
-        raise _refuse_length(source, len(rows))
-    return dict(zip(table.column_names, table.columns, strict=True)), rows, header_line
+    table = _read_csv(source, joints) if path.name == CSV else _read_parquet(source, joints)
+    if len(table.rows) > MOST_MEASUREMENTS:
+        raise _refuse_length(source, len(table.rows))
+    return table
 
 
-def _read_csv(path: str, joints: int) -> tuple[pa.Table, np.ndarray, int]:
+def _read_csv(path: str, joints: int) -> Cells:
+    """Columns of texts, of the rows that are not blank."""
     header_line, header = _scan(path)
     if not header:
         raise InputError(path, "", "an empty file", "a header and one row for each measurement of one target")
@@ -197,13 +273,13 @@ def _read_csv(path: str, joints: int) -> tuple[pa.Table, np.ndarray, int]:
             raise InputError(path, "", str(error), "comma-separated values, quotes in pairs") from None
         table = pa.table({name: pa.array([], pa.string()) for name in names})
     if wrong := next((row for row in other if row.text.replace(",", "").strip()), None):
-        where = f"row {wrong.number - header_line} (line {wrong.number})"
         allowed = f"{len(names)}, one for each column of the header"
-        raise InputError(path, where, counted(wrong.actual_columns, "cell"), allowed)
+        raise InputError(path, f"line {wrong.number}", counted(wrong.actual_columns, "cell"), allowed)
     table = pa.table({name: pc.utf8_trim_whitespace(table[name]) for name in names})
     filled = np.any([pc.not_equal(column, "").to_numpy() for column in table.columns], axis=0)
     rows = np.setdiff1d(np.arange(1, table.num_rows + len(other) + 1), [row.number - header_line for row in other])
-    return table.filter(pa.array(filled)), rows[filled].astype(np.int32), header_line
+    table = table.filter(pa.array(filled))
+    return Cells(path, dict(zip(names, table.columns, strict=True)), rows[filled].astype(np.int32), header_line)
 
 
 def _scan(path: str) -> tuple[int, str]:
@@ -226,7 +302,7 @@ def _scan(path: str) -> tuple[int, str]:
     return header, text
 
 
-def _read_parquet(path: str, joints: int) -> tuple[pa.Table, np.ndarray, None]:
+def _read_parquet(path: str, joints: int) -> Cells:
     texts = {TICK, *(name for name, column in file_columns(joints).items() if column.type == "string")}
     try:
         # pyarrow's own complaint of a column that is there twice is a list of all columns.
@@ -250,122 +326,13 @@ def _read_parquet(path: str, joints: int) -> tuple[pa.Table, np.ndarray, None]:
         table.validate(full=True)
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
-    return table, np.arange(1, table.num_rows + 1, dtype=np.int32), None
-
-
-def _texts(column: pa.ChunkedArray) -> list[str]:
-    encoded = column if pa.types.is_dictionary(column.type) else column.cast(pa.string()).dictionary_encode()
-    whole = encoded.unify_dictionaries().combine_chunks()
-    words = [str(word).strip() for word in whole.dictionary.to_pylist()]
-    return ["" if code is None else words[code] for code in whole.indices.to_pylist()]
+    columns = dict(zip(table.column_names, table.columns, strict=True))
+    return Cells(path, columns, np.arange(1, table.num_rows + 1, dtype=np.int32))
 
 
 def _refuse_length(path: str, found: int) -> InputError:
     allowed = f"at most {MOST_MEASUREMENTS} (the mean of a tracker's stream at each pose is one measurement)"
     return InputError(path, "", f"{found} rows of data", allowed)
-
-
-class MeasurementFile:
-    """A file of measurements, whose columns are checked as they are asked for.
-
-    `columns`: cells as they stand in the file. `rows` (N,): number in the file of each row that is not blank, 1 for the first
-    of data. `header_line`: line of the header, where the file is a text. `angles`, `wrench`, `approach`, `orientation`: names
-    of the columns that belong together; no orientation where positions are measured.
-    """
-
-    def __init__(
-        self,
-        path: str,
-        columns: Mapping[str, pa.ChunkedArray],
-        rows: np.ndarray,
-        header_line: int | None,
-        joints: int,
-        measured: str,
-    ) -> None:
-        self.path, self.columns, self.rows, self.header_line = path, columns, rows, header_line
-        known = file_columns(joints)
-        self.angles = [f"q{j}" for j in range(1, joints + 1)]
-        self.approach = [f"approach{j}" for j in range(1, joints + 1)]
-        self.wrench = [name for name, _, _ in WRENCH]
-        self.orientation = ["rx", "ry", "rz"] if measured == "pose" else []
-        required = ["pose", "load", "repeat", "target", *self.angles, "x", "y", "z", *self.orientation]
-        for group in (self.wrench, self.approach):
-            required += group if any(name in columns for name in group) else []
-        for name in required:
-            if name not in columns:
-                unit = f" in {known[name].unit}" if known[name].unit else ""
-                raise self.fault("header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
-        for name in self.angles:
-            for unit in SHOWN:
-                self._check_shown(name, f"{name}_{unit}", SHOWN[unit])
-
-    def fault(self, key: str, found: str, allowed: str) -> InputError:
-        """InputError of this file."""
-        return InputError(self.path, key, found, allowed)
-
-    def cell_fault(self, index: int, name: str, found: str, allowed: str) -> InputError:
-        """InputError of one cell, or without `name` of a row; `index` counts the measurements."""
-        column = f", column {name}" if name else ""
-        line = "" if self.header_line is None else f" (line {self.rows[index] + self.header_line})"
-        return self.fault(f"row {self.rows[index]}{column}{line}", found, allowed)
-
-    def has(self, names: Iterable[str]) -> bool:
-        """Whether all of some columns are there."""
-        return all(name in self.columns for name in names)
-
-    def numbers(self, names: Iterable[str]) -> np.ndarray:
-        """ndarray (N, len(names)) of finite numbers."""
-        return np.column_stack([self._column(name) for name in names])
-
-    def integers(self, name: str) -> np.ndarray:
-        """ndarray of int32 (N,)."""
-        values = self._column(name)
-        wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
-        if wrong.any():
-            index = int(np.argmax(wrong))
-            raise self._value_fault(index, name, f"an integer, up to {2**31 - 1}")
-        return values.astype(np.int32)
-
-    def texts(self, name: str) -> list[str]:
-        """list of str (N,)."""
-        return _texts(self.columns[name])
-
-    def _value_fault(self, index: int, name: str, allowed: str) -> InputError:
-        return self.cell_fault(index, name, show_cell(self.columns[name][index].as_py()), allowed)
-
-    def _check_shown(self, name: str, beside: str, scale: float) -> None:
-        """Refuse a row in which what the controller shows is not what the joint angle is."""
-        if beside not in self.columns:
-            return
-        values = self._column(name) / scale
-        wrong = np.abs(values - self._column(beside)) > SHOWN_TO
-        if wrong.any():
-            index = int(np.argmax(wrong))
-            allowed = f"{values[index]:.3f}, which is {name}, or a file without the column {beside}"
-            raise self._value_fault(index, beside, allowed)
-
-    def _column(self, name: str) -> np.ndarray:
-        try:
-            values = self.columns[name].cast(pa.float64()).to_numpy()
-        except pa.ArrowInvalid:
-            # A cell is none, or written as a spreadsheet does.
-            found = [plain_number(str(cell)) for cell in self.columns[name].to_pylist()]
-            if None in found:
-                raise self._value_fault(found.index(None), name, A_NUMBER) from None
-            values = np.array(found, float)
-        # Not a number is no more than anything either.
-        sound = np.abs(values) <= LARGEST_NUMBER
-        if not sound.all():
-            raise self._value_fault(int(np.argmin(sound)), name, f"a finite number, up to {LARGEST_NUMBER:g}")
-        if (place := find_beyond(name, values)) is not None:
-            raise self._value_fault(place, name, BOUNDS[name].allowed)
-        return values
-
-
-def show_cell(cell: Any) -> str:
-    """A cell as an error shows it."""
-    text = str(cell).strip().removesuffix(".0") if cell is not None else ""
-    return repr(text[:40]) if text else "nothing"
 
 
 def _write_csv(path: str, columns: Iterable[Column], table: Mapping[str, Sequence[Any] | np.ndarray]) -> None:

@@ -32,11 +32,12 @@ from elastocal.campaigns.holdout import (
     measured_poses,
     other_folder,
 )
-from elastocal.campaigns.measurements import CSV, FARTHEST_RAD, PARQUET, MeasurementFile, read_measurements, show_cell
+from elastocal.campaigns.measurements import CSV, FARTHEST_RAD, PARQUET, ROTATION, Cells, read_measurements
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import kind_of
+from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -59,8 +60,8 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
     _tables(folder)
     table = read_measurements(folder, robot.joints, document["measured"])
-    measurements = _measurements(table, robot, targets)
-    check_measurements(measurements, table, robot, targets, source)
+    measurements = _measurements(table, robot, targets, document["measured"])
+    _check_measurements(measurements, table, robot, targets, source)
     _check_compliance(document, robot, robot_path, measurements, source)
     _check_noise(document, measurements, robot.joints, source)
     held_out_mask(holdout, measurements, robot.reported_offset, source)
@@ -188,43 +189,37 @@ def _check_place(path: Path, folder: str | Path) -> None:
         raise InputError(path, "", f"{kind_of(os.lstat(path).st_mode)} that leads to no file", "the file itself")
 
 
-def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target]) -> Measurements:
-    reported = table.numbers(table.angles)
-    check_angles(reported, table, robot)
+def _measurements(table: Cells, robot: Robot, targets: Sequence[Target], measured: str) -> Measurements:
+    reported = table.matrix(f"q{j}" for j in range(1, robot.joints + 1))
+    _check_angles(reported, table, robot)
     names = {target.name: index for index, target in enumerate(targets)}
     labels = table.texts("target")
-    for index, label in enumerate(labels):
-        if label not in names:
-            allowed = f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
-            raise table.cell_fault(index, "target", show_cell(label), allowed)
+    unknown = next((index for index, label in enumerate(labels) if label not in names), None)
+    if unknown is not None:
+        raise table.fault(unknown, "target", f"a target of {DOCUMENT}: {closest_first(labels[unknown], list(names))}")
     approach = None
-    if table.has(table.approach):
-        senses = table.numbers(table.approach)
-        wrong = ~np.isin(senses, (-1.0, 0.0, 1.0))
+    if "approach1" in table.columns:
+        approach = table.matrix(f"approach{j}" for j in range(1, robot.joints + 1))
+        wrong = ~np.isin(approach, (-1.0, 0.0, 1.0))
         if wrong.any():
             index, joint = np.argwhere(wrong)[0]
-            raise table.cell_fault(index, table.approach[joint], f"{senses[index, joint]:g}", "-1, 0 or 1")
+            raise table.fault(index, f"approach{joint + 1}", "-1, 0 or 1")
         # Where a joint of the model follows two reported ones that came from opposite sides, its own sense is not known.
-        approach = np.sign(senses @ robot.reported_matrix.T)
+        approach = np.sign(approach @ robot.reported_matrix.T)
     return Measurements(
-        session=table.integers("session") if table.has(["session"]) else np.zeros(len(table.rows), np.int32),
-        pose=table.integers("pose"),
-        load=table.integers("load"),
-        repeat=table.integers("repeat"),
+        session=table.integers("session") if "session" in table.columns else np.zeros(len(table.rows), np.int32),
+        **{name: table.integers(name) for name in ("pose", "load", "repeat")},
         target=np.array([names[label] for label in labels], np.int32),
         joint_angles=robot.model_angles(reported),
-        wrench=table.numbers(table.wrench) if table.has(table.wrench) else np.zeros((len(table.rows), 6)),
-        position=table.numbers("xyz"),
-        rotation_vector=table.numbers(table.orientation) if table.orientation else None,
+        wrench=table.matrix(WRENCH_NAMES) if "fx" in table.columns else np.zeros((len(table.rows), 6)),
+        position=table.matrix("xyz"),
+        rotation_vector=table.matrix(ROTATION) if measured == "pose" else None,
         approach=approach,
-        **{name: table.numbers([name])[:, 0] if table.has([name]) else None for name in ("time_s", "temperature_c", "u95_m")},
+        **{name: table.numbers(name) if name in table.columns else None for name in ("time_s", "temperature_c", "u95_m")},
         row=table.rows,
     )
 
 
-# From pose to pose, in an order that has nothing to do with the time, it falls as often as not: in more than this share of at
-# least so many steps with a probability of one in 700 at most.
-_BACKWARDS, _FEWEST_IN_ORDER = 0.875, 5
 # A joint this far beyond its limits is no joint at its limit.
 _BEYOND_LIMITS_RAD = 0.5
 # A unit is wrong in a whole file. What is off in fewer rows than this is a gross error of theirs, which the diagnosis names.
@@ -252,7 +247,7 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
     return np.asarray((np.abs(reported) > farthest) | (beyond & inside(np.radians(reported))))
 
 
-def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> None:
+def _check_angles(reported: np.ndarray, table: Cells, robot: Robot) -> None:
     """Refuse degrees in more than single rows.
 
     `reported` (N, n): joint angles as the controller reports them. Raises `InputError`: the first such angle.
@@ -265,22 +260,43 @@ def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> 
             f"rad, not degrees, of a joint that goes from {low[joint]:.2f} to {high[joint]:.2f} rad"
             " (counted otherwise: reported_joints of the robot file)"
         )
-        raise table.cell_fault(index, table.angles[joint], f"{reported[index, joint]:g}", allowed)
+        raise table.fault(index, f"q{joint + 1}", allowed)
 
 
-def check_measurements(
-    measurements: Measurements, table: MeasurementFile, robot: Robot, targets: Sequence[Target], source: str
-) -> None:
+def _check_measurements(measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target], source: str) -> None:
     """Refuse measurements that cannot be of one campaign in the units of the format.
 
     `table`: where they were read from. `source`: document of the campaign, named in errors of what is not in the table. Raises
     `InputError`: the first fault: a measurement that is there twice, a load that contradicts its wrench, a pose at two places,
-    times that run backwards, millimetres or degrees, a target without a measurement.
+    millimetres or degrees, a target without a measurement.
     """
-    _check_duplicates(measurements, table, targets)
-    _check_loads(measurements, table)
-    _check_poses(measurements, table)
-    _check_times(measurements, table)
+    names = ("session", "pose", "load", "repeat", "target")
+    key = np.column_stack([getattr(measurements, name) for name in names])
+    first, group = groups_of(key)
+    again = first[group] != np.arange(len(measurements))
+    if again.any():
+        index = int(np.argmax(again))
+        words = [f"{name} {value}" for name, value in zip(names, key[index], strict=True) if name in table.columns]
+        found = f"{', '.join(words[:-1])}, target {targets[key[index, -1]].name} again"
+        raise table.fault(index, "", f"each once (first in {table.place(first[group[index]])})", found)
+    unloaded = measurements.load == 0
+    if "fx" not in table.columns and not unloaded.all():
+        raise table.fault(int(np.argmin(unloaded)), "load", f"0 where there are no columns {', '.join(WRENCH_NAMES)}")
+    wrong = unloaded[:, None] & (measurements.wrench != 0)
+    if wrong.any():
+        index, component = np.argwhere(wrong)[0]
+        found = f"{measurements.wrench[index, component]:g} with load 0"
+        raise table.fault(index, WRENCH_NAMES[component], "0 where load is 0", found)
+    pose_of = measured_poses(measurements)[1]
+    first = np.unique(pose_of, return_index=True)[1]
+    reported = table.matrix(f"q{j}" for j in range(1, robot.joints + 1))
+    away = np.abs(reported - reported[first[pose_of]])
+    wrong = away > SAME_POSE_RAD
+    if wrong.any():
+        index, joint = np.argwhere(wrong)[0]
+        earlier = table.place(first[pose_of[index]])
+        found = f"{reported[index, joint]:g}, {away[index, joint]:.3g} rad from {earlier} of the same pose"
+        raise table.fault(index, f"q{joint + 1}", f"measurements of one pose within {SAME_POSE_RAD} rad", found)
     _check_units(measurements, table, robot, targets)
     for index, target in enumerate(targets):
         if not (measurements.target == index).any():
@@ -288,68 +304,7 @@ def check_measurements(
             raise InputError(source, f"targets.{target.name}", "no measurement of it", allowed)
 
 
-def _check_duplicates(measurements: Measurements, table: MeasurementFile, targets: Sequence[Target]) -> None:
-    key = np.column_stack(
-        [measurements.session, measurements.pose, measurements.load, measurements.repeat, measurements.target]
-    )
-    first, group = groups_of(key)
-    again = first[group] != np.arange(len(measurements))
-    if again.any():
-        index = int(np.argmax(again))
-        session, pose, load, repeat, target = key[index]
-        of_session = f"session {session}, " if "session" in table.columns else ""
-        found = f"{of_session}pose {pose}, load {load}, repeat {repeat}, target {targets[target].name} again"
-        earlier = table.rows[first[group[index]]]
-        raise table.cell_fault(index, "", found, f"each once (first in row {earlier})")
-
-
-def _check_loads(measurements: Measurements, table: MeasurementFile) -> None:
-    unloaded = measurements.load == 0
-    if not table.has(table.wrench) and not unloaded.all():
-        index = int(np.argmin(unloaded))
-        allowed = f"0 where there are no columns {', '.join(table.wrench)}"
-        raise table.cell_fault(index, "load", str(measurements.load[index]), allowed)
-    wrong = unloaded[:, None] & (measurements.wrench != 0)
-    if wrong.any():
-        index, component = np.argwhere(wrong)[0]
-        found = f"{measurements.wrench[index, component]:g} with load 0"
-        raise table.cell_fault(index, table.wrench[component], found, "0 where load is 0")
-
-
-def _check_poses(measurements: Measurements, table: MeasurementFile) -> None:
-    pose_of = measured_poses(measurements)[1]
-    first = np.unique(pose_of, return_index=True)[1]
-    reported = table.numbers(table.angles)
-    away = np.abs(reported - reported[first[pose_of]])
-    wrong = away > SAME_POSE_RAD
-    if wrong.any():
-        index, joint = np.argwhere(wrong)[0]
-        earlier = table.rows[first[pose_of[index]]]
-        found = f"{reported[index, joint]:g}, {away[index, joint]:.3g} rad from row {earlier} of the same pose"
-        raise table.cell_fault(index, table.angles[joint], found, f"measurements of one pose within {SAME_POSE_RAD} rad")
-
-
-def _check_times(measurements: Measurements, table: MeasurementFile) -> None:
-    """Refuse a clock that runs backwards: in a session times fall from pose to pose, by their numbers and as they stand.
-
-    Poses may be measured in another order than that of their numbers, and stand in any order in the file: one of the two alone
-    says nothing of the clock.
-    """
-    if measurements.time_s is None:
-        return
-    pairs, pose_of = measured_poses(measurements)
-    first, begun = np.unique(pose_of, return_index=True)[1], np.full(len(pairs), np.inf)
-    np.minimum.at(begun, pose_of, measurements.time_s)
-    for session in np.unique(pairs[:, 0]):
-        members = np.flatnonzero(pairs[:, 0] == session)
-        falling = [np.diff(begun[members[order]]) < 0 for order in (slice(None), np.argsort(first[members]))]
-        if len(members) > _FEWEST_IN_ORDER and all(each.mean() > _BACKWARDS for each in falling):
-            last = members[np.argmax(first[members])]
-            found = f"{begun[last]:.15g}, when the poses before it were measured later"
-            raise table.cell_fault(int(first[last]), "time_s", found, "times that rise from pose to pose: s since any instant")
-
-
-def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robot, targets: Sequence[Target]) -> None:
+def _check_units(measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target]) -> None:
     tool = max((np.linalg.norm(target.offset_m) for target in targets if target.offset_m is not None), default=_LONGEST_TOOL_M)
     reach = tool + sum(abs(transform.constant) for transform in robot.chain.transforms if transform.kind == "T")
     for session in np.unique(measurements.session):
@@ -360,10 +315,10 @@ def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robo
             index, axis = np.unravel_index(np.argmax(away), away.shape)
             found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the measurements"
             allowed = f"metres, not millimetres; the robot reaches {reach:.3g} m"
-            raise table.cell_fault(members[index], "xyz"[axis], found, allowed)
+            raise table.fault(members[index], "xyz"[axis], allowed, found)
     if measurements.rotation_vector is not None:
         angle = np.linalg.norm(measurements.rotation_vector, axis=1)
         if angle.max() > FARTHEST_RAD:
             turned = int(np.argmax(angle))
             allowed = f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most"
-            raise table.cell_fault(turned, "rx, ry, rz", f"a turn of {angle[turned]:.4g}", allowed)
+            raise table.fault(turned, "rx, ry, rz", allowed, f"a turn of {angle[turned]:.4g}")

@@ -6,10 +6,14 @@ Neither `csv.Sniffer`, which guesses, nor pandas, which knows no lines, can ask 
 import codecs
 import csv
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
+
+from elastocal.campaigns.measurements import Cells
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, steering
 from elastocal.io.texts import decoded, read_bytes
@@ -63,6 +67,12 @@ class TextTable:
     lines: tuple[int, ...]
     left_out: tuple[str, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
+
+    def cells(self, columns: Mapping[str, str], scales: Mapping[str, float], kept: np.ndarray | None = None) -> Cells:
+        """Columns by other names, their headers by these; SI values of their units; of the rows kept, if not all."""
+        rows = np.arange(len(self.lines)) if kept is None else kept
+        chosen = {name: pa.chunked_array([[self.columns[header][row] for row in rows]]) for name, header in columns.items()}
+        return Cells(self.path, chosen, np.array(self.lines)[rows], 0, columns, scales)
 
 
 def read_text_table(

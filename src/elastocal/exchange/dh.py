@@ -42,7 +42,6 @@ from elastocal.errors import InputError, closest_first
 from elastocal.exchange.column_names import ANGLE, LENGTH, UNITS, read_units, split_unit
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.exchange.fixed_transforms import displacement_words, elementary, origin_transform, word
-from elastocal.exchange.measurement_table import CellReader
 from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, point_name
 from elastocal.io.documents import read_document
 from elastocal.io.texts import A_NUMBER, plain_number
@@ -146,8 +145,8 @@ def _read_table(path: str | Path, options: DhOptions) -> tuple[list[str], np.nda
         raise InputError(source, "header", f"no column {missing[0]}", "theta_offset, d, a and alpha, such as d_m or d_mm")
     if len(text.lines) > _MOST_ROWS:
         raise InputError(source, "", counted(len(text.lines), "row"), f"at most {_MOST_ROWS}, one for each joint")
-    read = CellReader(text, headers, {name: UNITS[_KINDS[name]][unit] for name, unit in units.items()})
-    for place, kind in enumerate(read.cells("type") if "type" in headers else ()):
+    read = text.cells(headers, {name: UNITS[_KINDS[name]][unit] for name, unit in units.items()})
+    for place, kind in enumerate(read.texts("type") if "type" in headers else ()):
         if kind.upper()[:1] not in ("R", ""):
             raise read.fault(place, "type", "R (revolute); what shifts or is fixed is written into the robot file")
     rows = np.column_stack([read.numbers(name) if name in headers else np.zeros(len(text.lines)) for name in _KINDS])
@@ -166,7 +165,7 @@ def _read_table(path: str | Path, options: DhOptions) -> tuple[list[str], np.nda
         *([f"not used: {', '.join(options.ignore)}"] if options.ignore else []),
         *text.left_out,
     ]
-    return read.cells("joint") if "joint" in headers else [], rows, notes
+    return read.texts("joint") if "joint" in headers else [], rows, notes
 
 
 def _unit(header: str, kind: str, stated: str | None, below: str | None, options: DhOptions, source: str) -> str:

@@ -17,15 +17,7 @@ import pandas as pd
 import yaml
 
 from elastocal.campaigns.holdout import number_alike
-from elastocal.campaigns.measurements import (
-    BOUNDS,
-    MOST_JOINTS,
-    TICK,
-    file_columns,
-    find_beyond,
-    sheet_columns,
-    show_cell,
-)
+from elastocal.campaigns.measurements import MOST_JOINTS, TICK, Cells, file_columns, sheet_columns
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, text_fault
 from elastocal.exchange.column_names import (
@@ -49,7 +41,7 @@ from elastocal.exchange.column_names import (
 )
 from elastocal.exchange.csv_dialect import Dialect, TextTable, read_text_table
 from elastocal.io.documents import check_document, read_document
-from elastocal.io.texts import A_NUMBER, plain_number
+from elastocal.io.texts import plain_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
@@ -150,62 +142,17 @@ def _filled_rows(text: TextTable, columns: Mapping[str, str], position: Sequence
     return np.flatnonzero(filled)
 
 
-class CellReader:
-    """Cells as numbers in SI units, with the line of what is none.
-
-    `columns`: headers by name. `scales`: SI values of their units, 1 where there is none. `kept`: rows that are read, if not
-    all.
-    """
-
-    def __init__(
-        self, text: TextTable, columns: Mapping[str, str], scales: Mapping[str, float], kept: Sequence[int] | np.ndarray = ()
-    ) -> None:
-        self.text, self.columns, self.scales = text, columns, dict(scales)
-        self.kept = np.array(kept, int) if len(kept) else np.arange(len(text.lines))
-
-    def fault(self, index: int, name: str, allowed: str) -> InputError:
-        """InputError of one cell; `index` counts the rows kept."""
-        row = self.kept[index]
-        header = self.columns[name]
-        where = f"line {self.text.lines[row]}, column {header}"
-        return InputError(self.text.path, where, show_cell(self.text.columns[header][row]), allowed)
-
-    def cells(self, name: str) -> list[str]:
-        """list of str (N,)."""
-        cells = self.text.columns[self.columns[name]]
-        return [cells[row] for row in self.kept]
-
-    def times(self, name: str) -> np.ndarray:
-        """ndarray (N,), s: as numbers, or as dates of ISO 8601: since 1970, at Greenwich without a zone."""
-        cells = self.cells(name)
-        numbers = [plain_number(cell, _LARGEST_TIME) for cell in cells]
-        if None not in numbers:
-            return self._bounded(name, np.array(numbers, float) * self.scales[name])
-        with suppress(ValueError, OverflowError):
-            dates = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True)
-            if dates.notna().all() and all("-" in cell or "/" in cell for cell in cells):
-                return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
-        raise self.fault(numbers.index(None), name, "numbers, or dates as 2023-05-04 10:20:33")
-
-    def numbers(self, name: str) -> np.ndarray:
-        """ndarray (N,), SI units."""
-        values = np.array([np.nan if (value := plain_number(cell)) is None else value for cell in self.cells(name)])
-        if not np.isfinite(values).all():
-            raise self.fault(int(np.argmin(np.isfinite(values))), name, A_NUMBER)
-        return self._bounded(name, values * self.scales.get(name, 1.0))
-
-    def _bounded(self, name: str, values: np.ndarray) -> np.ndarray:
-        if (index := find_beyond(name, values)) is not None:
-            raise self.fault(index, name, BOUNDS[name].allowed)
-        return values
-
-    def integers(self, name: str) -> np.ndarray:
-        """ndarray of int (N,)."""
-        values = self.numbers(name)
-        wrong = (values != np.round(values)) | (np.abs(values) > _LARGEST_ORDINAL)
-        if wrong.any():
-            raise self.fault(int(np.argmax(wrong)), name, f"an integer, up to {_LARGEST_ORDINAL}")
-        return values.astype(np.int64)
+def _times(read: Cells) -> np.ndarray:
+    """Times (N,), s: of numbers, or of dates of ISO 8601: since 1970, at Greenwich without a zone."""
+    cells = read.texts("time_s")
+    numbers = [plain_number(cell, _LARGEST_TIME) for cell in cells]
+    if None not in numbers:
+        return read.bounded("time_s", np.array(numbers, float) * read.scales["time_s"])
+    with suppress(ValueError, OverflowError):
+        dates = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True)
+        if dates.notna().all() and all("-" in cell or "/" in cell for cell in cells):
+            return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
+    raise read.fault(numbers.index(None), "time_s", "numbers, or dates as 2023-05-04 10:20:33")
 
 
 @dataclass(frozen=True)
@@ -265,16 +212,17 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     wanted = [*angles, *position, *orientation, *(name for name in WRENCH_NAMES if name in columns)]
     given = options.units or {}
     units = find_units(text, columns, wanted, stated, given, robot)
-    read = CellReader(text, columns, scales_of(units), _filled_rows(text, columns, position, options.skip_empty))
+    kept = _filled_rows(text, columns, position, options.skip_empty)
+    read = text.cells(columns, scales_of(units), kept)
     table = _number_poses(read, angles)
     table |= {name: read.numbers(name) for name in angles}
     if forces := [name for name in WRENCH_NAMES if name in columns]:
-        sign, zeros = -1.0 if options.wrench == "by-robot" else 1.0, np.zeros(len(read.kept))
+        sign, zeros = -1.0 if options.wrench == "by-robot" else 1.0, np.zeros(len(kept))
         # A minus sign before a zero would be read by people as a force.
         table |= {name: sign * read.numbers(name) + 0.0 if name in forces else zeros for name in WRENCH_NAMES}
     table |= {axis: read.numbers(name) for axis, name in zip(POSITION, position, strict=True)}
     if orientation:
-        vectors, off = rotation_vectors(rotation, np.column_stack([read.numbers(name) for name in orientation]))
+        vectors, off = rotation_vectors(rotation, read.matrix(orientation))
         if off.any():
             allowed = "a quaternion of length 1" if rotation == QUATERNIONS else "a rotation matrix, row by row"
             raise read.fault(int(np.argmax(off)), orientation[0], allowed)
@@ -282,8 +230,8 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     for name in (name for name in ("time_s", "temperature_c", "u95_m") if name in columns):
         try:
             unit = find_units(text, columns, [name], stated, given)
-            read.scales |= scales_of(unit)
-            table[name] = read.times(name) if name == "time_s" else read.numbers(name)
+            one = text.cells({name: columns[name]}, scales_of(unit), kept)
+            table[name] = _times(one) if name == "time_s" else one.numbers(name)
             units |= unit
         except InputError as error:
             # Time and temperature are left out where nobody asked for them.
@@ -304,7 +252,7 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
         rotation=rotation,
     )
     ignored = (*(header for header in text.columns if header not in used.values()), *(options.ignore or ()))
-    skipped = len(text.lines) - len(read.kept)
+    skipped = len(text.lines) - len(kept)
     return ImportedMeasurements(table, len(angles), resolved, ignored, skipped, (*text.left_out, *notes))
 
 
@@ -327,35 +275,32 @@ def _check_complete(
             raise InputError(text.path, "header", f"no column {', '.join(missing)}", allowed)
 
 
-def _targets(read: CellReader, name: str | None) -> np.ndarray:
-    if "target" in read.columns:
-        names = read.cells("target")
-        if fault := next((fault for each in set(names) if (fault := text_fault(each))), None):
-            raise InputError(read.text.path, f"column {read.columns['target']}", *fault)
-        return np.array(names)
-    if name is None:
+def _targets(read: Cells, name: str | None) -> np.ndarray:
+    if "target" not in read.columns and name is None:
         allowed = "--target NAME, the target of all rows, or --column target=NAME"
-        raise InputError(read.text.path, "header", "no column target", allowed)
-    if fault := text_fault(name):
-        raise InputError("--target", "", *fault)
-    return np.full(len(read.kept), name)
+        raise InputError(read.path, "header", "no column target", allowed)
+    names = read.texts("target") if "target" in read.columns else [name] * len(read.rows)
+    if fault := next((fault for each in dict.fromkeys(names) if (fault := text_fault(each))), None):
+        where = (read.path, f"column {read.headers['target']}") if "target" in read.columns else ("--target", "")
+        raise InputError(*where, *fault)
+    return np.array(names)
 
 
-def _number_poses(read: CellReader, angles: Sequence[str]) -> dict[str, np.ndarray]:
+def _number_poses(read: Cells, angles: Sequence[str]) -> dict[str, np.ndarray]:
     """Session and pose: labels are numbered; where no column has it, a pose is what has the same joint angles."""
     table: dict[str, Any] = {}
     if "session" in read.columns:
         table["session"] = read.integers("session")
     if "pose" in read.columns:
-        labels = read.cells("pose")
+        labels = read.texts("pose")
         numbered = all(label.isdigit() for label in labels)
         table["pose"] = read.integers("pose") if numbered else pd.factorize(pd.Series(labels))[0] + 1
     else:
-        table["pose"] = number_alike(np.column_stack([read.numbers(name) for name in angles]), SAME_POSE) + 1
+        table["pose"] = number_alike(read.matrix(angles), SAME_POSE) + 1
     return table
 
 
-def _ordinals(read: CellReader, table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _ordinals(read: Cells, table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Loads and repeats: as their columns have them, or counted by first appearance."""
     states = pd.DataFrame({"session": table.get("session", 0), "pose": table["pose"], "target": table["target"]})
     wrench = pd.DataFrame({name: table.get(name, 0.0) for name in WRENCH_NAMES}, index=states.index)

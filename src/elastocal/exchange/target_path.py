@@ -15,7 +15,6 @@ from elastocal.campaigns.measurements import FARTHEST_RAD
 from elastocal.campaigns.reading import find_degrees
 from elastocal.errors import InputError, closest_first
 from elastocal.exchange.csv_dialect import Dialect, read_text_table
-from elastocal.exchange.measurement_table import CellReader
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
@@ -58,11 +57,8 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     approach = tuple(f"approach{j}" for j in range(1, joints + 1))
     known = (*_POSE, *WRENCH_NAMES, *angles, *approach, "time_s", "temperature_c")
     text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
-    read, cells, header = (
-        CellReader(text, {name: name for name in text.columns}, {}),
-        text.columns,
-        f"line {text.dialect.header}",
-    )
+    cells, header = text.columns, f"line {text.dialect.header}"
+    read = text.cells({name: name for name in cells}, {})
     for name in _POSE:
         if name not in cells:
             allowed = f"{', '.join(_POSE)}: position in m and rotation vector in rad, base axes, separated by commas"
@@ -77,11 +73,11 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
             return None
         if missing := [name for name in names if name not in cells]:
             raise InputError(path, header, f"{', '.join(there)} without {', '.join(missing)}", "all of them or none")
-        return np.column_stack([read.numbers(name) for name in names])
+        return read.matrix(names)
 
     single = [group((name,)) for name in ("time_s", "temperature_c")]
     time, temperature = (None if column is None else column[:, 0] for column in single)
-    pose = np.column_stack([read.numbers(name) for name in _POSE])
+    pose = read.matrix(_POSE)
     for size, what, largest, allowed in (
         (np.abs(pose[:, :3]).max(axis=1), "position", _FARTHEST_M, "metres"),
         (np.linalg.norm(pose[:, 3:], axis=1), "turn", FARTHEST_RAD, "a rotation vector in rad, not degrees"),
