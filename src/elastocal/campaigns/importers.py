@@ -196,26 +196,27 @@ class Importer:
         holdout: Mapping[str, Any] | None = None,
     ) -> None:
         """Write one file, or one of each part, as a campaign's folder; `holdout` is as in ``campaign.yaml``."""
-        found = [(part, part.read(path)) for part, path in zip(self.parts or (self,), paths, strict=True)]
-        tables = []
-        for session, (part, measured) in enumerate(found):
-            pose, repeat = pose_and_repeat(measured.angles, part.same_pose_rad)
-            angles = measured.angles
+        tables, targets, joints = [], list[str](), 6
+        for session, (part, path) in enumerate(zip(self.parts or (self,), paths, strict=True)):
+            measured = part.read(path)
+            angles, joints = measured.angles, measured.angles.shape[1]
+            pose, repeat = pose_and_repeat(angles, part.same_pose_rad)
             if self.parts:
                 angles = read_robot(Path(robots_folder) / f"{part.robots[0]}.yaml").model_angles(angles)
-            table = _table(pose, repeat, angles, measured.positions, session if self.parts else None)
-            tables.append(table | dict(measured.others))
-        joints = found[0][1].angles.shape[1]
+            # One row for each target of each measurement.
+            names, rows = list(measured.positions), np.repeat(np.arange(len(pose)), len(measured.positions))
+            table = {"session": np.full(len(rows), session)} if self.parts else {}
+            table |= {"pose": pose[rows], "load": np.zeros(len(rows), int), "repeat": repeat[rows]}
+            table |= {"target": np.tile(names, len(pose))} | {f"q{j + 1}": column[rows] for j, column in enumerate(angles.T)}
+            positions = np.stack([*measured.positions.values()], axis=1).reshape(-1, 3)
+            tables.append(table | dict(zip("xyz", positions.T, strict=True)) | dict(measured.others))
+            targets += names
         document: dict[str, Any] = {
             "campaign": name,
             "robot": self.robots[-1] if joints > 6 else self.robots[0],
             "measured": "pose" if "rx" in tables[0] else "position",
             "frame": "tracker",
-            "targets": {
-                target: {"point": f"{joints}DoF", "offset_m": "unknown"}
-                for _, measured in found
-                for target in measured.positions
-            },
+            "targets": {target: {"point": f"{joints}DoF", "offset_m": "unknown"} for target in targets},
             "compliance": "nominal",
             # What such data can be fitted with at all before any physics is looked for.
             "declared": ["joint_offset", "link_geometry"],
@@ -224,19 +225,6 @@ class Importer:
         document |= {"holdout": dict(holdout)} if holdout else {}
         whole = {column: np.concatenate([table[column] for table in tables]) for column in tables[0]}
         write_campaign(folder, document, whole, joints)
-
-
-def _table(
-    pose: np.ndarray, repeat: np.ndarray, angles: np.ndarray, positions: Mapping[str, np.ndarray], session: int | None
-) -> dict[str, np.ndarray]:
-    """Columns of measurements, one row for each target of each measurement."""
-    names, count = list(positions), len(pose)
-    measured = np.stack([positions[name] for name in names], axis=1).reshape(-1, 3)
-    rows = np.repeat(np.arange(count), len(names))
-    table = {} if session is None else {"session": np.full(len(rows), session)}
-    table |= {"pose": pose[rows], "load": np.zeros(len(rows), int), "repeat": repeat[rows], "target": np.tile(names, count)}
-    table |= {f"q{j + 1}": column[rows] for j, column in enumerate(angles.T)}
-    return table | dict(zip("xyz", measured.T, strict=True))
 
 
 def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
 """A campaign's folder, written so that it is never half a campaign, and one to begin with: every key explained."""
 
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -85,24 +85,10 @@ def _explain(schema: str, document: Mapping[str, Any]) -> str:
     """
     lines = [f"# {read_schema(schema)['title']}. Keys behind # are optional."]
     for key, rule in read_schema(schema)["properties"].items():
-        lines += ["", *textwrap.wrap("; ".join(_meanings(rule)), _WIDTH, initial_indent="# ", subsequent_indent="# ")]
+        meaning = rule.get("description", key)
+        lines += ["", *textwrap.wrap(meaning, _WIDTH, initial_indent="# ", subsequent_indent="# ")]
         if key in document:
             lines.append(f"{key}: {one_line(document[key])}")
         else:
             lines.append(f"# {key}: {one_line(rule['examples'][0])}")
     return "\n".join(lines) + "\n"
-
-
-def _meanings(rule: Mapping[str, Any]) -> Iterator[str]:
-    """Descriptions of a key, of the keys inside of it, and of the values that it may have."""
-    meaning = rule.get("description")
-    if meaning:
-        yield meaning
-    if "enum" in rule and len(rule["enum"]) > 1 and not all(str(value) in str(meaning) for value in rule["enum"]):
-        yield f"one of {', '.join(map(str, rule['enum']))}"
-    inner = rule
-    for step in ("additionalProperties", "items"):
-        if isinstance(inner.get(step), dict) and "properties" in inner[step]:
-            inner = inner[step]
-    for key, each in inner.get("properties", {}).items():
-        yield f"{key}: {', '.join(dict.fromkeys(_meanings(each)))}"

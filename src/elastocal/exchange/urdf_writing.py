@@ -63,22 +63,16 @@ def _ends_of(urdf: Urdf, robot: Robot, source: str) -> tuple[str, str]:
     tips = [name for name in urdf.moments if point_name(name) == wanted]
     if not tips:
         raise InputError(source, "", f"no link {wanted!r}, the robot's last measuring point", _THE_SAME)
-    differ = None
     for tip in tips:
         for joint in reversed(urdf.path_to(tip, None)):
             try:
                 found, chain = nominal_chain(urdf, joint.parent, tip, source)
             except InputError:
                 continue
-            joints = tuple(each.name for each in found.joints)
-            if len(joints) == robot.joints and names in (None, (), joints):
-                if _is_same(chain, robot.chain):
-                    return joint.parent, tip
-                differ = differ or joints
-    found_words = f"no chain to {wanted!r} by {', '.join(names or ()) or counted(robot.joints, 'joint')}"
-    if differ:
-        found_words = f"a chain by {', '.join(differ)} to {wanted!r} that is not the robot file's"
-    raise InputError(source, "", found_words, _THE_SAME)
+            if names in (None, (), tuple(each.name for each in found.joints)) and _is_same(chain, robot.chain):
+                return joint.parent, tip
+    wanted_joints = ", ".join(names or ()) or counted(robot.joints, "joint")
+    raise InputError(source, "", f"no chain to {wanted!r} by {wanted_joints} as the robot file has it", _THE_SAME)
 
 
 def _is_same(chain: Chain, other: Chain) -> bool:
