@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from support import robot_of
 
 from elastocal.errors import InputError
-from elastocal.exchange.csv_dialect import SEPARATORS
+from elastocal.campaigns.tables import SEPARATORS
 from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
 
 SCALES = {"m": 1.0, "mm": 1e-3, "in": 0.0254, "rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "N": 1.0, "kN": 1e3, "Nm": 1.0}

@@ -11,7 +11,7 @@ from made_urdf import joint, link, robot
 
 from elastocal.campaigns.measurements import write_measurements
 from elastocal.campaigns.reading import read_robot
-from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS
+from elastocal.campaigns.tables import DECIMALS, SEPARATORS
 from elastocal.exchange.dh import DhOptions, robot_from_dh
 from elastocal.exchange.measurement_table import ImportOptions, import_options_text, read_import_options, read_measurement_table
 from elastocal.exchange.robot_text import write_robot

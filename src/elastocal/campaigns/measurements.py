@@ -4,26 +4,24 @@ import csv
 import itertools
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.csv
 import pyarrow.parquet as pq
 
+from elastocal.campaigns.tables import Cells, Dialect, read_text_table
 from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first, steering
+from elastocal.errors import InputError, closest_first
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
-from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
 from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
 
-# A diagnosis of a million measurements takes ten minutes and 2 GB (docs, benchmarks); a tracker's stream is averaged before.
+# A diagnosis of a million measurements takes 2 GB (benchmarks); a tracker's stream is averaged before.
 MOST_MEASUREMENTS = 2_000_000
-_LONGEST_LINE, _MOST_BYTES = 10_000, 500 * MOST_MEASUREMENTS
+_MOST_BYTES = 500 * MOST_MEASUREMENTS
 _MOST_ROW_GROUPS = 2_000
 # A file names no more.
 MOST_JOINTS = 99
@@ -39,20 +37,6 @@ SHOWN_TO = 2e-3
 
 # A turn and a half, of a rotation vector; nor does a joint of a serial arm report more, unless its limits say so.
 FARTHEST_RAD = 3.0 * np.pi
-# Least and largest value of a column, in its unit, and why. Generous: whatever lies beyond is in another unit, or no reading of
-# an instrument beside a robot.
-_Bound = tuple[float, float, str]
-_FORCE: _Bound = (-1e6, 1e6, "N, the weight of a hundred tonnes")
-_MOMENT: _Bound = (-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")
-_PLACE: _Bound = (-2e7, 2e7, "m, half the circumference of the Earth")
-BOUNDS: Mapping[str, _Bound] = {
-    **dict.fromkeys(("fx", "fy", "fz"), _FORCE),
-    **dict.fromkeys(("mx", "my", "mz"), _MOMENT),
-    **dict.fromkeys("xyz", _PLACE),
-    "time_s": (-1e11, 1e11, "s, three thousand years either way: not milliseconds of a calendar"),
-    "temperature_c": (-200.0, 200.0, "°C, in which arms work, not kelvin"),
-    "u95_m": (1e-8, 0.1, "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by"),
-}
 
 
 def file_columns(joints: int) -> dict[str, Column]:
@@ -79,86 +63,6 @@ def file_columns(joints: int) -> dict[str, Column]:
 def sheet_columns(joints: int) -> set[str]:
     """Names of the columns of a sheet for people, which a file of measurements may have beside `file_columns`."""
     return {TICK, *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in SHOWN)}
-
-
-@dataclass(frozen=True)
-class Cells:
-    """Columns of a table by name, as numbers in SI units or as texts; an `InputError` names the place of what is neither.
-
-    `columns`: cells as they stand in the file. `rows` (N,): number of each row in the file, 1 for the first of data.
-    `header_line`: line of the header, 0 where `rows` has lines, None where the file is no text. `headers`: what the file calls
-    columns, if otherwise. `scales`: SI values of their units, if not 1.
-    """
-
-    path: str
-    columns: Mapping[str, pa.ChunkedArray]
-    rows: np.ndarray
-    header_line: int | None = None
-    headers: Mapping[str, str] = field(default_factory=dict)
-    scales: Mapping[str, float] = field(default_factory=dict)
-
-    def fault(self, index: int, name: str, allowed: str, found: str | None = None) -> InputError:
-        """InputError of one cell, or without `name` of a row; `index` counts the rows."""
-        return InputError(
-            self.path,
-            f"{self.place(index)}{f', column {self.headers.get(name, name)}' if name else ''}",
-            _show(self.columns[name][index].as_py()) if found is None else found,
-            allowed,
-        )
-
-    def place(self, index: int) -> str:
-        """Where a row stands in the file."""
-        row = int(self.rows[index])
-        return f"row {row}" if self.header_line is None else f"line {row + self.header_line}"
-
-    def numbers(self, name: str) -> np.ndarray:
-        """ndarray (N,) of finite numbers."""
-        try:
-            values = self.columns[name].cast(pa.float64()).to_numpy()
-        except pa.ArrowInvalid:
-            # A cell is none, or written as a spreadsheet does.
-            found = [plain_number(str(cell)) for cell in self.columns[name].to_pylist()]
-            if None in found:
-                raise self.fault(found.index(None), name, A_NUMBER) from None
-            values = np.array(found, float)
-        # Not a number is no more than anything either.
-        sound = np.abs(values) <= LARGEST_NUMBER
-        if not sound.all():
-            raise self.fault(int(np.argmin(sound)), name, A_NUMBER)
-        return self.bounded(name, values * self.scales.get(name, 1.0))
-
-    def bounded(self, name: str, values: np.ndarray) -> np.ndarray:
-        """The same values (N,) of a column, all of which physics allows."""
-        least, largest, why = BOUNDS.get(name, (-np.inf, np.inf, ""))
-        wrong = ~((values >= least) & (values <= largest))
-        if wrong.any():
-            raise self.fault(int(np.argmax(wrong)), name, f"{least:g} to {largest:g} {why}")
-        return values
-
-    def matrix(self, names: Iterable[str]) -> np.ndarray:
-        """ndarray (N, len(names)) of finite numbers."""
-        return np.column_stack([self.numbers(name) for name in names])
-
-    def integers(self, name: str) -> np.ndarray:
-        """ndarray of int32 (N,)."""
-        values = self.numbers(name)
-        wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
-        if wrong.any():
-            raise self.fault(int(np.argmax(wrong)), name, f"an integer, up to {2**31 - 1}")
-        return values.astype(np.int32)
-
-    def texts(self, name: str) -> list[str]:
-        """list of str (N,)."""
-        column = self.columns[name]
-        encoded = column if pa.types.is_dictionary(column.type) else column.cast(pa.string()).dictionary_encode()
-        whole = encoded.unify_dictionaries().combine_chunks()
-        words = [str(word).strip() for word in whole.dictionary.to_pylist()]
-        return ["" if code is None else words[code] for code in whole.indices.to_pylist()]
-
-
-def _show(cell: Any) -> str:
-    text = "" if cell is None else str(cell).strip().removesuffix(".0")
-    return repr(text[:40]) if text else "nothing"
 
 
 def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
@@ -245,61 +149,13 @@ def _read(path: Path, joints: int) -> Cells:
 
 
 def _read_csv(path: str, joints: int) -> Cells:
-    """Columns of texts, of the rows that are not blank."""
-    header_line, header = _scan(path)
-    if not header:
-        raise InputError(path, "", "an empty file", "a header and one row for each measurement of one target")
-    names = [cell.strip() for cell in next(csv.reader([header], skipinitialspace=True))]
+    text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
+    header, names = text.dialect.header or 0, [*text.columns]
     if len(names) == 1 and any(separator in names[0] for separator in ";\t"):
         raise InputError(path, "header", repr(names[0][:40]), "columns separated by commas, decimals by a point")
     check_column_names(names, joints, path)
-    other: list[pyarrow.csv.InvalidRow] = []
-
-    def leave_out(row: pyarrow.csv.InvalidRow) -> str:
-        other.append(row)
-        return "skip"
-
-    try:
-        table = pyarrow.csv.read_csv(
-            path,
-            # Without threads rows of another length come with the number of their line.
-            pyarrow.csv.ReadOptions(use_threads=False, skip_rows=header_line, column_names=names),
-            pyarrow.csv.ParseOptions(ignore_empty_lines=False, invalid_row_handler=leave_out),
-            pyarrow.csv.ConvertOptions(column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False),
-        )
-    except pa.ArrowInvalid as error:
-        # A header is all that there is.
-        if "Empty CSV file" not in str(error):
-            raise InputError(path, "", str(error), "comma-separated values, quotes in pairs") from None
-        table = pa.table({name: pa.array([], pa.string()) for name in names})
-    if wrong := next((row for row in other if row.text.replace(",", "").strip()), None):
-        allowed = f"{len(names)}, one for each column of the header"
-        raise InputError(path, f"line {wrong.number}", counted(wrong.actual_columns, "cell"), allowed)
-    table = pa.table({name: pc.utf8_trim_whitespace(table[name]) for name in names})
-    filled = np.any([pc.not_equal(column, "").to_numpy() for column in table.columns], axis=0)
-    rows = np.setdiff1d(np.arange(1, table.num_rows + len(other) + 1), [row.number - header_line for row in other])
-    table = table.filter(pa.array(filled))
-    return Cells(path, dict(zip(names, table.columns, strict=True)), rows[filled].astype(np.int32), header_line)
-
-
-def _scan(path: str) -> tuple[int, str]:
-    """Number and text of the line that is the header; a line that no table of measurements has is refused."""
-    header, text = 0, ""
-    # A byte order mark is what spreadsheets write. Bytes that are no UTF-8 become what is refused with the line.
-    with open(path, encoding="utf-8-sig", errors="surrogateescape", newline="") as file:
-        for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), ""), 1):
-            where = f"line {number}"
-            if len(line) == _LONGEST_LINE:
-                raise InputError(path, where, f"{_LONGEST_LINE} characters or more", "one measurement in a line")
-            if not line.isascii() and any("\ud800" <= character <= "\udfff" for character in line):
-                raise InputError(path, where, "text that is not UTF-8", "a UTF-8 file")
-            if character := steering(line.rstrip("\r\n").replace("\t", " ")):
-                raise InputError(path, where, f"the character {character!a}", "printable characters")
-            if header and line.count('"') % 2:
-                raise InputError(path, where, "a quote that is not closed", "comma-separated values, quotes in pairs")
-            if not header and line.strip() and not line.lstrip().startswith("#"):
-                header, text = number, line
-    return header, text
+    table = text.cells({name: name for name in names}, {})
+    return replace(table, rows=(table.rows - header).astype(np.int32), header_line=header)
 
 
 def _read_parquet(path: str, joints: int) -> Cells:

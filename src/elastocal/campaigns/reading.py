@@ -32,7 +32,8 @@ from elastocal.campaigns.holdout import (
     measured_poses,
     other_folder,
 )
-from elastocal.campaigns.measurements import CSV, FARTHEST_RAD, PARQUET, ROTATION, Cells, read_measurements
+from elastocal.campaigns.measurements import CSV, FARTHEST_RAD, PARQUET, ROTATION, read_measurements
+from elastocal.campaigns.tables import Cells
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.io.documents import check_document, read_document

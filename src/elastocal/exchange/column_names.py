@@ -14,8 +14,8 @@ import numpy as np
 from scipy import constants
 from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.tables import TextTable
 from elastocal.errors import InputError, closest_first
-from elastocal.exchange.csv_dialect import TextTable
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 

@@ -37,10 +37,10 @@ from typing import Any
 
 import numpy as np
 
+from elastocal.campaigns.tables import Dialect, read_text_table
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.exchange.column_names import ANGLE, LENGTH, UNITS, read_units, split_unit
-from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.exchange.fixed_transforms import displacement_words, elementary, origin_transform, word
 from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, point_name
 from elastocal.io.documents import read_document

@@ -17,7 +17,8 @@ import pandas as pd
 import yaml
 
 from elastocal.campaigns.holdout import number_alike
-from elastocal.campaigns.measurements import MOST_JOINTS, TICK, Cells, file_columns, sheet_columns
+from elastocal.campaigns.measurements import MOST_JOINTS, TICK, file_columns, sheet_columns
+from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, text_fault
 from elastocal.exchange.column_names import (
@@ -39,7 +40,6 @@ from elastocal.exchange.column_names import (
     rotation_vectors,
     scales_of,
 )
-from elastocal.exchange.csv_dialect import Dialect, TextTable, read_text_table
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import plain_number
 from elastocal.mechanics.components import WRENCH_NAMES

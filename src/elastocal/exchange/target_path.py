@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.measurements import FARTHEST_RAD
 from elastocal.campaigns.reading import find_degrees
+from elastocal.campaigns.tables import Dialect, read_text_table
 from elastocal.errors import InputError, closest_first
-from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 

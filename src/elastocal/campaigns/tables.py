@@ -6,17 +6,17 @@ Neither `csv.Sniffer`, which guesses, nor pandas, which knows no lines, can ask 
 import codecs
 import csv
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from elastocal.campaigns.measurements import Cells
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, steering
-from elastocal.io.texts import decoded, read_bytes
+from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, decoded, plain_number, read_bytes
 
 # In this order: a header that holds a semicolon is not separated by its commas.
 SEPARATORS = {"tab": "\t", "semicolon": ";", "bar": "|", "comma": ",", "space": " "}
@@ -30,6 +30,22 @@ _SURE = re.compile(rf"(?![+-]?[1-9]\d{{0,2}},\d{{3}}$){_DECIMAL['comma'].pattern
 LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
 # Lines of a file with their numbers, from 1.
 _Lines = Sequence[tuple[int, str]]
+
+
+# Least and largest value of a column, in its unit, and why. Generous: whatever lies beyond is in another unit, or no reading of
+# an instrument beside a robot.
+_Bound = tuple[float, float, str]
+_FORCE: _Bound = (-1e6, 1e6, "N, the weight of a hundred tonnes")
+_MOMENT: _Bound = (-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")
+_PLACE: _Bound = (-2e7, 2e7, "m, half the circumference of the Earth")
+BOUNDS: Mapping[str, _Bound] = {
+    **dict.fromkeys(("fx", "fy", "fz"), _FORCE),
+    **dict.fromkeys(("mx", "my", "mz"), _MOMENT),
+    **dict.fromkeys("xyz", _PLACE),
+    "time_s": (-1e11, 1e11, "s, three thousand years either way: not milliseconds of a calendar"),
+    "temperature_c": (-200.0, 200.0, "°C, in which arms work, not kelvin"),
+    "u95_m": (1e-8, 0.1, "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by"),
+}
 
 
 @dataclass(frozen=True)
@@ -51,6 +67,86 @@ _WANTED = (
     "columns x, y, z or such; --header LINE and --column x=NAME say which line and which columns they are, "
     "--columns q1,q2,… what the columns of a table without a header are"
 )
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Columns of a table by name, as numbers in SI units or as texts; an `InputError` names the place of what is neither.
+
+    `columns`: cells as they stand in the file. `rows` (N,): number of each row in the file, 1 for the first of data.
+    `header_line`: line of the header, 0 where `rows` has lines, None where the file is no text. `headers`: what the file calls
+    columns, if otherwise. `scales`: SI values of their units, if not 1.
+    """
+
+    path: str
+    columns: Mapping[str, pa.ChunkedArray]
+    rows: np.ndarray
+    header_line: int | None = None
+    headers: Mapping[str, str] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
+
+    def fault(self, index: int, name: str, allowed: str, found: str | None = None) -> InputError:
+        """InputError of one cell, or without `name` of a row; `index` counts the rows."""
+        return InputError(
+            self.path,
+            f"{self.place(index)}{f', column {self.headers.get(name, name)}' if name else ''}",
+            _show(self.columns[name][index].as_py()) if found is None else found,
+            allowed,
+        )
+
+    def place(self, index: int) -> str:
+        """Where a row stands in the file."""
+        row = int(self.rows[index])
+        return f"row {row}" if self.header_line is None else f"line {row + self.header_line}"
+
+    def numbers(self, name: str) -> np.ndarray:
+        """ndarray (N,) of finite numbers."""
+        try:
+            values = self.columns[name].cast(pa.float64()).to_numpy()
+        except pa.ArrowInvalid:
+            # A cell is none, or written as a spreadsheet does.
+            found = [plain_number(str(cell)) for cell in self.columns[name].to_pylist()]
+            if None in found:
+                raise self.fault(found.index(None), name, A_NUMBER) from None
+            values = np.array(found, float)
+        # Not a number is no more than anything either.
+        sound = np.abs(values) <= LARGEST_NUMBER
+        if not sound.all():
+            raise self.fault(int(np.argmin(sound)), name, A_NUMBER)
+        return self.bounded(name, values * self.scales.get(name, 1.0))
+
+    def bounded(self, name: str, values: np.ndarray) -> np.ndarray:
+        """The same values (N,) of a column, all of which physics allows."""
+        least, largest, why = BOUNDS.get(name, (-np.inf, np.inf, ""))
+        wrong = ~((values >= least) & (values <= largest))
+        if wrong.any():
+            raise self.fault(int(np.argmax(wrong)), name, f"{least:g} to {largest:g} {why}")
+        return values
+
+    def matrix(self, names: Iterable[str]) -> np.ndarray:
+        """ndarray (N, len(names)) of finite numbers."""
+        return np.column_stack([self.numbers(name) for name in names])
+
+    def integers(self, name: str) -> np.ndarray:
+        """ndarray of int32 (N,)."""
+        values = self.numbers(name)
+        wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
+        if wrong.any():
+            raise self.fault(int(np.argmax(wrong)), name, f"an integer, up to {2**31 - 1}")
+        return values.astype(np.int32)
+
+    def texts(self, name: str) -> list[str]:
+        """list of str (N,)."""
+        column = self.columns[name]
+        encoded = column if pa.types.is_dictionary(column.type) else column.cast(pa.string()).dictionary_encode()
+        whole = encoded.unify_dictionaries().combine_chunks()
+        words = [str(word).strip() for word in whole.dictionary.to_pylist()]
+        return ["" if code is None else words[code] for code in whole.indices.to_pylist()]
+
+
+def _show(cell: Any) -> str:
+    text = "" if cell is None else str(cell).strip().removesuffix(".0")
+    return repr(text[:40]) if text else "nothing"
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import pytest
 from support import refused
 
 from elastocal.exchange import csv_dialect
-from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS, Dialect, read_text_table
+from elastocal.campaigns.tables import DECIMALS, SEPARATORS, Dialect, read_text_table
 
 
 def read(folder, text, encoding="utf-8", dialect=None, **more):
