@@ -5,7 +5,7 @@ import itertools
 import pytest
 from support import refused
 
-from elastocal.exchange import csv_dialect
+from elastocal.campaigns import tables
 from elastocal.campaigns.tables import DECIMALS, SEPARATORS, Dialect, read_text_table
 
 
@@ -67,9 +67,9 @@ def test_what_an_option_or_another_number_says_is_read(tmp_path, text, dialect, 
     ("limit", "largest", "words"), [("MOST_LINES", 200, "201 lines"), ("LARGEST_BYTES", 100, "more than 100 bytes")]
 )
 def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch, limit, largest, words):
-    monkeypatch.setattr(csv_dialect, limit, largest)
+    monkeypatch.setattr(tables, limit, largest)
     # Before any line is looked at.
-    monkeypatch.setattr(csv_dialect, "steering", None)
+    monkeypatch.setattr(tables, "steering", None)
     with refused(tmp_path / "table.txt", "", words):
         read(tmp_path, "x;y\n" + "1;2\n" * 200)
 

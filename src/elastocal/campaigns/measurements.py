@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from elastocal.campaigns.tables import Cells, Dialect, read_text_table
+from elastocal.campaigns.tables import Cells, read_text_table
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.io.atomic_writes import atomic_write
@@ -149,12 +149,9 @@ def _read(path: Path, joints: int) -> Cells:
 
 
 def _read_csv(path: str, joints: int) -> Cells:
-    text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
-    header, names = text.dialect.header or 0, [*text.columns]
-    if len(names) == 1 and any(separator in names[0] for separator in ";\t"):
-        raise InputError(path, "header", repr(names[0][:40]), "columns separated by commas, decimals by a point")
-    check_column_names(names, joints, path)
-    table = text.cells({name: name for name in names}, {})
+    text = read_text_table(path, lambda cells: "pose" in cells, wanted="a header with pose, load, repeat, target, q1 and so on")
+    check_column_names(text.columns, joints, path)
+    table, header = text.cells({name: name for name in text.columns}, {}), text.dialect.header or 0
     return replace(table, rows=(table.rows - header).astype(np.int32), header_line=header)
 
 

@@ -1,6 +1,5 @@
 """Which campaigns a configuration names and where they come from, and the user's own: checked before any job starts."""
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,6 @@ from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.errors import InputError
 from elastocal.io.documents import document_path, named_document
 from elastocal.io.json_files import read_json
-
-# What Snakemake refuses as the value of a wildcard.
-_PERIODIC = re.compile(r"(.+)\1{19}$")
 
 
 def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> dict[str, dict[str, Any]]:
@@ -64,8 +60,6 @@ def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results:
             raise InputError(path, "", "braces", "a path without braces, which Snakemake takes for wildcards")
     document, _ = read_descriptions(folder, robots_folder)
     name, source = document["campaign"], f"{folder}/{DOCUMENT}"
-    if _PERIODIC.search(name):
-        raise InputError(source, "campaign", repr(name), "a name that Snakemake does not take for an endless repetition")
     if name in named_campaigns(config):
         raise InputError(source, "campaign", repr(name), "a name that no campaign of config.yaml has")
     earlier = _folder_of_results(Path(results) / name)

@@ -17,7 +17,7 @@ import pandas as pd
 import yaml
 
 from elastocal.campaigns.holdout import number_alike
-from elastocal.campaigns.measurements import MOST_JOINTS, TICK, file_columns, sheet_columns
+from elastocal.campaigns.measurements import file_columns
 from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, text_fault
@@ -50,8 +50,6 @@ IMPORT = "import.yaml"
 SAME_POSE = 1e-3
 # Nanoseconds since 1970 are 2e18.
 _LARGEST_TIME = 1e19
-# Of a pose, load, repeat or session; as in measurements.csv.
-_LARGEST_ORDINAL = 2**31 - 1
 # What programs write where nothing was measured.
 _EMPTY = re.compile(r"|[+-]?nan(\(\w+\))?|[-–—]+|#?n/?a|n\.a\.|null|none", re.IGNORECASE)
 
@@ -93,22 +91,6 @@ def import_options_text(options: ImportOptions, source: str | Path) -> str:
     document |= {key: value for key, value in asdict(options).items() if value is not None}
     body = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
     return f"# The import again: elastocal import csv FILE --options {IMPORT} --folder FOLDER\n{body}"
-
-
-def _sheet_options(text: TextTable, options: ImportOptions) -> ImportOptions:
-    """Options of an import with the units of a sheet of `plan` that a spreadsheet saved, where the table is one.
-
-    Its columns are those of measurements.csv, in its units; those beside, such as ``q1_deg``, are left out.
-    """
-    headers = set(text.columns)
-    beside = headers & sheet_columns(MOST_JOINTS)
-    needed = {TICK, "pose", "load", "repeat", "target", *POSITION}
-    if not (needed <= headers and headers - beside <= {*file_columns(MOST_JOINTS)}):
-        return options
-    joints = {header.partition("_")[0]: "m" if header.endswith("mm") else "rad" for header in beside - {TICK}}
-    units = joints | {"lengths": "m", "angles": "rad"} | dict(options.units or {})
-    rotation = options.rotation or ("vector" if {*VECTOR} <= headers else None)
-    return replace(options, units=units, rotation=rotation, ignore=[*(options.ignore or ()), *sorted(beside)])
 
 
 def _one_row_each(text: TextTable, targets: Mapping[str, Sequence[str]]) -> TextTable:
@@ -193,8 +175,6 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
         return has_position(names) or (only_joints and not any(plain_number(cell) is not None for cell in cells))
 
     text = read_text_table(path, is_header, options, options.ignore or (), units_in=read_units, names=options.names or ())
-    options = _sheet_options(text, options)
-    text = replace(text, columns={name: cells for name, cells in text.columns.items() if name not in (options.ignore or ())})
     notes = [f"units in the row under the header: {len(text.units)}"] if text.units else []
     if options.targets:
         text, first = _one_row_each(text, options.targets), next(iter(options.targets.values()))
