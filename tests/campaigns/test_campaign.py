@@ -69,19 +69,16 @@ def test_what_was_not_measured_is_an_empty_column_and_is_absent_again(name):
     assert [part for part, values in vars(back).items() if values is None] == [name]
 
 
-def residuals_of(rows, held_out=False, **others):
-    before, after = (np.arange(2.0 * rows).reshape(2, rows) + start for start in (100.0, 200.0))
-    position = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    return residual_columns(
-        two_measurements(**others), held_out, False, np.array([False, True]), position, {"before": before, "after": after}
-    )
-
-
 def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_are_given():
-    columns = list_values(residuals_of(6))
+    before, after = (np.arange(12.0).reshape(2, 6) + start for start in (100.0, 200.0))
+    position, beyond = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]), np.array([False, True])
+    stages = {"before": before, "after": after[:, :3]}
+    columns = list_values(residual_columns(two_measurements(), False, False, beyond, position, stages))
     for number, component in enumerate(("dx", "dy", "dz", "rx", "ry", "rz")):
         assert columns[f"before_{component}"] == [100.0 + number, 106.0 + number]
-        assert columns[f"after_{component}"] == [200.0 + number, 206.0 + number]
+        np.testing.assert_array_equal(
+            columns[f"after_{component}"], [200.0 + number, 206.0 + number] if number < 3 else [np.nan] * 2
+        )
     assert (columns["x"], columns["y"], columns["z"]) == ([1.0, 4.0], [2.0, 5.0], [3.0, 6.0])
     assert (columns["row"], columns["q2"], columns["mz"], columns["time_s"]) == ([91, 92], [0.2, 0.4], [16, 26], [71, 81])
     assert columns["outside_range"] == [False, True]

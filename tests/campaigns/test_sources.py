@@ -126,7 +126,6 @@ OWN_FAULTS = {
         "campaign",
         ["kuka_nothing_missing", "no campaign of"],
     ),
-    "name that looks endless": ({"campaign": "ab" * 20}, "campaign", ["repetition"]),
     "another campaign that is not there": ({"holdout": {"campaign": "../other"}}, "holdout.campaign", ["'../other'", "beside"]),
     "itself for the test": ({"holdout": {"campaign": "."}}, "holdout.campaign", ["'.', the campaign itself"]),
     "robot from elsewhere": ({"robot": "/etc/passwd"}, "robot", ["'/etc/passwd'", "a file in this folder"]),

@@ -120,9 +120,7 @@ def _read_text(table: Mapping[str, Any], path: str | Path) -> PublicMeasurements
     separator, names, kind = table.get("separator", ","), table.get("names"), table["kind"]
     separator = r"\s+" if separator == "blanks" else separator
     try:
-        text = pd.read_csv(
-            path, sep=separator, decimal=table.get("decimal", "."), names=names, index_col=False, float_precision="round_trip"
-        )
+        text = pd.read_csv(path, sep=separator, decimal=table.get("decimal", "."), names=names, index_col=False)
         needed = [name for parts in table["positions"].values() for part in parts for name in part]
         there = [name for name in table["angles"] if name in text]
         for name in (*table["angles"][:6], *needed):

@@ -258,9 +258,9 @@ def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str
     for tag, parts in (("link", links), ("joint", joints)):
         if not 0 < len(parts) <= _MOST_PARTS:
             raise InputError(source, "", f"{len(parts)} times <{tag}>", f"a URDF with links and joints, at most {_MOST_PARTS}")
-        name, times = Counter(part.get("name", "") for part in parts).most_common(1)[0]
-        if times > 1 or not all(part.get("name") for part in parts):
-            raise InputError(source, f"{tag} {name!r}", f"{times} times", "a name for each, once")
+        counts = Counter(part.get("name", "") for part in parts)
+        if wrong := [name for name, times in counts.items() if times > 1 or not name]:
+            raise InputError(source, f"{tag} {wrong[0]!r}", f"{counts[wrong[0]]} times", "a name for each, and each name once")
     names = {link.attrib["name"] for link in links}
     parent_of: dict[str, str] = {}
     for joint in joints:
