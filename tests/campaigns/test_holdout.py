@@ -1,6 +1,5 @@
 """Poses that are held out: a split never parts a pose, depends on nothing but its seed, and leaves enough on both sides."""
 
-import os
 import time
 
 import numpy as np
@@ -12,7 +11,7 @@ from made_cells import DOCUMENT, POSES, Cell
 from scipy.optimize import brentq
 from support import refused
 
-from elastocal.campaigns.holdout import SAME_POSE_RAD, beyond_range, blocks, configurations, find_repeated, is_file_in, split
+from elastocal.campaigns.holdout import SAME_POSE_RAD, beyond_range, blocks, configurations, find_repeated, split
 
 
 def poses_of(measurements):
@@ -84,7 +83,7 @@ def test_a_session_is_held_out_where_five_poses_of_others_are_left(cell):
         ({"poses": [3, 12]}, "holdout.poses", ["found 12", "0..9"]),
         ({"poses": [3, [1, 4]]}, "holdout.poses", ["[1, 4]", "0..9"]),
         ({"blocks": 11}, "holdout.blocks", ["11", "at most as many as configurations, 10"]),
-        *(({"blocks": count}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]) for count in (9, 10)),
+        ({"blocks": 9}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
         ({"campaign": "../nowhere"}, "holdout.campaign", ["'../nowhere'", "campaign.yaml"]),
         ({"session": 3}, "holdout.session", ["found 3", "sessions that were measured: 0"]),
     ],
@@ -105,41 +104,15 @@ def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell, holdou
     assert parts(cell)[1] == once | {(session, pose + POSES) for session, pose in once}
 
 
-@pytest.fixture
-def places(tmp_path):
-    for name in ("cell/deep", "elsewhere", "linked"):
-        (tmp_path / name).mkdir(parents=True)
-        (tmp_path / name / "a").write_text("x")
-    (tmp_path / "cell/out").symlink_to(tmp_path / "elsewhere/a")
-    (tmp_path / "cell/inside").symlink_to("deep/a")
-    (tmp_path / "cell/loop").symlink_to("loop")
-    (tmp_path / "alias").symlink_to("cell")
-    os.mkfifo(tmp_path / "cell/pipe")
-    return tmp_path
-
-
-@pytest.mark.parametrize(
-    ("path", "inside"),
-    [
-        ("cell/deep/a", True),
-        ("cell/inside", True),
-        ("alias/deep/a", True),
-        ("cell/out", False),
-        ("elsewhere/a", False),
-        ("cell/pipe", False),
-        ("cell/" + "x" * 5000, False),
-    ],
-)
-def test_a_file_is_where_its_links_lead(places, path, inside):
-    assert is_file_in(places / path, places / "cell") is inside
-    assert is_file_in(places / path, places / "linked", places / "alias") is inside
-
-
-def test_thirty_poses_of_one_configuration_are_refused(cell):
+def test_poses_of_one_configuration_are_refused_and_a_hundred_thousand_told_apart_fast(cell):
     for name in [name for name in cell.table if name.startswith("q")]:
         cell.table[name] = [cell.table[name][0]] * len(cell.table[name])
     with refused(cell.source, "holdout", "1 configuration to fit and 0 held out", "at least 5 to fit"):
         cell.read()
+    angles = np.tile(np.random.default_rng(4).uniform(-2, 2, (2, 6)), (50_000, 1))
+    begun = time.process_time()
+    assert configurations(angles, np.arange(len(angles))).tolist() == [0, 1] * 50_000
+    assert time.process_time() - begun < 10.0
 
 
 def test_blocks_are_clusters_where_there_are_some():
@@ -179,13 +152,6 @@ def test_a_pose_repeats_another_where_no_joint_stands_elsewhere_than_one_pose_ma
     assert find_repeated(fitted, almost).all() and not find_repeated(fitted, elsewhere).any()
     # Each joint at the angle that it had in another pose is a pose of its own.
     assert not find_repeated(fitted, np.diag(fitted[:6])[None] * np.ones((1, 6))).any()
-
-
-def test_a_hundred_thousand_poses_of_one_configuration_are_told_apart_fast():
-    angles = np.tile(np.random.default_rng(4).uniform(-2, 2, (2, 6)), (50_000, 1))
-    begun = time.process_time()
-    assert configurations(angles, np.arange(len(angles))).tolist() == [0, 1] * 50_000
-    assert time.process_time() - begun < 10.0
 
 
 def test_repeats_of_a_pose_are_one_configuration_in_the_order_of_the_poses():

@@ -53,11 +53,11 @@ def test_faulty_cell_is_refused_by_row_and_column(cell, row, column, entry, word
 def test_faulty_cell_of_a_parquet_file_is_refused_alike(cell):
     cell.spoil(5, "x", None)
     cell.write("parquet")
-    with refused((cell.folder / "measurements.parquet").as_posix(), "row 5, column x", "found nothing", "a number"):
+    with refused(cell.folder / "measurements.parquet", "row 5, column x", "found nothing", "a number"):
         read_campaign(cell.folder, cell.robots)
 
 
-@pytest.mark.parametrize("missing", ["load", "target", "q3", "y", "rz", "mx", "approach1"])
+@pytest.mark.parametrize("missing", ["load", "q3", "rz", "mx", "approach1"])
 def test_missing_column_is_refused(cell, missing):
     cell.without(missing)
     with refused(cell.measurements, "header", f"no column {missing!r}", f"{missing}: "):
@@ -139,9 +139,7 @@ def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
         read_campaign(cell.folder, cell.robots)
 
 
-@pytest.mark.parametrize(
-    ("column", "entry", "found"), [("x", [0.0], "list"), ("x", b"1", "binary"), ("x", True, "bool"), ("target", b"A", "binary")]
-)
+@pytest.mark.parametrize(("column", "entry", "found"), [("x", "1", "string"), ("x", True, "bool"), ("target", b"A", "binary")])
 def test_a_column_of_parquet_holds_numbers_or_text(cell, column, entry, found):
     cell.table[column] = [entry] * len(cell.table[column])
     cell.write("parquet")

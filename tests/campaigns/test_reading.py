@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from made_cells import ARM, DOCUMENT, LOADS, POSES, REPEATS, WRENCH, Cell, assert_same
+from made_cells import ARM, DOCUMENT, LOADS, POSES, REPEATS, WRENCH, assert_same
 from support import refused
 
 from elastocal.campaigns.campaign import Target
@@ -14,24 +14,17 @@ from elastocal.campaigns.writing import write_campaign
 
 
 def test_campaign_is_read_as_written(cell):
-    cell.document |= {
-        "compliance": "identify",
-        "declared": ["joint_offset"],
-        "noise": {"position_m": 6e-5, "orientation_rad": 7e-5},
-        "holdout": {"fraction": 0.4, "seed": 5},
-    }
+    stated = {"compliance": "identify", "declared": ["joint_offset"], "noise": {"position_m": 6e-5, "orientation_rad": 7e-5}}
+    cell.document |= stated | {"holdout": {"fraction": 0.4, "seed": 5}}
     campaign, table = cell.read(effects=["joint_offset"]), cell.table
     assert (campaign.name, campaign.robot.name, campaign.measured, campaign.frame) == ("cell7", "three joints", "pose", "base")
     assert campaign.targets == (Target("A", "elbow", (0.0, 0.0, 0.1)), Target("B", "hand", None))
-    assert (campaign.compliance, campaign.declared) == ("identify", ("joint_offset",))
-    assert campaign.noise == {"position_m": 6e-5, "orientation_rad": 7e-5}
+    assert (campaign.compliance, campaign.declared, campaign.noise) == ("identify", ("joint_offset",), stated["noise"])
     assert campaign.holdout == {"fraction": 0.4, "seed": 5}
     measurements = campaign.measurements
     assert len(measurements) == POSES * LOADS * REPEATS * 2
-    for name in ("pose", "load", "repeat"):
-        np.testing.assert_array_equal(getattr(measurements, name), table[name])
     assert [campaign.targets[index].name for index in measurements.target] == table["target"]
-    expected = {"time_s": table["time_s"], "temperature_c": table["temperature_c"]}
+    expected = {name: table[name] for name in ("pose", "load", "repeat", "time_s", "temperature_c")}
     expected |= {"session": np.zeros(len(measurements)), "row": np.arange(1, len(measurements) + 1)}
     groups = {"joint_angles": ("q1", "q2", "q3"), "wrench": WRENCH, "position": "xyz", "rotation_vector": ("rx", "ry", "rz")}
     groups["approach"] = ("approach1", "approach2", "approach3")
@@ -41,19 +34,14 @@ def test_campaign_is_read_as_written(cell):
 
 
 def test_a_mount_is_turned_as_stated_or_unknown_and_left_out_as_the_offset_is(cell):
-    stated = {
-        "A": {"point": "elbow", "offset_m": [0, 0, 0.1], "rotation": [0, 0, 1.5]},
-        "B": {"point": "hand", "offset_m": [0, 0, 0], "rotation": "unknown"},
-    }
-    cell.document["targets"] = stated
+    targets = cell.document["targets"] = {name: dict(target) for name, target in DOCUMENT["targets"].items()}
+    targets["A"]["rotation"] = [0, 0, 1.5]
     assert [target.rotation for target in cell.read().targets] == [(0.0, 0.0, 1.5), None]
-    stated["A"].pop("rotation")
-    stated["B"] = {"point": "hand", "offset_m": "unknown"}
-    assert [target.rotation for target in cell.read().targets] == [(0.0, 0.0, 0.0), None]
-    stated["B"]["rotation"] = [0, 1, 0]
-    assert cell.read().targets[1].rotation == (0.0, 1.0, 0.0)
-    for wrong, words in (([0, 0, 92], "not degrees"), ([0, 0], "3 entries"), ("known", "unknown"), (1.5, "rad")):
-        stated["B"]["rotation"] = wrong
+    targets["A"].pop("rotation")
+    targets["B"]["rotation"] = [0, 1, 0]
+    assert [target.rotation for target in cell.read().targets] == [(0.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+    for wrong, words in (([0, 0, 92], "not degrees"), ([0, 0], "3 entries"), ("known", "unknown")):
+        targets["B"]["rotation"] = wrong
         with refused(cell.source, "targets.B.rotation", words):
             cell.read()
 
@@ -108,15 +96,10 @@ def test_other_campaign_is_the_test_of_all_measurements(cell, tmp_path):
     assert len(other.measurements) == len(campaign.measurements)
 
 
-def add_session(cell):
-    """The same poses again in session 7, and pose 3 of session 0 alone is not there."""
+@pytest.mark.parametrize("of", [1, 3])
+def test_folds_hold_every_pose_of_every_session_once_and_are_of_one_size(cell, of):
     cell.repeat_as_session_7()
     cell.keep([n for n, at in enumerate(zip(cell.table["session"], cell.table["pose"], strict=True)) if at != (0, 3)])
-
-
-@pytest.mark.parametrize("of", [1, 2, 3, 4, 7])
-def test_folds_hold_every_pose_of_every_session_once_and_are_of_one_size(cell, of):
-    add_session(cell)
     cell.write()
     folds = [folds_of(cell.folder, cell.robots, number, of)["poses"] for number in range(1, of + 1)]
     there = [(0, pose) for pose in range(POSES) if pose != 3] + [(7, pose) for pose in range(POSES)]
@@ -152,14 +135,8 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
         ({"noise": {"orientation_rad": 1e-4}}, "noise", ["no position_m", "u95_m"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": [1e-5]}}, "noise.joint_rad", ["1 number", "or 3"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": [0, 2.0, 0]}}, "noise.joint_rad[1]", ["2.0", "0 to 0.1"]),
-        *(
-            ({"noise": {"position_m": value}}, "noise.position_m", ["laser", "0.1"])
-            for value in (60, 0.2, 6e-12, 1e-300, -1e-4)
-        ),
-        *(
-            ({"noise": {"position_m": 1e-4, "orientation_rad": value}}, "noise.orientation_rad", ["resolves"])
-            for value in (60, 6e-12, 1e-300, -1.0)
-        ),
+        *(({"noise": {"position_m": value}}, "noise.position_m", ["laser", "0.1"]) for value in (0.2, 6e-12)),
+        ({"noise": {"position_m": 1e-4, "orientation_rad": 60}}, "noise.orientation_rad", ["resolves"]),
         ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0, 150]}}}, "targets.A.offset_m[2]", ["150", "reaches"]),
     ],
 )
@@ -269,14 +246,11 @@ def test_what_few_rows_alone_are_off_is_left_to_the_diagnosis(cell):
         cell.read()
 
 
-def test_whole_file_in_degrees_or_millimetres_is_refused(cell, tmp_path):
-    for names, factor, words in ((["q1", "q2", "q3"], 57.3, "degrees"), (["x", "y", "z"], 1e3, "millimetres")):
-        spoilt = Cell(tmp_path / words)
-        tmp_path.joinpath(words).mkdir()
-        for name in names:
-            spoilt.table[name] = [factor * number for number in spoilt.table[name]]
-        with refused(spoilt.measurements, f"column {names[0][0]}" if factor < 100 else "column ", words):
-            spoilt.read()
+def test_a_whole_file_in_degrees_is_refused(cell):
+    for name in ("q1", "q2", "q3"):
+        cell.table[name] = [57.3 * number for number in cell.table[name]]
+    with refused(cell.measurements, "column q", "not degrees"):
+        cell.read()
 
 
 def test_the_same_measurement_twice_is_refused(cell):

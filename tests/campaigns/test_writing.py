@@ -42,17 +42,13 @@ def arm():
 
 @pytest.mark.parametrize(("schema", "text"), [("robot", robot_template()), ("campaign", campaign_template("cell", arm()))])
 def test_every_key_is_explained_and_those_left_out_are_valid_once_uncommented(schema, text):
-    check_document(yaml.safe_load(text), schema, "template")
-    keys = {f"{line.removeprefix('# ').partition(':')[0]}" for line in text.splitlines() if ":" in line}
-    assert set(read_schema(schema)["properties"]) <= keys
-    optional = [
-        line
-        for line in text.splitlines()
-        if line.startswith("# ") and line[2:].partition(":")[0] in read_schema(schema)["properties"]
-    ]
-    for line in optional:
-        assert text.splitlines()[text.splitlines().index(line) - 1].startswith("# "), "explained above"
-        check_document(yaml.safe_load(text) | yaml.safe_load(line[2:]), schema, line)
+    known, lines, shown = read_schema(schema)["properties"], text.splitlines(), yaml.safe_load(text)
+    check_document(shown, schema, "template")
+    assert set(known) <= {line.removeprefix("# ").partition(":")[0] for line in lines}
+    for number, line in enumerate(lines):
+        if line.startswith("# ") and line[2:].partition(":")[0] in known:
+            assert lines[number - 1].startswith("# "), "explained above"
+            check_document(shown | yaml.safe_load(line[2:]), schema, line)
 
 
 def test_the_sheet_has_the_columns_that_every_campaign_needs():
