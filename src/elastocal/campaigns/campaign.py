@@ -71,10 +71,7 @@ class Measurements:
         return len(self.pose)
 
     def select(self, mask_or_index: np.ndarray) -> Measurements:
-        """The measurements of a mask or of an index array, in its order.
-
-        `mask_or_index` (N,) of bool, (M,) of int.
-        """
+        """The measurements of a mask (N,) or of an index array (M,), in its order."""
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         chosen: dict[str, Any] = {name: None if array is None else array[mask_or_index] for name, array in arrays.items()}
         return Measurements(**chosen)
@@ -82,16 +79,12 @@ class Measurements:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign that holds together.
+    """A campaign that holds together; its schema explains what it declares.
 
-    `robot`: with rigid joints where `compliance` is nominal and the robot file states none. `measured`: one of "position",
-    "pose". `frame`: tracker: the placement of the base in it is unknown, and another one in each session. `compliance`: one of
-    "nominal", "identify". `declared`: effects of the catalogue that the model already has. `noise`: ``position_m``,
-    ``orientation_rad``, ``joint_rad``, as far as the campaign declares them. `holdout`: ``fraction`` and ``seed``, ``blocks``
-    and ``seed``, ``session``, ``poses`` or ``campaign``. `remainder`: regression on what the final model leaves: a name in
-    `remainder.corrected`, "auto" for the best of them or none, or "none". `table`: name of the file of measurements; empty
-    where they come from none. `header_line`: line of the file in which its header stands, where it is a text whose rows are
-    lines.
+    `robot`: with rigid joints where `compliance` is nominal and the robot file states none. `frame`: of a tracker: the
+    placement of the base in it is unknown, and another one in each session. `remainder`: regression on what the final model
+    leaves, a name in `remainder.corrected`, "auto" or "none". `table`, `header_line`: name of the file of measurements, empty
+    for none, and the line of its header, where it is a text.
     """
 
     name: str
@@ -115,14 +108,8 @@ class Campaign:
 
 
 def assemble_campaign(document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str) -> Campaign:
-    """A campaign from its parts, which have been checked before.
-
-    Nominal compliances that the robot file does not state leave rigid joints.
-
-    `document`: contents of ``campaign.yaml``. `source`: named in errors.
-    """
+    """A campaign from its parts, checked before; `source`, the file of its document, is named in errors."""
     compliance = document.get("compliance", "nominal")
-    remainder = document.get("remainder", BEST_REMAINDER)
     rigid = compliance == "nominal" and not robot.compliance_known
     return Campaign(
         name=document["campaign"],
@@ -135,18 +122,14 @@ def assemble_campaign(document: Mapping[str, Any], robot: Robot, measurements: M
         noise=document.get("noise"),
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
         measurements=measurements,
-        remainder=remainder,
+        remainder=document.get("remainder", BEST_REMAINDER),
         table=document.get("table", ""),
         header_line=document.get("header_line"),
     )
 
 
 def targets_from(described: Mapping[str, Any], chain: Chain, source: str) -> tuple[Target, ...]:
-    """What a campaign says that it tracks.
-
-    `described`: ``targets`` of ``campaign.yaml``. `source`: named in errors. Raises `InputError`: a name that is no text, or a
-    measuring point that the chain does not have.
-    """
+    """``targets`` of ``campaign.yaml``, which `source`, named in errors, describes; an unknown measuring point is refused."""
     points = [point.name for point in chain.points]
     targets = []
     for name, target in described.items():

@@ -25,19 +25,14 @@ def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
     """Measurements to fit and measurements to test, parted by whole poses.
 
     Returns `training`, `held_out`: in the order of the file, on which the choice of poses does not depend. Where another
-    campaign is the test, all measurements are training and `held_out` is empty: see `reading.held_out_campaign`. Raises
-    `InputError`: too few poses, or poses that are not there.
+    campaign is the test, see `reading.held_out_campaign`, all measurements are training.
     """
     held_out = held_out_mask(campaign.holdout, campaign.measurements, campaign.robot.reported_offset, campaign.name)
     return campaign.measurements.select(~held_out), campaign.measurements.select(held_out)
 
 
 def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[str, Any]:
-    """How a campaign parts its measurements, in one way and with a seed where the poses are drawn.
-
-    `described`: ``holdout`` of ``campaign.yaml``. `folder`: folder of the campaign. `source`: named in errors. Raises
-    `InputError`: no way or more than one, a seed where nothing is drawn, or as `other_folder`.
-    """
+    """``holdout`` of ``campaign.yaml`` in a folder: one way to part measurements, with a seed where poses are drawn."""
     ways = [way for way in _HOLDOUTS if way in described]
     drawn = ways in (["fraction"], ["blocks"])
     if len(ways) != 1 or ("seed" in described and not drawn):
@@ -49,11 +44,7 @@ def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[s
 
 
 def other_folder(named: str, folder: Path, source: str) -> Path:
-    """Folder of the campaign that tests another one.
-
-    `named`: as ``holdout.campaign`` names it. `folder`: of the campaign that it tests. `source`: named in errors. Raises
-    `InputError`: no campaign there, the same campaign, or a folder elsewhere than beside or below the tested one's.
-    """
+    """Folder of the campaign that tests the one in `folder`, beside or below it, as ``holdout.campaign`` names it."""
     other = folder / named
     allowed = f"a folder beside this one with a {DOCUMENT}, such as ../other"
     if not is_file_in(other / DOCUMENT, folder.resolve().parent):
@@ -95,10 +86,7 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, report
 
 
 def measured_poses(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
-    """The poses that were measured, each once.
-
-    Returns `pairs` (P, 2): session and pose, sorted; `index` (N,) of int: of each measurement's pair.
-    """
+    """Session and pose of those that were measured, each once and sorted (P, 2); of each measurement its index there (N,)."""
     pairs = np.column_stack([measurements.session, measurements.pose])
     first, index = groups_of(pairs)
     return pairs[first], index
@@ -147,10 +135,7 @@ def is_file(path: str | Path) -> bool:
 
 
 def is_file_in(path: str | Path, *folders: str | Path) -> bool:
-    """Whether a path is that of a regular file in or below one of some folders.
-
-    `path`, `*folders`: links are followed, on both sides.
-    """
+    """Whether a path is that of a regular file in or below one of some folders; links are followed, on both sides."""
     return is_file(path) and any(Path(path).resolve().is_relative_to(Path(folder).resolve()) for folder in folders)
 
 

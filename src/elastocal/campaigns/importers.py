@@ -51,11 +51,7 @@ class PublicFile:
 
 
 def find_missing(names: Iterable[str], files: Mapping[str, PublicFile], kept: str | Path, box: str | Path) -> str | None:
-    """What of some files is missing where `FOLDER_VARIABLE` stands for a network.
-
-    `files`, `box`: as in `fetch`. `kept`: folder of what was downloaded before. Returns the first file that is missing, below
-    the folder of `FOLDER_VARIABLE`; None where all are there, or may be downloaded.
-    """
+    """The first of some files that is missing where `FOLDER_VARIABLE` stands for a network, see `fetch`; None without it."""
     for name in names if os.environ.get(FOLDER_VARIABLE) else ():
         if _at_hand(files[name], box) is None and not (Path(kept) / _name_copy(name, files[name])).is_file():
             return files[name].local

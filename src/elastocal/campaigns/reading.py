@@ -71,11 +71,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
 
 
 def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:
-    """What a campaign says of itself, and where its robot is described.
-
-    `folder`, `robots_folder`: as in `read_campaign`. Returns `document`: contents of ``campaign.yaml``, which follow their
-    schema. Raises `InputError`: a document that its schema refuses, or a robot that is not there.
-    """
+    """What a campaign says of itself, as its schema has it, and where its robot is described."""
     source = (Path(folder) / DOCUMENT).as_posix()
     _check_place(Path(source), folder)
     document = read_document(source)
@@ -84,10 +80,7 @@ def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[di
 
 
 def campaign_files(folder: str | Path, robots_folder: str | Path) -> list[str]:
-    """Files that a campaign is read from, those of the campaign that holds its test included.
-
-    `folder`, `robots_folder`: as in `read_campaign`. Raises `InputError`: as in `read_descriptions` and `holdout.other_folder`.
-    """
+    """Files that a campaign is read from, those of the campaign that holds its test included."""
     document, robot_path = read_descriptions(folder, robots_folder)
     files = [Path(folder) / DOCUMENT, *_tables(Path(folder)), robot_path]
     if other := document.get("holdout", {}).get("campaign"):
@@ -116,12 +109,7 @@ def read_robot(path: str | Path) -> Robot:
 def held_out_campaign(
     campaign: Campaign, folder: str | Path, robots_folder: str | Path, effects: Collection[str] | None = None
 ) -> Campaign | None:
-    """The other campaign that tests this one.
-
-    `folder`: folder of `campaign`. `effects`: as in `read_campaign`. Returns with its own targets and frame; all of its
-    measurements are for the test. None where this campaign holds out its own. Raises `InputError`: a fault of the other
-    campaign, or another chain than this one's.
-    """
+    """The other campaign that tests all of this one, of the same chain; None where this campaign holds out its own poses."""
     if "campaign" not in campaign.holdout:
         return None
     source, key = (Path(folder) / DOCUMENT).as_posix(), "holdout.campaign"
@@ -136,14 +124,9 @@ def held_out_campaign(
 
 
 def folds_of(folder: str | Path, robots_folder: str | Path, number: int, of: int) -> dict[str, Any]:
-    """Poses of one fold of a campaign, as in ``holdout`` of ``campaign.yaml``.
+    """Poses of fold `number`, from 1, `of` so many, dealt out in turn: as in ``holdout`` of ``campaign.yaml``.
 
-    Of K-fold cross-validation [1] by whole poses.
-
-    `folder`, `robots_folder`: as in `read_campaign`. `number`: fold, from 1. `of`: how many folds; poses are dealt out in turn.
-
-    [1] Geisser, S., The predictive sample reuse method with applications, Journal of the American Statistical Association 70,
-        1975.
+    K-fold cross-validation by whole poses: Geisser, The predictive sample reuse method with applications, JASA 70, 1975.
     """
     pairs = measured_poses(read_campaign(folder, robots_folder).measurements)[0]
     return {"poses": pairs[number - 1 :: of].tolist()}
@@ -249,10 +232,7 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
 
 
 def _check_angles(reported: np.ndarray, table: Cells, robot: Robot) -> None:
-    """Refuse degrees in more than single rows.
-
-    `reported` (N, n): joint angles as the controller reports them. Raises `InputError`: the first such angle.
-    """
+    """Refuse degrees in more than single rows of angles (N, n) as the controller reports them."""
     low, high = robot.joint_limits.T
     wrong = find_degrees(reported, robot)
     if wrong.any(axis=1).mean() > _SINGLE_ROWS:
@@ -265,12 +245,7 @@ def _check_angles(reported: np.ndarray, table: Cells, robot: Robot) -> None:
 
 
 def _check_measurements(measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target], source: str) -> None:
-    """Refuse measurements that cannot be of one campaign in the units of the format.
-
-    `table`: where they were read from. `source`: document of the campaign, named in errors of what is not in the table. Raises
-    `InputError`: the first fault: a measurement that is there twice, a load that contradicts its wrench, a pose at two places,
-    millimetres or degrees, a target without a measurement.
-    """
+    """Refuse measurements that cannot be of one campaign, `source`, in the units of the format, by their places there."""
     names = ("session", "pose", "load", "repeat", "target")
     key = np.column_stack([getattr(measurements, name) for name in names])
     first, group = groups_of(key)

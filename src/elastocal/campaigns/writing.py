@@ -79,10 +79,7 @@ def sheet_template(joints: int) -> str:
 
 
 def _explain(schema: str, document: Mapping[str, Any]) -> str:
-    """A document as YAML in which each key of its schema is explained; those that it leaves out stand as comments.
-
-    `schema`: name of the schema, as in `read_schema`.
-    """
+    """A document as YAML in which each key of its schema is explained; those that it leaves out stand as comments."""
     lines = [f"# {read_schema(schema)['title']}. Keys behind # are optional."]
     for key, rule in read_schema(schema)["properties"].items():
         meaning = rule.get("description", key)

@@ -10,22 +10,17 @@ begins a UR5e in the standard notation. A column of angles or lengths ends in it
 units under the header; without, an option says which. ``joint`` and a ``type`` of R may be left out.
 
 A row of the standard notation [1] is ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, one of Craig's modified notation [2]
-``Rx(alpha) Tx(a) Rz(theta) Tz(d)`` with the alpha and a of its own row, which he calls alpha and a of i - 1. A joint's angle is
-added to theta.
+``Rx(alpha) Tx(a) Rz(theta) Tz(d)`` with the alpha and a of its own row, which he calls alpha and a of i - 1. Along its own axis
+a joint frame may be anywhere. Where two axes are nearly parallel, a calibrated table has lengths d of hundreds of metres that
+cancel [3]; the frames of a chain need not be there.
 
-Joint frames may be moved along their own axes, which changes no pose behind them: a turn about z and a shift along z commute,
-``Tz(s) Rz(q) Tz(-s) = Rz(q)``. Where two axes are nearly parallel, their common normal is anywhere along them, and a calibrated
-table has lengths d of hundreds of metres that cancel [3]; the frames of a chain need not be there.
-
-The ROS drivers of Universal Robots write a calibrated arm as ``kinematics`` instead [4]: a fixed transform before each joint,
-``{x, y, z, roll, pitch, yaw}`` (m, rad), as ``origin`` of a URDF; the joint turns about z. The base frame is that of the
-controller (``base`` of ur_description, not ``base_link``).
+The ROS drivers of Universal Robots write a calibrated arm as ``kinematics`` instead: before each joint, which turns about z, a
+fixed transform ``{x, y, z, roll, pitch, yaw}`` (m, rad), as ``origin`` of a URDF, from the controller's base frame on.
 
 [1] Denavit, J. and Hartenberg, R. S., A kinematic notation for lower-pair mechanisms based on matrices, Journal of Applied
     Mechanics 22, 1955.
 [2] Craig, J. J., Introduction to Robotics: Mechanics and Control, Addison-Wesley, 1986.
 [3] Hayati, S., Robot arm geometric link parameter estimation, 22nd IEEE Conference on Decision and Control, 1983.
-[4] Universal Robots, ur_calibration: extracts the factory calibration of a robot, github.com/UniversalRobots.
 """
 
 import math
@@ -68,11 +63,7 @@ _LACKS = ["no masses: the weight of the links is not known", "no limits of any j
 
 @dataclass(frozen=True)
 class DhOptions:
-    """How a table is read.
-
-    `angles`, `lengths`: units of columns that do not say; asked for where they are None. `decimal`: of CSV; found out where
-    it is None. `ignore`: columns that are left out.
-    """
+    """Units of columns that do not say, the decimal mark where it is not to be found out, and columns to leave out."""
 
     angles: str | None = None
     lengths: str | None = None

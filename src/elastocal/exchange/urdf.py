@@ -1,14 +1,11 @@
 """A URDF file, read safely, and the serial chain between two of its links as the contents of a robot file.
 
-The Unified Robot Description Format [1] is XML. No document type is accepted, and so no entity that grows or fetches another
-file; meshes, materials and plug-ins are left out, and no other file is opened.
+The Unified Robot Description Format (wiki.ros.org/urdf/XML) is XML. No document type is accepted, and so no entity that grows
+or fetches another file; no other file is opened.
 
-A joint of a URDF is a fixed transform (``origin``), and then a rotation about or a translation along an axis. The transform
-becomes ``Tx Ty Tz Rz Ry Rx``; an axis that is not x, y or z is turned into z and back, ``Rz Ry Rz(q1) Ry Rz``. A chain with a
-joint that mimics another one is refused. All that a joint carries rigidly is one mass, side branches and what stands behind the
-tip included.
-
-[1] Open Robotics, XML Robot Description Format (URDF), wiki.ros.org/urdf/XML.
+A joint is a fixed transform (``origin``), which becomes ``Tx Ty Tz Rz Ry Rx``, and then a motion about or along an axis; one
+that is not x, y or z is turned into z and back. All that a joint carries rigidly is one mass, side branches and what stands
+behind the tip included.
 """
 
 import math
@@ -69,7 +66,7 @@ _FEWEST_ALIKE, _NAMED = 3, 4
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: `origin` (4, 4) in the parent's frame, `axis` (3,) in its own; limits not stated are 0; whether it mimics."""
+    """`origin` (4, 4) is in the parent's frame, `axis` (3,) in its own; limits that are not stated are 0."""
 
     name: str
     kind: str
@@ -120,11 +117,7 @@ class UrdfChain:
 
 
 def robot_from_urdf(path: str | Path, base: str, tip: str, points: Sequence[str] = ()) -> Imported:
-    """The robot between two links of a URDF.
-
-    `base`, `tip`: links: the robot's base frame, and its last measuring point. `points`: links between them that become
-    measuring points too. Raises `InputError`: as in `read_urdf` and `chain_between`; a prismatic joint without limits.
-    """
+    """The robot between two links of a URDF: its base frame, and its last measuring point; `points` between become others."""
     urdf, source = read_urdf(path), str(path)
     chain = chain_between(urdf, base, tip, points, source)
     masses, notes = _weights(urdf, chain)
@@ -282,12 +275,7 @@ def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str
 
 
 def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
-    """The chain from one link to another that it carries.
-
-    `base`, `tip`: names of links. `points`: further links of the chain that become measuring points; the tip is the last one
-    always. `source`: named in errors. Raises `InputError`: a link that is not there or not on the chain, a tip that the base
-    does not carry, a joint that the notation cannot say.
-    """
+    """The chain from one link, `base`, to another that it carries; `points`, links of it, and the tip are measuring points."""
     path = _path(urdf, base, tip, source)
     on_chain = [base, *(joint.child for joint in path)]
     for name in points:
