@@ -296,11 +296,7 @@ def _find_header(
         if not line:
             raise InputError(source, f"line {stated.header}", "no header", "the line that names the columns")
         return next(iter(marks_in(line)), "comma"), stated.header, line
-    for number, line in kept:
-        for name in marks_in(line):
-            if is_header(_split_cells(line, name, source, number)):
-                return name, number, line
-    for number, line in comments:
+    for number, line in (*kept, *comments):
         for name in marks_in(line):
             if is_header(_split_cells(line, name)):
                 return name, number, line

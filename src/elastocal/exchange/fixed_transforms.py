@@ -27,32 +27,21 @@ def word(name: str, amount: float) -> str:
     return f"{name}({'-' if amount < 0 else ''}{text}{'deg' if turns else ''})" if amount else ""
 
 
-def express_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str]]:
-    """A joint's axis as one of the chain's, between a fixed rotation and its inverse where it is oblique.
+def express_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str], np.ndarray]:
+    """A joint's axis (3,), not zero, as one of the chain's, between a fixed rotation and its inverse where it is oblique.
 
-    `axis` (3,): not zero. Returns `before`: words of the rotation that turns z into the axis, empty for x, y and z; `letter`,
-    `sign`: of the axis then, and "-" or ""; `after`: words of the rotation back.
+    Returns `before`: words of the rotation that turns z into the axis, empty for x, y and z; `letter`, `sign`: of the axis
+    then, and "-" or ""; `after`: words of the rotation back; the fixed rotation before, as a matrix (3, 3).
     """
-    turns, letter, sign = _find_turns(axis)
-    before, after = turns.items(), [(name, -angle) for name, angle in reversed(turns.items())]
-    both = ([text for name, angle in part if (text := word(name, angle))] for part in (before, after))
-    return next(both), letter, sign, next(both)
-
-
-def axis_rotation(axis: np.ndarray) -> np.ndarray:
-    """The fixed rotation before a joint about an axis, as in `express_axis`, ndarray (3, 3)."""
-    turn = np.eye(3)
-    for name, angle in _find_turns(axis)[0].items():
-        turn = turn @ rotation_about(name[1], math.radians(round(math.degrees(angle), _DECIMALS)))
-    return turn
-
-
-def _find_turns(axis: np.ndarray) -> tuple[dict[str, float], str, str]:
     unit = np.asarray(axis, float) / np.linalg.norm(axis)
     along = int(np.argmax(np.abs(unit)))
     if np.abs(np.delete(unit, along)).max() < 10.0**-_DECIMALS:
-        return {}, "xyz"[along], "-" if unit[along] < 0 else ""
-    return {"Rz": math.atan2(unit[1], unit[0]), "Ry": math.atan2(math.hypot(unit[0], unit[1]), unit[2])}, "z", ""
+        return [], "xyz"[along], "-" if unit[along] < 0 else "", [], np.eye(3)
+    turns = [("Rz", math.atan2(unit[1], unit[0])), ("Ry", math.atan2(math.hypot(unit[0], unit[1]), unit[2]))]
+    before = [text for name, angle in turns if (text := word(name, angle))]
+    after = [text for name, angle in reversed(turns) if (text := word(name, -angle))]
+    angles = [math.radians(round(math.degrees(angle), _DECIMALS)) for _, angle in turns]
+    return before, "z", "", after, rotation_about("z", angles[0]) @ rotation_about("y", angles[1])
 
 
 def yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:

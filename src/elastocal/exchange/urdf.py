@@ -24,7 +24,6 @@ import numpy as np
 from elastocal.counting import first_names
 from elastocal.errors import InputError, closest_first
 from elastocal.exchange.fixed_transforms import (
-    axis_rotation,
     displacement_words,
     express_axis,
     homogeneous,
@@ -299,8 +298,8 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
                 axis = " ".join(f"{part:g}" for part in joint.axis)
                 raise InputError(source, f"joint {joint.name!r}: axis xyz", axis, "a direction")
             moving.append(joint)
-            before, letter, minus, after = express_axis(joint.axis)
-            body, here = len(moving), homogeneous(axis_rotation(joint.axis).T)
+            before, letter, minus, after, turn = express_axis(joint.axis)
+            body, here = len(moving), homogeneous(turn.T)
             words += [*before, f"{_MOVING[joint.kind]}{letter}({minus}q{body})", *after]
         if joint.child in marked:
             words.append(f"[{marked[joint.child]}]")

@@ -15,7 +15,7 @@ import numpy as np
 
 from elastocal.counting import counted
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import axis_rotation, elementary, homogeneous, yaw_pitch_roll
+from elastocal.exchange.fixed_transforms import elementary, express_axis, homogeneous, yaw_pitch_roll
 from elastocal.exchange.robot_text import point_name
 from elastocal.exchange.urdf import LARGEST_BYTES, Joint, Urdf, UrdfChain, chain_between, read_urdf
 from elastocal.io.texts import read_bytes
@@ -111,7 +111,7 @@ def _origins(path: list[Joint], nominal: Robot, calibrated: Robot) -> dict[str, 
             to_chain = np.linalg.inv(here) @ before[number]
             error = error @ elementary(transform.kind, transform.axis, transform.sign * offset[transform.coordinate])
             change = to_chain @ error @ np.linalg.inv(to_chain)
-            number, here = number + 1, homogeneous(axis_rotation(joint.axis).T)
+            number, here = number + 1, homogeneous(express_axis(joint.axis)[-1].T)
         elif joint is path[-1]:
             change = error
         if np.abs(change - np.eye(4)).max() > 10.0**-_DECIMALS:
