@@ -210,7 +210,7 @@ def find_columns(text: TextTable, mapped: Mapping[str, str], robot: Robot | None
         if meant is None or mapped.get(meant, header) != header:
             continue
         if found.get(meant, header) != header:
-            quaternion = f"; of a quaternion --column qw={header!r} …" if meant in ("q1", "q2", "q3", "q4") else ""
+            quaternion = "; of a quaternion --column qw=NAME …" if meant in ("q1", "q2", "q3", "q4") else ""
             allowed = f"--column {meant}=NAME, or --ignore NAME{quaternion}"
             raise InputError(text.path, "header", f"both {found[meant]!r} and {header!r} for {meant}", allowed)
         if meant not in mapped and unit not in (None, *_NO_UNIT) and kind_of(meant) == (NONE,):
