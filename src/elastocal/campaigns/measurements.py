@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from elastocal.campaigns.tables import Cells, read_text_table
+from elastocal.campaigns.tables import A_HEADER_ALONE, Cells, read_text_table
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.io.atomic_writes import atomic_write
@@ -106,7 +106,12 @@ def described_by(folder: Path) -> tuple[list[str], str]:
     there = next((path for path in (folder / CSV, folder / PARQUET) if path.is_file()), None)
     if there is None:
         return [], "position"
-    table = _read(there, MOST_JOINTS)
+    try:
+        table = _read(there, MOST_JOINTS)
+    except InputError as error:
+        if error.found != A_HEADER_ALONE:
+            raise
+        return [], "position"
     names = dict.fromkeys(name for name in (table.texts("target") if "target" in table.columns else ()) if name)
     return list(names), "pose" if {*ROTATION} <= table.columns.keys() else "position"
 

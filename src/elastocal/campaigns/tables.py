@@ -26,6 +26,7 @@ _COMMENTS = ("#", "%", "//")
 _DECIMAL = {name: re.compile(rf"[+-]?\d*[{mark}]\d+([eE][+-]?\d+)?", re.ASCII) for name, mark in DECIMALS.items()}
 # Three digits behind a comma may stand between thousands; these do not.
 _SURE = re.compile(rf"(?![+-]?[1-9]\d{{0,2}},\d{{3}}$){_DECIMAL['comma'].pattern}", re.ASCII)
+A_HEADER_ALONE = "a header alone"
 # The whole of it is in memory, as text and as cells: some 2 GB at most.
 LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
 # Lines of a file with their numbers, from 1.
@@ -218,7 +219,7 @@ def read_text_table(
     units = dict(zip(names, (rows and units_in(rows[0][1])) or (), strict=False))
     rows = rows[1:] if units else rows
     if not rows:
-        raise InputError(source, "", "a header alone", "one row for each measurement")
+        raise InputError(source, "", A_HEADER_ALONE, "one row for each measurement")
     for name in ignored:
         if name not in names:
             raise InputError(source, where, f"no column {name!r} to ignore", closest_first(name, list(dict.fromkeys(names))))
