@@ -81,19 +81,13 @@ def test_a_users_own_campaign_has_one_spelling_however_its_folder_is_given(confi
     users_folder(tmp_path)
     (tmp_path / "cell").rename(tmp_path / "2026")
     (tmp_path / "link").symlink_to(tmp_path / "2026")
-
-    def folders(*given):
-        return {
-            user_campaign(config | {"campaign": each}, config_folder / "robots", tmp_path / "results")["cell7"]
-            for each in given
-        }
-
-    absolute = f"{tmp_path}/2026"
-    monkeypatch.chdir(tmp_path)
-    assert folders("2026", 2026, "2026/", "./2026", "2026/../2026//", absolute, f"{absolute}/", "link") == {"2026"}
     (tmp_path / "beside").mkdir()
-    monkeypatch.chdir(tmp_path / "beside")
-    assert folders("../2026", absolute, "../link/") == {absolute}
+    everywhere = {"": ["2026", 2026, "./2026", "2026/../2026//", "link"], "beside": ["../2026", "../link/"]}
+    for place, given in everywhere.items():
+        monkeypatch.chdir(tmp_path / place)
+        for each in [*given, f"{tmp_path}/2026/"]:
+            found = user_campaign(config | {"campaign": each}, config_folder / "robots", tmp_path / "results")
+            assert found == {"cell7": f"{tmp_path}/2026" if place else "2026"}
 
 
 OWN_FAULTS = {
@@ -118,24 +112,19 @@ def test_fault_in_a_users_own_campaign_is_one_line_that_names_its_file(fault, co
 
 def test_two_campaigns_of_one_name_are_refused_while_both_are_there(config, config_folder, tmp_path):
     """The second would overwrite the reports of the first."""
-    folder, results = users_folder(tmp_path), tmp_path / "results"
+    folder, results, other = users_folder(tmp_path), tmp_path / "results", tmp_path / "other"
     (results / "cell7").mkdir(parents=True)
+    other.mkdir()
 
-    def own():
+    def own(source):
+        (results / "cell7/campaign.json").write_text(json.dumps({"source": source}), encoding="utf-8")
         return user_campaign(config | {"campaign": folder}, config_folder / "robots", results)
 
-    def earlier(source):
-        (results / "cell7/campaign.json").write_text(json.dumps({"source": source}), encoding="utf-8")
-
-    other = tmp_path / "other"
-    other.mkdir()
-    earlier(f"{other}/campaign.yaml")
     with refused(f"{folder}/campaign.yaml", "campaign", "'cell7', whose results are of", str(other), f"{results}/cell7"):
-        own()
+        own(f"{other}/campaign.yaml")
     # The same folder by another path, one that is gone, and results that do not say: nothing is overwritten.
     for source in (f"{other}/../cell/campaign.yaml", f"{tmp_path}/gone/campaign.yaml", 7):
-        earlier(source)
-        assert own() == {"cell7": folder}
+        assert own(source) == {"cell7": folder}
 
 
 def test_two_campaigns_that_test_each_other_come_with_the_files_of_both(config, config_folder, tmp_path):

@@ -216,7 +216,7 @@ class _Builder(ElementTree.TreeBuilder):
         allowed = "a URDF without a document type, for entities of one could be endless or other files"
         raise InputError(self.source, "", "<!DOCTYPE", allowed)
 
-    def start(self, tag: str, attrs: dict[str, str]) -> Element:  # type: ignore[override]
+    def start(self, tag: str, attrs: dict[str, str]) -> Element:
         uri, _, name = tag.rpartition("}")
         self.count, self.depth = self.count + 1, self.depth + 1
         if self.count > _MOST_ELEMENTS or self.depth > _DEEPEST:
