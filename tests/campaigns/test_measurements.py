@@ -84,17 +84,16 @@ def test_lines_before_the_header_are_passed_over_and_counted(cell):
         read_campaign(cell.folder, cell.robots)
 
 
-@pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_more_measurements_than_fit_into_memory_are_refused(cell, kind, monkeypatch):
-    cell.write(kind)
-    rows = len(cell.table["pose"])
-    monkeypatch.setattr("elastocal.campaigns.measurements.MOST_MEASUREMENTS", rows)
+def test_more_measurements_than_fit_into_memory_are_refused(cell, monkeypatch):
+    cell.write("parquet")
+    rows, path = len(cell.table["pose"]), cell.folder / "measurements.parquet"
+    monkeypatch.setattr(module, "MOST_MEASUREMENTS", rows)
     assert len(read_campaign(cell.folder, cell.robots).measurements) == rows
-    monkeypatch.setattr("elastocal.campaigns.measurements.MOST_MEASUREMENTS", rows - 1)
-    with refused(f"{cell.folder}/measurements.{kind}", "", "rows of data", f"at most {rows - 1}"):
+    monkeypatch.setattr(module, "MOST_MEASUREMENTS", rows - 1)
+    with refused(path, "", "rows of data", f"at most {rows - 1}"):
         read_campaign(cell.folder, cell.robots)
-    monkeypatch.setattr("elastocal.campaigns.measurements._MOST_BYTES", 100)
-    with refused(f"{cell.folder}/measurements.{kind}", "", "bytes", "at most 100"):
+    monkeypatch.setattr(module, "_MOST_BYTES", 100)
+    with refused(path, "", "bytes", "at most 100"):
         read_campaign(cell.folder, cell.robots)
 
 

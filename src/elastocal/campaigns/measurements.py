@@ -143,14 +143,10 @@ def write_measurements(path: str | Path, table: Mapping[str, Sequence[Any] | np.
 
 
 def _read(path: Path, joints: int) -> Cells:
-    source = path.as_posix()
     if (size := path.stat().st_size) > _MOST_BYTES:
         allowed = f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements"
-        raise InputError(source, "", counted(size, "byte"), allowed)
-    table = _read_csv(source, joints) if path.name == CSV else _read_parquet(source, joints)
-    if len(table.rows) > MOST_MEASUREMENTS:
-        raise _refuse_length(source, len(table.rows))
-    return table
+        raise InputError(path, "", counted(size, "byte"), allowed)
+    return (_read_csv if path.name == CSV else _read_parquet)(path.as_posix(), joints)
 
 
 def _read_csv(path: str, joints: int) -> Cells:
@@ -169,15 +165,17 @@ def _read_parquet(path: str, joints: int) -> Cells:
         check_column_names(fields.names, joints, path)
         # A kilobyte may hold a list of a billion numbers; each row group takes memory of its own beside its rows.
         for field in fields:
-            kind = field.type.value_type if pa.types.is_dictionary(field.type) else field.type
+            kind = field.type
             is_number = pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_null(kind)
-            if not (is_number or (pa.types.is_string(kind) and field.name in texts)):
+            word = kind.value_type if pa.types.is_dictionary(kind) else kind
+            if not (is_number or (pa.types.is_string(word) and field.name in texts)):
                 allowed = "numbers, or text" if field.name in texts else "numbers"
                 raise InputError(path, f"column {field.name}", f"type {field.type}", allowed)
         if groups > _MOST_ROW_GROUPS:
             raise InputError(path, "", f"{groups} row groups", f"at most {_MOST_ROW_GROUPS}")
         if count > MOST_MEASUREMENTS:
-            raise _refuse_length(path, count)
+            allowed = f"at most {MOST_MEASUREMENTS} (the mean of a tracker's stream at each pose is one measurement)"
+            raise InputError(path, "", f"{count} rows of data", allowed)
         # As dictionaries texts take the memory that they take in the file.
         there = [name for name in fields.names if name in texts]
         table = pq.read_table(path, read_dictionary=there, page_checksum_verification=True, partitioning=None)
@@ -186,11 +184,6 @@ def _read_parquet(path: str, joints: int) -> Cells:
         raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
     columns = dict(zip(table.column_names, table.columns, strict=True))
     return Cells(path, columns, np.arange(1, table.num_rows + 1, dtype=np.int32))
-
-
-def _refuse_length(path: str, found: int) -> InputError:
-    allowed = f"at most {MOST_MEASUREMENTS} (the mean of a tracker's stream at each pose is one measurement)"
-    return InputError(path, "", f"{found} rows of data", allowed)
 
 
 def _write_csv(path: str, columns: Iterable[Column], table: Mapping[str, Sequence[Any] | np.ndarray]) -> None:
