@@ -39,6 +39,7 @@ def test_a_spreadsheets_semicolons_and_decimal_commas_are_the_same_numbers(cell)
         (3, "q2", "0.1.2", ["'0.1.2'", "a number"]),
         (3, "q2", "", ["nothing", "a number"]),
         (80, "z", "nan", ["'nan'", "a number"]),
+        (7, "q3", "1e13", ["'1e13'", "up to 1e+12"]),
         (2, "repeat", "3000000000", ["'3000000000'", "integer"]),
         (2, "q1", "1_0", ["'1_0'", "a number"]),
         (2, "pose", "\uff10", ["a number"]),

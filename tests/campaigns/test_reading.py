@@ -225,7 +225,7 @@ def test_links_out_of_the_folder_are_refused_without_a_look_at_them(cell, file):
     ("row", "column", "entry", "words"),
     [
         (1, "fz", 3.0, ["3 with load 0", "0 where load is 0"]),
-        (4, "q1", 57.3, ["57.3", "of the same pose", "within 0.02 rad"]),
+        (4, "q1", 3.0, ["3, ", "of the same pose", "within 0.02 rad"]),
         (12, "rx, ry, rz", None, ["a turn of", "not degrees"]),
     ],
 )

@@ -249,7 +249,8 @@ def _root_of(data: bytes, source: str) -> Element:
 def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str) -> None:
     for tag, parts in (("link", links), ("joint", joints)):
         if not 0 < len(parts) <= _MOST_PARTS:
-            raise InputError(source, "", f"{len(parts)} times <{tag}>", f"a URDF with links and joints, at most {_MOST_PARTS}")
+            found = f"{len(parts)} times <{tag}>" if parts else f"no <{tag}>"
+            raise InputError(source, "", found, f"a URDF with links and joints, at most {_MOST_PARTS}")
         counts = Counter(part.get("name", "") for part in parts)
         if wrong := [name for name, times in counts.items() if times > 1 or not name]:
             raise InputError(source, f"{tag} {wrong[0]!r}", f"{counts[wrong[0]]} times", "a name for each, and each name once")
