@@ -192,7 +192,9 @@ def _measurements(table: Cells, robot: Robot, targets: Sequence[Target], measure
         approach = np.sign(approach @ robot.reported_matrix.T)
     return Measurements(
         session=table.integers("session") if "session" in table.columns else np.zeros(len(table.rows), np.int32),
-        **{name: table.integers(name) for name in ("pose", "load", "repeat")},
+        pose=table.integers("pose"),
+        load=table.integers("load"),
+        repeat=table.integers("repeat"),
         target=np.array([names[label] for label in labels], np.int32),
         joint_angles=robot.model_angles(reported),
         wrench=table.matrix(WRENCH_NAMES) if "fx" in table.columns else np.zeros((len(table.rows), 6)),

@@ -259,7 +259,7 @@ def _targets(read: Cells, name: str | None) -> np.ndarray:
     if "target" not in read.columns and name is None:
         allowed = "--target NAME, the target of all rows, or --column target=NAME"
         raise InputError(read.path, "header", "no column target", allowed)
-    names = read.texts("target") if "target" in read.columns else [name] * len(read.rows)
+    names = read.texts("target") if "target" in read.columns else [name or ""] * len(read.rows)
     if fault := next((fault for each in dict.fromkeys(names) if (fault := text_fault(each))), None):
         where = (read.path, f"column {read.headers['target']}") if "target" in read.columns else ("--target", "")
         raise InputError(*where, *fault)
