@@ -36,8 +36,16 @@ from elastocal.campaigns.tables import Dialect, read_text_table
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.exchange.column_names import ANGLE, LENGTH, UNITS, read_units, split_unit
-from elastocal.exchange.fixed_transforms import displacement_words, elementary, origin_transform, word
-from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, point_name
+from elastocal.exchange.robot_text import (
+    MOST_TURNS,
+    Imported,
+    check_imported,
+    displacement_words,
+    elementary,
+    origin_transform,
+    point_name,
+    word,
+)
 from elastocal.io.documents import read_document
 from elastocal.io.texts import A_NUMBER, plain_number
 

@@ -23,13 +23,15 @@ import numpy as np
 
 from elastocal.counting import first_names
 from elastocal.errors import InputError, closest_first
-from elastocal.exchange.fixed_transforms import (
+from elastocal.exchange.robot_text import (
+    Imported,
+    check_imported,
     displacement_words,
     express_axis,
     homogeneous,
     origin_transform,
+    point_name,
 )
-from elastocal.exchange.robot_text import Imported, check_imported, point_name
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
 from elastocal.mechanics.robot import STANDARD_GRAVITY, UNLIMITED_DEG
 

@@ -15,8 +15,7 @@ import numpy as np
 
 from elastocal.counting import counted
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import elementary, express_axis, homogeneous, yaw_pitch_roll
-from elastocal.exchange.robot_text import point_name
+from elastocal.exchange.robot_text import elementary, express_axis, homogeneous, point_name, yaw_pitch_roll
 from elastocal.exchange.urdf import LARGEST_BYTES, Joint, Urdf, UrdfChain, chain_between, read_urdf
 from elastocal.io.texts import read_bytes
 from elastocal.mechanics.chain import Chain, Transform, parse_chain
