@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal.campaigns.columns import columns_of
+from elastocal.campaigns.campaign import columns_of
 from elastocal.fitting.case import case_from
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import effect_columns, linearize

@@ -10,7 +10,7 @@ from made_cells import assert_same
 from support import refused
 
 from elastocal.campaigns import measurements as module
-from elastocal.campaigns.measurements import BOUNDS, CSV, read_measurements
+from elastocal.campaigns.measurements import CSV, read_measurements
 from elastocal.campaigns.reading import read_campaign
 
 
@@ -26,32 +26,47 @@ def test_blank_rows_and_blanks_around_cells_are_passed_over_and_counted(cell):
     assert len(measurements) == len(cell.table["pose"])
 
 
+def test_a_spreadsheets_semicolons_and_decimal_commas_are_the_same_numbers(cell):
+    whole = cell.read().measurements
+    cell.table = {name: [str(each).replace(".", ",") for each in column] for name, column in cell.table.items()}
+    cell.write(separator=";")
+    assert_same(read_campaign(cell.folder, cell.robots).measurements, whole)
+
+
 @pytest.mark.parametrize(
     ("row", "column", "entry", "words"),
     [
         (3, "q2", "0.1.2", ["'0.1.2'", "a number"]),
         (3, "q2", "", ["nothing", "a number"]),
-        (80, "z", "nan", ["'nan'", "finite"]),
-        (7, "fx", "inf", ["'inf'", "finite"]),
+        (80, "z", "nan", ["'nan'", "a number"]),
+        (7, "q3", "1e13", ["'1e13'", "up to 1e+12"]),
         (2, "repeat", "3000000000", ["'3000000000'", "integer"]),
         (2, "q1", "1_0", ["'1_0'", "a number"]),
-        (2, "pose", "\uff10", ["a number", "digits 0 to 9"]),
+        (2, "pose", "\uff10", ["a number"]),
+        (14, "fx", -1e9, ["hundred tonnes"]),
+        (14, "my", 1e8, ["ten metres"]),
+        (14, "x", 1e9, ["the Earth"]),
+        (14, "time_s", 1.6e11, ["three thousand years"]),
+        (14, "u95_m", 0.0, ["more than 0"]),
+        (14, "u95_m", 0.2, ["1e-08 to 0.1 m"]),
+        (14, "temperature_c", 293.15, ["-200 to 200"]),
     ],
 )
 def test_faulty_cell_is_refused_by_row_and_column(cell, row, column, entry, words):
+    cell.table["u95_m"] = [1e-4] * len(cell.table["pose"])
     cell.spoil(row, column, entry)
-    with refused(cell.measurements, f"row {row}, column {column} (line {row + 1}):", *words):
+    with refused(cell.measurements, f"line {row + 1}, column {column}:", *words):
         cell.read()
 
 
 def test_faulty_cell_of_a_parquet_file_is_refused_alike(cell):
     cell.spoil(5, "x", None)
     cell.write("parquet")
-    with refused((cell.folder / "measurements.parquet").as_posix(), "row 5, column x", "found nothing", "finite"):
+    with refused(cell.folder / "measurements.parquet", "row 5, column x", "found nothing", "a number"):
         read_campaign(cell.folder, cell.robots)
 
 
-@pytest.mark.parametrize("missing", ["pose", "load", "repeat", "target", "q3", "y", "rz", "mx", "approach1"])
+@pytest.mark.parametrize("missing", ["load", "q3", "rz", "mx", "approach1"])
 def test_missing_column_is_refused(cell, missing):
     cell.without(missing)
     with refused(cell.measurements, "header", f"no column {missing!r}", f"{missing}: "):
@@ -74,34 +89,32 @@ def test_lines_before_the_header_are_passed_over_and_counted(cell):
     path.write_text('# tracker "A, 20 °C\n\n  # poses\n' + path.read_text(encoding="utf-8"), encoding="utf-8")
     assert_same(read_campaign(cell.folder, cell.robots).measurements, whole)
     path.write_text(path.read_text(encoding="utf-8").replace("\n0,0,0,A", "\n0,0,no,A"), encoding="utf-8")
-    with refused(cell.measurements, "row 1, column repeat (line 5)", "'no'"):
+    with refused(cell.measurements, "line 5, column repeat", "'no'"):
         read_campaign(cell.folder, cell.robots)
 
 
-@pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_more_measurements_than_fit_into_memory_are_refused(cell, kind, monkeypatch):
-    cell.write(kind)
-    rows = len(cell.table["pose"])
-    monkeypatch.setattr("elastocal.campaigns.measurements.MOST_MEASUREMENTS", rows)
+def test_more_measurements_than_fit_into_memory_are_refused(cell, monkeypatch):
+    cell.write("parquet")
+    rows, path = len(cell.table["pose"]), cell.folder / "measurements.parquet"
+    monkeypatch.setattr(module, "MOST_MEASUREMENTS", rows)
     assert len(read_campaign(cell.folder, cell.robots).measurements) == rows
-    monkeypatch.setattr("elastocal.campaigns.measurements.MOST_MEASUREMENTS", rows - 1)
-    with refused(f"{cell.folder}/measurements.{kind}", "", "rows of data", f"at most {rows - 1}"):
+    monkeypatch.setattr(module, "MOST_MEASUREMENTS", rows - 1)
+    with refused(path, "", "rows of data", f"at most {rows - 1}"):
         read_campaign(cell.folder, cell.robots)
-    monkeypatch.setattr("elastocal.campaigns.measurements._MOST_BYTES", 100)
-    with refused(f"{cell.folder}/measurements.{kind}", "", "bytes", "at most 100"):
+    monkeypatch.setattr(module, "_MOST_BYTES", 100)
+    with refused(path, "", "bytes", "at most 100"):
         read_campaign(cell.folder, cell.robots)
 
 
 @pytest.mark.parametrize(
     ("text", "key", "words"),
     [
-        (b"", "", ["an empty file"]),
-        (b"pose,load\n0,0\n0,0,0\n", "row 2", ["3 cells", "2, one for each column"]),
-        (b'pose,load\n0,"0\n', "line 2", ["comma-separated"]),
+        (b"", "", ["nothing but comments"]),
+        (b"load,repeat\n0,0\n", "line 1", ["a header with pose"]),
+        (b"pose,load\n0,0\n0,0,0\n", "line 3", ["3 cells", "2, one for each column"]),
         (b'pose,load\n0,0\n0,"0\n' + b"0,0\n" * 9, "line 3", ["quotes in pairs"]),
         (b"pose,load\n" + b"0,0\n" * 5000 + b"0,\xff\n", "line 5002", ["not UTF-8"]),
-        (b"pose,load\n0,0\n" + b"0" * 20_000 + b",0\n", "line 3", ["10000 characters or more"]),
-        (b"q1,x,q1\n0,0,0\n", "header", ["column 'q1' twice", "once"]),
+        (b"pose,x,pose\n0,0,0\n", "line 1", ["column 'pose' twice", "once"]),
     ],
 )
 def test_file_that_is_no_table_is_refused(cell, text, key, words):
@@ -134,13 +147,11 @@ def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
         read_campaign(cell.folder, cell.robots)
 
 
-@pytest.mark.parametrize(
-    ("column", "entry", "found"), [("x", [0.0], "list"), ("x", b"1", "binary"), ("x", True, "bool"), ("target", b"A", "binary")]
-)
+@pytest.mark.parametrize(("column", "entry", "found"), [("x", "1", "string"), ("x", True, "bool"), ("target", b"A", "binary")])
 def test_a_column_of_parquet_holds_numbers_or_text(cell, column, entry, found):
     cell.table[column] = [entry] * len(cell.table[column])
     cell.write("parquet")
-    with refused(cell.folder / "measurements.parquet", f"column {column}", found, "numbers, or text"):
+    with refused(cell.folder / "measurements.parquet", f"column {column}", found, "numbers"):
         read_campaign(cell.folder, cell.robots)
 
 
@@ -162,21 +173,7 @@ def test_a_sheet_may_be_ticked_and_have_degrees_that_agree(cell):
     assert len(read_campaign(cell.folder, cell.robots).measurements) == len(cell.table["pose"])
     cell.table["q2_deg"][4] += 1.0
     cell.write()
-    with refused(cell.measurements, "row 5, column q2_deg (line 6)", "which is q2"):
-        cell.read()
-
-
-IMPOSSIBLE = {
-    **{"fx": [2e6, -1e9], "my": [1e8], "x": [1e9], "time_s": [1.6e11, -1e12], "u95_m": [0.0, -1e-5, 6e-12, 1e-300, 60.0, 0.2]},
-    "temperature_c": [-500.0, -273.2, 293.15, 1e6],
-}
-
-
-@pytest.mark.parametrize(("column", "entry"), [(column, entry) for column, found in IMPOSSIBLE.items() for entry in found])
-def test_what_physics_does_not_allow_is_refused_by_row_and_column(cell, column, entry):
-    cell.table["u95_m"] = [1e-4] * len(cell.table["pose"])
-    cell.spoil(14, column, entry)
-    with refused(cell.measurements, f"row 14, column {column} (line 15)", BOUNDS[column].allowed):
+    with refused(cell.measurements, "line 6, column q2_deg", "which is q2"):
         cell.read()
 
 
@@ -195,7 +192,7 @@ def test_what_a_small_file_of_parquet_would_grow_to_is_refused_before_it_is_read
         read_campaign(cell.folder, cell.robots)
 
 
-@pytest.mark.parametrize("character", ["\x1b", "\x0c", "\u202e", "\x85"])
+@pytest.mark.parametrize("character", ["\x1b", "\u202e"])
 def test_a_character_that_would_steer_a_terminal_is_refused_with_its_line(tmp_path, character):
     (tmp_path / CSV).write_text(f"pose,target\n1,a\n2,a{character}b\n", encoding="utf-8")
     with refused(tmp_path / CSV, "", "character"):

@@ -2,11 +2,14 @@
 
 import pyarrow as pa
 import pytest
+import yaml
 from made_cells import assert_same
 from support import refused
 
 from elastocal.campaigns.reading import read_campaign
-from elastocal.campaigns.writing import write_campaign
+from elastocal.campaigns.writing import campaign_template, robot_template, sheet_template, write_campaign
+from elastocal.io.documents import check_document, read_schema
+from elastocal.mechanics.robot_file import robot_from_document
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
@@ -31,3 +34,22 @@ def test_campaign_that_cannot_be_written_leaves_the_one_before_it(cell, tmp_path
     with pytest.raises((ValueError, pa.ArrowException), match=r"argument|length"):
         write_campaign(folder, document, cell.table | {"q3": cell.table["q3"][1:]}, 3, kind)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def arm():
+    return robot_from_document(yaml.safe_load(robot_template()), "robot.yaml")
+
+
+@pytest.mark.parametrize(("schema", "text"), [("robot", robot_template()), ("campaign", campaign_template("cell", arm()))])
+def test_every_key_is_explained_and_those_left_out_are_valid_once_uncommented(schema, text):
+    known, lines, shown = read_schema(schema)["properties"], text.splitlines(), yaml.safe_load(text)
+    check_document(shown, schema, "template")
+    assert set(known) <= {line.removeprefix("# ").partition(":")[0] for line in lines}
+    for number, line in enumerate(lines):
+        if line.startswith("# ") and line[2:].partition(":")[0] in known:
+            assert lines[number - 1].startswith("# "), "explained above"
+            check_document(shown | yaml.safe_load(line[2:]), schema, line)
+
+
+def test_the_sheet_has_the_columns_that_every_campaign_needs():
+    assert sheet_template(2) == "pose,load,repeat,target,q1,q2,fx,fy,fz,mx,my,mz,x,y,z\n"

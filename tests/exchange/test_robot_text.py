@@ -1,10 +1,23 @@
-"""The text of a robot file: read by a person and by the loader."""
+"""The text of a robot file, read by a person and by the loader; its fixed transforms in words, beside pinocchio's rotations."""
 
+import numpy as np
+import pinocchio as pin
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 from support import refused
 
-from elastocal.exchange.robot_text import check_imported, refuse_existing, robot_text, write_robot
+from elastocal.exchange.robot_text import (
+    check_imported,
+    displacement_words,
+    express_axis,
+    refuse_existing,
+    robot_text,
+    write_robot,
+)
+from elastocal.mechanics.chain import parse_chain
+from elastocal.mechanics.kinematics import poses
 
 DOCUMENT = {
     "masses": [{"link": 1, "mass_kg": 2.0, "centre_m": [1e-5, 0.0, 0.5], "relative_std": 0.2}],
@@ -34,8 +47,6 @@ def test_the_head_says_where_it_came_from_and_what_it_lacks(result):
     assert "# Masses are guessed." in lines
     assert any("No compliances" in line for line in lines) and any("payload_kg" in line for line in lines)
     assert all(len(line) <= 128 for line in lines)
-    keys = [line.partition(":")[0] for line in lines if line[0].isalpha()]
-    assert keys == ["name", "joint_names", "chain", "joint_limits_deg", "masses"]
 
 
 def test_what_a_robot_file_may_not_say_is_refused_by_the_other_file(tmp_path):
@@ -56,3 +67,27 @@ def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
     for place in (tmp_path, tmp_path / "none" / "robot.yaml"):
         with refused(place, "", "no place"):
             refuse_existing(place, True)
+
+
+angles = st.one_of(st.floats(-np.pi, np.pi), st.sampled_from([np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9, np.pi / 2 - 1e-13, 0.0]))
+
+
+@given(angles, angles, angles, st.tuples(*[st.floats(-2, 2)] * 3))
+def test_a_displacement_is_what_its_words_make(roll, pitch, yaw, shift):
+    transform = np.eye(4)
+    transform[:3, :3], transform[:3, 3] = pin.rpy.rpyToMatrix(roll, pitch, yaw), shift
+    chain = parse_chain(" ".join(["Rz(q1)", *displacement_words(transform), "[E]"]), {}, "x")
+    position, rotation = poses(chain, np.zeros((1, 1)), chain.end_effector)
+    np.testing.assert_allclose(position[0], shift, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(rotation[0], transform[:3, :3], rtol=0, atol=1e-11)
+
+
+@given(st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 1e-3), st.floats(-3, 3))
+def test_a_turn_about_any_axis_is_between_a_rotation_and_its_inverse(axis, turn):
+    unit = np.array(axis) / np.linalg.norm(axis)
+    before, letter, sign, after, turned = express_axis(np.array(axis))
+    chain = parse_chain(" ".join([*before, f"R{letter}({sign}q1)", *after, "[E]"]), {}, "x")
+    rotation = poses(chain, np.array([[turn]]), chain.end_effector)[1][0]
+    np.testing.assert_allclose(rotation, pin.exp3(turn * unit), rtol=0, atol=1e-11)
+    if before:
+        np.testing.assert_allclose(turned[:, 2], unit, rtol=0, atol=1e-11)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
-from made_urdf import Pinocchio, assert_same_poses, joint, link, robot, segments, written
+from made_urdf import Pinocchio, assert_same_poses, joint, link, robot, written
 from support import refused
 from synthetic import made_states
 
@@ -57,52 +56,25 @@ def assert_same_weight(arm, path, within=None):
 )
 def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(tmp_path, base, tip, names):
     path = written(tmp_path, *ARM)
-    result = robot_from_urdf(path, base, tip, relative_std=0.3)
+    result = robot_from_urdf(path, base, tip)
     arm = through_its_file(result)
     assert arm.joint_names == names and {mass.link for mass in arm.masses} == {*range(len(names) + 1)}
     assert_same_poses(arm, path, base, tip)
     assert assert_same_weight(arm, path) > 1.0
     # What a URDF does not say is not made up.
-    assert not arm.compliance_known and {mass.relative_std for mass in arm.masses} == {0.3}
-    assert any("no compliances" in note for note in result.notes) and any("30 %, by assumption" in n for n in result.notes)
+    assert not arm.compliance_known and {mass.relative_std for mass in arm.masses} == {0.2}
+    assert any("no compliances" in note for note in result.notes) and any("20 %, by assumption" in n for n in result.notes)
 
 
-@pytest.mark.parametrize("limits", [None, (-1e16, 1e16)])
-def test_no_limits_and_those_that_stand_for_none_are_a_turn_either_way(tmp_path, limits):
+@pytest.mark.parametrize(
+    ("limits", "found"),
+    [(None, "no limits"), ((-1e16, 1e16), "no radians"), ((-170, 170), "limits of -170 to 170, no radians")],
+)
+def test_no_limits_and_those_that_are_no_radians_are_a_turn_either_way(tmp_path, limits, found):
     free = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), limits=limits))
     result = robot_from_urdf(free, "a", "b")
     assert result.document["joint_limits_deg"] == [[-360.0, 360.0]]
-    assert any("'j' has no limits" in note for note in result.notes)
-
-
-@pytest.mark.parametrize("limits", [(-170, 170), (0, 20)])
-def test_limits_that_look_like_degrees_are_asked_for(tmp_path, limits):
-    path = written(
-        tmp_path, *map(link, "abc"), joint("j", "a", "b", xyz=(0, 0, 1), limits=limits), joint("rail", "b", "c", "prismatic")
-    )
-    with refused(path, "joint 'j': limit", "turns", "--limits deg", "--limits rad"):
-        robot_from_urdf(path, "a", "c")
-    degrees = robot_from_urdf(path, "a", "c", limits_in="deg")
-    assert degrees.document["joint_limits_deg"] == [[float(each) for each in limits], [-2.0, 2.0]]
-    assert any("degrees" in note for note in degrees.notes)
-    radians = robot_from_urdf(path, "a", "c", limits_in="rad")
-    np.testing.assert_allclose(radians.robot.joint_limits[0], limits)
-
-
-@settings(max_examples=20, deadline=None)
-@given(parts=segments)
-def test_any_chain_is_where_pinocchio_has_it_and_weighs_as_much(tmp_path_factory, parts):
-    """Each link also carries a bolted part at its side."""
-    described = [link("l0", 1.0)]
-    for number, (kind, xyz, rpy, axis, mass, centre, beside) in enumerate(parts, 1):
-        described += [link(f"l{number}", mass, centre), link(f"s{number}", 1.5 * mass, centre)]
-        described.append(joint(f"j{number}", f"l{number - 1}", f"l{number}", kind, xyz, rpy, axis, (-1, 1)))
-        described.append(joint(f"b{number}", f"l{number}", f"s{number}", "fixed", beside, (0.4, 0.0, 0.2)))
-    path = written(tmp_path_factory.mktemp("urdf"), *described)
-    tip = f"l{len(parts)}"
-    arm = through_its_file(robot_from_urdf(path, "l0", tip))
-    assert_same_poses(arm, path, "l0", tip, count=4)
-    assert_same_weight(arm, path, 1e-5)
+    assert any("'j' has" in note and found in note for note in result.notes)
 
 
 TREE = (
@@ -126,11 +98,12 @@ def one_joint(*names, **more):
         (TREE, ("hand", "base"), "base 'hand', tip 'base'", ["other way round"]),
         (TREE, ("arm", "other"), "base 'arm', tip 'other'", ["two branches"]),
         (TREE, ("root", "base"), "base 'root', tip 'base'", ["no joint that moves"]),
-        (TREE, ("hand", "hand"), "base 'hand', tip 'hand'", ["no joint that moves"]),
         (TREE, ("base", "hand", ["other"]), "point", ["'other'", "arm"]),
-        *(
-            ((*TREE[:5], *TREE[6:8], joint("foot", "root", "base", kind)), ("root", "hand"), "joint 'foot'", [kind, "revolute"])
-            for kind in ("floating", "planar")
+        (
+            (*TREE[:5], *TREE[6:8], joint("foot", "root", "base", "planar")),
+            ("root", "hand"),
+            "joint 'foot'",
+            ["planar", "revolute"],
         ),
         (one_joint("a", "b", axis=(0, 0, 0)), ("a", "b"), "joint 'j0'", ["0 0 0"]),
         ((*map(link, "ab"), joint("j", "a", "b", mimic=("x", 1.0, 0.0))), ("a", "b"), "joint 'j'", ["mimics"]),
@@ -166,10 +139,10 @@ def test_meshes_and_what_else_is_no_joint_or_mass_is_left_out(tmp_path):
 
 
 @pytest.mark.parametrize("text", [BOMB, OUTSIDE], ids=["entities of entities", "an entity outside"])
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
-def test_entities_are_refused_before_they_are_looked_at(tmp_path, text, encoding):
-    with refused(tmp_path / "made.urdf", "line 1", "<!DOCTYPE"):
-        read_urdf(file_of(tmp_path, text, encoding))
+def test_entities_are_refused_before_they_are_looked_at(tmp_path, text):
+    for encoding in ("utf-8", "utf-16"):
+        with refused(tmp_path / "made.urdf", "", "<!DOCTYPE"):
+            read_urdf(file_of(tmp_path, text, encoding))
 
 
 def test_more_than_a_urdf_can_have_is_refused_at_once(tmp_path, monkeypatch):
@@ -177,9 +150,9 @@ def test_more_than_a_urdf_can_have_is_refused_at_once(tmp_path, monkeypatch):
     joints = [joint(f"j{number}", f"l{number}", f"l{number + 1}") for number in range(2001)]
     with refused(tmp_path / "made.urdf", "", "2002 times <link>", "at most 2000"):
         read_urdf(file_of(tmp_path, robot(*links, *joints)))
-    with refused(tmp_path / "made.urdf", "line 3", "more than 50 elements in each other"):
+    with refused(tmp_path / "made.urdf", "", "more than 50 elements in each other"):
         read_urdf(file_of(tmp_path, robot("<a>" * 50 + "</a>" * 50)))
-    with refused(tmp_path / "made.urdf", "line 3", "more than 200000 elements"):
+    with refused(tmp_path / "made.urdf", "", "more than 200000 elements"):
         read_urdf(file_of(tmp_path, robot("<a/>" * 200_000)))
     monkeypatch.setattr(urdf, "LARGEST_BYTES", 1000)
     with refused(tmp_path / "made.urdf", "", "more than 1000 bytes"):
@@ -195,16 +168,13 @@ FAULTS = {
     "a macro": (MACRO, "", ["<xacro:include>", "run it first"]),
     "a property": (robot(link("${prefix}a"), *SOUND), "<link>", ["${prefix}a", "run it first"]),
     "no XML": ("name: KUKA\n", "line 1", ["XML"]),
-    "no name": (robot(*SOUND, "<link/>"), "<link>", ["no name"]),
+    "no name": (robot(*SOUND, "<link/>"), "link ''", ["a name for each"]),
     "an unknown type": (robot(*SOUND[:2], joint("j", "a", "b", "hinge")), "joint 'j'", ["'hinge'", "revolute"]),
-    "no child": (robot(*SOUND[:2], joint("j", "a", "b").replace('<child link="b"/>', "")), "joint 'j'", ["child ''"]),
     "two parents": (robot(*SOUND, joint("k", "a", "b")), "joint 'k'", ["another joint"]),
     "a loop": (robot(*SOUND, joint("k", "b", "a")), "link", ["a loop"]),
     "a word for a number": (changed('upper="2"', 'upper="two"'), "joint 'j': limit upper", ["'two'"]),
-    "two origins": (changed("</joint>", "<origin/></joint>"), "joint 'j'", ["<origin> 2 times"]),
     "a negative mass": (robot(link("a", -1.0), *SOUND[1:]), "link 'a': mass value", ["-1", "0 or more"]),
     "a number beyond all machines": (changed(PLACE, 'xyz="0 0 1e300"'), "joint 'j': origin xyz", ["1e300"]),
-    "a mass of nothing": (robot(link("a", 1.0).replace('value="1.0"', ""), *SOUND[1:]), "link 'a'", ["a number"]),
 }
 
 
@@ -232,15 +202,10 @@ FLANGED = (
 FINGER = (link("finger", 1.0, (0, 0, 0.1)), joint("open", "hand", "finger", "prismatic", (0, 0, 0.2)))
 
 
-def test_what_moves_beside_the_chain_weighs_as_at_zero_and_is_told(tmp_path):
+def test_what_moves_beside_the_chain_weighs_as_at_zero_and_beside_the_column_not_at_all(tmp_path):
     masses, (note,) = weights(tmp_path, *FLANGED, *FINGER)
-    assert masses[1] == {
-        "link": 1, "mass_kg": 3.0, "centre_m": pytest.approx([0.4, 0, 0.1]), "relative_std": 0.2
-    }  # fmt: skip
-    assert "open" in note and "zero" in note
-
-
-def test_what_moves_beside_the_column_weighs_on_nothing_and_other_joints_are_told(tmp_path):
+    entry = {"link": 1, "mass_kg": 3.0, "centre_m": pytest.approx([0.4, 0, 0.1]), "relative_std": 0.2}
+    assert masses[1] == entry and "open" in note and "zero" in note
     result = robot_from_urdf(written(tmp_path, *FLANGED, link("door", 7.0), joint("hinge", "base", "door")), "base", "hand")
     assert [entry["mass_kg"] for entry in result.document["masses"]] == [9.0, 2.0]
     assert "joints that are no part of the chain, left out: hinge" in result.notes

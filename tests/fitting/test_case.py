@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made
 
-from elastocal.campaigns.columns import columns_of
+from elastocal.campaigns.campaign import columns_of
 from elastocal.fitting.case import case_from, noise_facts, noise_from
 from elastocal.fitting.noise import Noise
 from elastocal.io.documents import read_document

@@ -12,19 +12,18 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from support import robot_of
 
+from elastocal.campaigns.tables import SEPARATORS
 from elastocal.errors import InputError
-from elastocal.exchange.csv_dialect import SEPARATORS
 from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
 
 SCALES = {"m": 1.0, "mm": 1e-3, "in": 0.0254, "rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "N": 1.0, "kN": 1e3, "Nm": 1.0}
 # How joints are called, by their number from 1.
-JOINTS = ("q{0}", "J{0}", "Axis {0}", "joint_{0}", "q[{0}]", "J({0})", "q[{1}]", "actual_q_{1}", "rax_{0}", "/js/J{0}/position")
+JOINTS = ("q{0}", "J{0}", "Axis {0}", "joint_{0}", "q[{0}]", "J({0})", "actual_q_{0}", "rax_{0}")
 # How positions are, without a marker's name and with one.
 POSITIONS = {
     "x": ("{x}", "{marker}_{x}"),
     "X": ("{X}", "{X}_{marker}"),
     "Position X": ("Position {X}", "{marker} Position {X}"),
-    "topic": ("/tcp/pose/position/{x}", "/{marker}/pose/position/{x}"),
     "A.x": ("{x}", "{marker}.{x}"),
 }
 TIMES = {
@@ -55,7 +54,7 @@ def written_campaigns(draw):
     blank = separator == "space"
     quotes = decimal == separator == "comma" or (not blank and pick(False, True))
     length, angle, force = pick("m", "mm", "in"), pick("rad", "deg", "mrad"), pick("", "N", "kN")
-    wide, called = not blank and pick(False, True), pick("x", "X", "topic", "A.x") if blank else pick(*POSITIONS)
+    wide, called = not blank and pick(False, True), pick("x", "X", "A.x") if blank else pick(*POSITIONS)
     targets = pick(("A", "B"), ("T1", "T2", "T3")) if wide else pick(("SMR",), ("SMR",) if blank else ("A", "B"))
     rotation = "none" if wide else pick("none", "vector", "quaternion", "matrix", "euler:ZYX", "euler:xyz", "euler:ZYZ")
     time = pick("", *TIMES)
@@ -73,7 +72,7 @@ def written_campaigns(draw):
     style = pick(*(name for name in JOINTS if not blank or " " not in name))
     for j, slides in enumerate(prismatic):
         cells, meant = rounded(rng.uniform(-2.8, 2.8, poses), length if slides else angle, 6)
-        per_pose(style.format(j + 1, j), length if slides else angle, cells)
+        per_pose(style.format(j + 1), length if slides else angle, cells)
         rows[f"q{j + 1}"] = np.repeat(meant, len(targets))
     cells, position = rounded(rng.uniform(-3, 3, (poses, len(targets), 3)), length, 5)
     turns = Rotation.random(poses * len(targets), rng=rng)
@@ -94,8 +93,7 @@ def written_campaigns(draw):
     for quantity, unit, values in own:
         values = np.reshape(values, (poses, len(targets)))
         for t, marker in enumerate(targets if wide else [""]):
-            # Topics of one end are one column to the import: of several targets they are called otherwise.
-            words = POSITIONS["x" if wide and called == "topic" else called][wide]
+            words = POSITIONS[called][wide]
             header = words.format(x=quantity, X=quantity.upper(), marker=marker) if quantity in "xyz" else quantity
             if wide:
                 places.setdefault(marker, []).append(len(columns))
@@ -127,15 +125,16 @@ def written_campaigns(draw):
     order = list(rng.permutation(len(columns))) if pick(False, True) else list(range(len(columns)))
     columns = [columns[k] for k in order]
 
-    # Units stand in headers, in a row of their own, or nowhere; with topics they are to be stated.
+    # Units stand in headers, in a row of their own, or nowhere.
     style = pick("{} [{}]", "{} ({})", "{}_{}", "none", *([] if blank else ["row"]))
     style = style.replace(" ", "") if blank else style
     bare = style in ("row", "none")
-    headers = [h if not u or bare or h.startswith("/") else style.format(h, u) for h, u, _ in columns]
+    headers = [h if not u or bare else style.format(h, u) for h, u, _ in columns]
     if wide:
         options["targets"] = {marker: [headers[order.index(place)] for place in three] for marker, three in places.items()}
-    topics = style != "row" and any(h.startswith("/") and u for h, u, _ in columns)
-    if style in ("none", "{}_{}") or topics:
+    if rotation.startswith("euler:"):
+        options["columns"] = {name: headers[[h for h, _, _ in columns].index(name)] for name in ("e1", "e2", "e3")}
+    if style in ("none", "{}_{}"):
         options["units"] |= {"angles": angle, "lengths": length} | ({"q1": length} if prismatic[0] else {})
     if force == "kN" and style == "none":
         options["units"] |= {name: "kN" for name in FORCES[:3]}

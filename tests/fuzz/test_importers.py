@@ -11,7 +11,7 @@ from made_urdf import joint, link, robot
 
 from elastocal.campaigns.measurements import write_measurements
 from elastocal.campaigns.reading import read_robot
-from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS
+from elastocal.campaigns.tables import DECIMALS, SEPARATORS
 from elastocal.exchange.dh import DhOptions, robot_from_dh
 from elastocal.exchange.measurement_table import ImportOptions, import_options_text, read_import_options, read_measurement_table
 from elastocal.exchange.robot_text import write_robot
@@ -36,10 +36,7 @@ ELEMENTS = (
     '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="/etc/passwd"/>',
     "<![CDATA[",
 )
-DH = (
-    "joint,theta_offset_deg,d_mm,a_m,alpha,type,lower_deg,upper_deg,mass_kg,cx,cy,cz_mm,point\n"
-    "A,0,162,0.1,90,R,-90,90,3,0.1,0,5,elbow\nB,-90,0,-0.4,0,F,,,,,,,\nC,0,0.1,0,pi/2,R,,,2,0,0,0,\n"
-)
+DH = "joint,theta_offset_deg,d_mm,a_m,alpha,type\nbase,0,250,0,90,R\n,5,0,0,0,F\nelbow,-3.5,0,0.4,1,R\n"
 ANGLE_CELLS = st.sampled_from(["pi/0", "1e9*pi", "-pi/2", "0*pi/0", "9" * 200 + "pi", "1e308", "P", "F", "-1e-320"])
 KINEMATICS = {"kinematics": {"hash": "a", "shoulder": {"x": 0, "y": 0.1, "z": "1e-05", "roll": 1.5, "pitch": 0, "yaw": -9e-06}}}
 TRACKER = "Tracker 7;;\nPose;J1;J2 [deg];q3;X [mm];Y;Z;Target;qw;qx;qy;qz;fz [kN];time\n" + "".join(

@@ -3,7 +3,7 @@
 from analysed_robots import ROBOTS
 from made_audits import CONFIGURATION
 
-from elastocal.campaigns.columns import columns_of
+from elastocal.campaigns.campaign import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import residual_blocks
 from elastocal.diagnosis.settings import Settings

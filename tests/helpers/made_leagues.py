@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from made_remainders import smoothly_wrong_folder
 
-from elastocal.campaigns.columns import columns_of
+from elastocal.campaigns.campaign import columns_of
 from elastocal.loop.loading import load_whole_campaign
 from elastocal_proof.league.folds import DataSet, dealt
 

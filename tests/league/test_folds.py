@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_leagues import made_data_set
 
-from elastocal.campaigns.columns import measurements_from
+from elastocal.campaigns.campaign import measurements_from
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import write_table
 from elastocal.loop.schemas import measurements

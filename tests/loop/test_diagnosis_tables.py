@@ -6,8 +6,7 @@ from made_folders import made_folder
 from support import chain_of, changed
 from synthetic import NOISE, made_estimate, made_model
 
-from elastocal.campaigns.campaign import Target
-from elastocal.campaigns.columns import columns_of
+from elastocal.campaigns.campaign import Target, columns_of
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.fit_result import Fit
 from elastocal.fitting.parameters import parameters

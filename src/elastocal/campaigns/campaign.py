@@ -1,4 +1,4 @@
-"""What a measured campaign is: its targets, its measurements and what it declares of itself."""
+"""What a measured campaign is: its targets, its measurements and what it declares of itself, also as columns of tables."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from elastocal.errors import InputError, closest_first
 from elastocal.mechanics.chain import Chain
+from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 from elastocal.mechanics.robot import Robot, with_rigid_joints
 
 DOCUMENT = "campaign.yaml"
@@ -70,10 +71,7 @@ class Measurements:
         return len(self.pose)
 
     def select(self, mask_or_index: np.ndarray) -> Measurements:
-        """The measurements of a mask or of an index array, in its order.
-
-        `mask_or_index` (N,) of bool, (M,) of int.
-        """
+        """The measurements of a mask (N,) or of an index array (M,), in its order."""
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         chosen: dict[str, Any] = {name: None if array is None else array[mask_or_index] for name, array in arrays.items()}
         return Measurements(**chosen)
@@ -81,16 +79,12 @@ class Measurements:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign that holds together.
+    """A campaign that holds together; its schema explains what it declares.
 
-    `robot`: with rigid joints where `compliance` is nominal and the robot file states none. `measured`: one of "position",
-    "pose". `frame`: tracker: the placement of the base in it is unknown, and another one in each session. `compliance`: one of
-    "nominal", "identify". `declared`: effects of the catalogue that the model already has. `noise`: ``position_m``,
-    ``orientation_rad``, ``joint_rad``, as far as the campaign declares them. `holdout`: ``fraction`` and ``seed``, ``blocks``
-    and ``seed``, ``session``, ``poses`` or ``campaign``. `remainder`: regression on what the final model leaves: a name in
-    `remainder.corrected`, "auto" for the best of them or none, or "none". `table`: name of the file of measurements; empty
-    where they come from none. `header_line`: line of the file in which its header stands, where it is a text whose rows are
-    lines.
+    `robot`: with rigid joints where `compliance` is nominal and the robot file states none. `frame`: of a tracker: the
+    placement of the base in it is unknown, and another one in each session. `remainder`: regression on what the final model
+    leaves, a name in `remainder.corrected`, "auto" or "none". `table`, `header_line`: name of the file of measurements, empty
+    for none, and the line of its header, where it is a text.
     """
 
     name: str
@@ -114,14 +108,8 @@ class Campaign:
 
 
 def assemble_campaign(document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str) -> Campaign:
-    """A campaign from its parts, which have been checked before.
-
-    Nominal compliances that the robot file does not state leave rigid joints.
-
-    `document`: contents of ``campaign.yaml``. `source`: named in errors.
-    """
+    """A campaign from its parts, checked before; `source`, the file of its document, is named in errors."""
     compliance = document.get("compliance", "nominal")
-    remainder = document.get("remainder", BEST_REMAINDER)
     rigid = compliance == "nominal" and not robot.compliance_known
     return Campaign(
         name=document["campaign"],
@@ -134,18 +122,14 @@ def assemble_campaign(document: Mapping[str, Any], robot: Robot, measurements: M
         noise=document.get("noise"),
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
         measurements=measurements,
-        remainder=remainder,
+        remainder=document.get("remainder", BEST_REMAINDER),
         table=document.get("table", ""),
         header_line=document.get("header_line"),
     )
 
 
 def targets_from(described: Mapping[str, Any], chain: Chain, source: str) -> tuple[Target, ...]:
-    """What a campaign says that it tracks.
-
-    `described`: ``targets`` of ``campaign.yaml``. `source`: named in errors. Raises `InputError`: a name that is no text, or a
-    measuring point that the chain does not have.
-    """
+    """``targets`` of ``campaign.yaml``, which `source`, named in errors, describes; an unknown measuring point is refused."""
     points = [point.name for point in chain.points]
     targets = []
     for name, target in described.items():
@@ -160,3 +144,89 @@ def targets_from(described: Mapping[str, Any], chain: Chain, source: str) -> tup
             Target(name, target["point"], *(None if value == UNKNOWN else tuple(map(float, value)) for value in stated))
         )
     return tuple(targets)
+
+
+_IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
+
+
+def columns_of(measurements: Measurements) -> dict[str, np.ndarray]:
+    """Columns of the measurements table, dict of str to ndarray (N,)."""
+    count, joints = measurements.joint_angles.shape
+    columns = _identity(measurements) | _commanded(measurements)
+    columns |= dict(zip("xyz", measurements.position.T, strict=True))
+    columns |= dict(zip(("rx", "ry", "rz"), _or_missing(measurements.rotation_vector, (count, 3)).T, strict=True))
+    approach = _or_missing(measurements.approach, (count, joints))
+    columns |= {f"approach{j + 1}": approach[:, j] for j in range(joints)}
+    return columns | {name: _or_missing(getattr(measurements, name), (count,)) for name in ("time_s", "temperature_c", "u95_m")}
+
+
+def measurements_from(columns: Mapping[str, np.ndarray]) -> Measurements:
+    """Measurements from the columns of their table, dict of str to ndarray (N,)."""
+    joints = sum(name.startswith("approach") for name in columns)
+    return Measurements(
+        **{name: columns[name] for name in _IDENTITY},
+        joint_angles=np.column_stack([columns[f"q{j}"] for j in range(1, joints + 1)]),
+        wrench=np.column_stack([columns[name] for name in WRENCH_NAMES]),
+        position=np.column_stack([columns[axis] for axis in "xyz"]),
+        rotation_vector=_or_none(np.column_stack([columns[f"r{axis}"] for axis in "xyz"])),
+        approach=_or_none(np.column_stack([columns[f"approach{j}"] for j in range(1, joints + 1)])),
+        time_s=_or_none(columns["time_s"]),
+        temperature_c=_or_none(columns["temperature_c"]),
+        u95_m=_or_none(columns["u95_m"]),
+    )
+
+
+def residual_columns(
+    measurements: Measurements,
+    held_out: bool,
+    gross_errors: bool,
+    outside: np.ndarray,
+    position: np.ndarray,
+    stages: Mapping[str, np.ndarray],
+) -> dict[str, np.ndarray]:
+    """Columns of the residuals table.
+
+    `outside` (N,) of bool: whether each lies outside of the range of the poses fitted. `position` (N, 3): m, base axes.
+    `stages` (N, rows): residuals "before", of the declared model, and "after", of the found one, m and rad. Returns (N,).
+    """
+    count = len(measurements)
+    columns = _identity(measurements)
+    columns |= {"held_out": np.full(count, held_out), "gross_error": np.full(count, gross_errors), "outside_range": outside}
+    columns |= {"time_s": _or_missing(measurements.time_s, (count,))} | _commanded(measurements)
+    columns |= dict(zip("xyz", position.T, strict=True))
+    for stage, residual in stages.items():
+        whole = np.full((count, 6), np.nan)
+        whole[:, : residual.shape[1]] = residual
+        columns |= {f"{stage}_{name}": whole[:, k] for k, name in enumerate(COMPONENT_NAMES)}
+    return columns
+
+
+def _identity(measurements: Measurements) -> dict[str, np.ndarray]:
+    return {name: getattr(measurements, name) for name in _IDENTITY}
+
+
+def _commanded(measurements: Measurements) -> dict[str, np.ndarray]:
+    angles = {f"q{joint}": values for joint, values in enumerate(measurements.joint_angles.T, 1)}
+    return angles | dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))
+
+
+def _or_missing(values: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
+    return np.full(shape, np.nan) if values is None else values
+
+
+def _or_none(values: np.ndarray) -> np.ndarray | None:
+    return None if np.isnan(values).all() else values
+
+
+def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Group equal rows: `numpy.unique` along the first axis, many times as fast.
+
+    `keys` (N, k). Returns `first` (G,) of int: first row of each group; groups in lexicographic order; `group` (N,) of int: of
+    each row.
+    """
+    order = np.lexsort(keys.T[::-1])
+    rising = keys[order]
+    new = np.concatenate([np.ones(min(len(keys), 1), bool), (rising[1:] != rising[:-1]).any(axis=1)])
+    group = np.empty(len(keys), int)
+    group[order] = np.cumsum(new) - 1
+    return order[new], group

@@ -1,16 +1,19 @@
-"""Which poses of a campaign are fitted and which are held out to test the fit; where the campaign that tests may lie."""
+"""Which poses of a campaign are held out to test the fit, and where poses lie in joint space: blocks, repeats, range."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements
-from elastocal.campaigns.groups import groups_of
-from elastocal.campaigns.joint_space import blocks_of_poses, configurations
+from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements, groups_of
 from elastocal.counting import counted
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 _HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
 # Below these a fit or a test says nothing.
@@ -22,19 +25,14 @@ def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
     """Measurements to fit and measurements to test, parted by whole poses.
 
     Returns `training`, `held_out`: in the order of the file, on which the choice of poses does not depend. Where another
-    campaign is the test, all measurements are training and `held_out` is empty: see `reading.held_out_campaign`. Raises
-    `InputError`: too few poses, or poses that are not there.
+    campaign is the test, see `reading.held_out_campaign`, all measurements are training.
     """
     held_out = held_out_mask(campaign.holdout, campaign.measurements, campaign.robot.reported_offset, campaign.name)
     return campaign.measurements.select(~held_out), campaign.measurements.select(held_out)
 
 
 def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[str, Any]:
-    """How a campaign parts its measurements, in one way and with a seed where the poses are drawn.
-
-    `described`: ``holdout`` of ``campaign.yaml``. `folder`: folder of the campaign. `source`: named in errors. Raises
-    `InputError`: no way or more than one, a seed where nothing is drawn, or as `other_folder`.
-    """
+    """``holdout`` of ``campaign.yaml`` in a folder: one way to part measurements, with a seed where poses are drawn."""
     ways = [way for way in _HOLDOUTS if way in described]
     drawn = ways in (["fraction"], ["blocks"])
     if len(ways) != 1 or ("seed" in described and not drawn):
@@ -46,11 +44,7 @@ def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[s
 
 
 def other_folder(named: str, folder: Path, source: str) -> Path:
-    """Folder of the campaign that tests another one.
-
-    `named`: as ``holdout.campaign`` names it. `folder`: of the campaign that it tests. `source`: named in errors. Raises
-    `InputError`: no campaign there, the same campaign, or a folder elsewhere than beside or below the tested one's.
-    """
+    """Folder of the campaign that tests the one in `folder`, beside or below it, as ``holdout.campaign`` names it."""
     other = folder / named
     allowed = f"a folder beside this one with a {DOCUMENT}, such as ../other"
     if not is_file_in(other / DOCUMENT, folder.resolve().parent):
@@ -92,10 +86,7 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, report
 
 
 def measured_poses(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
-    """The poses that were measured, each once.
-
-    Returns `pairs` (P, 2): session and pose, sorted; `index` (N,) of int: of each measurement's pair.
-    """
+    """Session and pose of those that were measured, each once and sorted (P, 2); of each measurement its index there (N,)."""
     pairs = np.column_stack([measurements.session, measurements.pose])
     first, index = groups_of(pairs)
     return pairs[first], index
@@ -144,8 +135,127 @@ def is_file(path: str | Path) -> bool:
 
 
 def is_file_in(path: str | Path, *folders: str | Path) -> bool:
-    """Whether a path is that of a regular file in or below one of some folders.
-
-    `path`, `*folders`: links are followed, on both sides.
-    """
+    """Whether a path is that of a regular file in or below one of some folders; links are followed, on both sides."""
     return is_file(path) and any(Path(path).resolve().is_relative_to(Path(folder).resolve()) for folder in folders)
+
+
+# Measurements of one pose share their joint angles up to what a controller's servo error can differ: a joint that moves less
+# does not distinguish poses.
+SAME_POSE_RAD = 0.02
+_ROUNDS = 100
+# How often a pose drawn like the others, from a box, is called beyond their range.
+_LEVEL = 0.05
+
+
+def blocks(joint_angles: np.ndarray, count: int) -> np.ndarray:
+    """Poses parted into blocks of neighbours whose sizes differ by one at most.
+
+    Bisecting k-means [1] with parts of given size: a block is cut across its principal direction [2], then across the line
+    between the means of its parts until these stay. No draw decides, and no block is too small to be held out. Joints count
+    alike, by the cosine and sine of their angles over their spread.
+
+    `joint_angles` (P, n): rad. `count`: of blocks, at most P. Returns (P,) of int: 0 .. count-1.
+
+    [1] Steinbach, M., Karypis, G. and Kumar, V., A comparison of document clustering techniques, KDD Workshop on Text Mining,
+        2000.
+    [2] Boley, D., Principal direction divisive partitioning, Data Mining and Knowledge Discovery 2, 1998.
+    """
+    circle = np.stack([np.cos(joint_angles), np.sin(joint_angles)], axis=-1)
+    circle = circle - circle.mean(axis=0)
+    spread = np.sqrt((circle**2).mean(axis=0).sum(axis=-1))
+    points = (circle / np.maximum(spread, SAME_POSE_RAD)[:, None]).reshape(len(joint_angles), -1)
+    found = np.zeros(len(points), int)
+    waiting = [(np.arange(len(points)), 0, count)]
+    while waiting:
+        members, first, parts = waiting.pop()
+        found[members] = first
+        if parts == 1:
+            continue
+        about = points[members] - points[members].mean(axis=0)
+        direction = np.linalg.svd(about, full_matrices=False)[2][0]
+        # The sign of a singular vector is arbitrary.
+        direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
+        lower = parts // 2
+        cut = round(len(members) * lower / parts)
+        order = np.argsort(about @ direction, kind="stable")
+        for _ in range(_ROUNDS):
+            before, direction = set(order[:cut]), about[order[cut:]].mean(axis=0) - about[order[:cut]].mean(axis=0)
+            order = np.argsort(about @ direction, kind="stable")
+            if set(order[:cut]) == before:
+                break
+        waiting += [(members[order[:cut]], first, lower), (members[order[cut:]], first + lower, parts - lower)]
+    return found
+
+
+def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """The configuration of each pose, ndarray of int (P,), from angles (N, n) and pose, 0 .. P-1, of measurements or states.
+
+    In the order of the poses each that has none yet begins one and takes those with its joint angles, up to what a
+    controller's servo error can differ: the leader algorithm (Hartigan, Clustering Algorithms, 1975). Poses along a path, each
+    near the next, are several configurations.
+    """
+    return number_alike(_means(joint_angles, pose), SAME_POSE_RAD)
+
+
+def number_alike(points: np.ndarray, within: float) -> np.ndarray:
+    """Number of each row (N, n), 0 for the first: one for rows that agree to `within` with the row that began it."""
+    # Equal rows lead or follow together: a tree of a hundred thousand equal points takes minutes.
+    first, same = groups_of(points)
+    order = np.argsort(first)
+    different = points[first[order]]
+    tree = _tree(different)
+    # What is farther from all others is not asked for its neighbours, and the neighbours of all are never held at once.
+    nearest, _ = tree.query(different, k=[2], p=np.inf, distance_upper_bound=np.nextafter(within, 1.0))
+    alone = np.isinf(np.ravel(nearest))
+    found, count = np.full(len(different), -1), 0
+    for leader in range(len(different)):
+        if found[leader] < 0:
+            found[leader] = count
+            if not alone[leader]:
+                near = np.array(tree.query_ball_point(different[leader], within, p=np.inf))
+                found[near[found[near] < 0]] = count
+            count += 1
+    return found[np.argsort(order)][same]
+
+
+def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> np.ndarray:
+    """`blocks` of poses, ndarray of int (P,), by the means of their configurations; other arguments as of `configurations`."""
+    configuration = configurations(joint_angles, pose)
+    return blocks(_means(_means(joint_angles, pose), configuration), count)[configuration]
+
+
+def _means(joint_angles: np.ndarray, group: np.ndarray) -> np.ndarray:
+    mean = np.zeros((group.max() + 1, joint_angles.shape[1]))
+    np.add.at(mean, group, joint_angles)
+    return mean / np.bincount(group)[:, None]
+
+
+def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
+    """Poses at which a joint stands farther beyond those of other poses than chance explains.
+
+    Of P + 1 poses drawn from a box, one stands beyond the others' range at one of the 2 n ends by more than a share t of that
+    range with probability 2 n (1 + t)^(1-P) / (P + 1) at most, from the spacings of uniform order statistics [1]. The margin
+    is the t that makes this 5 %, or what measurements of one pose may differ: without one, half of the random poses beside 20
+    others would be called outside.
+
+    `fitted_angles` (P, n): rad. `joint_angles` (S, n): rad. Returns (S,) of bool.
+
+    [1] David, H. A. and Nagaraja, H. N., Order Statistics, section 6.4, Wiley, 2003.
+    """
+    poses, joints = fitted_angles.shape
+    low, high = fitted_angles.min(axis=0), fitted_angles.max(axis=0)
+    share = max((2.0 * joints / (_LEVEL * (poses + 1))) ** (1.0 / max(poses - 1, 1)) - 1.0, 0.0)
+    margin = np.maximum(share * (high - low), SAME_POSE_RAD)
+    return ((joint_angles < low - margin) | (joint_angles > high + margin)).any(axis=1)
+
+
+def find_repeated(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
+    """Whether states (S, n) have in every joint the angle of a same one of those fitted (P, n), rad: ndarray of bool (S,)."""
+    return np.isfinite(_tree(fitted_angles).query(joint_angles, p=np.inf, distance_upper_bound=SAME_POSE_RAD)[0])
+
+
+def _tree(points: np.ndarray) -> cKDTree:
+    # Its import takes a tenth of each start of Snakemake, whose rules read campaign.yaml and need no tree.
+    from scipy.spatial import cKDTree
+
+    return cKDTree(points)

@@ -6,34 +6,26 @@ flange, measured by a tracker in a frame that nobody knows.
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import logging
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from datetime import datetime
-from functools import cache, reduce
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy  # Its parts load as they are used: the rules ask importers for their files alone, at each start of Snakemake.
+import scipy
 
+from elastocal.campaigns.holdout import number_alike
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
-from elastocal.counting import counted
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, read_document
-from elastocal.io.texts import read_bytes, read_text
 
-# Of the sources here the largest has four megabytes.
-LARGEST_BYTES = 200_000_000
 # Names a folder that already has the files, for machines without a network.
 FOLDER_VARIABLE = "ELASTOCAL_DATA"
-_MAT = "a MAT file of version 5"
 
 
 @dataclass(frozen=True)
@@ -59,11 +51,7 @@ class PublicFile:
 
 
 def find_missing(names: Iterable[str], files: Mapping[str, PublicFile], kept: str | Path, box: str | Path) -> str | None:
-    """What of some files is missing where `FOLDER_VARIABLE` stands for a network.
-
-    `files`, `box`: as in `fetch`. `kept`: folder of what was downloaded before. Returns the first file that is missing, below
-    the folder of `FOLDER_VARIABLE`; None where all are there, or may be downloaded.
-    """
+    """The first of some files that is missing where `FOLDER_VARIABLE` stands for a network, see `fetch`; None without it."""
     for name in names if os.environ.get(FOLDER_VARIABLE) else ():
         if _at_hand(files[name], box) is None and not (Path(kept) / _name_copy(name, files[name])).is_file():
             return files[name].local
@@ -120,106 +108,41 @@ class PublicMeasurements:
     others: Mapping[str, np.ndarray]
 
 
-@dataclass(frozen=True)
-class TextFormat:
-    """How a table of angles and positions (mm) is read; keys are those of the schema."""
+def _read_text(table: Mapping[str, Any], path: str | Path) -> PublicMeasurements:
+    """A table of text as its entry, `table`, says; an `InputError` names what is no such table, or a column that is missing."""
+    # Neither pandas nor the parts of scipy load at each start of Snakemake, whose rules ask importers for their files alone.
+    import pandas as pd
 
-    kind: str
-    angles: Sequence[str]
-    positions: Mapping[str, Sequence[Sequence[str]]]
-    separator: str = ","
-    decimal: str = "."
-    names: Sequence[str] = ()
-    fewer_joints: int = 0
-    orientation: Sequence[str] = ()
-    time: str = ""
-    temperature: str = ""
-    angles_in: str = "deg"
-
-    def read(self, path: str | Path) -> PublicMeasurements:
-        """An `InputError` names a column that is missing, or row and column of what is no number."""
-        cells = self._cells(path)
-
-        def table(names: Sequence[str]) -> np.ndarray:
-            return np.column_stack([self._numbers(path, name, cells[name]) for name in names])
-
-        there = [name for name in self.angles if name in cells]
-        if there != list(self.angles) and there != list(self.angles[: self.fewer_joints] or self.angles):
-            raise InputError(path, "header", f"{', '.join(there) or 'no joint'}", ", ".join(self.angles))
-        angles = table(there)
-        positions = {t: 1e-3 * reduce(np.add, [table(names) for names in parts]) for t, parts in self.positions.items()}
+    separator, names, kind = table.get("separator", ","), table.get("names"), table["kind"]
+    separator = r"\s+" if separator == "blanks" else separator
+    try:
+        text = pd.read_csv(path, sep=separator, decimal=table.get("decimal", "."), names=names, index_col=False)
+        needed = [name for parts in table["positions"].values() for part in parts for name in part]
+        there = [name for name in table["angles"] if name in text]
+        for name in (*table["angles"][:6], *needed):
+            if name not in text:
+                raise InputError(path, "header", f"no column {name!r}", kind)
+        angles = text[there].to_numpy(float)
+        positions = {
+            target: 1e-3 * sum(text[part].to_numpy(float) for part in parts) for target, parts in table["positions"].items()
+        }
         others: dict[str, np.ndarray] = {}
-        if self.orientation:
-            turn = scipy.spatial.transform.Rotation.from_euler("XYZ", table(self.orientation), degrees=True)
-            others |= dict(zip(("rx", "ry", "rz"), turn.as_rotvec().T, strict=True))
-        if self.temperature in cells:
-            others["temperature_c"] = self._numbers(path, self.temperature, cells[self.temperature])
-        if (times := _times(cells.get(self.time, ()))) is not None:
-            others["time_s"] = times
-        return PublicMeasurements(angles if self.angles_in == "rad" else np.radians(angles), positions, others)
-
-    def _cells(self, path: str | Path) -> dict[str, tuple[str, ...]]:
-        text = read_text(path, LARGEST_BYTES)
-        try:
-            if self.separator == "blanks":
-                lines = [line.split() for line in text.split("\n")]
-            else:
-                lines = [*csv.reader(io.StringIO(text, newline=""), delimiter=self.separator, strict=True)]
-        except csv.Error as error:
-            raise InputError(path, "", str(error), f"text with columns separated by {self.separator}") from None
-        lines = [line for line in lines if line]
-        header, rows = (self.names, lines) if self.names else (lines[0] if lines else [], lines[1:])
-        if not rows:
-            raise InputError(path, "", "no row of data", self.kind)
-        for number, line in enumerate(rows, 1):
-            if len(line) != len(header):
-                raise InputError(path, f"row {number}", counted(len(line), "cell"), f"{len(header)}, one for each column")
-        needed = (*(name for parts in self.positions.values() for names in parts for name in names), *self.orientation)
-        for name in (*self.angles[: self.fewer_joints or None], *needed):
-            if name not in header:
-                raise InputError(path, "header", f"no column {name!r}", self.kind)
-        return dict(zip(header, zip(*rows, strict=True), strict=True))
-
-    def _numbers(self, path: str | Path, name: str, cells: Sequence[str]) -> np.ndarray:
-        values = np.full(len(cells), np.nan)
-        for index, cell in enumerate(cells):
-            with suppress(ValueError):
-                values[index] = float(cell.replace(self.decimal, "."))
-            if not np.isfinite(values[index]):
-                allowed = f"a number with a decimal {'comma' if self.decimal == ',' else 'point'}, not infinite"
-                raise InputError(path, f"row {index + 1}, column {name}", repr(cell), allowed)
-        return values
-
-
-def _times(cells: Iterable[str]) -> np.ndarray | None:
-    """Seconds since the first row; None where there are none, or a spreadsheet has cut the stamps down to 2,02011E+13."""
-    try:
-        stamps = [datetime.strptime(cell, "%Y%m%d%H%M%S") for cell in cells]
-    except ValueError:
-        return None
-    return np.array([(stamp - stamps[0]).total_seconds() for stamp in stamps]) if stamps else None
-
-
-def read_mat(path: str | Path, **shapes: int) -> dict[str, np.ndarray]:
-    """Variables (rows, columns) of a MAT file, by how many columns each has; all have the rows of the first."""
-    content = read_bytes(path, LARGEST_BYTES, _MAT)
-    # The stubs of scipy know paths alone.
-    stream: Any = io.BytesIO(content)
-    try:
-        found: dict[str, Any] = scipy.io.loadmat(stream, variable_names=list(shapes))
-    except Exception:
-        # The reader lets through whatever broken bytes make of its parts; its words say nothing of the file.
-        found_words = f"no readable MAT file, or one that is damaged ({counted(len(content), 'byte')})"
-        raise InputError(path, "", found_words, _MAT) from None
-    for name, width in shapes.items():
-        shape, rows = np.shape(found.get(name, ())), len(found.get(next(iter(shapes)), ()))
-        if not rows or shape != (rows, width) or found[name].dtype.kind != "f":
-            raise InputError(path, name, f"shape {shape}" if name in found else "nothing", f"(measurements, {width}) numbers")
-    return {name: found[name] for name in shapes}
+        if turn := table.get("orientation"):
+            vectors = scipy.spatial.transform.Rotation.from_euler("XYZ", text[turn].to_numpy(float), degrees=True).as_rotvec()
+            others |= dict(zip(("rx", "ry", "rz"), vectors.T, strict=True))
+        if table.get("temperature") in text:
+            others["temperature_c"] = text[table["temperature"]].to_numpy(float)
+    except (ValueError, OSError) as error:
+        raise error if isinstance(error, InputError) else InputError(path, "", str(error), kind) from None
+    # Where a spreadsheet has cut the stamps down to 2,02011E+13 there are none.
+    if table.get("time") in text and pd.api.types.is_integer_dtype(text[table["time"]]):
+        stamps = pd.to_datetime(text[table["time"]].astype(str), format="%Y%m%d%H%M%S")
+        others["time_s"] = (stamps - stamps[0]).dt.total_seconds().to_numpy()
+    return PublicMeasurements(angles if table.get("angles_in") == "rad" else np.radians(angles), positions, others)
 
 
 def _read_fanuc_static(path: str | Path) -> PublicMeasurements:
-    found = read_mat(path, q=6, mA=3, mB=3, mC=3)
+    found = scipy.io.loadmat(path)
     return PublicMeasurements(found["q"], {target: found[f"m{target}"] for target in "ABC"}, {})
 
 
@@ -229,16 +152,11 @@ def _read_motoman(path: str | Path) -> PublicMeasurements:
     Poses whose reflector the tracker did not see are left out, and so is the 13th of the larger file's 587, which the source's
     own reader (loadNewLeicaDataset.m) leaves out. The turntable stands still; its encoder's last digits move.
     """
-    rows = read_mat(path, dataset=26)["dataset"]
+    rows = scipy.io.loadmat(path)["dataset"]
     rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
-    angles, position, turntable = slice(7, 13), slice(19, 22), 6
-    rows = rows[np.isfinite(rows[:, position]).all(axis=1)]
+    rows = rows[np.isfinite(rows[:, 19:22]).all(axis=1)]
     rows = np.delete(rows, 12, axis=0) if len(rows) == 587 else rows
-    if not len(rows) or not np.isfinite(rows[:, angles]).all():
-        raise InputError(path, "dataset", "no pose with angles and a position", "poses of the right arm with a reflector")
-    if (turned := np.abs(rows[:, turntable]).max()) > 1e-3:
-        raise InputError(path, f"dataset column {turntable + 1}", f"a turntable at {turned:g} rad", "one that stands at 0")
-    return PublicMeasurements(rows[:, angles], {"reflector": rows[:, position]}, {})
+    return PublicMeasurements(rows[:, 7:13], {"reflector": rows[:, 19:22]}, {})
 
 
 @dataclass(frozen=True)
@@ -272,26 +190,27 @@ class Importer:
         holdout: Mapping[str, Any] | None = None,
     ) -> None:
         """Write one file, or one of each part, as a campaign's folder; `holdout` is as in ``campaign.yaml``."""
-        found = [(part, part.read(path)) for part, path in zip(self.parts or (self,), paths, strict=True)]
-        tables = []
-        for session, (part, measured) in enumerate(found):
-            pose, repeat = pose_and_repeat(measured.angles, part.same_pose_rad)
-            angles = measured.angles
+        tables, targets, joints = [], list[str](), 6
+        for session, (part, path) in enumerate(zip(self.parts or (self,), paths, strict=True)):
+            measured = part.read(path)
+            angles, joints = measured.angles, measured.angles.shape[1]
+            pose, repeat = pose_and_repeat(angles, part.same_pose_rad)
             if self.parts:
                 angles = read_robot(Path(robots_folder) / f"{part.robots[0]}.yaml").model_angles(angles)
-            table = _table(pose, repeat, angles, measured.positions, session if self.parts else None)
-            tables.append(table | dict(measured.others))
-        joints = found[0][1].angles.shape[1]
+            # One row for each target of each measurement.
+            names, rows = list(measured.positions), np.repeat(np.arange(len(pose)), len(measured.positions))
+            table = {"session": np.full(len(rows), session)} if self.parts else {}
+            table |= {"pose": pose[rows], "load": np.zeros(len(rows), int), "repeat": repeat[rows]}
+            table |= {"target": np.tile(names, len(pose))} | {f"q{j + 1}": column[rows] for j, column in enumerate(angles.T)}
+            positions = np.stack([*measured.positions.values()], axis=1).reshape(-1, 3)
+            tables.append(table | dict(zip("xyz", positions.T, strict=True)) | dict(measured.others))
+            targets += names
         document: dict[str, Any] = {
             "campaign": name,
             "robot": self.robots[-1] if joints > 6 else self.robots[0],
             "measured": "pose" if "rx" in tables[0] else "position",
             "frame": "tracker",
-            "targets": {
-                target: {"point": f"{joints}DoF", "offset_m": "unknown"}
-                for _, measured in found
-                for target in measured.positions
-            },
+            "targets": {target: {"point": f"{joints}DoF", "offset_m": "unknown"} for target in targets},
             "compliance": "nominal",
             # What such data can be fitted with at all before any physics is looked for.
             "declared": ["joint_offset", "link_geometry"],
@@ -302,34 +221,12 @@ class Importer:
         write_campaign(folder, document, whole, joints)
 
 
-def _table(
-    pose: np.ndarray, repeat: np.ndarray, angles: np.ndarray, positions: Mapping[str, np.ndarray], session: int | None
-) -> dict[str, np.ndarray]:
-    """Columns of measurements, one row for each target of each measurement."""
-    names, count = list(positions), len(pose)
-    measured = np.stack([positions[name] for name in names], axis=1).reshape(-1, 3)
-    rows = np.repeat(np.arange(count), len(names))
-    table = {} if session is None else {"session": np.full(len(rows), session)}
-    table |= {"pose": pose[rows], "load": np.zeros(len(rows), int), "repeat": repeat[rows], "target": np.tile(names, count)}
-    table |= {f"q{j + 1}": column[rows] for j, column in enumerate(angles.T)}
-    return table | dict(zip("xyz", measured.T, strict=True))
-
-
 def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Number poses by their joint angles: single-linkage clusters by the largest difference, cut at the tolerance.
-
-    Gower and Ross, Minimum spanning trees and single linkage cluster analysis, Applied Statistics 18, 1969. `joint_angles`
-    (N, n). Returns `pose`, `repeat` (N,): poses from 0 in the order in which they first come, repeats of each from 0.
-    """
-    # Not at each start of Snakemake either.
+    """Poses (N,) of joint angles (N, n), numbered as they first come, and repeats of each (N,), both from 0."""
     import pandas as pd
 
-    count = len(joint_angles)
-    pairs = scipy.spatial.KDTree(joint_angles).query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")
-    graph = scipy.sparse.coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
-    pose = pd.Series(pd.factorize(label)[0], dtype=np.int32)
-    return pose.to_numpy(), pose.groupby(pose).cumcount().to_numpy(np.int32)
+    pose = number_alike(joint_angles, tolerance_rad)
+    return pose, pd.Series(pose).groupby(pose).cumcount().to_numpy()
 
 
 _MAT_FILES: dict[str, Callable[[str | Path], PublicMeasurements]] = {
@@ -346,7 +243,7 @@ def read_importers(path: Path) -> dict[str, Importer]:
     found: dict[str, Importer] = {}
     for name, entry in document.items():
         files = {each: PublicFile(**(entry["source"] | file)) for each, file in entry.get("files", {}).items()}
-        read = TextFormat(**entry["table"]).read if "table" in entry else _MAT_FILES.get(name, _no_file)
+        read = partial(_read_text, entry["table"]) if "table" in entry else _MAT_FILES.get(name, _no_file)
         parts = tuple(found[part] for part in entry.get("parts", ()))
         files |= {each: file for part in parts for each, file in part.files.items()}
         stated = {key: entry[key] for key in ("noise", "same_pose_rad") if key in entry}

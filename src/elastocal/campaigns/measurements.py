@@ -1,42 +1,33 @@
 """Files of measurements: their columns, read cell by cell with the row of every fault, and written."""
 
-from __future__ import annotations
-
 import csv
+import itertools
 import math
-import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import islice
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from elastocal.campaigns.tables import A_HEADER_ALONE, Cells, read_text_table
 from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first, steering
+from elastocal.errors import InputError, closest_first
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
-from elastocal.io.texts import LARGEST_NUMBER
-from elastocal.mechanics.components import WRENCH
+from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
 
-# Of each column the cells: numbers as an array, where all of them are numbers.
-Columns = dict[str, Sequence[Any] | np.ndarray]
-
-# A diagnosis of a million measurements takes ten minutes and 2 GB (docs, benchmarks); a tracker's stream is averaged before.
+# A diagnosis of a million measurements takes 2 GB (benchmarks); a tracker's stream is averaged before.
 MOST_MEASUREMENTS = 2_000_000
-# Forty columns of twenty digits are 1,000 characters.
-_LONGEST_LINE, _MOST_BYTES = 10_000, 1000 * MOST_MEASUREMENTS
+_MOST_BYTES = 500 * MOST_MEASUREMENTS
 _MOST_ROW_GROUPS = 2_000
-# Rows whose texts are in memory at a time; their numbers take a tenth of that.
-_ROWS_AT_A_TIME = 20_000
-_COMMENT = "#"
 # A file names no more.
 MOST_JOINTS = 99
 
 CSV, PARQUET = "measurements.csv", "measurements.parquet"
+ROTATION = ("rx", "ry", "rz")
 # Columns of a sheet for people: a place to tick, which is not read, and joint angles as controllers show them, q1_deg or q1_mm,
 # with the SI value of one unit. They must agree with q1 .. qn to what is shown.
 TICK = "done"
@@ -44,44 +35,8 @@ SHOWN = {"deg": math.radians(1.0), "mm": 1e-3}
 SHOWN_TO = 2e-3
 
 
-@dataclass(frozen=True)
-class Bound:
-    """Least and largest value of a column, in its unit, and the reason in words that follow "x to y"."""
-
-    least: float
-    largest: float
-    reason: str
-
-    @property
-    def allowed(self) -> str:
-        """What an error says."""
-        return f"{self.least:g} to {self.largest:g} {self.reason}"
-
-
 # A turn and a half, of a rotation vector; nor does a joint of a serial arm report more, unless its limits say so.
 FARTHEST_RAD = 3.0 * np.pi
-# Generous: whatever lies beyond is in another unit, or no reading of an instrument beside a robot.
-_FORCE = Bound(-1e6, 1e6, "N, the weight of a hundred tonnes")
-_MOMENT = Bound(-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")
-_PLACE = Bound(-2e7, 2e7, "m, half the circumference of the Earth")
-BOUNDS: Mapping[str, Bound] = {
-    **dict.fromkeys(("fx", "fy", "fz"), _FORCE),
-    **dict.fromkeys(("mx", "my", "mz"), _MOMENT),
-    **dict.fromkeys("xyz", _PLACE),
-    "time_s": Bound(-1e11, 1e11, "s, three thousand years either way: not milliseconds of a calendar"),
-    "temperature_c": Bound(-200.0, 200.0, "°C, in which arms work, not kelvin"),
-    "u95_m": Bound(1e-8, 0.1, "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by"),
-}
-
-
-def find_beyond(name: str, values: np.ndarray) -> int | None:
-    """First of the values of a column (N,) that physics does not allow; None where it allows all of them."""
-    bound = BOUNDS.get(name)
-    if bound is None:
-        return None
-    # Not a number is no more than anything either.
-    wrong = ~((values >= bound.least) & (values <= bound.largest))
-    return int(np.argmax(wrong)) if wrong.any() else None
 
 
 def file_columns(joints: int) -> dict[str, Column]:
@@ -110,24 +65,37 @@ def sheet_columns(joints: int) -> set[str]:
     return {TICK, *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in SHOWN)}
 
 
-def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFile:
-    """Open the measurements of a campaign.
+def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
+    """The measurements of a campaign, with all columns that it needs.
 
     `folder`: holds either `CSV` or `PARQUET`. `measured`: one of "position", "pose". Raises `InputError`: no file or two, a
     file that cannot be read, a column that is missing, unknown or there twice, a row of another length, more than
-    `MOST_MEASUREMENTS` rows.
+    `MOST_MEASUREMENTS` rows, or angles that are others than those shown beside.
     """
     there = [path for path in (folder / CSV, folder / PARQUET) if path.is_file()]
     if len(there) != 1:
         found = "both" if there else "neither"
         raise InputError(folder.as_posix(), "", f"{found} {CSV} {'and' if there else 'nor'} {PARQUET}", "one of them")
-    path = there[0].as_posix()
-    if (size := there[0].stat().st_size) > _MOST_BYTES:
-        raise InputError(path, "", counted(size, "byte"), f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements")
-    columns, rows, lines = (_read_csv if there[0].name == CSV else _read_parquet)(path, joints)
-    if len(rows) == 0:
-        raise InputError(path, "", "no row of data", "one row for each measurement of one target")
-    return MeasurementFile(path, columns, rows, lines, joints, measured)
+    table, known = _read(there[0], joints), file_columns(joints)
+    if len(table.rows) == 0:
+        raise InputError(there[0], "", "no row of data", "one row for each measurement of one target")
+    angles, approach = ([f"{letter}{j}" for j in range(1, joints + 1)] for letter in ("q", "approach"))
+    required = ["pose", "load", "repeat", "target", *angles, "x", "y", "z", *(ROTATION if measured == "pose" else ())]
+    for group in (WRENCH_NAMES, approach):
+        required += group if any(name in table.columns for name in group) else []
+    for name in required:
+        if name not in table.columns:
+            unit = f" in {known[name].unit}" if known[name].unit else ""
+            raise InputError(table.path, "header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
+    for name, unit in itertools.product(angles, SHOWN):
+        if (beside := f"{name}_{unit}") in table.columns:
+            values = table.numbers(name) / SHOWN[unit]
+            wrong = np.abs(values - table.numbers(beside)) > SHOWN_TO
+            if wrong.any():
+                index = int(np.argmax(wrong))
+                allowed = f"{values[index]:.3f}, which is {name}, or a file without the column {beside}"
+                raise table.fault(index, beside, allowed)
+    return table
 
 
 def described_by(folder: Path) -> tuple[list[str], str]:
@@ -138,17 +106,24 @@ def described_by(folder: Path) -> tuple[list[str], str]:
     there = next((path for path in (folder / CSV, folder / PARQUET) if path.is_file()), None)
     if there is None:
         return [], "position"
-    columns = (_read_csv if there.name == CSV else _read_parquet)(there.as_posix(), MOST_JOINTS)[0]
-    names = dict.fromkeys(text for cell in columns.get("target", ()) if (text := str(cell).strip()))
-    return list(names), "pose" if {"rx", "ry", "rz"} <= columns.keys() else "position"
+    try:
+        table = _read(there, MOST_JOINTS)
+    except InputError as error:
+        if error.found != A_HEADER_ALONE:
+            raise
+        return [], "position"
+    names = dict.fromkeys(name for name in (table.texts("target") if "target" in table.columns else ()) if name)
+    return list(names), "pose" if {*ROTATION} <= table.columns.keys() else "position"
 
 
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
-    """Refuse a column that the format does not have.
+    """Refuse a column that the format does not have, or that is there twice.
 
     `path`: named in errors. Raises `InputError`: the first such column.
     """
     known, beside = file_columns(joints), sheet_columns(joints)
+    if twice := next((name for place, name in enumerate(names) if name in [*names][:place]), None):
+        raise InputError(path, "header", f"column {twice!r} twice", "each column once")
     for name in names:
         if name not in known and name not in beside:
             # That q7 is unknown helps little where it is not stated how many joints the robot has.
@@ -167,257 +142,48 @@ def write_measurements(path: str | Path, table: Mapping[str, Sequence[Any] | np.
         (_write_csv if Path(path).name == CSV else _write_parquet)(partial, columns, table)
 
 
-def _read_csv(path: str, joints: int) -> tuple[Columns, np.ndarray, np.ndarray]:
-    """Columns, and of each row that is not blank its number and its line; a few thousand rows at a time."""
+def _read(path: Path, joints: int) -> Cells:
+    if (size := path.stat().st_size) > _MOST_BYTES:
+        allowed = f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements"
+        raise InputError(path, "", counted(size, "byte"), allowed)
+    return (_read_csv if path.name == CSV else _read_parquet)(path.as_posix(), joints)
+
+
+def _read_csv(path: str, joints: int) -> Cells:
+    text = read_text_table(path, lambda cells: "pose" in cells, wanted="a header with pose, load, repeat, target, q1 and so on")
+    check_column_names(text.columns, joints, path)
+    table, header = text.cells({name: name for name in text.columns}, {}), text.dialect.header or 0
+    return replace(table, rows=(table.rows - header).astype(np.int32), header_line=header)
+
+
+def _read_parquet(path: str, joints: int) -> Cells:
     texts = {TICK, *(name for name, column in file_columns(joints).items() if column.type == "string")}
-    # A byte order mark is what spreadsheets write. Bytes that are no UTF-8 become what `_lines` refuses with the line.
-    with open(path, encoding="utf-8-sig", errors="surrogateescape", newline="") as file:
-        source = _lines(file, path)
-        before, first = next(((number, line) for number, line in enumerate(source) if not _is_passed_over(line)), (0, ""))
-        header = [cell.strip() for cell in next(_split([first], path, before), (0, [""]))[1]]
-        if not first:
-            raise InputError(path, "", "an empty file", "a header and one row for each measurement of one target")
-        if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
-            raise InputError(path, "header", repr(header[0][:40]), "columns separated by commas, decimals by a point")
-        _check_header(path, header)
-        check_column_names(header, joints, path)
-        chunks: list[list[Any]] = [[] for _ in header]
-        rows: list[int] = []
-        lines: list[int] = []
-        numbered = enumerate(_split(source, path, before + 1), 1)
-        while block := list(islice(numbered, _ROWS_AT_A_TIME)):
-            kept = [(row, line, cells) for row, (line, cells) in block if any(cell.strip() for cell in cells)]
-            for row, line, cells in kept:
-                if len(cells) != len(header):
-                    allowed = f"{len(header)}, one for each column of the header"
-                    raise InputError(path, f"row {row} (line {line})", counted(len(cells), "cell"), allowed)
-            rows += [row for row, _, _ in kept]
-            lines += [line for _, line, _ in kept]
-            if len(rows) > MOST_MEASUREMENTS:
-                raise _refuse_length(path, "more")
-            for name, chunk, column in zip(header, chunks, zip(*(cells for _, _, cells in kept), strict=True), strict=False):
-                chunk.append([sys.intern(cell.strip()) for cell in column] if name in texts else _numbers(column))
-    columns = {name: _join(chunk) for name, chunk in zip(header, chunks, strict=True)}
-    return columns, np.array(rows, np.int32), np.array(lines, np.int32)
-
-
-def _lines(file: TextIO, path: str) -> Iterator[str]:
-    """Lines of a file, of bounded length each."""
-    for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), ""), 1):
-        if len(line) == _LONGEST_LINE:
-            raise InputError(path, f"line {number}", f"{_LONGEST_LINE} characters or more", "one measurement in a line")
-        if not line.isascii() and any("\ud800" <= character <= "\udfff" for character in line):
-            raise InputError(path, f"line {number}", "text that is not UTF-8", "a UTF-8 file")
-        if character := steering(line.rstrip("\r\n").replace("\t", " ")):
-            raise InputError(path, f"line {number}", f"the character {character!a}", "printable characters")
-        yield line
-
-
-def _is_passed_over(line: str) -> bool:
-    """Whether a line before the header is blank or a comment."""
-    return not line.strip() or line.lstrip().startswith(_COMMENT)
-
-
-def _split(lines: Iterable[str], path: str, before: int) -> Iterator[tuple[int, list[str]]]:
-    """Line in the file and cells of each row; `before` lines of the file are left out."""
-    reader = csv.reader(lines, skipinitialspace=True, strict=True)
-    ended = 0
-    try:
-        for cells in reader:
-            ended = reader.line_num
-            yield before + ended, cells
-    except csv.Error as error:
-        # A quote that is never closed is in the first of the lines that it swallows.
-        raise InputError(path, f"line {before + ended + 1}", str(error), "comma-separated values, quotes in pairs") from None
-
-
-def _numbers(cells: Sequence[str]) -> np.ndarray | list[str]:
-    """Cells as numbers where all of them are, else as they stand in the file."""
-    try:
-        values = _read_numbers(cells)
-    except ValueError:
-        return list(cells)
-    return values if np.isfinite(values).all() else list(cells)
-
-
-def _read_numbers(cells: Sequence[Any] | np.ndarray) -> np.ndarray:
-    """ndarray of float (N,); a ValueError or TypeError where a cell is none, such as 1_0 or other scripts' digits."""
-    if not isinstance(cells, np.ndarray) and any(isinstance(cell, str) and not _is_plain(cell) for cell in cells):
-        raise ValueError
-    return np.array(cells, float)
-
-
-def _is_plain(cell: str) -> bool:
-    return "_" not in cell and (cell.isascii() or cell.strip().isascii())
-
-
-def _join(chunks: Sequence[Any]) -> Sequence[Any] | np.ndarray:
-    if chunks and all(isinstance(chunk, np.ndarray) for chunk in chunks):
-        return np.concatenate(chunks)
-    return [cell for chunk in chunks for cell in chunk]
-
-
-def _read_parquet(path: str, joints: int) -> tuple[Columns, np.ndarray, None]:
-    texts = [name for name, column in file_columns(joints).items() if column.type == "string"]
     try:
         # pyarrow's own complaint of a column that is there twice is a list of all columns.
         with pq.ParquetFile(path) as file:
             fields, count, groups = file.schema_arrow, file.metadata.num_rows, file.metadata.num_row_groups
-        names = fields.names
-        _check_header(path, names)
-        check_column_names(names, joints, path)
+        check_column_names(fields.names, joints, path)
         # A kilobyte may hold a list of a billion numbers; each row group takes memory of its own beside its rows.
-        if nested := next((field for field in fields if pa.types.is_nested(field.type)), None):
-            raise InputError(path, f"column {nested.name}", f"type {nested.type}", "numbers, or text")
+        for field in fields:
+            kind = field.type
+            is_number = pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_null(kind)
+            word = kind.value_type if pa.types.is_dictionary(kind) else kind
+            if not (is_number or (pa.types.is_string(word) and field.name in texts)):
+                allowed = "numbers, or text" if field.name in texts else "numbers"
+                raise InputError(path, f"column {field.name}", f"type {field.type}", allowed)
         if groups > _MOST_ROW_GROUPS:
             raise InputError(path, "", f"{groups} row groups", f"at most {_MOST_ROW_GROUPS}")
         if count > MOST_MEASUREMENTS:
-            raise _refuse_length(path, f"{count}")
+            allowed = f"at most {MOST_MEASUREMENTS} (the mean of a tracker's stream at each pose is one measurement)"
+            raise InputError(path, "", f"{count} rows of data", allowed)
         # As dictionaries texts take the memory that they take in the file.
-        table = pq.read_table(
-            path, read_dictionary=[name for name in texts if name in names], page_checksum_verification=True, partitioning=None
-        )
+        there = [name for name in fields.names if name in texts]
+        table = pq.read_table(path, read_dictionary=there, page_checksum_verification=True, partitioning=None)
         table.validate(full=True)
-        columns = {name: _cells(path, name, column) for name, column in zip(table.column_names, table.columns, strict=True)}
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
-    return columns, np.arange(1, table.num_rows + 1, dtype=np.int32), None
-
-
-def _cells(path: str, name: str, column: pa.ChunkedArray) -> Sequence[Any] | np.ndarray:
-    """Cells of a column of Parquet: an array where all are numbers, which takes a fourth of the memory of a list."""
-    kind = column.type
-    if pa.types.is_dictionary(kind) and pa.types.is_string(kind.value_type):
-        whole = column.unify_dictionaries().combine_chunks()
-        words = [*map(sys.intern, whole.dictionary.to_pylist()), None]
-        return [words[code] for code in whole.indices.fill_null(len(words) - 1).to_pylist()]
-    if (pa.types.is_floating(kind) or pa.types.is_integer(kind)) and not column.null_count:
-        return column.to_numpy()
-    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_string(kind) or pa.types.is_null(kind)):
-        raise InputError(path, f"column {name}", f"type {kind}", "numbers, or text")
-    return column.to_pylist()
-
-
-def _check_header(path: str, names: Sequence[str]) -> None:
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            raise InputError(path, "header", f"column {name!r} twice", "each column once")
-        seen.add(name)
-
-
-def _refuse_length(path: str, found: str) -> InputError:
-    allowed = f"at most {MOST_MEASUREMENTS} (the mean of a tracker's stream at each pose is one measurement)"
-    return InputError(path, "", f"{found} rows of data", allowed)
-
-
-class MeasurementFile:
-    """A file of measurements, whose columns are checked as they are asked for.
-
-    `columns`: cells as they stand in the file. `rows` (N,): number in the file of each row that is not blank, 1 for the first
-    of data. `lines` (N,): line of the file that each row ends in, where the file is a text. `angles`, `wrench`, `approach`,
-    `orientation`: names of the columns that belong together; no orientation where positions are measured.
-    """
-
-    def __init__(
-        self, path: str, columns: Columns, rows: np.ndarray, lines: np.ndarray | None, joints: int, measured: str
-    ) -> None:
-        self.path, self.columns, self.rows, self.lines = path, columns, rows, lines
-        known = file_columns(joints)
-        self.angles = [f"q{j}" for j in range(1, joints + 1)]
-        self.approach = [f"approach{j}" for j in range(1, joints + 1)]
-        self.wrench = [name for name, _, _ in WRENCH]
-        self.orientation = ["rx", "ry", "rz"] if measured == "pose" else []
-        required = ["pose", "load", "repeat", "target", *self.angles, "x", "y", "z", *self.orientation]
-        for group in (self.wrench, self.approach):
-            required += group if any(name in columns for name in group) else []
-        for name in required:
-            if name not in columns:
-                unit = f" in {known[name].unit}" if known[name].unit else ""
-                raise self.fault("header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
-        for name in self.angles:
-            for unit in SHOWN:
-                self._check_shown(name, f"{name}_{unit}", SHOWN[unit])
-
-    @property
-    def header_line(self) -> int | None:
-        """Line of the header, where every row of data is a line of a text."""
-        if self.lines is None or np.ptp(self.lines - self.rows):
-            return None
-        return int(self.lines[0] - self.rows[0])
-
-    def fault(self, key: str, found: str, allowed: str) -> InputError:
-        """InputError of this file."""
-        return InputError(self.path, key, found, allowed)
-
-    def cell_fault(self, index: int, name: str, found: str, allowed: str) -> InputError:
-        """InputError of one cell, or without `name` of a row; `index` counts the measurements."""
-        column = f", column {name}" if name else ""
-        line = "" if self.lines is None else f" (line {self.lines[index]})"
-        return self.fault(f"row {self.rows[index]}{column}{line}", found, allowed)
-
-    def has(self, names: Iterable[str]) -> bool:
-        """Whether all of some columns are there."""
-        return all(name in self.columns for name in names)
-
-    def numbers(self, names: Iterable[str]) -> np.ndarray:
-        """ndarray (N, len(names)) of finite numbers."""
-        return np.column_stack([self._column(name) for name in names])
-
-    def integers(self, name: str) -> np.ndarray:
-        """ndarray of int32 (N,)."""
-        values = self._column(name)
-        wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
-        if wrong.any():
-            index = int(np.argmax(wrong))
-            raise self._value_fault(index, name, f"an integer, up to {2**31 - 1}")
-        return values.astype(np.int32)
-
-    def texts(self, name: str) -> list[str]:
-        """list of str (N,)."""
-        return [str(cell).strip() for cell in self.columns[name]]
-
-    def _value_fault(self, index: int, name: str, allowed: str) -> InputError:
-        return self.cell_fault(index, name, show_cell(self.columns[name][index]), allowed)
-
-    def _check_shown(self, name: str, beside: str, scale: float) -> None:
-        """Refuse a row in which what the controller shows is not what the joint angle is."""
-        if beside not in self.columns:
-            return
-        values = self._column(name) / scale
-        wrong = np.abs(values - self._column(beside)) > SHOWN_TO
-        if wrong.any():
-            index = int(np.argmax(wrong))
-            allowed = f"{values[index]:.3f}, which is {name}, or a file without the column {beside}"
-            raise self._value_fault(index, beside, allowed)
-
-    def _column(self, name: str) -> np.ndarray:
-        try:
-            values = _read_numbers(self.columns[name])
-        except (ValueError, TypeError):
-            index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
-            raise self._value_fault(index, name, "a number with a decimal point, in digits 0 to 9") from None
-        # Not a number is no more than anything either.
-        sound = np.abs(values) <= LARGEST_NUMBER
-        if not sound.all():
-            raise self._value_fault(int(np.argmin(sound)), name, f"a finite number, up to {LARGEST_NUMBER:g}")
-        if (place := find_beyond(name, values)) is not None:
-            raise self._value_fault(place, name, BOUNDS[name].allowed)
-        return values
-
-
-def _is_number(cell: Any) -> bool:
-    try:
-        _read_numbers([cell])
-    except (ValueError, TypeError):
-        return False
-    return True
-
-
-def show_cell(cell: Any) -> str:
-    """A cell as an error shows it."""
-    text = str(cell).strip().removesuffix(".0") if cell is not None else ""
-    return repr(text[:40]) if text else "nothing"
+    columns = dict(zip(table.column_names, table.columns, strict=True))
+    return Cells(path, columns, np.arange(1, table.num_rows + 1, dtype=np.int32))
 
 
 def _write_csv(path: str, columns: Iterable[Column], table: Mapping[str, Sequence[Any] | np.ndarray]) -> None:

@@ -19,10 +19,12 @@ from elastocal.campaigns.campaign import (
     Measurements,
     Target,
     assemble_campaign,
+    groups_of,
     targets_from,
 )
 from elastocal.campaigns.holdout import (
     FEWEST_HELD_OUT_POSES,
+    SAME_POSE_RAD,
     held_out_mask,
     holdout_from,
     is_file,
@@ -30,12 +32,13 @@ from elastocal.campaigns.holdout import (
     measured_poses,
     other_folder,
 )
-from elastocal.campaigns.measurement_checks import check_angles, check_measurements
-from elastocal.campaigns.measurements import CSV, PARQUET, MeasurementFile, read_measurements, show_cell
+from elastocal.campaigns.measurements import CSV, FARTHEST_RAD, PARQUET, ROTATION, read_measurements
+from elastocal.campaigns.tables import Cells
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import kind_of
+from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -58,8 +61,8 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
     _tables(folder)
     table = read_measurements(folder, robot.joints, document["measured"])
-    measurements = _measurements(table, robot, targets)
-    check_measurements(measurements, table, robot, targets, source)
+    measurements = _measurements(table, robot, targets, document["measured"])
+    _check_measurements(measurements, table, robot, targets, source)
     _check_compliance(document, robot, robot_path, measurements, source)
     _check_noise(document, measurements, robot.joints, source)
     held_out_mask(holdout, measurements, robot.reported_offset, source)
@@ -68,11 +71,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
 
 
 def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:
-    """What a campaign says of itself, and where its robot is described.
-
-    `folder`, `robots_folder`: as in `read_campaign`. Returns `document`: contents of ``campaign.yaml``, which follow their
-    schema. Raises `InputError`: a document that its schema refuses, or a robot that is not there.
-    """
+    """What a campaign says of itself, as its schema has it, and where its robot is described."""
     source = (Path(folder) / DOCUMENT).as_posix()
     _check_place(Path(source), folder)
     document = read_document(source)
@@ -81,10 +80,7 @@ def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[di
 
 
 def campaign_files(folder: str | Path, robots_folder: str | Path) -> list[str]:
-    """Files that a campaign is read from, those of the campaign that holds its test included.
-
-    `folder`, `robots_folder`: as in `read_campaign`. Raises `InputError`: as in `read_descriptions` and `holdout.other_folder`.
-    """
+    """Files that a campaign is read from, those of the campaign that holds its test included."""
     document, robot_path = read_descriptions(folder, robots_folder)
     files = [Path(folder) / DOCUMENT, *_tables(Path(folder)), robot_path]
     if other := document.get("holdout", {}).get("campaign"):
@@ -113,12 +109,7 @@ def read_robot(path: str | Path) -> Robot:
 def held_out_campaign(
     campaign: Campaign, folder: str | Path, robots_folder: str | Path, effects: Collection[str] | None = None
 ) -> Campaign | None:
-    """The other campaign that tests this one.
-
-    `folder`: folder of `campaign`. `effects`: as in `read_campaign`. Returns with its own targets and frame; all of its
-    measurements are for the test. None where this campaign holds out its own. Raises `InputError`: a fault of the other
-    campaign, or another chain than this one's.
-    """
+    """The other campaign that tests all of this one, of the same chain; None where this campaign holds out its own poses."""
     if "campaign" not in campaign.holdout:
         return None
     source, key = (Path(folder) / DOCUMENT).as_posix(), "holdout.campaign"
@@ -133,14 +124,9 @@ def held_out_campaign(
 
 
 def folds_of(folder: str | Path, robots_folder: str | Path, number: int, of: int) -> dict[str, Any]:
-    """Poses of one fold of a campaign, as in ``holdout`` of ``campaign.yaml``.
+    """Poses of fold `number`, from 1, `of` so many, dealt out in turn: as in ``holdout`` of ``campaign.yaml``.
 
-    Of K-fold cross-validation [1] by whole poses.
-
-    `folder`, `robots_folder`: as in `read_campaign`. `number`: fold, from 1. `of`: how many folds; poses are dealt out in turn.
-
-    [1] Geisser, S., The predictive sample reuse method with applications, Journal of the American Statistical Association 70,
-        1975.
+    K-fold cross-validation by whole poses: Geisser, The predictive sample reuse method with applications, JASA 70, 1975.
     """
     pairs = measured_poses(read_campaign(folder, robots_folder).measurements)[0]
     return {"poses": pairs[number - 1 :: of].tolist()}
@@ -187,35 +173,130 @@ def _check_place(path: Path, folder: str | Path) -> None:
         raise InputError(path, "", f"{kind_of(os.lstat(path).st_mode)} that leads to no file", "the file itself")
 
 
-def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target]) -> Measurements:
-    reported = table.numbers(table.angles)
-    check_angles(reported, table, robot)
+def _measurements(table: Cells, robot: Robot, targets: Sequence[Target], measured: str) -> Measurements:
+    reported = table.matrix(f"q{j}" for j in range(1, robot.joints + 1))
+    _check_angles(reported, table, robot)
     names = {target.name: index for index, target in enumerate(targets)}
     labels = table.texts("target")
-    for index, label in enumerate(labels):
-        if label not in names:
-            allowed = f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
-            raise table.cell_fault(index, "target", show_cell(label), allowed)
+    unknown = next((index for index, label in enumerate(labels) if label not in names), None)
+    if unknown is not None:
+        raise table.fault(unknown, "target", f"a target of {DOCUMENT}: {closest_first(labels[unknown], list(names))}")
     approach = None
-    if table.has(table.approach):
-        senses = table.numbers(table.approach)
-        wrong = ~np.isin(senses, (-1.0, 0.0, 1.0))
+    if "approach1" in table.columns:
+        approach = table.matrix(f"approach{j}" for j in range(1, robot.joints + 1))
+        wrong = ~np.isin(approach, (-1.0, 0.0, 1.0))
         if wrong.any():
             index, joint = np.argwhere(wrong)[0]
-            raise table.cell_fault(index, table.approach[joint], f"{senses[index, joint]:g}", "-1, 0 or 1")
+            raise table.fault(index, f"approach{joint + 1}", "-1, 0 or 1")
         # Where a joint of the model follows two reported ones that came from opposite sides, its own sense is not known.
-        approach = np.sign(senses @ robot.reported_matrix.T)
+        approach = np.sign(approach @ robot.reported_matrix.T)
     return Measurements(
-        session=table.integers("session") if table.has(["session"]) else np.zeros(len(table.rows), np.int32),
+        session=table.integers("session") if "session" in table.columns else np.zeros(len(table.rows), np.int32),
         pose=table.integers("pose"),
         load=table.integers("load"),
         repeat=table.integers("repeat"),
         target=np.array([names[label] for label in labels], np.int32),
         joint_angles=robot.model_angles(reported),
-        wrench=table.numbers(table.wrench) if table.has(table.wrench) else np.zeros((len(table.rows), 6)),
-        position=table.numbers("xyz"),
-        rotation_vector=table.numbers(table.orientation) if table.orientation else None,
+        wrench=table.matrix(WRENCH_NAMES) if "fx" in table.columns else np.zeros((len(table.rows), 6)),
+        position=table.matrix("xyz"),
+        rotation_vector=table.matrix(ROTATION) if measured == "pose" else None,
         approach=approach,
-        **{name: table.numbers([name])[:, 0] if table.has([name]) else None for name in ("time_s", "temperature_c", "u95_m")},
+        **{name: table.numbers(name) if name in table.columns else None for name in ("time_s", "temperature_c", "u95_m")},
         row=table.rows,
     )
+
+
+# A joint this far beyond its limits is no joint at its limit.
+_BEYOND_LIMITS_RAD = 0.5
+# A unit is wrong in a whole file. What is off in fewer rows than this is a gross error of theirs, which the diagnosis names.
+_SINGLE_ROWS = 0.2
+# Positions spread over more reaches than this are not in metres. Millimetres spread so unless all lie within centimetres.
+_FARTHEST_REACHES = 10.0
+# A target sits at most about this far from its measuring point.
+_LONGEST_TOOL_M = 1.0
+
+
+def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
+    """Angles that look like degrees: more turns than a joint has, or far beyond limits that a 57th of the angle keeps.
+
+    `reported` (N, n): joint angles as the controller reports them. Returns (N, n) of bool.
+    """
+    low, high = robot.joint_limits.T
+    farthest = max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
+
+    def inside(reported: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        angles = robot.model_angles(reported)
+        return (angles >= low - margin) & (angles <= high + margin)
+
+    # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
+    beyond = ~inside(reported, _BEYOND_LIMITS_RAD) & ~inside(-reported, _BEYOND_LIMITS_RAD)
+    return np.asarray((np.abs(reported) > farthest) | (beyond & inside(np.radians(reported))))
+
+
+def _check_angles(reported: np.ndarray, table: Cells, robot: Robot) -> None:
+    """Refuse degrees in more than single rows of angles (N, n) as the controller reports them."""
+    low, high = robot.joint_limits.T
+    wrong = find_degrees(reported, robot)
+    if wrong.any(axis=1).mean() > _SINGLE_ROWS:
+        index, joint = np.argwhere(wrong)[0]
+        allowed = (
+            f"rad, not degrees, of a joint that goes from {low[joint]:.2f} to {high[joint]:.2f} rad"
+            " (counted otherwise: reported_joints of the robot file)"
+        )
+        raise table.fault(index, f"q{joint + 1}", allowed)
+
+
+def _check_measurements(measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target], source: str) -> None:
+    """Refuse measurements that cannot be of one campaign, `source`, in the units of the format, by their places there."""
+    names = ("session", "pose", "load", "repeat", "target")
+    key = np.column_stack([getattr(measurements, name) for name in names])
+    first, group = groups_of(key)
+    again = first[group] != np.arange(len(measurements))
+    if again.any():
+        index = int(np.argmax(again))
+        words = [f"{name} {value}" for name, value in zip(names, key[index], strict=True) if name in table.columns]
+        found = f"{', '.join(words[:-1])}, target {targets[key[index, -1]].name} again"
+        raise table.fault(index, "", f"each once (first in {table.place(first[group[index]])})", found)
+    unloaded = measurements.load == 0
+    if "fx" not in table.columns and not unloaded.all():
+        raise table.fault(int(np.argmin(unloaded)), "load", f"0 where there are no columns {', '.join(WRENCH_NAMES)}")
+    wrong = unloaded[:, None] & (measurements.wrench != 0)
+    if wrong.any():
+        index, component = np.argwhere(wrong)[0]
+        found = f"{measurements.wrench[index, component]:g} with load 0"
+        raise table.fault(index, WRENCH_NAMES[component], "0 where load is 0", found)
+    pose_of = measured_poses(measurements)[1]
+    first = np.unique(pose_of, return_index=True)[1]
+    reported = table.matrix(f"q{j}" for j in range(1, robot.joints + 1))
+    away = np.abs(reported - reported[first[pose_of]])
+    wrong = away > SAME_POSE_RAD
+    if wrong.any():
+        index, joint = np.argwhere(wrong)[0]
+        earlier = table.place(first[pose_of[index]])
+        found = f"{reported[index, joint]:g}, {away[index, joint]:.3g} rad from {earlier} of the same pose"
+        raise table.fault(index, f"q{joint + 1}", f"measurements of one pose within {SAME_POSE_RAD} rad", found)
+    _check_units(measurements, table, robot, targets)
+    for index, target in enumerate(targets):
+        if not (measurements.target == index).any():
+            allowed = f"targets that {Path(table.path).name} has measurements of"
+            raise InputError(source, f"targets.{target.name}", "no measurement of it", allowed)
+
+
+def _check_units(measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target]) -> None:
+    tool = max((np.linalg.norm(target.offset_m) for target in targets if target.offset_m is not None), default=_LONGEST_TOOL_M)
+    reach = tool + sum(abs(transform.constant) for transform in robot.chain.transforms if transform.kind == "T")
+    for session in np.unique(measurements.session):
+        members = np.flatnonzero(measurements.session == session)
+        position = measurements.position[members]
+        away = np.abs(position - np.median(position, axis=0))
+        if np.quantile(away.max(axis=1), 1.0 - _SINGLE_ROWS) > _FARTHEST_REACHES * reach:
+            index, axis = np.unravel_index(np.argmax(away), away.shape)
+            found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the measurements"
+            allowed = f"metres, not millimetres; the robot reaches {reach:.3g} m"
+            raise table.fault(members[index], "xyz"[axis], allowed, found)
+    if measurements.rotation_vector is not None:
+        angle = np.linalg.norm(measurements.rotation_vector, axis=1)
+        if angle.max() > FARTHEST_RAD:
+            turned = int(np.argmax(angle))
+            allowed = f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most"
+            raise table.fault(turned, "rx, ry, rz", allowed, f"a turn of {angle[turned]:.4g}")

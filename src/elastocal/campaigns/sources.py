@@ -1,6 +1,5 @@
 """Which campaigns a configuration names and where they come from, and the user's own: checked before any job starts."""
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,16 +11,11 @@ from elastocal.errors import InputError
 from elastocal.io.documents import document_path, named_document
 from elastocal.io.json_files import read_json
 
-# What Snakemake refuses as the value of a wildcard.
-_PERIODIC = re.compile(r"(.+)\1{19}$")
-
 
 def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> dict[str, dict[str, Any]]:
-    """Where the campaigns that a configuration names come from.
+    """Documents of the campaigns that a configuration names, by the names of their files in `folder`, checked.
 
-    `config`: checked. `folder`: holds ``campaigns/`` and ``robots/``. `source`: file of the configuration, named in errors.
-    Returns documents by the names of their files; a simulated one has the document of its robot under ``robot_document``.
-    Raises `InputError`: the first fault found.
+    A simulated one has the document of its robot under ``robot_document``. `source`: file of the configuration.
     """
     found = {}
     for name in named_campaigns(config):
@@ -50,11 +44,10 @@ def named_league(config: Mapping[str, Any]) -> list[str]:
 
 
 def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results: str | Path) -> dict[str, str]:
-    """A user's own campaign, its documents checked before any job starts.
+    """Folder of a user's own campaign by its name, spelled in one way however it was given; empty where there is none.
 
-    `config`: ``campaign`` is its folder. `results`: folder with the results of each campaign by its name. Returns its folder by
-    its name, spelled in one way however it was given; empty where there is none. Raises `InputError`: as
-    `reading.campaign_files`; a name that a campaign of this project has, or another one whose results are there.
+    `config`: ``campaign`` is its folder. `results`: of each campaign by its name. An `InputError` refuses faults of its
+    documents, and a name that a campaign of this project has, or another one whose results are there.
     """
     if not config.get("campaign"):
         return {}
@@ -64,8 +57,6 @@ def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results:
             raise InputError(path, "", "braces", "a path without braces, which Snakemake takes for wildcards")
     document, _ = read_descriptions(folder, robots_folder)
     name, source = document["campaign"], f"{folder}/{DOCUMENT}"
-    if _PERIODIC.search(name):
-        raise InputError(source, "campaign", repr(name), "a name that Snakemake does not take for an endless repetition")
     if name in named_campaigns(config):
         raise InputError(source, "campaign", repr(name), "a name that no campaign of config.yaml has")
     earlier = _folder_of_results(Path(results) / name)

@@ -41,7 +41,7 @@ def init(
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV, PARQUET, described_by
     from elastocal.campaigns.reading import read_robot
-    from elastocal.campaigns.template import campaign_template, robot_template, sheet_template
+    from elastocal.campaigns.writing import campaign_template, robot_template, sheet_template
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text

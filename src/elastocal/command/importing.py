@@ -35,7 +35,6 @@ def urdf(
     tip: Annotated[str, Option(help="Link at the end; its frame is the last measuring point.")],
     output: _Output,
     point: Annotated[list[str] | None, Option(help="A link between them that targets may sit on; any number.")] = None,
-    limits: Annotated[Literal["deg", "rad"] | None, Option(help="Unit of the limits of joints that turn.")] = None,
     force: _Force = False,
 ) -> None:
     """Make a robot file of the chain between two links of a URDF.
@@ -46,7 +45,7 @@ def urdf(
     from elastocal.exchange.urdf import robot_from_urdf
 
     refuse_existing(output, force)
-    _write(robot_from_urdf(file, base, tip, point or (), limits_in=limits), output)
+    _write(robot_from_urdf(file, base, tip, point or ()), output)
 
 
 @importing.command(epilog=example("elastocal import dh arm.csv -o robot.yaml"))
@@ -63,8 +62,8 @@ def dh(
 ) -> None:
     """Make a robot file of a Denavit-Hartenberg table.
 
-    The table has one row for each joint. Columns: theta_offset_deg, d_m, a_m, alpha_deg; optionally joint, type (R, P or F),
-    lower_deg, upper_deg, point. The first two rows of a UR5e, standard notation:
+    The table has one row for each joint. Columns: theta_offset_deg, d_m, a_m, alpha_deg; optionally joint
+    and type (R). The first two rows of a UR5e, standard notation:
 
     joint, theta_offset_deg, d_m, a_m, alpha_deg, type
 
@@ -102,7 +101,7 @@ def csv(
     wrench: Annotated[Literal["on-robot", "by-robot"] | None, Option(help="Forces on the robot, or by it.")] = None,
     skip_empty: Annotated[bool, Option("--skip-empty", help="Leave out rows without a position.")] = False,
     decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of decimals. Default: found out.")] = None,
-    encoding: Annotated[str | None, Option(help="Such as utf-8 or cp1252. Default: found out.")] = None,
+    encoding: Annotated[str | None, Option(help="Such as cp1252. Default: UTF-8, or UTF-16 by its mark.")] = None,
     header: Annotated[int | None, Option(min=1, max=MOST_ROWS, help="Line with the names. Default: found out.")] = None,
     robot: Annotated[Path | None, Option(help="Its joint_names are names of columns. Default: the campaign's robot.")] = None,
     options: Annotated[Path | None, Option(help="import.yaml of an earlier import, to repeat it.")] = None,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
-ROBOT, URDF, SIDECAR, DH, DELTAS = _EXPORTED = "robot.yaml", "robot.urdf", "effects.json", "dh.csv", "dh_deltas.csv"
+ROBOT, URDF, SIDECAR = _EXPORTED = "robot.yaml", "robot.urdf", "effects.json"
 _ROUNDING_MM = 1e-5
 
 
@@ -103,9 +103,9 @@ def export(
         Path | None, Option(help="The URDF that the robot was imported from. Its joint origins are changed, nothing else.")
     ] = None,
 ) -> None:
-    """Write the calibrated robot: robot file, URDF, DH, effects.
+    """Write the calibrated robot: robot file, URDF, effects.
 
-    URDF and DH parameters hold the geometry; effects.json holds springs and effects as well. None holds the regression on the
+    A URDF holds the geometry; effects.json holds springs and effects as well. None holds the regression on the
     remainder: what is lost with it is said, and the accuracy stated is without.
     """
     from datetime import date
@@ -143,7 +143,6 @@ def export(
             (partial / URDF).write_bytes(drop_in.content)
             lines += _drop_in(drop_in, partial / URDF, nominal, robot, states.joint_angles)
         write_json(partial / SIDECAR, document)
-        lines += _denavit_hartenberg(nominal, robot, partial, output)
     at = nominal.reported_angles(states.joint_angles)
     under = OperatingConditions(states.wrench, None, states.time_s, states.temperature_c)
     if document["effects"]:
@@ -178,17 +177,3 @@ def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, a
         what = "ratios of joints, and errors behind a last joint that has no fixed one after it"
         lines.append(f"{URDF} cannot hold {what}: up to {off:.3f} mm at the measured poses")
     return lines
-
-
-def _denavit_hartenberg(nominal: Robot, robot: Robot, partial: Path, output: Path) -> list[str]:
-    """Write the DH parameters, and by how much they differ from the nominal ones; lines to print."""
-    from elastocal.exchange.dh_writing import dh_deltas, dh_table
-    from elastocal.io.data_frames import write_csv
-
-    try:
-        table, deltas = dh_table(robot, nominal), dh_deltas(nominal, robot)
-    except InputError as error:
-        return [f"no DH parameters: {error}"]
-    write_csv(partial / DH, table, digits=12)
-    write_csv(partial / DELTAS, deltas)
-    return [str(output / DH), str(output / DELTAS)]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.campaigns.groups import groups_of
+from elastocal.campaigns.campaign import groups_of
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states, single_observations
 from elastocal.fitting.prediction import measured_in_base

@@ -1,8 +1,8 @@
 """What the columns of other people's tables are: by their names, and in which unit; what is ambiguous is asked for.
 
-A column is recognized by what it is usually called, such as ``J1``, ``A1``, ``Joint 1`` or ``q1 [deg]`` for the first joint, or
-by the end of a topic, ``/tcp/pose/position/x``. Its unit stands in brackets or behind the name (``x_mm``), in a row under the
-names, or is stated by an option. Orientations come in several notations, of which some say by themselves what they are.
+A column is recognized by what it is usually called, such as ``J1``, ``A1``, ``Joint 1`` or ``q1 [deg]`` for the first joint.
+Its unit stands in brackets or behind the name (``x_mm``), in a row under the names, or is stated by an option. Orientations
+come in several notations, of which some say by themselves what they are.
 """
 
 import itertools
@@ -14,9 +14,8 @@ import numpy as np
 from scipy import constants
 from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.tables import TextTable
 from elastocal.errors import InputError, closest_first
-from elastocal.exchange.csv_dialect import TextTable
-from elastocal.io.texts import plain_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
@@ -51,8 +50,6 @@ _ALLOWED = (
 )
 # Rounded to four digits, a quaternion's length and a matrix' columns are off by less.
 UNIT_LENGTH = 2e-3
-# Columns that a table may have in two meanings: external axes E1 to E3 beside an orientation.
-_OTHER_ANGLES = (("A", "B", "C"), ("W", "P", "R"), ("O", "A", "T"))
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _INDEX = re.compile(r"([^\[(]*?)\s*[\[(]\s*([0-9]+)\s*[\])](.*)", re.ASCII)
 # Of what has a usual unit; angles and lengths have two each and must be stated.
@@ -72,7 +69,7 @@ _ALSO = {
     **{f"f{axis}": (f"force{axis}",) for axis in "xyz"},
     **{f"m{axis}": (f"moment{axis}", f"torque{axis}") for axis in "xyz"},
     **{f"r{axis}": (f"rot{axis}", angle, f"rv{axis}") for axis, angle in zip("xyz", ("roll", "pitch", "yaw"), strict=True)},
-    "pose": ("poseid", "posenumber", "configuration", "config"),
+    "pose": ("poseid", "posenumber"),
     "load": ("loadid", "loadcase"),
     "repeat": ("repetition", "cycle"),
     "target": ("reflector", "smr", "marker"),
@@ -82,9 +79,8 @@ _ALSO = {
     "u95_m": ("u95", "expandeduncertainty"),
 }
 _KNOWN = {other: name for name, others in _ALSO.items() for other in (name.replace("_", ""), *others)}
-_KNOWN |= {name: name for name in (*EULER, *MATRIX, *HOMOGENEOUS)}
-# Last but one names of topics that hold angles by their number.
-_ANGLES = ("position", "positions", "jointstates", "joints", "jointpositions")
+# Euler angles are named by options alone: E1 to E3 may be external axes.
+_KNOWN |= {name: name for name in (*MATRIX, *HOMOGENEOUS)}
 
 
 def kind_of(name: str) -> tuple[str, ...]:
@@ -103,7 +99,7 @@ def kind_of(name: str) -> tuple[str, ...]:
 
 def is_name(name: str) -> bool:
     """Whether a column of that name can be imported."""
-    return name in _ALSO or name in _KNOWN.values() or re.fullmatch(r"(q|approach)[1-9][0-9]?", name) is not None
+    return name in {*_KNOWN.values(), *EULER} or re.fullmatch(r"(q|approach)[1-9][0-9]?", name) is not None
 
 
 def has_position(names: Collection[str | None]) -> bool:
@@ -123,10 +119,15 @@ def find_joints(names: Iterable[str]) -> list[str]:
     return [f"q{number}" for number in sorted(int(name[1:]) for name in names if re.fullmatch(r"q[0-9]+", name))]
 
 
-def unit_scale(unit: str, kinds: Iterable[str]) -> float | None:
+def _scale(unit: str, kinds: Iterable[str]) -> float | None:
     """SI value of one unit, if it is one of some kinds."""
     plain = _simplify_unit(unit)
     return next((UNITS[kind][plain] for kind in kinds if plain in UNITS[kind]), None)
+
+
+def scales_of(units: Mapping[str, str]) -> dict[str, float]:
+    """SI values of the units of columns, by their names."""
+    return {name: _scale(unit, kind_of(name)) or 1.0 for name, unit in units.items()}
 
 
 def read_units(cells: Sequence[str]) -> list[str] | None:
@@ -140,8 +141,7 @@ def read_units(cells: Sequence[str]) -> list[str] | None:
 def recognize_column(header: str) -> tuple[str | None, str | None]:
     """Name of a column and unit, each None where the header does not say it.
 
-    A number in brackets is an index, whatever else stands there a unit. Of a topic such as ``/tcp/pose/position/x`` or
-    ``field.pose.position.x`` the last two names count, or the last but one before ``position``.
+    A number in brackets is an index, whatever else stands there a unit.
     """
     text, unit = split_unit(header)
     name = _find_name(text)
@@ -161,31 +161,18 @@ def split_unit(header: str) -> tuple[str, str | None]:
     behind = _BEHIND.fullmatch(header)
     if _find_name(header) is None and behind and any(_simplify_unit(behind[2]) in units for units in UNITS.values()):
         name = _find_name(behind[1])
-        if name is None or unit_scale(behind[2], kind_of(name)) is not None:
+        if name is None or _scale(behind[2], kind_of(name)) is not None:
             return behind[1], _simplify_unit(behind[2])
     return header, None
 
 
 def _find_name(text: str) -> str | None:
-    for plain in _names_in(text):
-        for pattern, letter in ((_JOINT, "q"), (_APPROACH, "approach")):
-            # Joint 0 is somebody's first: whose, an option or the other columns have to say.
-            if (match := pattern.fullmatch(plain)) and (number := int(match[match.lastindex or 1])):
-                return f"{letter}{number}"
-        if plain in _KNOWN:
-            return _KNOWN[plain]
-    return None
-
-
-def _names_in(text: str) -> list[str]:
-    """What a header may be called: the whole of it, and of a topic its end."""
-    parts = [plain for part in re.split(r"[/.]", text) if (plain := _simplify(part))]
-    if len(parts) < 2:
-        return [_simplify(text)]
-    if parts[-1] in ("position", "pos"):
-        return [_simplify(text), parts[-2]]
-    alone = [parts[-1]] if _JOINT.fullmatch(parts[-1]) and parts[-2] in _ANGLES else []
-    return [_simplify(text), parts[-2] + parts[-1], *alone]
+    plain = _simplify(text)
+    for pattern, letter in ((_JOINT, "q"), (_APPROACH, "approach")):
+        # Joint 0 is somebody's first: whose, an option has to say.
+        if (match := pattern.fullmatch(plain)) and (number := int(match[match.lastindex or 1])):
+            return f"{letter}{number}"
+    return _KNOWN.get(plain)
 
 
 def _simplify(text: str) -> str:
@@ -196,45 +183,35 @@ def _simplify_unit(unit: str) -> str:
     return re.sub(r"[ ·*.⋅]", "", unit).replace("degrees", "deg").replace("degree", "deg")
 
 
-def find_columns(
-    text: TextTable, mapped: Mapping[str, str], robot: Robot | None
-) -> tuple[dict[str, str], dict[str, str], list[str]]:
-    """Headers by name, those of the options first, the units that headers state, and notes."""
+def find_columns(text: TextTable, mapped: Mapping[str, str], robot: Robot | None) -> tuple[dict[str, str], dict[str, str]]:
+    """Headers by name, those of the options first, and the units that headers and the row under them state, by name."""
     for header in mapped.values():
         if header not in text.columns:
             raise InputError(text.path, "header", f"no column {header!r}", closest_first(header, list(text.columns)))
+    of_joints = {_simplify(called): f"q{joint}" for joint, called in enumerate((robot and robot.joint_names) or (), 1)}
     guesses = {header: recognize_column(header) for header in text.columns}
-    certain: set[str] = set()
-    for joint, called in enumerate((robot and robot.joint_names) or (), 1):
-        for header in text.columns:
-            for plain, unit in ((header, None), split_unit(header)):
-                if header not in certain and _simplify(called) in _names_in(plain):
-                    guesses[header] = (f"q{joint}", unit)
-                    certain.add(header)
-    for header, (name, unit) in guesses.items():
+    parts = {name for name, _ in guesses.values()} | {*mapped}
+    found, stated = dict(mapped), dict[str, str]()
+    for header, (guess, unit) in guesses.items():
+        for plain, beside in (split_unit(header), (header, None)):
+            if name := of_joints.get(_simplify(plain)):
+                guess, unit = name, beside
+        if _simplify(header) == "q0" and {"qx", "qy", "qz"} <= parts and "qw" not in parts:
+            guess, unit = "qw", None
         below = text.units.get(header)
         if unit and below and unit != below:
             allowed = f"one unit; --ignore {header!r}, or a table with one of them"
             raise InputError(text.path, "header", f"{header!r} and {below!r} in the row under it", allowed)
-        guesses[header] = (name, unit or below)
-    parts = {name: header for header, (name, _) in guesses.items() if name in QUATERNION}
-    if parts.keys() == {"qx", "qy", "qz"} and "qw" not in mapped:
-        # With the other three parts of a quaternion q0 has length 1.
-        for header in text.columns:
-            is_free = _simplify(header) == "q0" and header not in mapped.values()
-            if is_free and _have_unit_length(text, [header, *parts.values()]):
-                guesses[header] = ("qw", None)
-                certain.add(header)
-    free = [header for header in text.columns if header not in certain and guesses[header][0] not in mapped]
-    joints, notes = _find_counted_joints(text, free, {*mapped.values()})
-    guesses |= {header: (name, guesses[header][1]) for header, name in joints.items()}
-    found, stated = dict(mapped), dict[str, str]()
-    for header, (guess, unit) in guesses.items():
-        meant = next((name for name, named in mapped.items() if named == header), guess)
+        unit, meant = unit or below, next((name for name, named in mapped.items() if named == header), guess)
+        counted = _JOINT.fullmatch(_simplify(split_unit(header)[0]))
+        if meant is None and counted and int(counted[2]) == 0 and "q1" not in mapped:
+            allowed = f"--column q1={header!r} …, each joint's, or --ignore {header!r}"
+            raise InputError(text.path, "header", f"{header!r}, counted from 0", allowed)
         if meant is None or mapped.get(meant, header) != header:
             continue
         if found.get(meant, header) != header:
-            allowed = f"--column {meant}=NAME, or --ignore NAME"
+            quaternion = "; of a quaternion --column qw=NAME …" if meant in ("q1", "q2", "q3", "q4") else ""
+            allowed = f"--column {meant}=NAME, or --ignore NAME{quaternion}"
             raise InputError(text.path, "header", f"both {found[meant]!r} and {header!r} for {meant}", allowed)
         if meant not in mapped and unit not in (None, *_NO_UNIT) and kind_of(meant) == (NONE,):
             allowed = (
@@ -244,7 +221,7 @@ def find_columns(
         found[meant] = header
         if unit is not None:
             stated[meant] = unit
-    return found, stated, notes
+    return found, stated
 
 
 def find_units(
@@ -273,55 +250,11 @@ def find_units(
         if unit is None:
             option = "--lengths mm" if kinds[0] == LENGTH else "--angles deg"
             raise InputError(text.path, "header", f"no unit of {columns[name]!r}", f"{option} or such, or --unit {name}=UNIT")
-        if unit_scale(unit, kinds) is None:
+        if _scale(unit, kinds) is None:
             allowed = f"{', '.join(unit for kind in kinds for unit in UNITS[kind])}, by --unit {name}=UNIT"
             raise InputError(text.path, f"unit of {columns[name]!r}", repr(unit), allowed)
         found[name] = unit
     return found
-
-
-def _find_counted_joints(text: TextTable, headers: Sequence[str], mapped: set[str]) -> tuple[dict[str, str], list[str]]:
-    """Names of joints that headers count from 0, and notes; what may be a quaternion, or counts in two ways, is asked for."""
-    families: dict[str, dict[int, str]] = {}
-    for header in headers:
-        matches = (_JOINT.fullmatch(name) for name in _names_in(split_unit(header)[0]))
-        if match := next(filter(None, matches), None):
-            families.setdefault(match[1], {}).setdefault(int(match[2]), header)
-    # What options name needs no question, unless they name a part of what is counted from 0.
-    families = {
-        name: members if 0 in members and not mapped >= {*members.values()} else free
-        for name, members in families.items()
-        if (free := {number: header for number, header in members.items() if header not in mapped})
-    }
-    for members in families.values():
-        headers = [members[number] for number in sorted(members)]
-        if sorted(members) in ([0, 1, 2, 3], [1, 2, 3, 4]) and _have_unit_length(text, headers):
-            other = next((each for each in families.values() if each is not members), {1: "NAME"})
-            allowed = (
-                f"--column qw={headers[0]!r} … qz={headers[3]!r} (real part first) and --column q1={other[min(other)]!r} …, or "
-                f"for joints --column q1={headers[0]!r} …"
-            )
-            found = f"{', '.join(headers)}: joints, or quaternions, as they have length 1"
-            raise InputError(text.path, "header", found, allowed)
-    if len(families) > 1 and not set.intersection(*(set(members) - {0} for members in families.values())):
-        named = " and ".join(repr(members[min(members)]) for members in families.values())
-        allowed = "--column q1=NAME …, or --ignore NAME for those of one kind"
-        raise InputError(text.path, "header", f"joints called {named} …", allowed)
-    for members in families.values():
-        if 0 in members:
-            headers = [members[number] for number in sorted(members)]
-            if len(members) != max(members) + 1 or len(members) == 4 or mapped & {*members.values()}:
-                allowed = f"--column q1={headers[0]!r} …, each joint's"
-                raise InputError(text.path, "header", f"{', '.join(headers)}, counted from 0", allowed)
-            note = f"joints counted from 0: q1 is {headers[0]!r}, q{len(headers)} is {headers[-1]!r}"
-            return {header: f"q{number + 1}" for number, header in members.items()}, [note]
-    return {}, []
-
-
-def _have_unit_length(text: TextTable, headers: Sequence[str]) -> bool:
-    rows = [[plain_number(cell) for cell in cells] for cells in zip(*(text.columns[header] for header in headers), strict=True)]
-    numbers = np.array([row for row in rows if None not in row], float)
-    return len(numbers) > 0 and bool((np.abs(np.linalg.norm(numbers, axis=1) - 1.0) <= UNIT_LENGTH).all())
 
 
 def columns_of_rotation(notation: str, there: Collection[str]) -> tuple[str, ...]:
@@ -337,18 +270,16 @@ def columns_of_rotation(notation: str, there: Collection[str]) -> tuple[str, ...
     return by_axis if len(set(axes)) == 3 and all(name in there for name in by_axis) else EULER
 
 
-def find_rotation(text: TextTable, columns: Mapping[str, str], mapped: Mapping[str, str], notation: str | None) -> str:
+def find_rotation(text: TextTable, columns: Mapping[str, str], notation: str | None) -> str:
     """Notation of the orientations of a table: the one that is stated, or the one that the names of columns leave.
 
-    `columns`: headers by name. `mapped`: those of them that options state. Raises `InputError` where it is ambiguous.
+    `columns`: headers by name. Raises `InputError` where it is ambiguous.
     """
     if notation is not None:
         axes = notation.removeprefix(EULER_ANGLES)
         turns = re.fullmatch(r"[XYZ]{3}|[xyz]{3}", axes) and all(one != other for one, other in itertools.pairwise(axes))
         if not (turns if axes != notation else notation in _NOTATIONS):
             raise InputError("--rotation", "", repr(notation), _ALLOWED)
-        if columns_of_rotation(notation, columns) == EULER:
-            _check_external_axes(text, columns, mapped)
         return notation
     for certain in _CERTAIN:
         if all(name in columns for name in _NOTATIONS[certain]):
@@ -360,18 +291,6 @@ def find_rotation(text: TextTable, columns: Mapping[str, str], mapped: Mapping[s
         allowed = f"--rotation vector, euler:ZYX, euler:xyz … or none: {_ALLOWED}"
         raise InputError(text.path, "header", f"orientations {', '.join(angles)} of an unknown notation", allowed)
     return NO_ROTATION
-
-
-def _check_external_axes(text: TextTable, columns: Mapping[str, str], mapped: Mapping[str, str]) -> None:
-    """Ask where angles ``E1`` to ``E3`` may be external axes, as other columns look like the orientation."""
-    plain = {re.split(r"[\[(]", header)[0].strip().upper(): header for header in text.columns}
-    guessed = [columns[name] for name in EULER if name in columns and name not in mapped]
-    others = [[plain[letter] for letter in letters] for letters in _OTHER_ANGLES if plain.keys() >= {*letters}]
-    if guessed and (others or plain.keys() & {"E4", "E5", "E6"}):
-        other_names = others[0] if others else ["NAME", "NAME", "NAME"]
-        allowed = " ".join(f"--column {name}={header!r}" for name, header in zip(EULER, other_names, strict=True))
-        own = " or ".join([f"{', '.join(guessed)} (external axes?)", *(", ".join(each) for each in others)])
-        raise InputError(text.path, "header", f"orientations in {own}", f"{allowed}, or the same with {', '.join(guessed)}")
 
 
 def rotation_vectors(notation: str, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -15,28 +15,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import yaml
-from scipy.spatial import cKDTree
 
-from elastocal.campaigns.measurements import (
-    BOUNDS,
-    FARTHEST_RAD,
-    MOST_JOINTS,
-    TICK,
-    file_columns,
-    find_beyond,
-    sheet_columns,
-    show_cell,
-)
+from elastocal.campaigns.holdout import number_alike
+from elastocal.campaigns.measurements import file_columns
+from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, text_fault
 from elastocal.exchange.column_names import (
-    ANGLE,
     HOMOGENEOUS_MATRICES,
     POSITION,
     QUATERNIONS,
-    TIME,
     TRANSLATION,
-    UNITS,
     VECTOR,
     columns_of_rotation,
     find_columns,
@@ -45,28 +34,22 @@ from elastocal.exchange.column_names import (
     find_units,
     has_position,
     is_name,
-    kind_of,
     lengths_in,
     read_units,
     recognize_column,
     rotation_vectors,
-    unit_scale,
+    scales_of,
 )
-from elastocal.exchange.csv_dialect import Dialect, TextTable, read_text_table
 from elastocal.io.documents import check_document, read_document
-from elastocal.io.texts import A_NUMBER, plain_number
+from elastocal.io.texts import plain_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
 IMPORT = "import.yaml"
 # Angles that a controller reports twice at one standstill agree to better; poses of a plan lie degrees apart.
 SAME_POSE = 1e-3
-# Rows of one pose whose joints stand farther apart (rad or m) are not of one pose: a label says something else.
-_ONE_POSE = 0.1
 # Nanoseconds since 1970 are 2e18.
 _LARGEST_TIME = 1e19
-# Of a pose, load, repeat or session; as in measurements.csv.
-_LARGEST_ORDINAL = 2**31 - 1
 # What programs write where nothing was measured.
 _EMPTY = re.compile(r"|[+-]?nan(\(\w+\))?|[-–—]+|#?n/?a|n\.a\.|null|none", re.IGNORECASE)
 
@@ -110,22 +93,6 @@ def import_options_text(options: ImportOptions, source: str | Path) -> str:
     return f"# The import again: elastocal import csv FILE --options {IMPORT} --folder FOLDER\n{body}"
 
 
-def _sheet_options(text: TextTable, options: ImportOptions) -> ImportOptions:
-    """Options of an import with the units of a sheet of `plan` that a spreadsheet saved, where the table is one.
-
-    Its columns are those of measurements.csv, in its units; those beside, such as ``q1_deg``, are left out.
-    """
-    headers = set(text.columns)
-    beside = headers & sheet_columns(MOST_JOINTS)
-    needed = {TICK, "pose", "load", "repeat", "target", *POSITION}
-    if not (needed <= headers and headers - beside <= {*file_columns(MOST_JOINTS)}):
-        return options
-    joints = {header.partition("_")[0]: "m" if header.endswith("mm") else "rad" for header in beside - {TICK}}
-    units = joints | {"lengths": "m", "angles": "rad"} | dict(options.units or {})
-    rotation = options.rotation or ("vector" if {*VECTOR} <= headers else None)
-    return replace(options, units=units, rotation=rotation, ignore=[*(options.ignore or ()), *sorted(beside)])
-
-
 def _one_row_each(text: TextTable, targets: Mapping[str, Sequence[str]]) -> TextTable:
     """A table with one row for each target of a row, whose position has the headers of the first target's."""
     for name, headers in targets.items():
@@ -143,7 +110,7 @@ def _one_row_each(text: TextTable, targets: Mapping[str, Sequence[str]]) -> Text
     return replace(text, columns=columns, lines=tuple(line for line in text.lines for _ in targets))
 
 
-def rows_with_position(text: TextTable, columns: Mapping[str, str], position: Sequence[str], skip_empty: bool) -> np.ndarray:
+def _filled_rows(text: TextTable, columns: Mapping[str, str], position: Sequence[str], skip_empty: bool) -> np.ndarray:
     """Rows that have a position; `skip_empty`: NaN, - and N/A are none either."""
     empty = _EMPTY.fullmatch if skip_empty else re.compile("").fullmatch
     filled = np.array([[not empty(cell) for cell in text.columns[columns[name]]] for name in position]).all(axis=0)
@@ -157,89 +124,17 @@ def rows_with_position(text: TextTable, columns: Mapping[str, str], position: Se
     return np.flatnonzero(filled)
 
 
-class CellReader:
-    """Cells as numbers in SI units, with the line of what is none."""
-
-    def __init__(self, text: TextTable, columns: Mapping[str, str], units: dict[str, str], kept: np.ndarray) -> None:
-        self.text, self.columns, self.units, self.kept = text, columns, units, kept
-
-    def fault(self, index: int, name: str, allowed: str) -> InputError:
-        """InputError of one cell; `index` counts the rows kept."""
-        row = self.kept[index]
-        header = self.columns[name]
-        where = f"line {self.text.lines[row]}, column {header}"
-        return InputError(self.text.path, where, show_cell(self.text.columns[header][row]), allowed)
-
-    def cells(self, name: str) -> list[str]:
-        """list of str (N,)."""
-        cells = self.text.columns[self.columns[name]]
-        return [cells[row] for row in self.kept]
-
-    def times(self, name: str) -> np.ndarray:
-        """ndarray (N,), s: as numbers, times of day or dates of ISO 8601; of dates since 1970, at Greenwich without a zone."""
-        cells = self.cells(name)
-        numbers = [plain_number(cell, _LARGEST_TIME) for cell in cells]
-        if None not in numbers:
-            return self._bounded(name, np.array(numbers, float) * UNITS[TIME][self.units[name]])
-        with suppress(ValueError, OverflowError):
-            dates = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True)
-            if dates.notna().all() and all("-" in cell or "/" in cell for cell in cells):
-                return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
-        with suppress(ValueError, OverflowError):
-            seconds = pd.to_timedelta(pd.Series(cells)).dt.total_seconds().to_numpy()
-            if np.isfinite(seconds).all() and all(":" in cell for cell in cells):
-                # On over midnight.
-                return seconds + 86400.0 * np.concatenate([[0], np.cumsum(np.diff(seconds) < -43200.0)])
-        raise self.fault(numbers.index(None), name, "numbers, times as 10:20:33 or dates as 2023-05-04 10:20:33")
-
-    def numbers(self, name: str) -> np.ndarray:
-        """ndarray (N,), SI units."""
-        values = np.array([np.nan if (value := plain_number(cell)) is None else value for cell in self.cells(name)])
-        if not np.isfinite(values).all():
-            raise self.fault(int(np.argmin(np.isfinite(values))), name, A_NUMBER)
-        unit = self.units.get(name)
-        return self._bounded(name, values if unit is None else values * (unit_scale(unit, kind_of(name)) or 1.0))
-
-    def _bounded(self, name: str, values: np.ndarray) -> np.ndarray:
-        if (index := find_beyond(name, values)) is not None:
-            raise self.fault(index, name, BOUNDS[name].allowed)
-        return values
-
-    def integers(self, name: str) -> np.ndarray:
-        """ndarray of int (N,)."""
-        values = self.numbers(name)
-        wrong = (values != np.round(values)) | (np.abs(values) > _LARGEST_ORDINAL)
-        if wrong.any():
-            raise self.fault(int(np.argmax(wrong)), name, f"an integer, up to {_LARGEST_ORDINAL}")
-        return values.astype(np.int64)
-
-
-def _covariates(
-    read: CellReader, mapped: Mapping[str, str], stated: Mapping[str, str], given: Mapping[str, str], notes: list[str]
-) -> dict[str, np.ndarray]:
-    """Time, temperature and uncertainty; of the first two is left out, with a note, what nobody asked for and cannot be read.
-
-    `mapped`: names of columns that options state. `stated`, `given`: units by headers and by options. `notes` is added to.
-    """
-    found = {}
-    for name in ("time_s", "temperature_c", "u95_m"):
-        if name not in read.columns:
-            continue
-        header = read.columns[name]
-        try:
-            read.units |= find_units(read.text, read.columns, [name], stated, given)
-            found[name] = read.times(name) if name == "time_s" else read.numbers(name)
-        except InputError as error:
-            if name in mapped or name in given or name == "u95_m":
-                raise InputError(error.source, error.key, error.found, f"{error.allowed}, or --ignore {header!r}") from None
-            read.units.pop(name, None)
-            notes.append(f"{header!r} not read: {error.key} has {error.found}")
-            continue
-        if plain_number(read.cells(name)[0], _LARGEST_TIME) is None:
-            notes.append(f"{header!r} read as times of day or dates, such as {read.cells(name)[0]!r}, in s")
-        elif name not in stated and name not in given:
-            notes.append(f"{header!r} in {read.units[name]}, as nothing states a unit")
-    return found
+def _times(read: Cells) -> np.ndarray:
+    """Times (N,), s: of numbers, or of dates of ISO 8601: since 1970, at Greenwich without a zone."""
+    cells = read.texts("time_s")
+    numbers = [plain_number(cell, _LARGEST_TIME) for cell in cells]
+    if None not in numbers:
+        return read.bounded("time_s", np.array(numbers, float) * read.scales["time_s"])
+    with suppress(ValueError, OverflowError):
+        dates = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True)
+        if dates.notna().all() and all("-" in cell or "/" in cell for cell in cells):
+            return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
+    raise read.fault(numbers.index(None), "time_s", "numbers, or dates as 2023-05-04 10:20:33")
 
 
 @dataclass(frozen=True)
@@ -280,58 +175,64 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
         return has_position(names) or (only_joints and not any(plain_number(cell) is not None for cell in cells))
 
     text = read_text_table(path, is_header, options, options.ignore or (), units_in=read_units, names=options.names or ())
-    options = _sheet_options(text, options)
-    text = replace(text, columns={name: cells for name, cells in text.columns.items() if name not in (options.ignore or ())})
     notes = [f"units in the row under the header: {len(text.units)}"] if text.units else []
     if options.targets:
         text, first = _one_row_each(text, options.targets), next(iter(options.targets.values()))
         mapped |= dict(zip(POSITION, first, strict=True)) | {"target": "target"}
         notes += [f"{name} has {', '.join(map(repr, headers))}" for name, headers in options.targets.items()]
-    columns, stated, of_joints = find_columns(text, mapped, robot)
-    notes += of_joints
+    columns, stated = find_columns(text, mapped, robot)
     if find_joints(columns) and not has_position(columns) and (lengths := lengths_in(text.columns)):
         allowed = "columns x, y, z of a point; distances alone, as of a draw wire or a ball bar, cannot be used yet"
         raise InputError(text.path, "header", f"{', '.join(map(repr, lengths))} and no position", allowed)
-    rotation = find_rotation(text, columns, mapped, options.rotation)
+    rotation = find_rotation(text, columns, options.rotation)
     position = TRANSLATION if rotation == HOMOGENEOUS_MATRICES else POSITION
     angles = find_joints(columns)
     orientation = columns_of_rotation(rotation, columns)
     _check_complete(text, columns, angles, (*position, *orientation), robot)
     wanted = [*angles, *position, *orientation, *(name for name in WRENCH_NAMES if name in columns)]
-    units = find_units(text, columns, wanted, stated, options.units or {}, robot)
-    read = CellReader(text, columns, units, rows_with_position(text, columns, position, options.skip_empty))
-    covariates = _covariates(read, mapped, stated, options.units or {}, notes)
-    notes += _surprises(read, angles, {*stated, *(options.units or {})})
-    table = _number_poses(read, angles, mapped)
+    given = options.units or {}
+    units = find_units(text, columns, wanted, stated, given, robot)
+    kept = _filled_rows(text, columns, position, options.skip_empty)
+    read = text.cells(columns, scales_of(units), kept)
+    table = _number_poses(read, angles)
     table |= {name: read.numbers(name) for name in angles}
     if forces := [name for name in WRENCH_NAMES if name in columns]:
-        sign, zeros = -1.0 if options.wrench == "by-robot" else 1.0, np.zeros(len(read.kept))
+        sign, zeros = -1.0 if options.wrench == "by-robot" else 1.0, np.zeros(len(kept))
         # A minus sign before a zero would be read by people as a force.
         table |= {name: sign * read.numbers(name) + 0.0 if name in forces else zeros for name in WRENCH_NAMES}
     table |= {axis: read.numbers(name) for axis, name in zip(POSITION, position, strict=True)}
     if orientation:
-        vectors, off = rotation_vectors(rotation, np.column_stack([read.numbers(name) for name in orientation]))
+        vectors, off = rotation_vectors(rotation, read.matrix(orientation))
         if off.any():
             allowed = "a quaternion of length 1" if rotation == QUATERNIONS else "a rotation matrix, row by row"
             raise read.fault(int(np.argmax(off)), orientation[0], allowed)
         table |= dict(zip(VECTOR, vectors.T, strict=True))
-    table |= covariates
+    for name in (name for name in ("time_s", "temperature_c", "u95_m") if name in columns):
+        try:
+            unit = find_units(text, columns, [name], stated, given)
+            one = text.cells({name: columns[name]}, scales_of(unit), kept)
+            table[name] = _times(one) if name == "time_s" else one.numbers(name)
+            units |= unit
+        except InputError as error:
+            # Time and temperature are left out where nobody asked for them.
+            if name in mapped or name in given or name == "u95_m":
+                raise InputError(
+                    error.source, error.key, error.found, f"{error.allowed}, or --ignore {columns[name]!r}"
+                ) from None
+            notes.append(f"{columns[name]!r} not read: {error.key} has {error.found}")
     table |= {f"approach{j}": read.numbers(f"approach{j}") for j in range(1, len(angles) + 1) if f"approach{j}" in columns}
     table["target"] = _targets(read, options.target)
     table |= _ordinals(read, table)
-    used = {*wanted, *table}
+    used = {name: header for name, header in columns.items() if name in {*wanted, *table}}
     resolved = replace(
         options,
         **asdict(text.dialect),
-        columns={
-            name: header for name, header in columns.items() if name in used and not (name == "target" and options.targets)
-        },
+        columns={name: header for name, header in used.items() if not (name == "target" and options.targets)},
         units=units,
         rotation=rotation,
     )
-    read_headers = {columns[name] for name in columns if name in used}
-    ignored = (*(header for header in text.columns if header not in read_headers), *(options.ignore or ()))
-    skipped = len(text.lines) - len(read.kept)
+    ignored = (*(header for header in text.columns if header not in used.values()), *(options.ignore or ()))
+    skipped = len(text.lines) - len(kept)
     return ImportedMeasurements(table, len(angles), resolved, ignored, skipped, (*text.left_out, *notes))
 
 
@@ -354,60 +255,32 @@ def _check_complete(
             raise InputError(text.path, "header", f"no column {', '.join(missing)}", allowed)
 
 
-def _surprises(read: CellReader, angles: Sequence[str], stated: set[str]) -> list[str]:
-    """Units that nothing states, and angles that may be in another one."""
-    usual = [name for name in WRENCH_NAMES if name in read.units and name not in stated]
-    named = ", ".join(f"{read.columns[name]!r} in {read.units[name]}" for name in usual)
-    notes = [f"units as usual, as nothing states them: {named}"] if usual else []
-    for name in angles:
-        largest = np.abs(read.numbers(name)).max()
-        if read.units[name] in UNITS[ANGLE] and largest > FARTHEST_RAD:
-            turns = f"{largest / (2 * np.pi):.1f} turns"
-            notes.append(f"{read.columns[name]!r} goes to {largest:.4g} rad, {turns}: if these are degrees, --angles deg")
-    return notes
-
-
-def _targets(read: CellReader, name: str | None) -> np.ndarray:
-    if "target" in read.columns:
-        names = read.cells("target")
-        if fault := next((fault for each in set(names) if (fault := text_fault(each))), None):
-            raise InputError(read.text.path, f"column {read.columns['target']}", *fault)
-        return np.array(names)
-    if name is None:
+def _targets(read: Cells, name: str | None) -> np.ndarray:
+    if "target" not in read.columns and name is None:
         allowed = "--target NAME, the target of all rows, or --column target=NAME"
-        raise InputError(read.text.path, "header", "no column target", allowed)
-    if fault := text_fault(name):
-        raise InputError("--target", "", *fault)
-    return np.full(len(read.kept), name)
+        raise InputError(read.path, "header", "no column target", allowed)
+    names = read.texts("target") if "target" in read.columns else [name or ""] * len(read.rows)
+    if fault := next((fault for each in dict.fromkeys(names) if (fault := text_fault(each))), None):
+        where = (read.path, f"column {read.headers['target']}") if "target" in read.columns else ("--target", "")
+        raise InputError(*where, *fault)
+    return np.array(names)
 
 
-def _number_poses(read: CellReader, angles: Sequence[str], mapped: Mapping[str, str]) -> dict[str, np.ndarray]:
+def _number_poses(read: Cells, angles: Sequence[str]) -> dict[str, np.ndarray]:
     """Session and pose: labels are numbered; where no column has it, a pose is what has the same joint angles."""
     table: dict[str, Any] = {}
     if "session" in read.columns:
         table["session"] = read.integers("session")
     if "pose" in read.columns:
-        labels = read.cells("pose")
+        labels = read.texts("pose")
         numbered = all(label.isdigit() for label in labels)
         table["pose"] = read.integers("pose") if numbered else pd.factorize(pd.Series(labels))[0] + 1
-        if "pose" not in mapped and "session" not in table:
-            _check_poses(read, angles, table["pose"])
     else:
-        table["pose"] = _number_alike(np.column_stack([read.numbers(name) for name in angles]), SAME_POSE)
+        table["pose"] = number_alike(read.matrix(angles), SAME_POSE) + 1
     return table
 
 
-def _check_poses(read: CellReader, angles: Sequence[str], pose: np.ndarray) -> None:
-    """Ask what a column is whose name says pose, but not its contents, such as the configuration of an arm: FUT."""
-    values = pd.DataFrame({name: read.numbers(name) for name in angles}).groupby(pose)
-    apart = (values.transform("max") - values.transform("min")).max(axis=1).to_numpy() > _ONE_POSE
-    if apart.any():
-        header = read.columns["pose"]
-        allowed = f"one posture for each, or --ignore {header!r}, or --column pose=NAME (NAME {header!r} where it is right)"
-        raise read.fault(int(np.argmax(apart)), "pose", allowed)
-
-
-def _ordinals(read: CellReader, table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _ordinals(read: Cells, table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Loads and repeats: as their columns have them, or counted by first appearance."""
     states = pd.DataFrame({"session": table.get("session", 0), "pose": table["pose"], "target": table["target"]})
     wrench = pd.DataFrame({name: table.get(name, 0.0) for name in WRENCH_NAMES}, index=states.index)
@@ -423,17 +296,3 @@ def _ordinals(read: CellReader, table: Mapping[str, np.ndarray]) -> dict[str, np
     else:
         states["repeat"] = states.groupby(["session", "pose", "load", "target"]).cumcount()
     return {name: states[name].to_numpy() for name in ("load", "repeat")}
-
-
-def _number_alike(values: np.ndarray, within: float) -> np.ndarray:
-    """Number of each row by first appearance, from 1: one for rows that agree to `within`."""
-    different, which = np.unique(values, axis=0, return_inverse=True)
-    near = cKDTree(different)
-    numbers = np.zeros(len(different), np.int64)
-    number = 0
-    for row in which:
-        if not numbers[row]:
-            number += 1
-            alike = np.array(near.query_ball_point(different[row], within, p=np.inf))
-            numbers[alike[numbers[alike] == 0]] = number
-    return numbers[which]

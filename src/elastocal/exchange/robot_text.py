@@ -1,10 +1,13 @@
-"""A robot file as text that a person reads: where it came from, keys in their usual order, a line for each joint's mass."""
+"""A robot that was read of a file of another kind: its fixed transforms in words of the chain notation, and its robot file.
+
+A rigid displacement becomes ``Tx Ty Tz Rz Ry Rx``, the rotation by yaw, pitch and roll; what is zero is left out.
+"""
 
 import hashlib
 import math
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,13 +22,10 @@ from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
 _WIDTH = 128
-_INDENT = "  "
-# Kilograms and metres to the nanometre.
-_DECIMALS = 9
-# Of what an import finds.
-_ORDER = ("name", "joint_names", "chain", "joint_limits_deg", "compliance_urad_per_Nm", "gravity_m_s2", "masses")
 # A joint may count any number of turns; a thousand are a mistake.
 MOST_TURNS = 1000
+# Picometres, and as many degrees: a chain of any length keeps to far less than a nanometre, and cos(90 deg) is no length.
+_DECIMALS = 12
 
 
 @dataclass(frozen=True)
@@ -63,19 +63,6 @@ def point_name(link: str) -> str:
     return re.sub(r"[\[\]\s]", "_", link)
 
 
-def mass_entries(moments: Mapping[int, np.ndarray], relative_std: float) -> list[dict[str, Any]]:
-    """``masses`` of a robot file.
-
-    `moments` (4,): of what each link carries the mass times its centre, m kg, and the mass, kg; by the number of the link.
-    """
-    entries = []
-    for link, (*moment, mass) in sorted(moments.items()):
-        centre = np.round(np.array(moment) / mass, _DECIMALS) + 0.0
-        entry = {"link": link, "mass_kg": round(float(mass), _DECIMALS), "centre_m": centre.tolist()}
-        entries.append(entry | {"relative_std": relative_std})
-    return entries
-
-
 def robot_text(result: Imported) -> str:
     """The text of a robot file."""
     head = []
@@ -83,8 +70,16 @@ def robot_text(result: Imported) -> str:
         # Whatever a file's name holds stays inside of a comment.
         plain = "".join(character if character.isprintable() else "?" for character in text)
         head += textwrap.wrap(plain, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
-    body = [line for key in _ORDER if key in result.document for line in _lines(key, result.document[key])]
-    return "\n".join([*head, *body]) + "\n"
+    body: list[str] = []
+    for key, value in result.document.items():
+        if key == "masses":
+            body += ["masses:", *(f"  - {one_line(entry)}" for entry in value)]
+        else:
+            # A name may have blanks that a break of the line would join.
+            width = _WIDTH if key in ("chain", "joint_limits_deg") else 10**6
+            line = f"{key}: {one_line(value)}"
+            body += textwrap.wrap(line, width, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False)
+    return "\n".join([*head, *body, ""])
 
 
 def write_robot(result: Imported, path: str | Path) -> None:
@@ -110,17 +105,6 @@ def summary(result: Imported) -> list[str]:
     ]
 
 
-def _lines(key: str, value: Any) -> list[str]:
-    whole_words: dict[str, Any] = {"subsequent_indent": _INDENT, "break_on_hyphens": False, "break_long_words": False}
-    if key == "chain":
-        return ["chain: >-", *textwrap.wrap(value, _WIDTH, initial_indent=_INDENT, **whole_words)]
-    if key == "masses":
-        return ["masses:", *(f"{_INDENT}- {one_line(entry)}" for entry in value)]
-    if key == "joint_limits_deg":
-        return textwrap.wrap(f"{key}: {one_line(value)}", _WIDTH, **whole_words)
-    return [f"{key}: {one_line(value)}"]
-
-
 def refuse_existing(path: str | Path, force: bool) -> None:
     """Refuse a path where something is already, but for a file with `force`."""
     if Path(path).is_dir() or not Path(path).resolve().parent.is_dir():
@@ -128,3 +112,76 @@ def refuse_existing(path: str | Path, force: bool) -> None:
     check_places(path)
     if Path(path).exists() and not force:
         raise InputError(path, "", "a file that is there already", "another --output, or --force to replace it")
+
+
+def displacement_words(transform: np.ndarray) -> list[str]:
+    """A homogeneous transform (4, 4) in words."""
+    amounts = dict(zip(("Tx", "Ty", "Tz"), transform[:3, 3], strict=True))
+    amounts |= dict(zip(("Rz", "Ry", "Rx"), yaw_pitch_roll(transform[:3, :3]), strict=True))
+    return [text for name, amount in amounts.items() if (text := word(name, amount))]
+
+
+def word(name: str, amount: float) -> str:
+    """``Tx(0.5)`` of m, ``Rx(90deg)`` of rad; empty for nothing."""
+    turns = name.startswith("R")
+    amount = round(math.degrees(amount) if turns else amount, _DECIMALS)
+    text = np.format_float_positional(abs(amount), trim="-")
+    return f"{name}({'-' if amount < 0 else ''}{text}{'deg' if turns else ''})" if amount else ""
+
+
+def express_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str], np.ndarray]:
+    """A joint's axis (3,), not zero, as one of the chain's, between a fixed rotation and its inverse where it is oblique.
+
+    Returns `before`: words of the rotation that turns z into the axis, empty for x, y and z; `letter`, `sign`: of the axis
+    then, and "-" or ""; `after`: words of the rotation back; the fixed rotation before, as a matrix (3, 3).
+    """
+    unit = np.asarray(axis, float) / np.linalg.norm(axis)
+    along = int(np.argmax(np.abs(unit)))
+    if np.abs(np.delete(unit, along)).max() < 10.0**-_DECIMALS:
+        return [], "xyz"[along], "-" if unit[along] < 0 else "", [], np.eye(3)
+    turns = [("Rz", math.atan2(unit[1], unit[0])), ("Ry", math.atan2(math.hypot(unit[0], unit[1]), unit[2]))]
+    before = [text for name, angle in turns if (text := word(name, angle))]
+    after = [text for name, angle in reversed(turns) if (text := word(name, -angle))]
+    angles = [math.radians(round(math.degrees(angle), _DECIMALS)) for _, angle in turns]
+    return before, "z", "", after, rotation_about("z", angles[0]) @ rotation_about("y", angles[1])
+
+
+def yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:
+    """Angles of R (3, 3) = Rz(yaw) Ry(pitch) Rx(roll), rad.
+
+    Near a pitch of 90 deg yaw and roll are not separate; the roll is read of what the yaw leaves, so that the product is right.
+    """
+    level = math.hypot(rotation[0, 0], rotation[1, 0])
+    yaw = math.atan2(rotation[1, 0], rotation[0, 0]) if level > 10.0**-_DECIMALS else 0.0
+    rest = rotation_about("z", -yaw) @ rotation
+    return yaw, math.atan2(-rotation[2, 0], level), math.atan2(-rest[1, 2], rest[1, 1])
+
+
+def rotation_about(letter: str, angle_rad: float) -> np.ndarray:
+    """Rotation matrix about x, y or z, ndarray (3, 3)."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[letter]
+    turn = np.eye(3)
+    turn[first, first] = turn[second, second] = c
+    turn[first, second], turn[second, first] = -s, s
+    return turn
+
+
+def elementary(kind: str, axis: int, amount: float) -> np.ndarray:
+    """Shift (``T``, m) along or turn (``R``, rad) about an axis, 0 to 2, ndarray (4, 4)."""
+    if kind == "R":
+        return homogeneous(rotation_about("xyz"[axis], amount))
+    return homogeneous(np.eye(3), amount * np.eye(3)[axis])
+
+
+def homogeneous(rotation: np.ndarray, shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)) -> np.ndarray:
+    """A turn (3, 3) and a shift (3,) as one, ndarray (4, 4)."""
+    found = np.eye(4)
+    found[:3, :3], found[:3, 3] = rotation, shift
+    return found
+
+
+def origin_transform(xyz: Sequence[float], rpy: Sequence[float]) -> np.ndarray:
+    """Shift (m), then turn by roll, pitch and yaw (rad) as the origin of a URDF has them, ndarray (4, 4)."""
+    roll, pitch, yaw = rpy
+    return homogeneous(rotation_about("z", yaw) @ rotation_about("y", pitch) @ rotation_about("x", roll), xyz)

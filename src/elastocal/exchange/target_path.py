@@ -11,16 +11,14 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.measurement_checks import find_degrees
 from elastocal.campaigns.measurements import FARTHEST_RAD
+from elastocal.campaigns.reading import find_degrees
+from elastocal.campaigns.tables import Dialect, read_text_table
 from elastocal.errors import InputError, closest_first
-from elastocal.exchange.csv_dialect import Dialect, read_text_table
-from elastocal.exchange.measurement_table import CellReader
-from elastocal.mechanics.components import WRENCH
+from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
-_WRENCH = tuple(name for name, _, _ in WRENCH)
 # Of a corrected target.
 OK = "ok"
 # Of a corrected target whose error nothing bounds, before the reason.
@@ -57,9 +55,10 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     """
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
     approach = tuple(f"approach{j}" for j in range(1, joints + 1))
-    known = (*_POSE, *_WRENCH, *angles, *approach, "time_s", "temperature_c")
-    read = _cells(path)
-    cells, header = read.columns, f"line {read.text.dialect.header}"
+    known = (*_POSE, *WRENCH_NAMES, *angles, *approach, "time_s", "temperature_c")
+    text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
+    cells, header = text.columns, f"line {text.dialect.header}"
+    read = text.cells({name: name for name in cells}, {})
     for name in _POSE:
         if name not in cells:
             allowed = f"{', '.join(_POSE)}: position in m and rotation vector in rad, base axes, separated by commas"
@@ -74,15 +73,24 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
             return None
         if missing := [name for name in names if name not in cells]:
             raise InputError(path, header, f"{', '.join(there)} without {', '.join(missing)}", "all of them or none")
-        return np.column_stack([read.numbers(name) for name in names])
+        return read.matrix(names)
 
     single = [group((name,)) for name in ("time_s", "temperature_c")]
     time, temperature = (None if column is None else column[:, 0] for column in single)
-    position, rotation = _poses(read)
-    wrench = group(_WRENCH if set(_WRENCH[3:]) & set(cells) else _WRENCH[:3])
+    pose = read.matrix(_POSE)
+    for size, what, largest, allowed in (
+        (np.abs(pose[:, :3]).max(axis=1), "position", _FARTHEST_M, "metres"),
+        (np.linalg.norm(pose[:, 3:], axis=1), "turn", FARTHEST_RAD, "a rotation vector in rad, not degrees"),
+    ):
+        row = int(np.argmax(size))
+        if size[row] > largest:
+            found = f"a {what} of {size[row]:g}"
+            raise InputError(path, f"line {text.lines[row]}", found, f"{allowed}, {largest:.3g} at most")
+    wrench = group(WRENCH_NAMES if set(WRENCH_NAMES[3:]) & set(cells) else WRENCH_NAMES[:3])
     if wrench is not None:
         wrench = np.pad(wrench, ((0, 0), (0, 6 - wrench.shape[1])))
-    return TargetPath(position, rotation, group(angles), wrench, group(approach), time, temperature, read.text.lines)
+    rotation = Rotation.from_rotvec(pose[:, 3:]).as_matrix()
+    return TargetPath(pose[:, :3], rotation, group(angles), wrench, group(approach), time, temperature, text.lines)
 
 
 def read_target_path_of(path: str | Path, robot: Robot) -> TargetPath:
@@ -95,23 +103,3 @@ def read_target_path_of(path: str | Path, robot: Robot) -> TargetPath:
         allowed = f"rad, of a joint that goes from {low:.2f} to {high:.2f} rad"
         raise InputError(path, f"line {wanted.lines[row]}", found, allowed)
     return wanted
-
-
-def _cells(path: str | Path) -> CellReader:
-    """Cells of a file in SI units, whose header is its first line."""
-    text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
-    return CellReader(text, {name: name for name in text.columns}, {}, np.arange(len(text.lines)))
-
-
-def _poses(read: CellReader) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (N, 3) and rotations (N, 3, 3)."""
-    pose = np.column_stack([read.numbers(name) for name in _POSE])
-    for size, what, largest, allowed in (
-        (np.abs(pose[:, :3]).max(axis=1), "position", _FARTHEST_M, "metres"),
-        (np.linalg.norm(pose[:, 3:], axis=1), "turn", FARTHEST_RAD, "a rotation vector in rad, not degrees"),
-    ):
-        row = int(np.argmax(size))
-        if size[row] > largest:
-            where, found = f"line {read.text.lines[row]}", f"a {what} of {size[row]:g}"
-            raise InputError(read.text.path, where, found, f"{allowed}, {largest:.3g} at most")
-    return pose[:, :3], Rotation.from_rotvec(pose[:, 3:]).as_matrix()

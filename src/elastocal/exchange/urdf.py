@@ -1,40 +1,37 @@
 """A URDF file, read safely, and the serial chain between two of its links as the contents of a robot file.
 
-The Unified Robot Description Format [1] is XML. No document type is accepted, and so no entity that grows or fetches another
-file; meshes, materials and plug-ins are left out, and no other file is opened.
+The Unified Robot Description Format (wiki.ros.org/urdf/XML) is XML. No document type is accepted, and so no entity that grows
+or fetches another file; no other file is opened.
 
-A joint of a URDF is a fixed transform (``origin``), and then a rotation about or a translation along an axis. The transform
-becomes ``Tx Ty Tz Rz Ry Rx``; an axis that is not x, y or z is turned into z and back, ``Rz Ry Rz(q1) Ry Rz``. A chain with a
-joint that mimics another one is refused. All that a joint carries rigidly is one mass, side branches and what stands behind the
-tip included.
-
-[1] Open Robotics, XML Robot Description Format (URDF), wiki.ros.org/urdf/XML.
+A joint is a fixed transform (``origin``), which becomes ``Tx Ty Tz Rz Ry Rx``, and then a motion about or along an axis; one
+that is not x, y or z is turned into z and back. All that a joint carries rigidly is one mass, side branches and what stands
+behind the tip included.
 """
 
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
-from xml.parsers import expat
 
 import numpy as np
 
 from elastocal.counting import first_names
 from elastocal.errors import InputError, closest_first
-from elastocal.exchange import URDF_MASS_STD
-from elastocal.exchange.fixed_transforms import (
-    axis_rotation,
+from elastocal.exchange.robot_text import (
+    Imported,
+    check_imported,
     displacement_words,
     express_axis,
     homogeneous,
     origin_transform,
+    point_name,
 )
-from elastocal.exchange.robot_text import MOST_TURNS, Imported, check_imported, mass_entries, point_name
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
 from elastocal.mechanics.robot import STANDARD_GRAVITY, UNLIMITED_DEG
 
@@ -56,9 +53,13 @@ _NUMBERS = {
     ("limit", "upper"): (1, "0"),
     ("mass", "value"): (1, ""),
 }
-# Limits to a billionth of a degree, or to a nanometre; gravity to so many m/s².
+# Limits to a billionth of a degree, or to a nanometre; gravity to so many m/s²; masses to so many kg.
 _DECIMALS = 9
-# Two turns, and rounding; the limits of a joint in degrees are farther, and few joints turn so often.
+# How well masses are known, as a standard deviation over the value. A URDF does not say where they come from: of a drawing
+# without cables, grease and covers, or guessed; where dynamic parameters of robots were identified, masses and centres of such
+# models were off by a tenth to a third.
+_MASS_STD = 0.2
+# Two turns, and rounding; limits in degrees are farther, and so are those of programs where a joint has none.
 _FARTHEST_RAD = 4.0 * math.pi + 0.01
 # So many links of a robot never weigh the same; links and joints that a note names.
 _FEWEST_ALIKE, _NAMED = 3, 4
@@ -66,7 +67,7 @@ _FEWEST_ALIKE, _NAMED = 3, 4
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: `origin` (4, 4) in the parent's frame, `axis` (3,) in its own; limits not stated are 0; whether it mimics."""
+    """`origin` (4, 4) is in the parent's frame, `axis` (3,) in its own; limits that are not stated are 0."""
 
     name: str
     kind: str
@@ -116,28 +117,13 @@ class UrdfChain:
     links: dict[str, tuple[int, np.ndarray]]
 
 
-def robot_from_urdf(
-    path: str | Path,
-    base: str,
-    tip: str,
-    points: Sequence[str] = (),
-    relative_std: float = URDF_MASS_STD,
-    limits_in: str | None = None,
-) -> Imported:
-    """The robot between two links of a URDF.
-
-    `base`, `tip`: links: the robot's base frame, and its last measuring point. `points`: links between them that become
-    measuring points too. `relative_std`: how well the masses are known. `limits_in`: unit of the limits of joints that turn;
-    asked for where one goes farther than joints do in rad. Limits of continuous joints are a turn either way. Raises
-    `InputError`: as in `read_urdf` and `chain_between`; a prismatic joint without limits.
-    """
+def robot_from_urdf(path: str | Path, base: str, tip: str, points: Sequence[str] = ()) -> Imported:
+    """The robot between two links of a URDF: its base frame, and its last measuring point; `points` between become others."""
     urdf, source = read_urdf(path), str(path)
     chain = chain_between(urdf, base, tip, points, source)
-    masses, notes = _weights(urdf, chain, relative_std)
+    masses, notes = _weights(urdf, chain)
     notes.insert(0, f"read: {', '.join(f'q{n} from {joint.name!r}' for n, joint in enumerate(chain.joints, 1))}")
-    limits = [_limits(joint, limits_in, notes, source) for joint in chain.joints]
-    if limits_in == "deg":
-        notes.append("limits read in degrees, as the option says")
+    limits = [_limits(joint, notes, source) for joint in chain.joints]
     document: dict[str, Any] = {"name": urdf.name, "joint_names": [joint.name for joint in chain.joints]}
     document |= {"chain": chain.notation, "joint_limits_deg": limits}
     # The tree's root is upright.
@@ -148,29 +134,24 @@ def robot_from_urdf(
         notes.append(f"gravity as at {base!r} where the root of the tree stands upright and the joints before it are at zero")
     if masses:
         document["masses"] = masses
-        notes.append(f"masses are known to {100 * relative_std:g} %, by assumption: a URDF does not say")
+        notes.append(f"masses are known to {100 * _MASS_STD:g} %, by assumption: a URDF does not say")
     if beside := [joint.name for joint in urdf.joints if joint.kind != "fixed" and joint.child not in chain.links]:
         notes.append(f"joints that are no part of the chain, left out: {', '.join(beside)}")
     return check_imported(document, path, f"the links from {base!r} to {tip!r}", notes)
 
 
-def _limits(joint: Joint, limits_in: str | None, notes: list[str], source: str) -> list[float]:
-    """Degrees, of prismatic joints metres."""
-    low, high, farthest = joint.lower, joint.upper, max(-joint.lower, joint.upper)
-    prismatic, called = joint.kind == "prismatic", f"joint {joint.name!r}: limit"
-    if joint.kind == "continuous" and low >= high:
-        return list(UNLIMITED_DEG)
+def _limits(joint: Joint, notes: list[str], source: str) -> list[float]:
+    """Degrees, of prismatic joints metres; a turn either way where a joint that turns has none, or none in radians."""
+    low, high, prismatic = joint.lower, joint.upper, joint.kind == "prismatic"
     if low >= high and prismatic:
-        raise InputError(
-            source, called, f"{low:g} to {high:g}", 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
-        )
-    if low >= high or (not prismatic and farthest > 2.0 * math.pi * MOST_TURNS):
-        notes.append(f"joint {joint.name!r} has no limits in the URDF: a turn either way")
-        return list(UNLIMITED_DEG)
-    if limits_in is None and not prismatic and farthest > _FARTHEST_RAD:
-        allowed = "radians; --limits deg where the file has degrees, or --limits rad where the joint does turn as often"
-        raise InputError(source, called, f"{low:g} to {high:g}, {farthest / (2.0 * math.pi):.0f} turns", allowed)
-    return [round(value if prismatic or limits_in == "deg" else math.degrees(value), _DECIMALS) for value in (low, high)]
+        allowed = 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
+        raise InputError(source, f"joint {joint.name!r}: limit", f"{low:g} to {high:g}", allowed)
+    if prismatic or (low < high and max(-low, high) <= _FARTHEST_RAD):
+        return [round(value if prismatic else math.degrees(value), _DECIMALS) for value in (low, high)]
+    if joint.kind != "continuous":
+        found = f"limits of {low:g} to {high:g}, no radians" if low < high else "no limits in the URDF"
+        notes.append(f"joint {joint.name!r} has {found}: a turn either way")
+    return list(UNLIMITED_DEG)
 
 
 def read_urdf(path: str | Path) -> Urdf:
@@ -178,24 +159,20 @@ def read_urdf(path: str | Path) -> Urdf:
     source = Path(path).as_posix()
     root = _root_of(read_bytes(path, LARGEST_BYTES, "a URDF file"), source)
     links, joints = root.findall("link"), root.findall("joint")
-    for part in (*links, *joints):
-        if not part.get("name"):
-            raise InputError(source, f"<{part.tag}>", "no name", "a name")
     _check_tree(links, joints, source)
     moments = {}
     for part in links:
-        called, inertial = f"link {part.attrib['name']!r}", _child(part, "inertial", source)
+        called, inertial = f"link {part.attrib['name']!r}", part.find("inertial")
         mass, centre = 0.0, [0.0, 0.0, 0.0]
         if inertial is not None:
             centre = _numbers(inertial, "origin", "xyz", called, source)
-            if _child(inertial, "mass", source) is not None:
+            if inertial.find("mass") is not None:
                 (mass,) = _numbers(inertial, "mass", "value", called, source)
             if mass < 0:
                 raise InputError(source, f"{called}: mass value", f"{mass:g}", "0 or more kg")
         moments[part.attrib["name"]] = mass * np.array([*centre, 1.0])
     made = tuple(_joint(part, source) for part in joints)
-    name = root.get("name") or Path(path).stem
-    return Urdf(name, moments, made, {joint.child: joint for joint in made})
+    return Urdf(root.get("name") or Path(path).stem, moments, made, {joint.child: joint for joint in made})
 
 
 def _joint(part: Element, source: str) -> Joint:
@@ -210,18 +187,10 @@ def _joint(part: Element, source: str) -> Joint:
     return Joint(name, part.attrib["type"], *ends, origin, axis, lower, upper, part.find("mimic") is not None)
 
 
-def _child(part: Element, tag: str, source: str) -> Element | None:
-    """What a part has of a tag, once at most."""
-    children = part.findall(tag)
-    if len(children) > 1:
-        raise InputError(source, f"{part.tag} {part.get('name', '')!r}", f"<{tag}> {len(children)} times", "once at most")
-    return children[0] if children else None
-
-
 def _numbers(part: Element, tag: str, attribute: str, called: str, source: str) -> list[float]:
     """Numbers of an attribute of a child, or what they are where nothing states them."""
     count, default = _NUMBERS[tag, attribute]
-    child = _child(part, tag, source)
+    child = part.find(tag)
     text = default if child is None else child.get(attribute, default)
     # Programs write 1e16 and more where a joint has no limit.
     largest = 1e100 if tag == "limit" else LARGEST_NUMBER
@@ -238,44 +207,42 @@ def _end(joint: Element, tag: str) -> str:
     return "" if end is None else end.get("link", "")
 
 
-def _root_of(data: bytes, source: str) -> Element:
-    """The root of the tree, its names without namespaces."""
-    parser, count, depth = expat.ParserCreate(), 0, 0
+class _Builder(ElementTree.TreeBuilder):
+    """Builds a tree whose names have no namespaces; what could grow without end, and what xacro has not read, is refused."""
 
-    def begin(*_: object) -> None:
-        nonlocal count, depth
-        count, depth = count + 1, depth + 1
-        if count > _MOST_ELEMENTS or depth > _DEEPEST:
-            found = (
-                f"more than {_DEEPEST} elements in each other" if depth > _DEEPEST else f"more than {_MOST_ELEMENTS} elements"
-            )
-            raise InputError(source, f"line {parser.CurrentLineNumber}", found, "a URDF, which needs fewer")
+    def __init__(self, source: str) -> None:
+        super().__init__()
+        self.source, self.count, self.depth = source, 0, 0
 
-    def end(*_: object) -> None:
-        nonlocal depth
-        depth -= 1
-
-    def refuse(*_: object) -> None:
+    def doctype(self, *_: object) -> None:
         allowed = "a URDF without a document type, for entities of one could be endless or other files"
-        raise InputError(source, f"line {parser.CurrentLineNumber}", "<!DOCTYPE", allowed)
+        raise InputError(self.source, "", "<!DOCTYPE", allowed)
 
-    parser.StartDoctypeDeclHandler, parser.StartElementHandler, parser.EndElementHandler = refuse, begin, end
-    try:
-        parser.Parse(data, True)
-        root = ElementTree.fromstring(data)
-    except (expat.ExpatError, ElementTree.ParseError, ValueError, LookupError) as error:
-        if isinstance(error, InputError):
-            raise
-        line = getattr(error, "lineno", None) or getattr(error, "position", (None,))[0]
-        raise InputError(source, f"line {line}" if line else "", str(error).partition(":")[0], "a URDF, which is XML") from None
-    for element in root.iter():
-        uri, _, name = element.tag.rpartition("}")
+    def start(self, tag: str, attrs: dict[str, str]) -> Element:
+        uri, _, name = tag.rpartition("}")
+        self.count, self.depth = self.count + 1, self.depth + 1
+        if self.count > _MOST_ELEMENTS or self.depth > _DEEPEST:
+            most = f"{_DEEPEST} elements in each other" if self.depth > _DEEPEST else f"{_MOST_ELEMENTS} elements"
+            raise InputError(self.source, "", f"more than {most}", "a URDF, which needs fewer")
         if "xacro" in uri:
-            raise InputError(source, "", f"<xacro:{name}>", _XACRO)
-        for value in element.attrib.values():
-            if "${" in value or "$(" in value:
-                raise InputError(source, f"<{name}>", repr(value), _XACRO)
-        element.tag = name
+            raise InputError(self.source, "", f"<xacro:{name}>", _XACRO)
+        if wrong := next((value for value in attrs.values() if "${" in value or "$(" in value), None):
+            raise InputError(self.source, f"<{name}>", repr(wrong), _XACRO)
+        return super().start(name, attrs)
+
+    def end(self, tag: str) -> Element:
+        self.depth -= 1
+        return super().end(tag.rpartition("}")[2])
+
+
+def _root_of(data: bytes, source: str) -> Element:
+    try:
+        root = ElementTree.fromstring(data, ElementTree.XMLParser(target=_Builder(source)))
+    except ElementTree.ParseError as error:
+        where, words = f"line {error.position[0]}", str(error).partition(":")[0]
+        raise InputError(source, where, words, "a URDF, which is XML") from None
+    except (ValueError, LookupError) as error:
+        raise error if isinstance(error, InputError) else InputError(source, "", str(error), "a URDF, which is XML") from None
     if root.tag != "robot":
         raise InputError(source, "", f"<{root.tag}>", "a URDF, which is a <robot>")
     return root
@@ -283,13 +250,12 @@ def _root_of(data: bytes, source: str) -> Element:
 
 def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str) -> None:
     for tag, parts in (("link", links), ("joint", joints)):
-        if not parts:
-            raise InputError(source, "", f"no <{tag}>", "a URDF with links and joints")
-        if len(parts) > _MOST_PARTS:
-            raise InputError(source, "", f"{len(parts)} times <{tag}>", f"at most {_MOST_PARTS}")
-        name, times = Counter(part.attrib["name"] for part in parts).most_common(1)[0]
-        if times > 1:
-            raise InputError(source, f"{tag} {name!r}", f"{times} times", "each name once")
+        if not 0 < len(parts) <= _MOST_PARTS:
+            found = f"{len(parts)} times <{tag}>" if parts else f"no <{tag}>"
+            raise InputError(source, "", found, f"a URDF with links and joints, at most {_MOST_PARTS}")
+        counts = Counter(part.get("name", "") for part in parts)
+        if wrong := [name for name, times in counts.items() if times > 1 or not name]:
+            raise InputError(source, f"{tag} {wrong[0]!r}", f"{counts[wrong[0]]} times", "a name for each, and each name once")
     names = {link.attrib["name"] for link in links}
     parent_of: dict[str, str] = {}
     for joint in joints:
@@ -301,26 +267,17 @@ def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str
             if name not in names:
                 raise InputError(source, called, f"{tag} {name!r}", "a link of this file")
         if child in parent_of:
-            raise InputError(
-                source, called, f"child {child!r}, which another joint has too", "a tree: each link below one joint"
-            )
+            found = f"child {child!r}, which another joint has too"
+            raise InputError(source, called, found, "a tree: each link below one joint")
         parent_of[child] = parent
-    for name in parent_of:
-        seen, at = {name}, parent_of.get(name)
-        while at is not None and at not in seen:
-            seen.add(at)
-            at = parent_of.get(at)
-        if at is not None:
-            raise InputError(source, f"link {at!r}", "a loop of joints", "a tree: no link below itself")
+    try:
+        TopologicalSorter({child: [parent] for child, parent in parent_of.items()}).prepare()
+    except CycleError as error:
+        raise InputError(source, f"link {error.args[1][0]!r}", "a loop of joints", "a tree: no link below itself") from None
 
 
 def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
-    """The chain from one link to another that it carries.
-
-    `base`, `tip`: names of links. `points`: further links of the chain that become measuring points; the tip is the last one
-    always. `source`: named in errors. Raises `InputError`: a link that is not there or not on the chain, a tip that the base
-    does not carry, a joint that the notation cannot say.
-    """
+    """The chain from one link, `base`, to another that it carries; `points`, links of it, and the tip are measuring points."""
     path = _path(urdf, base, tip, source)
     on_chain = [base, *(joint.child for joint in path)]
     for name in points:
@@ -344,8 +301,8 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
                 axis = " ".join(f"{part:g}" for part in joint.axis)
                 raise InputError(source, f"joint {joint.name!r}: axis xyz", axis, "a direction")
             moving.append(joint)
-            before, letter, minus, after = express_axis(joint.axis)
-            body, here = len(moving), homogeneous(axis_rotation(joint.axis).T)
+            before, letter, minus, after, turn = express_axis(joint.axis)
+            body, here = len(moving), homogeneous(turn.T)
             words += [*before, f"{_MOVING[joint.kind]}{letter}({minus}q{body})", *after]
         if joint.child in marked:
             words.append(f"[{marked[joint.child]}]")
@@ -365,17 +322,14 @@ def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
         raise InputError(source, both, found, "a tip that the base carries")
     if not any(joint.kind in _MOVING for joint in path):
         raise InputError(source, both, "no joint that moves between them", "links with joints between")
-    if wrong := next((joint for joint in path if joint.kind not in (*_MOVING, "fixed")), None):
-        raise InputError(source, f"joint {wrong.name!r}", f"type {wrong.kind}", " | ".join((*_MOVING, "fixed")))
-    if wrong := next((joint for joint in path if joint.mimics), None):
-        allowed = (
-            "a chain of joints that move by themselves; parallel links are written in the robot file, see docs/campaign.md"
-        )
-        raise InputError(source, f"joint {wrong.name!r}", "a joint that mimics another one", allowed)
+    if wrong := next((joint for joint in path if joint.mimics or joint.kind not in (*_MOVING, "fixed")), None):
+        found = "a joint that mimics another one" if wrong.mimics else f"type {wrong.kind}"
+        allowed = f"{' | '.join((*_MOVING, 'fixed'))}; parallel links are written in the robot file, see docs/campaign.md"
+        raise InputError(source, f"joint {wrong.name!r}", found, allowed)
     return path
 
 
-def _weights(urdf: Urdf, chain: UrdfChain, relative_std: float) -> tuple[list[dict[str, Any]], list[str]]:
+def _weights(urdf: Urdf, chain: UrdfChain) -> tuple[list[dict[str, Any]], list[str]]:
     """Entries of ``masses`` of a robot file, see `mechanics.robot_file`, and what is to be said of them."""
     moments: dict[int, np.ndarray] = {}
     at_zero = set()
@@ -397,4 +351,9 @@ def _weights(urdf: Urdf, chain: UrdfChain, relative_std: float) -> tuple[list[di
     if at_zero:
         held = first_names(sorted(at_zero), _NAMED)
         notes.insert(0, f"joints beside the chain are held at zero for what they carry: {held}")
-    return mass_entries(moments, relative_std), notes
+    entries = []
+    for number, (*mass_times_centre, mass) in sorted(moments.items()):
+        centre = np.round(np.array(mass_times_centre) / mass, _DECIMALS) + 0.0
+        entry = {"link": number, "mass_kg": round(float(mass), _DECIMALS), "centre_m": centre.tolist()}
+        entries.append(entry | {"relative_std": _MASS_STD})
+    return entries, notes

@@ -15,8 +15,7 @@ import numpy as np
 
 from elastocal.counting import counted
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import axis_rotation, elementary, homogeneous, yaw_pitch_roll
-from elastocal.exchange.robot_text import point_name
+from elastocal.exchange.robot_text import elementary, express_axis, homogeneous, point_name, yaw_pitch_roll
 from elastocal.exchange.urdf import LARGEST_BYTES, Joint, Urdf, UrdfChain, chain_between, read_urdf
 from elastocal.io.texts import read_bytes
 from elastocal.mechanics.chain import Chain, Transform, parse_chain
@@ -63,22 +62,16 @@ def _ends_of(urdf: Urdf, robot: Robot, source: str) -> tuple[str, str]:
     tips = [name for name in urdf.moments if point_name(name) == wanted]
     if not tips:
         raise InputError(source, "", f"no link {wanted!r}, the robot's last measuring point", _THE_SAME)
-    differ = None
     for tip in tips:
         for joint in reversed(urdf.path_to(tip, None)):
             try:
                 found, chain = nominal_chain(urdf, joint.parent, tip, source)
             except InputError:
                 continue
-            joints = tuple(each.name for each in found.joints)
-            if len(joints) == robot.joints and names in (None, (), joints):
-                if _is_same(chain, robot.chain):
-                    return joint.parent, tip
-                differ = differ or joints
-    found_words = f"no chain to {wanted!r} by {', '.join(names or ()) or counted(robot.joints, 'joint')}"
-    if differ:
-        found_words = f"a chain by {', '.join(differ)} to {wanted!r} that is not the robot file's"
-    raise InputError(source, "", found_words, _THE_SAME)
+            if names in (None, (), tuple(each.name for each in found.joints)) and _is_same(chain, robot.chain):
+                return joint.parent, tip
+    wanted_joints = ", ".join(names or ()) or counted(robot.joints, "joint")
+    raise InputError(source, "", f"no chain to {wanted!r} by {wanted_joints} as the robot file has it", _THE_SAME)
 
 
 def _is_same(chain: Chain, other: Chain) -> bool:
@@ -117,7 +110,7 @@ def _origins(path: list[Joint], nominal: Robot, calibrated: Robot) -> dict[str, 
             to_chain = np.linalg.inv(here) @ before[number]
             error = error @ elementary(transform.kind, transform.axis, transform.sign * offset[transform.coordinate])
             change = to_chain @ error @ np.linalg.inv(to_chain)
-            number, here = number + 1, homogeneous(axis_rotation(joint.axis).T)
+            number, here = number + 1, homogeneous(express_axis(joint.axis)[-1].T)
         elif joint is path[-1]:
             change = error
         if np.abs(change - np.eye(4)).max() > 10.0**-_DECIMALS:

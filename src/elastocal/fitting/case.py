@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.campaign import Campaign, assemble_campaign
-from elastocal.campaigns.columns import measurements_from
+from elastocal.campaigns.campaign import Campaign, assemble_campaign, measurements_from
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.fitting.model import Model, declared_model
 from elastocal.fitting.noise import Noise

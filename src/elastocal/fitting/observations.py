@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.groups import groups_of
+from elastocal.campaigns.campaign import groups_of
 
 if TYPE_CHECKING:
     from typing import Any

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.campaigns import reading
-from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
-from elastocal.campaigns.columns import columns_of
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, columns_of
 from elastocal.campaigns.holdout import split
 from elastocal.effects.catalogue import effects
 from elastocal.io.documents import read_document

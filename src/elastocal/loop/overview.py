@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.application.accuracy import calibrate_on_case, campaign_accuracy
-from elastocal.campaigns.columns import columns_of
+from elastocal.campaigns.campaign import columns_of
 from elastocal.data_checks.protocol import faults
 from elastocal.data_checks.warnings import controller_warnings
 from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of

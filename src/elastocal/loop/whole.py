@@ -19,7 +19,7 @@ from elastocal.application.accuracy import (
 )
 from elastocal.application.calibrated import forward, nominal_forward
 from elastocal.application.certificate import effect_costs
-from elastocal.campaigns.columns import columns_of
+from elastocal.campaigns.campaign import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table

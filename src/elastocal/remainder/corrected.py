@@ -10,7 +10,7 @@ import numpy as np
 
 import elastocal.remainder
 from elastocal.campaigns.campaign import BEST_REMAINDER
-from elastocal.campaigns.joint_space import blocks_of_poses, configurations
+from elastocal.campaigns.holdout import blocks_of_poses, configurations
 from elastocal.effects.catalogue import effects, moves_robot
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit_frames

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.joint_space import SAME_POSE_RAD, configurations
+from elastocal.campaigns.holdout import SAME_POSE_RAD, configurations
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.remainder.corrected import inputs_of

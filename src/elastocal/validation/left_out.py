@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
-from elastocal.campaigns.joint_space import blocks_of_poses, configurations
+from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES, blocks_of_poses, configurations
 from elastocal.fitting.displacement import kept_conditions
 from elastocal.fitting.identifiability import solve_normal
 from elastocal.fitting.least_squares import ON_THE_WAY, fit

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.joint_space import configurations
+from elastocal.campaigns.holdout import configurations
 from elastocal.counting import counted
 from elastocal.fitting.observations import state_clusters
 

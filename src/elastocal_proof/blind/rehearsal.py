@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.application.calibrated import nominal_forward
 from elastocal.application.inverse_kinematics import SOLVED_M, find_beyond_limits, refine
+from elastocal.campaigns.tables import LARGEST_BYTES
 from elastocal.errors import InputError
-from elastocal.exchange.csv_dialect import LARGEST_BYTES
 from elastocal.exchange.target_path import read_target_path
 from elastocal.io.atomic_writes import atomic_write, check_places
 from elastocal.io.texts import read_text

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.columns import columns_of, measurements_from
-from elastocal.campaigns.holdout import measured_poses
-from elastocal.campaigns.joint_space import blocks_of_poses, configurations
+from elastocal.campaigns.campaign import columns_of, measurements_from
+from elastocal.campaigns.holdout import blocks_of_poses, configurations, measured_poses
 from elastocal.fitting.case import Case, case_from
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance

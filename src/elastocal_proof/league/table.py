@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from elastocal.campaigns.groups import groups_of
+from elastocal.campaigns.campaign import groups_of
 from elastocal.counting import counted
 from elastocal.random_streams import stream
 from elastocal.remainder.tuning import NORMAL_WIDTH

@@ -6,29 +6,47 @@ Neither `csv.Sniffer`, which guesses, nor pandas, which knows no lines, can ask 
 import codecs
 import csv
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
 
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first, steering
-from elastocal.io.texts import decoded, read_bytes
+from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, decoded, plain_number, read_bytes
 
 # In this order: a header that holds a semicolon is not separated by its commas.
 SEPARATORS = {"tab": "\t", "semicolon": ";", "bar": "|", "comma": ",", "space": " "}
 DECIMALS = {"point": ".", "comma": ","}
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-# What Western spreadsheets and instruments write beyond ASCII. Another encoding that gives these alone is not to be expected:
-# that of Windows is taken where a file is no UTF-8, and asked for where anything else comes out.
-_WESTERN, _WESTERN_SIGNS = "cp1252", frozenset("°µ±²³·äöüÄÖÜßàâçèéêëîïôùûñÉ\u00a0")
 _COMMENTS = ("#", "%", "//")
 _DECIMAL = {name: re.compile(rf"[+-]?\d*[{mark}]\d+([eE][+-]?\d+)?", re.ASCII) for name, mark in DECIMALS.items()}
-# Three digits behind a comma, which may stand between thousands.
-_EITHER = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
+# Three digits behind a comma may stand between thousands; these do not.
+_SURE = re.compile(rf"(?![+-]?[1-9]\d{{0,2}},\d{{3}}$){_DECIMAL['comma'].pattern}", re.ASCII)
+A_HEADER_ALONE = "a header alone"
 # The whole of it is in memory, as text and as cells: some 2 GB at most.
 LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
 # Lines of a file with their numbers, from 1.
 _Lines = Sequence[tuple[int, str]]
+
+
+# Least and largest value of a column, in its unit, and why. Generous: whatever lies beyond is in another unit, or no reading of
+# an instrument beside a robot.
+_Bound = tuple[float, float, str]
+_FORCE: _Bound = (-1e6, 1e6, "N, the weight of a hundred tonnes")
+_MOMENT: _Bound = (-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")
+_PLACE: _Bound = (-2e7, 2e7, "m, half the circumference of the Earth")
+BOUNDS: Mapping[str, _Bound] = {
+    **dict.fromkeys(("fx", "fy", "fz"), _FORCE),
+    **dict.fromkeys(("mx", "my", "mz"), _MOMENT),
+    **dict.fromkeys("xyz", _PLACE),
+    "time_s": (-1e11, 1e11, "s, three thousand years either way: not milliseconds of a calendar"),
+    "temperature_c": (-200.0, 200.0, "°C, in which arms work, not kelvin"),
+    "u95_m": (1e-8, 0.1, "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by"),
+}
 
 
 @dataclass(frozen=True)
@@ -53,6 +71,86 @@ _WANTED = (
 
 
 @dataclass(frozen=True)
+class Cells:
+    """Columns of a table by name, as numbers in SI units or as texts; an `InputError` names the place of what is neither.
+
+    `columns`: cells as they stand in the file. `rows` (N,): number of each row in the file, 1 for the first of data.
+    `header_line`: line of the header, 0 where `rows` has lines, None where the file is no text. `headers`: what the file calls
+    columns, if otherwise. `scales`: SI values of their units, if not 1.
+    """
+
+    path: str
+    columns: Mapping[str, pa.ChunkedArray]
+    rows: np.ndarray
+    header_line: int | None = None
+    headers: Mapping[str, str] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
+
+    def fault(self, index: int, name: str, allowed: str, found: str | None = None) -> InputError:
+        """InputError of one cell, or without `name` of a row; `index` counts the rows."""
+        return InputError(
+            self.path,
+            f"{self.place(index)}{f', column {self.headers.get(name, name)}' if name else ''}",
+            _show(self.columns[name][index].as_py()) if found is None else found,
+            allowed,
+        )
+
+    def place(self, index: int) -> str:
+        """Where a row stands in the file."""
+        row = int(self.rows[index])
+        return f"row {row}" if self.header_line is None else f"line {row + self.header_line}"
+
+    def numbers(self, name: str) -> np.ndarray:
+        """ndarray (N,) of finite numbers."""
+        try:
+            values = self.columns[name].cast(pa.float64()).to_numpy()
+        except pa.ArrowInvalid:
+            # A cell is none, or written as a spreadsheet does.
+            found = [plain_number(str(cell)) for cell in self.columns[name].to_pylist()]
+            if None in found:
+                raise self.fault(found.index(None), name, A_NUMBER) from None
+            values = np.array(found, float)
+        # Not a number is no more than anything either.
+        sound = np.abs(values) <= LARGEST_NUMBER
+        if not sound.all():
+            raise self.fault(int(np.argmin(sound)), name, A_NUMBER)
+        return self.bounded(name, values * self.scales.get(name, 1.0))
+
+    def bounded(self, name: str, values: np.ndarray) -> np.ndarray:
+        """The same values (N,) of a column, all of which physics allows."""
+        least, largest, why = BOUNDS.get(name, (-np.inf, np.inf, ""))
+        wrong = ~((values >= least) & (values <= largest))
+        if wrong.any():
+            raise self.fault(int(np.argmax(wrong)), name, f"{least:g} to {largest:g} {why}")
+        return values
+
+    def matrix(self, names: Iterable[str]) -> np.ndarray:
+        """ndarray (N, len(names)) of finite numbers."""
+        return np.column_stack([self.numbers(name) for name in names])
+
+    def integers(self, name: str) -> np.ndarray:
+        """ndarray of int32 (N,)."""
+        values = self.numbers(name)
+        wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
+        if wrong.any():
+            raise self.fault(int(np.argmax(wrong)), name, f"an integer, up to {2**31 - 1}")
+        return values.astype(np.int32)
+
+    def texts(self, name: str) -> list[str]:
+        """list of str (N,)."""
+        column = self.columns[name]
+        encoded = column if pa.types.is_dictionary(column.type) else column.cast(pa.string()).dictionary_encode()
+        whole = encoded.unify_dictionaries().combine_chunks()
+        words = [str(word).strip() for word in whole.dictionary.to_pylist()]
+        return ["" if code is None else words[code] for code in whole.indices.to_pylist()]
+
+
+def _show(cell: Any) -> str:
+    text = "" if cell is None else str(cell).strip().removesuffix(".0")
+    return repr(text[:40]) if text else "nothing"
+
+
+@dataclass(frozen=True)
 class TextTable:
     """Cells of a table: decimal points throughout; `lines` has the line of the file of each row.
 
@@ -66,6 +164,12 @@ class TextTable:
     lines: tuple[int, ...]
     left_out: tuple[str, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
+
+    def cells(self, columns: Mapping[str, str], scales: Mapping[str, float], kept: np.ndarray | None = None) -> Cells:
+        """Columns by other names, their headers by these; SI values of their units; of the rows kept, if not all."""
+        rows = np.arange(len(self.lines)) if kept is None else kept
+        chosen = {name: pa.chunked_array([[self.columns[header][row] for row in rows]]) for name, header in columns.items()}
+        return Cells(self.path, chosen, np.array(self.lines)[rows], 0, columns, scales)
 
 
 def read_text_table(
@@ -115,7 +219,7 @@ def read_text_table(
     units = dict(zip(names, (rows and units_in(rows[0][1])) or (), strict=False))
     rows = rows[1:] if units else rows
     if not rows:
-        raise InputError(source, "", "a header alone", "one row for each measurement")
+        raise InputError(source, "", A_HEADER_ALONE, "one row for each measurement")
     for name in ignored:
         if name not in names:
             raise InputError(source, where, f"no column {name!r} to ignore", closest_first(name, list(dict.fromkeys(names))))
@@ -166,26 +270,18 @@ def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]
 
 
 def _decode(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, str]:
-    """Text of a file and its encoding, found out where it is not stated."""
-    if encoding is not None:
-        try:
-            return decoded(content, path, encoding).removeprefix("\ufeff"), encoding
-        except InputError:
-            raise
-        except (LookupError, ValueError) as error:
-            known = "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, shift_jis, gb18030 or utf-16-le"
-            raise InputError("--encoding", "", f"{encoding!r}: {error}", known) from None
-    found = next((name for mark, name in _MARKS if content.startswith(mark)), "")
+    """Text of a file and its encoding: the stated one, that of a byte order mark, or UTF-8."""
+    found = encoding or next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
     try:
-        return decoded(content, path, found or "utf-8"), found or "utf-8"
+        return decoded(content, path, found).removeprefix("\ufeff"), found
     except InputError as error:
-        western = content.decode(_WESTERN, errors="replace")
-        if found:
+        if found != "utf-8":
             raise
-        if all(character in _WESTERN_SIGNS for character in western if not character.isascii()):
-            return western, _WESTERN
         allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
         raise InputError(path, error.key, error.found, allowed) from None
+    except (LookupError, ValueError) as error:
+        known = "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, shift_jis, gb18030 or utf-16-le"
+        raise InputError("--encoding", "", f"{encoding!r}: {error}", known) from None
 
 
 def _find_header(
@@ -201,11 +297,7 @@ def _find_header(
         if not line:
             raise InputError(source, f"line {stated.header}", "no header", "the line that names the columns")
         return next(iter(marks_in(line)), "comma"), stated.header, line
-    for number, line in kept:
-        for name in marks_in(line):
-            if is_header(_split_cells(line, name, source, number)):
-                return name, number, line
-    for number, line in comments:
+    for number, line in (*kept, *comments):
         for name in marks_in(line):
             if is_header(_split_cells(line, name)):
                 return name, number, line
@@ -219,9 +311,7 @@ def _split_cells(line: str, separator: str, source: str = "", number: int = 0) -
     """
     mark = SEPARATORS[separator]
     if mark == " ":
-        if '"' not in line:
-            return line.split()
-        line = " ".join(line.split("\t")).strip()
+        return line.split()
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True, strict=True))
     except csv.Error as error:
@@ -233,20 +323,16 @@ def _split_cells(line: str, separator: str, source: str = "", number: int = 0) -
 
 def _find_decimal(columns: dict[str, tuple[str, ...]], lines: Sequence[int], separator: str, source: str) -> str:
     """The decimal mark that all numbers have; refused are numbers that may be read in two ways."""
-    seen: dict[str, tuple[int, str]] = {}
-    sure = False
-    for number, row in zip(lines, zip(*columns.values(), strict=True), strict=True):
-        for cell in row:
-            name = "comma" if "," in cell else "point" if "." in cell and "point" not in seen else ""
-            if name and _DECIMAL[name].fullmatch(cell):
-                seen.setdefault(name, (number, cell))
-                sure |= name == "comma" and not _EITHER.fullmatch(cell)
-        if len(seen) == 2:
-            (one, left), (other, right) = seen["point"], seen["comma"]
-            allowed = "one decimal mark, and none between thousands; --decimal point or comma says which"
-            raise InputError(source, "", f"{left!r} in line {one} and {right!r} in line {other}", allowed)
-    if "comma" in seen and (separator == "comma" or not sure):
-        number, cell = seen["comma"]
+
+    def first(pattern: re.Pattern[str], mark: str) -> tuple[int, str] | None:
+        rows = zip(lines, zip(*columns.values(), strict=True), strict=True)
+        return next(((number, cell) for number, row in rows for cell in row if mark in cell and pattern.fullmatch(cell)), None)
+
+    point, comma = (first(_DECIMAL[name], mark) for name, mark in DECIMALS.items())
+    if point and comma:
+        allowed = "one decimal mark, and none between thousands; --decimal point or comma says which"
+        raise InputError(source, "", f"{point[1]!r} in line {point[0]} and {comma[1]!r} in line {comma[0]}", allowed)
+    if comma and (separator == "comma" or not first(_SURE, ",")):
         allowed = "--decimal comma where the comma is the decimal mark, or numbers without marks between thousands"
-        raise InputError(source, f"line {number}", repr(cell), allowed)
-    return next(iter(seen), "point")
+        raise InputError(source, f"line {comma[0]}", repr(comma[1]), allowed)
+    return "comma" if comma else "point"
