@@ -15,14 +15,12 @@ from elastocal_proof.blind.folders import (
     load_ground_truth,
     seal_cases,
     write_blind_campaign,
-    write_dynamic_campaign,
     write_truth,
 )
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.kinds import Defect, truth_of
 from elastocal_proof.plant.physical_robot import specimen
-from elastocal_proof.plant.weights import declared_masses
 
 
 @pytest.fixture(scope="module")
@@ -67,14 +65,6 @@ def test_the_record_is_sealed_outside_of_the_folder_by_its_hash(tmp_path, fanuc_
     digest = write_truth(sealed, record, tmp_path / "blind" / "case0")
     assert digest == hashlib.sha256(sealed.read_bytes()).hexdigest()
     assert json.loads(sealed.read_text()) == record
-
-
-def test_the_analysis_reads_the_folder_of_a_moving_arm(tmp_path, fanuc_specimen):
-    declared = declared_masses(fanuc_specimen.arm)
-    write_dynamic_campaign(tmp_path / "c", "c", ROBOTS / "fanuc.yaml", fanuc_specimen, 2000, 4, declared)
-    campaign = read_campaign(tmp_path / "c", ROBOTS)
-    assert len(campaign.measurements) == 2000 and np.unique(campaign.measurements.pose).size == 2000
-    assert campaign.compliance == "nominal" and len(campaign.robot.masses) == 7
 
 
 def test_a_record_is_refused_anywhere_inside_the_campaigns_folder_however_the_path_is_written(tmp_path):

@@ -26,6 +26,7 @@ from elastocal_proof.plant.machine import (
     TaperedTube,
     equilibrium,
     machine_of,
+    usual_gravity_torque,
 )
 
 # One joint about y, its link forwards along x, and a measuring point at its end.
@@ -247,3 +248,15 @@ def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_i
     np.testing.assert_allclose(data.site("inner").xpos, [0.4, 0.0, 0.0], atol=1e-14)
     with pytest.raises(InputError, match="inner"):
         machine_of(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))
+
+
+def test_usual_torque_of_weight_is_the_root_mean_square_of_mass_gravity_and_horizontal_lever():
+    arm, masses = (
+        arm_of("Tz(0.4) Ry(q1) Tx(2) Ry(q2) [elbow] Tx(1) [hand]"),
+        (Mass(0, 99.0, 0.5), Mass(1, 10.0, 0.5), Mass(2, 4.0, 1.0)),
+    )
+    found = usual_gravity_torque(arm, masses, (0.0, 0.0, -9.8))
+    # Both angles are evenly spread over a whole turn, of which 64 draws are known to a tenth.
+    fore = 9.8 * 4.0 * np.sqrt(0.5)
+    upper = 9.8 * (10.0 + 4.0 * 2.0) * np.sqrt(0.5)
+    np.testing.assert_allclose(found, [np.hypot(upper, fore), fore], rtol=0.15)

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal_proof.plant.arm import declared_masses
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.instruments import Move
 from elastocal_proof.plant.kinds import KINDS, Defect, drawn_defect, with_defects
+from elastocal_proof.plant.machine import on_stretches
+from elastocal_proof.plant.physical_robot import Move
 from elastocal_proof.plant.sizing import Yardstick, size_for
-from elastocal_proof.plant.weights import declared_masses, on_stretches
 
 
 @pytest.mark.parametrize("target", [10.0, 200.0])

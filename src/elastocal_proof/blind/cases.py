@@ -16,15 +16,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal_proof.blind.folders import write_blind_campaign, write_truth
-from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
+from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file, declared_masses
 from elastocal_proof.plant.bad_rows import possible_kinds, with_bad_rows
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.instruments import Tracker, misplaced_base
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
-from elastocal_proof.plant.physical_robot import PhysicalRobot, specimen
-from elastocal_proof.plant.random_numbers import stream
+from elastocal_proof.plant.machine import on_stretches, usual_gravity_torque
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Tracker, misplaced_base, specimen, stream
 from elastocal_proof.plant.sizing import Yardstick, size_for
-from elastocal_proof.plant.weights import declared_masses, on_stretches, usual_gravity_torque
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -42,11 +42,11 @@ from elastocal.validation.conformity import predicted_conformity
 from elastocal_proof.blind import schemas
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.blind.rehearsal import ERRORS_OF_GEOMETRY, bow, hidden_robot, reached, with_misplaced_base
+from elastocal_proof.plant.arm import declared_masses
 from elastocal_proof.plant.bad_rows import HELD_POINT, ZEROS, with_bad_rows
 from elastocal_proof.plant.campaigns import Design, schedule_of, usual_force_N
 from elastocal_proof.plant.kinds import KINDS
-from elastocal_proof.plant.random_numbers import stream
-from elastocal_proof.plant.weights import declared_masses
+from elastocal_proof.plant.physical_robot import stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

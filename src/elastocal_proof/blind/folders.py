@@ -17,7 +17,7 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.json_files import read_json
-from elastocal_proof.plant.campaigns import DYNAMIC, Design, dynamic_table, measured_table
+from elastocal_proof.plant.campaigns import Design, measured_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -85,29 +85,6 @@ def write_blind_campaign(
         "measurements": len(table["pose"]),
         "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
     } | ({"bad_rows": [asdict(slip) for slip in slips]} if slipped else {})
-
-
-def write_dynamic_campaign(
-    folder: str | Path,
-    name: str,
-    robot_file: str | Path,
-    robot: PhysicalRobot,
-    measurements: int,
-    seed: int,
-    declared: Sequence[LinkMass] = (),
-) -> None:
-    """Measure a robot by a tracker in its dynamic mode, without a load; arguments as in `write_blind_campaign`.
-
-    Compliances are held at those of the robot file, beside errors of geometry, and random poses held out.
-    """
-    document = campaign_document(name, robot.arm, DYNAMIC) | {
-        "compliance": "nominal",
-        "declared": ["joint_offset", "link_geometry"],
-        "noise": {"position_m": robot.tracker.sigma_m},
-        "holdout": {"fraction": 0.3, "seed": 1},
-    }
-    write_campaign(folder, document, dynamic_table(robot, measurements, seed), robot.arm.joints, "parquet")
-    write_robot(folder, robot_file, robot, declared)
 
 
 def write_robot(

@@ -41,7 +41,7 @@ from elastocal_proof.blind.cases import NAMED, absent_on, defects_of, yardstick_
 from elastocal_proof.blind.cases import Case as BlindCase
 from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, with_defects
-from elastocal_proof.plant.random_numbers import stream
+from elastocal_proof.plant.physical_robot import stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

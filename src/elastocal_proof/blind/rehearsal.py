@@ -25,10 +25,8 @@ from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import at_joints, listed, physical_name
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
 from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, lever_of, usual_force_N
-from elastocal_proof.plant.instruments import misplaced_base
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, seen_poses, specimen
-from elastocal_proof.plant.random_numbers import stream
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, misplaced_base, seen_poses, specimen, stream
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

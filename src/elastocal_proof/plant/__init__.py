@@ -5,4 +5,4 @@ agreement of the two is a finding and not the same line of code run twice. The
 laws of the defects are on purpose not those of the catalogue: what the analysis fits is never exactly what was done.
 """
 
-from elastocal_proof.plant import catalogued, outside  # noqa: F401 - they enter their defects into the table of kinds
+from elastocal_proof.plant import laws  # noqa: F401 - it enters its defects into the table of kinds

@@ -1,6 +1,6 @@
 """Defects: all that can be wrong with a physical robot, named as in the catalogue, or ``outside:...`` where it is not there.
 
-The table of their kinds, which `catalogued` and `outside` fill, the joints at which they can be, and what they change. A defect
+The table of their kinds, which `laws` fills, the joints at which they can be, and what they change. A defect
 has one size, which scales it, and a seed, from which its other details (directions, phases, thresholds) are drawn; they do not
 change with the size.
 """
@@ -16,11 +16,9 @@ import numpy as np
 from scipy.constants import g as standard_gravity
 
 from elastocal.errors import InputError
-from elastocal_proof.plant.arm import Arm
-from elastocal_proof.plant.machine import Mass
-from elastocal_proof.plant.physical_robot import DriveLaw, PhysicalRobot, Schedule
-from elastocal_proof.plant.random_numbers import stream
-from elastocal_proof.plant.weights import declared_masses, on_stretches, usual_gravity_torque
+from elastocal_proof.plant.arm import Arm, declared_masses
+from elastocal_proof.plant.machine import Mass, on_stretches, usual_gravity_torque
+from elastocal_proof.plant.physical_robot import DriveLaw, PhysicalRobot, Schedule, stream
 
 OUTSIDE = "outside:"
 TURN = 2 * np.pi

@@ -22,13 +22,13 @@ from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
-from elastocal_proof.plant.arm import Arm, Stretch, turned
+from elastocal_proof.plant.arm import Arm, LinkMass, Stretch, turned
 
 # Start of the names of some structural springs, and what they deflect by, beyond their compliance, under a force (S,).
 StructureLaw = tuple[str, Callable[[np.ndarray], np.ndarray]]
 # MuJoCo wants mass in each moving body; this weighs nothing beside a load of newtons.
 _NOTHING_KG = 1e-12
-_SWEEPS = 60
+_SWEEPS, _POSES = 60, 64
 # Of the largest deflection: a hundredth of a picometre of millimetres.
 _TOLERANCE = 1e-11
 _NOWHERE = (0.0, 0.0, 0.0)
@@ -374,3 +374,24 @@ def equilibrium(
             return Equilibrium(coordinates, force, position, rotation, sweep)
         coordinates = following
     raise RuntimeError(f"no equilibrium after {_SWEEPS} sweeps: the last moved by {change.max():.3g}")
+
+
+def on_stretches(masses: Iterable[LinkMass], arm: Arm) -> tuple[Mass, ...]:
+    """The same weights as a structure has them: along the line of the stretch, and aside of it."""
+    found = []
+    for mass in masses:
+        centre, vector = np.array(mass.centre_m), arm.stretches[mass.link].vector_m
+        along = float(np.clip(centre @ vector / (vector @ vector), 0.0, 1.0)) if vector.any() else 0.0
+        found.append(Mass(mass.link, mass.mass_kg, along, tuple((centre - along * vector).tolist())))
+    return tuple(found)
+
+
+def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: tuple[float, ...]) -> np.ndarray:
+    """Root mean square torque of the links' weight on each drive over the arm's range of angles, (n,), N m."""
+    low, high = arm.limits.T
+    machine = machine_of(arm, Structure(masses=tuple(masses), gravity_m_s2=gravity_m_s2))
+    coordinates = np.zeros((_POSES, machine.model.nq))
+    # The same poses for all, of no campaign.
+    coordinates[:, machine.drive] = low + (high - low) * np.random.default_rng(0).random((_POSES, arm.joints))
+    torque = machine.forces(coordinates, np.zeros((_POSES, arm.joints + 1)))[0][:, machine.gear]
+    return np.sqrt((torque**2).mean(axis=0))

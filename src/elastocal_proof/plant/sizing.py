@@ -24,7 +24,6 @@ import numpy as np
 
 from elastocal_proof.plant.arm import rotation_vector
 from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, read_poses, seen_poses
-from elastocal_proof.plant.weights import allowed_centre_std_m
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -155,7 +154,7 @@ def _responses(
     for number, mass in enumerate(declared):
         weight = mass.mass_kg * np.array(model.opt.gravity)
         torques.append(mass.relative_std * (weight @ moves[number]))
-        moment = np.cross(axes[number], weight, axisa=1, axisc=1) * allowed_centre_std_m(mass, robot.arm.reach_m)
+        moment = np.cross(axes[number], weight, axisa=1, axisc=1) * mass.allowed_centre_std_m(robot.arm.reach_m)
         torques += [np.einsum("si,sij->sj", moment[..., axis], turns[number]) for axis in range(3)]
     return jacobian, torques
 
