@@ -39,15 +39,11 @@ def rms(table, model):
 
 
 @pytest.mark.slow
-def test_each_wanted_pose_is_commanded_by_every_model(table):
+def test_every_pose_is_commanded_by_every_model_and_the_model_found_is_nearer_than_the_declared_one(table):
     assert table.groupby(["part", "model"]).size().to_dict() == {
         (part, model): 12 if part == "milling" else 6 for part in PARTS for model in MODELS
     }
     assert table.loc[table["model"].isin([FOUND, TRUE]), "corrected"].all()
-
-
-@pytest.mark.slow
-def test_the_model_found_is_nearer_than_the_declared_one_and_that_nearer_than_a_rigid_robot(table):
     assert rms(table, TRUE) < rms(table, FOUND) < rms(table, DECLARED)
     assert rms(table, DECLARED) < min(rms(table, GEOMETRY), rms(table, UNCORRECTED))
     assert table["named"].all()

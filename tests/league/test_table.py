@@ -52,12 +52,10 @@ MECHANISMS = pd.DataFrame(
         for name, p, s in (("link_weight", 0.9, 0.4), ("payload", 0.01, 0.2))
     ]
 )
-FIGURE = {"rms_mm": 0.5, "what": "RMS", "source": "somebody", "why": "fitted poses"}
-PUBLISHED = pd.DataFrame([{"data": name} | FIGURE for name in ("one", "three")])
 
 
 def written(table):
-    return league_page(table, MECHANISMS, PUBLISHED, METHODS, {"four": "folder/four.csv"})
+    return league_page(table, MECHANISMS, METHODS, {"four": "folder/four.csv"})
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +64,7 @@ def page():
 
 
 def test_each_split_has_a_table_in_which_the_best_is_bold(page):
-    assert page.count("## ") == 6
+    assert page.count("## ") == 5
     for line in (line for line in page.splitlines() if line.startswith("| one ") and "(" in line and "**" in line):
         assert line.count("**") == 2
     assert page.count("**") == 2 * 6
@@ -77,9 +75,8 @@ def test_a_split_that_no_data_set_has_is_left_out():
     assert "Random poses" in page and "another session" in page and "Blocks of joint space" not in page
 
 
-def test_improbable_mechanisms_and_figures_of_other_data_are_left_out(page):
+def test_improbable_mechanisms_are_left_out(page):
     assert "link weight" in page and "payload" not in page
-    assert "somebody" in page and "three" not in page
 
 
 def test_the_page_says_first_how_often_a_diagnosis_leads_and_how_surely(page):

@@ -11,10 +11,8 @@ from elastocal_proof.plant.arm import (
     LinkMass,
     arm_from_document,
     arm_from_file,
-    declared_masses,
     off_the_line,
     rotation_vector,
-    true_masses,
     turned,
 )
 
@@ -77,7 +75,13 @@ def test_masses_and_gravity_are_as_the_file_declares_them_or_of_the_usual_kind()
         (2, 7.5, (0.1, 0.2, 0.3), 0.02),
     ]
     assert arm.gravity_m_s2 == (9.8, 0.0, 0.0)
-    assert arm_of().masses == () and arm_of().gravity_m_s2 == (0.0, 0.0, -9.80665)
+    assert arm_of().gravity_m_s2 == (0.0, 0.0, -9.80665) and (arm.compensated, arm_of().compensated) == (False, True)
+    # Of the arm in the foot and in the carousel with its motors; each link behind it weighs half of the one before.
+    usual = arm_from_file(ROBOTS / "kuka.yaml").masses
+    mass = np.array([m.mass_kg for m in usual])
+    assert [m.link for m in usual] == list(range(7)) and {m.relative_std for m in usual} == {0.1}
+    np.testing.assert_allclose(mass[3:] / mass[2:-1], 0.5, rtol=5e-3)
+    np.testing.assert_allclose(mass[:2] / mass.sum(), [0.18, 0.27], rtol=1e-3)
 
 
 def test_rotations_are_pinocchios_and_survive_the_way_there_and_back_up_to_a_half_turn(rng):
@@ -87,14 +91,6 @@ def test_rotations_are_pinocchios_and_survive_the_way_there_and_back_up_to_a_hal
     vector = angle[:, None] * axis
     np.testing.assert_allclose(turned(vector), [pin.exp3(v) for v in vector], atol=1e-12)
     np.testing.assert_allclose(rotation_vector(turned(vector)), vector, atol=1e-9)
-
-
-def test_a_file_is_read_as_its_document(tmp_path):
-    (tmp_path / "arm.yaml").write_text(str(document()), encoding="utf-8")
-    np.testing.assert_array_equal(arm_from_file(tmp_path / "arm.yaml").axes, arm_of().axes)
-    (tmp_path / "arm.yaml").write_text(str(document("Rz(q1)", 1)), encoding="utf-8")
-    with refused((tmp_path / "arm.yaml").as_posix(), "chain"):
-        arm_from_file(tmp_path / "arm.yaml")
 
 
 def test_a_file_without_compliances_and_limits_is_of_an_arm_of_usual_ones():
@@ -114,18 +110,6 @@ def test_drives_that_the_plant_cannot_move_are_refused(chain):
         arm_from_document(document(chain), "my.yaml")
 
 
-TWO_CHAIN = "Tz(0.4) Ry(q1) Tx(2) Ry(q2) [elbow] Tx(1) [hand]"
-TWO = arms_at_rest.arm_of(TWO_CHAIN)
-
-
-def test_where_the_file_has_none_each_link_behind_the_carousel_weighs_half_of_the_one_before():
-    guessed = declared_masses(arm_from_file(ROBOTS / "kuka.yaml"))
-    mass, total = np.array([m.mass_kg for m in guessed]), sum(m.mass_kg for m in guessed)
-    assert [m.link for m in guessed] == list(range(7)) and {m.relative_std for m in guessed} == {0.1}
-    np.testing.assert_allclose(mass[3:] / mass[2:-1], 0.5, rtol=5e-3)
-    np.testing.assert_allclose(mass[:2] / total, [0.18, 0.27], rtol=1e-3)
-
-
 @pytest.mark.parametrize(
     "centre, std, allowed", [((0.0, 0.3, 0.4), 0.01, 0.01), ((0.0, 0.0, 0.0), 0.002, 0.006), ((0.2, 0.0, 0.0), 0.004, 0.006)]
 )
@@ -135,20 +119,8 @@ def test_a_centre_is_known_as_a_share_of_its_distance_and_no_better_than_a_short
     assert mass.allowed_centre_std_m(3.0) == pytest.approx(allowed)
 
 
-def test_masses_of_specimens_scatter_about_the_declared_ones_as_these_are_known():
-    declared = (LinkMass(1, 50.0, (0.3, 0.0, 0.4), 0.1),) * 2000
-    drawn = true_masses(declared, np.random.default_rng(2))
-    off = np.column_stack([[m.mass_kg / 50.0 - 1.0 for m in drawn], np.array([m.centre_m for m in drawn]) - (0.3, 0.0, 0.4)])
-    off /= [0.1, 0.05, 0.05, 0.05]
-    # Four standard errors of 2000 normal draws: a right generator fails four means and four deviations once in 2,000 seeds.
-    np.testing.assert_allclose(off.mean(axis=0), 0.0, atol=4 / np.sqrt(2000))
-    np.testing.assert_allclose(off.std(axis=0), 1.0, atol=4 / np.sqrt(4000))
-    assert np.abs(off).max() <= 3.0 + 1e-9
-    assert np.abs(np.corrcoef(off.T) - np.eye(4)).max() < 4 / np.sqrt(2000)
-
-
 def test_centres_off_the_line_move_across_it_alone_and_weights_stay():
-    arm, largest = TWO, 0.02
+    arm, largest = arms_at_rest.arm_of("Tz(0.4) Ry(q1) Tx(2) Ry(q2) [elbow] Tx(1) [hand]"), 0.02
     masses = (LinkMass(0, 9.0, (0.0, 0.0, 0.1), 0.1), LinkMass(1, 8.0, (0.5, 0.0, 0.0), 0.1)) * 100
     moved = off_the_line(masses, arm, largest, np.random.default_rng(4))
     shift = np.array([m.centre_m for m in moved]) - np.array([m.centre_m for m in masses])

@@ -21,13 +21,10 @@ from scipy.spatial.transform import Rotation
 from statsmodels.robust.norms import HuberT
 
 from elastocal_proof.audit.arm import Arm, cantilever
-from elastocal_proof.audit.audited import COMPONENTS, POSITION, WRENCH
-from elastocal_proof.audit.findings import Finding, compare
+from elastocal_proof.audit.audited import COMPONENTS, POSITION, WRENCH, Audited, Finding, compare
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-
-    from elastocal_proof.audit.audited import Audited
 
 _STATE, _TURN = ["session", "pose", "load"], ["rx", "ry", "rz"]
 # Steps of a fit end at so many standard errors of the scatter that is there; standard errors belong to the step before.

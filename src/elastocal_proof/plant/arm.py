@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -56,11 +56,8 @@ class Point:
 
 @dataclass(frozen=True)
 class Stretch:
-    """What is rigid between two drives.
-
-    `vector_m` (3,): from its near to its far end, in the frame at its near end. `rotation` (3, 3): of the frame at its far end,
-    in that at its near end.
-    """
+    """What is rigid between two drives: vector (3,) from its near to its far end, and rotation (3, 3) of the frame at its far
+    end, both in the frame at its near end."""
 
     vector_m: np.ndarray
     rotation: np.ndarray
@@ -72,8 +69,7 @@ class LinkMass:
     """What one link weighs.
 
     `link`: 0 is the column; k turns with joint k. `centre_m`: in the frame directly behind the rotation of joint `link`; of the
-    column in the axes of the base. `relative_std`: how well the mass is known, and each component of the centre as a share of
-    the centre's distance.
+    column in the axes of the base. `relative_std`: of the mass; of each component of the centre as a share of its distance.
     """
 
     link: int
@@ -92,15 +88,13 @@ class LinkMass:
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm, all fixed rotations and lengths sorted into stretches.
+    """An arm, all fixed rotations and lengths sorted into stretches; what its file does not state is usual for its size.
 
     `stretches`: n + 1 of them: the column, and one behind each drive. `axes` (n, 3): axis of each drive with its sense, in the
-    frame at the far end of the stretch before it. `compliance` (n,): rad/(N m), as the robot file states it, or usual for the
-    size of the arm; a plant's own may differ. `limits` (n, 2): rad; a turn either way where the robot file states none.
+    frame at the far end of the stretch before it. `compliance` (n,): rad/(N m); a specimen's own differs. `limits` (n, 2): rad.
     `reported_matrix`, `reported_offset` (n, n), (n,): angles from what the controller shows: q = matrix @ shown + offset.
-    `masses`: as the robot file declares them; empty where it does not. `gravity_m_s2`: in the axes of the base. `rated_kg`:
-    rated load, where the file has one. `compensated`: whether the arm has a gravity compensator at the shoulder. `ratios`:
-    turns of the motor for one of each joint, where the file has them.
+    `masses`: as declared. `gravity_m_s2`: in the axes of the base. `compensated`: by a gravity compensator at the shoulder.
+    `gear_ratio`: turns of the motor for one of each joint.
     """
 
     name: str
@@ -112,9 +106,9 @@ class Arm:
     reported_offset: np.ndarray
     masses: tuple[LinkMass, ...]
     gravity_m_s2: tuple[float, ...]
-    rated_kg: float | None
+    payload_kg: float
     compensated: bool
-    ratios: tuple[float, ...]
+    gear_ratio: tuple[float, ...]
 
     @property
     def joints(self) -> int:
@@ -124,22 +118,12 @@ class Arm:
     @cached_property
     def lengths_m(self) -> np.ndarray:
         """Of all stretches, (n + 1,)."""
-        return np.array([np.linalg.norm(stretch.vector_m) for stretch in self.stretches])
+        return _lengths_of(self.stretches)
 
     @property
     def reach_m(self) -> float:
         """Length of all that joint 1 carries, stretched out."""
         return float(sum(self.lengths_m[1:]))
-
-    @property
-    def payload_kg(self) -> float:
-        """Rated load; where the file has none, 8 kg m^-3 times the cube of the reach, as arms of 1 to 3 m have."""
-        return 8.0 * self.reach_m**3 if self.rated_kg is None else self.rated_kg
-
-    @property
-    def gear_ratio(self) -> tuple[float, ...]:
-        """Turns of the motor for one of each joint; usual ones where the file has none."""
-        return self.ratios or tuple(_USUAL_RATIOS[joint % len(_USUAL_RATIOS)] for joint in range(self.joints))
 
     @property
     def load_share(self) -> float:
@@ -177,28 +161,44 @@ def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm
     places, or a chain that does not end in a measuring point.
     """
     stretches, axes = _stretches_of(document["chain"], document.get("lengths_m", {}), source)
-    n, shown = len(axes), document.get("reported_joints", {})
-    masses = [mass | {"centre_m": tuple(map(float, mass["centre_m"]))} for mass in document.get("masses", ())]
-    arm = Arm(
+    n, shown, lengths = len(axes), document.get("reported_joints", {}), _lengths_of(stretches)
+    reach = float(sum(lengths[1:]))
+    # Arms of 1 to 3 m carry 8 kg m^-3 times the cube of their reach.
+    payload = document.get("payload_kg", 8.0 * reach**3)
+    behind = np.cumsum(lengths[:0:-1])[::-1]
+    compliance = _WIND_UP_RAD / (standard_gravity * max(payload, _LEAST_KG) * np.maximum(behind, _SHORTEST_LEVER_M))
+    if "compliance_urad_per_Nm" in document:
+        compliance = 1e-6 * np.array(document["compliance_urad_per_Nm"], float)
+    masses = [LinkMass(**mass | {"centre_m": tuple(map(float, mass["centre_m"]))}) for mass in document.get("masses", ())]
+    return Arm(
         document["name"],
         stretches,
         axes,
-        1e-6 * np.array(document.get("compliance_urad_per_Nm", np.zeros(n)), float),
+        compliance,
         np.radians(np.array(document.get("joint_limits_deg", [[-360.0, 360.0]] * n), float)),
         np.array(shown.get("matrix", np.eye(n)), float),
         np.radians(np.array(shown.get("offset_deg", np.zeros(n)), float)),
-        tuple(LinkMass(**mass) for mass in masses),
+        tuple(masses or _usual_masses(stretches, payload * reach, reach)),
         tuple(map(float, document.get("gravity_m_s2", (0.0, 0.0, -standard_gravity)))),
-        document.get("payload_kg"),
+        payload,
         # A file that declares no weights declares no compensator either.
         "compensator" in document or not masses,
-        tuple(document.get("gear_ratio", ())),
+        tuple(document.get("gear_ratio", [_USUAL_RATIOS[joint % len(_USUAL_RATIOS)] for joint in range(n)])),
     )
-    if "compliance_urad_per_Nm" in document:
-        return arm
-    behind = np.cumsum(arm.lengths_m[:0:-1])[::-1]
-    weight = standard_gravity * max(arm.payload_kg, _LEAST_KG)
-    return replace(arm, compliance=_WIND_UP_RAD / (weight * np.maximum(behind, _SHORTEST_LEVER_M)))
+
+
+def _lengths_of(stretches: Iterable[Stretch]) -> np.ndarray:
+    return np.array([np.linalg.norm(stretch.vector_m) for stretch in stretches])
+
+
+def _usual_masses(stretches: Sequence[Stretch], payload_times_reach: float, reach: float) -> list[LinkMass]:
+    """What the links of an arm weigh of which nobody says it."""
+    falling = _FALL ** np.arange(len(stretches) - 2)
+    shares = [_FOOT, _CAROUSEL, *((1.0 - _FOOT - _CAROUSEL) * falling / falling.sum())]
+    # Centres before the middle of the link, and a little to the side, where the motors sit; to the millimetre.
+    centres = [np.round(_ALONG * stretch.vector_m + np.array([0.0, _ASIDE * reach, 0.0]), 3) for stretch in stretches]
+    total = _SCALE_KG * payload_times_reach**_POWER
+    return [LinkMass(link, round(float(share * total), 1), tuple(centres[link].tolist())) for link, share in enumerate(shares)]
 
 
 def _stretches_of(chain: str, lengths: Mapping[str, float], source: str) -> tuple[tuple[Stretch, ...], np.ndarray]:
@@ -239,19 +239,6 @@ def rotation_vector(rotation: np.ndarray) -> np.ndarray:
     """Rotation vectors (..., 3), rad, of rotation matrices (..., 3, 3); angles up to and at a half turn."""
     # A product of two rotations is one but for rounding, which needs no other to be found for it.
     return Rotation.from_matrix(np.array(rotation), assume_valid=True).as_rotvec()
-
-
-def declared_masses(arm: Arm) -> tuple[LinkMass, ...]:
-    """What the robot file says the links weigh, or a rule where it says nothing."""
-    if arm.masses:
-        return arm.masses
-    total = _SCALE_KG * (arm.payload_kg * arm.reach_m) ** _POWER
-    falling = _FALL ** np.arange(arm.joints - 1)
-    shares = [_FOOT, _CAROUSEL, *((1.0 - _FOOT - _CAROUSEL) * falling / falling.sum())]
-    # Centres before the middle of the link, and a little to the side, where the motors sit; to the millimetre.
-    aside = np.array([0.0, _ASIDE * arm.reach_m, 0.0])
-    centres = [tuple(np.round(_ALONG * stretch.vector_m + aside, 3).tolist()) for stretch in arm.stretches]
-    return tuple(LinkMass(link, round(float(shares[link] * total), 1), centre) for link, centre in enumerate(centres))
 
 
 def true_masses(masses: Iterable[LinkMass], draws: np.random.Generator) -> tuple[LinkMass, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal_proof.plant.arm import rotation_vector
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, read_poses, stream
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, logged_temperature, read_poses, stream
 
 if TYPE_CHECKING:
     from elastocal_proof.plant.arm import Arm
@@ -28,16 +28,14 @@ _LONG_M = 2.5
 class Design:
     """How a campaign is made, and what is written down of it.
 
-    `held_out`: the last poses, which no step of the analysis may see before its last. `force_N`: largest force; its direction
-    is random in each pose. None: what suits the arm, `usual_force_N`. `force_times`: how many times that force is really meant.
-    `ladder`: shares of it, 0 first: each is a load. `lever_m`: from the flange to where the force acts, base axes; shorter in
-    proportion on an arm of less than 2.5 m. `repeats`, `repeated_poses`: how often loads 0 and 1 of the first poses are read.
-    `approach_each_load`: whether each load is approached afresh; otherwise loads of one pose follow each other without a move.
-    `points`: measuring points with a target each, or `FLANGE`; empty for all. `covariates`: which of `COVARIATES` are written
-    down. `declared_noise` (float, float): standard deviations that the campaign claims, m and rad; right or wrong. `declared`:
-    effects that the campaign says its model has. `measured`: one of "pose", "position". `frame`: one of "base", "tracker".
-    `reach`: share of the joint limits, about their middle, that poses are drawn from. `undeclared`: keys of the robot file that
-    the analyst's lacks.
+    `held_out`: the last poses. `force_N`: largest force, of a random direction in each pose; None: what suits the arm;
+    `force_times`: how many times that is really meant. `ladder`: shares of it, 0 first: each is a load. `lever_m`: from the
+    flange to where the force acts, base axes; shorter in proportion on an arm of less than 2.5 m. `repeats`, `repeated_poses`:
+    how often loads 0 and 1 of the first poses are read. `approach_each_load`: whether each load is approached afresh; otherwise
+    loads of one pose follow each other without a move. `points`: measuring points with a target each, or `FLANGE`; empty for
+    all. `covariates`: which are written down. `declared_noise`: standard deviations that the campaign claims, m and rad.
+    `declared`: effects that its model has. `measured`: "pose" or "position". `frame`: "base" or "tracker". `reach`: share of
+    the joint limits, about their middle, that poses are drawn from. `undeclared`: keys that the analyst's robot file lacks.
     """
 
     poses: int = 30
@@ -134,7 +132,7 @@ def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> 
     covariates = {
         "approach": dict(zip([f"approach{j}" for j in joints], each(schedule.sense.astype(float)).T, strict=True)),
         "time": {"time_s": each(schedule.time_s)},
-        "temperature": {"temperature_c": each(robot.warmth.shown(schedule.time_s))},
+        "temperature": {"temperature_c": each(logged_temperature(schedule.time_s))},
     }
     for covariate in design.covariates:
         table |= covariates[covariate]

@@ -36,11 +36,7 @@ _ROUNDS = 12
 
 @dataclass(frozen=True)
 class Signal:
-    """What a defect does to the measurements.
-
-    `raw`, `retained`: non-centralities before and after absorption. `rms_m`, `rms_rad`: root mean square over all measurements
-    of the length of the change of position, and of orientation.
-    """
+    """Of a defect: non-centralities before and after absorption, and RMS lengths of the changes of position and orientation."""
 
     raw: float
     retained: float
@@ -75,12 +71,11 @@ class Yardstick:
             [self._flat(np.einsum("stij,sj->sti", jacobian[:, self.targets], turn)) for turn in turns]
             for turns in (springs, [robot.compliance * torque for torque in torques])
         )
-        if free_frame:
-            position = self.poses[0][:, self.targets]
-            for axis in np.eye(3):
-                along, nothing = np.broadcast_to(axis, position.shape), np.zeros_like(position)
-                columns.append(self._flat(np.concatenate([along, nothing], axis=-1)))
-                columns.append(self._flat(np.concatenate([np.cross(axis, position), along], axis=-1)))
+        position = self.poses[0][:, self.targets]
+        for axis in np.eye(3) if free_frame else ():
+            along, nothing = np.broadcast_to(axis, position.shape), np.zeros_like(position)
+            columns.append(self._flat(np.concatenate([along, nothing], axis=-1)))
+            columns.append(self._flat(np.concatenate([np.cross(axis, position), along], axis=-1)))
         height = len(columns[0])
         # A column of nothing, such as the compliance of a joint that no load turns, absorbs nothing.
         columns = [column / np.linalg.norm(column) for column in columns if column.any()]
@@ -135,9 +130,7 @@ def _responses(
     model, data, gear = machine.model, mujoco.MjData(machine.model), machine.gear
     shift, turn, count = np.empty((3, model.nv)), np.empty((3, model.nv)), len(coordinates)
     jacobian = np.empty((count, len(machine.sites), 6, len(gear)))
-    # Of the centres of mass.
-    moves, turns = np.empty((2, len(declared), count, 3, len(gear)))
-    axes = np.empty((len(declared), count, 3, 3))
+    torques = np.empty((len(declared), 4, count, len(gear)))
     for state, row in enumerate(coordinates):
         data.qpos[:] = row
         mujoco.mj_kinematics(model, data)
@@ -146,17 +139,13 @@ def _responses(
             mujoco.mj_jacSite(model, data, shift, turn, site)
             jacobian[state, point, :3], jacobian[state, point, 3:] = shift[:, gear], turn[:, gear]
         for number, mass in enumerate(declared):
-            link = machine.links[mass.link]
-            axes[number, state] = data.xmat[link].reshape(3, 3)
-            mujoco.mj_jac(model, data, shift, turn, data.xpos[link] + axes[number, state] @ mass.centre_m, link)
-            moves[number, state], turns[number, state] = shift[:, gear], turn[:, gear]
-    torques = []
-    for number, mass in enumerate(declared):
-        weight = mass.mass_kg * np.array(model.opt.gravity)
-        torques.append(mass.relative_std * (weight @ moves[number]))
-        moment = np.cross(axes[number], weight, axisa=1, axisc=1) * mass.allowed_centre_std_m(robot.arm.reach_m)
-        torques += [np.einsum("si,sij->sj", moment[..., axis], turns[number]) for axis in range(3)]
-    return jacobian, torques
+            link, weight = model.body(f"arm{mass.link}" if mass.link else "foot").id, mass.mass_kg * np.array(model.opt.gravity)
+            axes = data.xmat[link].reshape(3, 3)
+            mujoco.mj_jac(model, data, shift, turn, data.xpos[link] + axes @ mass.centre_m, link)
+            torques[number, 0, state] = mass.relative_std * (weight @ shift[:, gear])
+            moments = np.cross(axes.T, weight) * mass.allowed_centre_std_m(robot.arm.reach_m)
+            torques[number, 1:, state] = moments @ turn[:, gear]
+    return jacobian, [*torques.reshape(-1, count, len(gear))]
 
 
 def size_for(
@@ -167,11 +156,10 @@ def size_for(
     quantity: str = "retained",
     largest: float = np.inf,
 ) -> float:
-    """Size of a defect at which its non-centrality is as wanted.
+    """Size of a defect at which its non-centrality, "retained" or "raw", is the target to one per cent.
 
-    `robot_of_size`: robot with the defect of a given size. `start`: a size to begin with. `target`: non-centrality. `quantity`:
-    one of "retained", "raw". `largest`: no larger size is tried. Raises `ValueError`: no size has it to one per cent: the
-    defect is absorbed whatever its size, saturates, or would be larger than allowed.
+    `robot_of_size`: robot with the defect of a given size. Raises `ValueError`: no size up to the largest has it: the defect is
+    absorbed whatever its size, saturates, or would be larger than allowed.
 
     The non-centrality of a linear effect grows with the square of its size; the secant of the logarithms allows for others.
     """
