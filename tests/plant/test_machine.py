@@ -9,7 +9,6 @@ import pinocchio as pin
 import pytest
 from analysed_robots import ROBOTS, analysed
 from arms_at_rest import STATES, angles_and_wrenches, arm_of, at_rest, forces_at
-from scipy.optimize import brentq
 from support import OTHER_CHAINS, robot_of
 
 from elastocal.errors import InputError
@@ -67,12 +66,6 @@ def assert_unloaded_poses_alike(arm, robot, angles):
         wanted = poses(robot.chain, angles, point)
         np.testing.assert_allclose(position[:, number], wanted[0], atol=1e-12)
         np.testing.assert_allclose(rotation[:, number], wanted[1], atol=1e-12)
-
-
-@pytest.mark.parametrize("key", ["kuka", "fanuc", "abb", "ur10", "gp180", "iiwa14"])
-def test_poses_without_load_are_those_of_the_analysis(key):
-    arm = arm_from_file(ROBOTS / f"{key}.yaml")
-    assert_unloaded_poses_alike(arm, analysed(key), angles_and_wrenches(arm)[0])
 
 
 @pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
@@ -152,26 +145,6 @@ def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(ar
         mujoco.mj_applyFT(model, data, push[:3], push[3:], data.site_xpos[flange], model.site_bodyid[flange], force)
         left = (data.qfrc_inverse - force)[free] + (row / np.where(compliance > 0, compliance, 1.0))[free]
         assert np.abs(left).max() < 1e-9 * np.abs(force).max()
-
-
-def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
-    mass, angles = 200.0, np.array([[-1.0], [0.0], [0.7], [np.pi / 2]])
-    machine, found = at_rest(LEVER, angles, np.zeros((4, 6)), Structure(masses=(Mass(1, mass, 0.8),)))
-    moment = mass * 9.80665 * 0.8
-    # theta = C m g l cos(q + theta), to all orders; seven degrees at most.
-    wanted = [brentq(lambda t, q=q: t - 50e-6 * moment * np.cos(q + t), -1.0, 1.0, xtol=1e-15) for q in angles[:, 0]]
-    np.testing.assert_allclose(found.coordinates[:, machine.gear[0]], wanted, atol=1e-11)
-    np.testing.assert_allclose(found.position[:, 0, 2], -np.sin(angles[:, 0] + wanted), atol=1e-11)
-
-
-def test_a_structural_spring_yields_by_its_compliance_and_its_laws():
-    machine = machine_of(LEVER, Structure(base=(0.0, 0.0, 2e-8, 0.0, 0.0, 0.0)))
-    index, wrench = machine.springs["base_z"], np.array([[0.0, 0.0, 1000.0, 0.0, 0.0, 0.0], [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]])
-    laws = [("base_z", lambda force: 1e-11 * force**2), ("nothing", lambda force: force)]
-    laws.append(("base_z", lambda force: np.array([1e-5, 3e-5])))
-    loading = np.full((2, 1), np.pi / 2), wrench, np.zeros((2, 2))
-    found = equilibrium(machine, *loading, lambda torque, unloaded: 0.0 * torque, laws)
-    np.testing.assert_allclose(found.coordinates[:, index], [2e-5 + 1e-5 + 1e-5, -1e-5 + 0.25e-5 + 3e-5], rtol=1e-9)
 
 
 def test_an_arm_that_finds_no_rest_is_an_error_and_a_start_near_it_changes_nothing():

@@ -81,8 +81,8 @@ def shifted(robot, *shift, turn=(0.0, 0.0, 0.0)):
 def test_a_tracker_farther_away_makes_the_same_shift_weigh_less(weightless, schedule):
     tracker = replace(weightless.tracker, sigma_m=0.0, sigma_m_per_m=1e-5)
     robot = replace(weightless, tracker=tracker)
-    yardstick = Yardstick(robot, schedule, targets=[0], orientation=False)
-    change = yardstick.seen_and_left(shifted(robot, 1e-4, 0.0, 0.0))[0].reshape(-1, 3)[:, 0]
+    yardstick = Yardstick(robot, schedule, targets=[0])
+    change = yardstick.seen_and_left(shifted(robot, 1e-4, 0.0, 0.0))[0].reshape(-1, 6)[:, 0]
     distance = np.linalg.norm(yardstick.poses[0][:, 0] - np.array(tracker.stand_m), axis=-1)
     np.testing.assert_allclose(change, 10.0 / distance[schedule.training])
 

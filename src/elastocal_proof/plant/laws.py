@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -81,26 +82,25 @@ def stiff_by_angle(robot: PhysicalRobot, joint: int, of: int, size: float, phase
 
 
 def usual_torque_Nm(robot: PhysicalRobot, joint: int) -> float:  # noqa: N802 - units in names keep their case
-    """Torque on a joint as its gear is made for: that of the weight it carries, and of a usual load on top.
-
-    Of a kilonewton at a heavy arm: 1500 N m by the arm's reach before the wrist, 450 N m by the tool's half metre behind it.
-    """
+    """Torque on a joint as its gear is made for: that of the weight it carries, and of a kilonewton at a heavy arm."""
     arm, structure = robot.arm, robot.structure
     load = (1500.0 if joint < arm.joints - 3 else 450.0) * arm.load_share * min(1.0, arm.reach_m / _HEAVY_REACH_M)
     return load + float(usual_gravity_torque(arm, structure.masses, structure.gravity_m_s2)[joint])
 
 
-def wrong_cell(robot: PhysicalRobot, error: str, draws: Draws, parameters: dict[str, float], **changes: Any) -> Applied:
-    """The error in a frame that is drawn, of a cell at a location that is drawn.
+def wrong_cell(field: str, start: str, robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+    """An error in a frame that is drawn, of a cell at a location that is drawn.
 
     The catalogue's laws leave the moment as stated; those of a cell in the pull are not comparable.
     """
+    vector, error = size * direction(draws), field.partition("_")[0]
+    # What is felt beyond what is shown is minus the bias of the display.
+    changes: dict[str, Any] = {field: tuple(-vector if error == "bias" else vector)}
     # In the flange's axes or not, beside the errors of the load cell that are so already.
-    changes |= {"in_flange": (*robot.cell.in_flange, error) if draws.integers(2) else robot.cell.in_flange}
-    if error == "shift":
-        return changed(robot, "cell", **changes), parameters
-    mount = ("pull", "flange")[draws.integers(2)]
-    return changed(robot, "cell", mount=mount, **changes), parameters if mount == "flange" else {}
+    changes["in_flange"] = (*robot.cell.in_flange, error) if draws.integers(2) else robot.cell.in_flange
+    if error != "shift":
+        changes["mount"] = ("pull", "flange")[draws.integers(2)]
+    return changed(robot, "cell", **changes), named(start, vector) if changes.get("mount") != "pull" else {}
 
 
 # Geometry
@@ -129,10 +129,7 @@ kind("tracker_scale", "1", 2e-5, nowhere)(lambda robot, size, draws: (changed(ro
 
 @kind("link_weight", "kg", 100.0, weighed, scale=(0.0, 1.0))
 def link_weight(robot: PhysicalRobot, size: float, draws: Draws, *joints: int) -> Applied:
-    """Weight of the upper arm, which turns joint 2, of the forearm, which turns the elbow too, or of all links.
-
-    By the joints that it turns: of one link beside its line, or of all as their masses are declared.
-    """
+    """Weight of the upper arm or the forearm, beside its line, or of all links as declared, by the joints that it turns."""
     arm, old = robot.arm, robot.structure.masses
     link = weighing_links(arm).get(tuple(joint + 1 for joint in joints))
     if link is not None:
@@ -188,10 +185,7 @@ def transmission_ratio(robot: PhysicalRobot, size: float, draws: Draws, joint: i
 
 @kind("bearing_runout", "m", 3e-5, each_joint)
 def bearing_runout(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """The axis of a joint moves to and fro by `size`, once a turn across it and twice across both; so it wobbles at its edge.
-
-    An axis that circled once with the joint, or against it, would be a link of other dimensions.
-    """
+    """The axis of a joint moves to and fro once a turn across it and twice across both: circling, it would be another link."""
     phases, old, number = draws.uniform(0, TURN, 4), robot.structure, joint + 1
 
     def runout(order: int, size: float, phase: float) -> SpringLaw:
@@ -293,10 +287,7 @@ def flange_flexibility(robot: PhysicalRobot, size: float, draws: Draws) -> Appli
 
 @kind("stiffening", "1", 0.3, each_joint, largest=0.95)
 def stiffening(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """Teeth that come to bear one after another: beyond each of three torques the compliance falls by a third of its share.
-
-    theta = - sum_k d sign(tau) max(|tau| - tau_k, 0).
-    """
+    """Teeth that come to bear one after another, each a third: theta = - sum_k d sign(tau) max(|tau| - tau_k, 0)."""
     starts = usual_torque_Nm(robot, joint) * np.sort(draws.uniform(0.1, 0.8, 3))
     drop = size * robot.compliance[joint] / 3
 
@@ -309,11 +300,7 @@ def stiffening(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> A
 
 @kind("lost_motion", "rad", 7e-5, each_joint)
 def lost_motion(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """Play between flanks that only a seal's weak spring bridges: theta = D clip(tau / tau_t, -1, 1).
-
-    In series with the gear's spring, so that beyond the torque tau_t that closes the gap the flanks lie on each other and the
-    play adds a constant D, half of the gap.
-    """
+    """Play, of a gap 2 D, between flanks that only a seal's weak spring bridges: theta = D clip(tau / tau_t, -1, 1)."""
     closing = usual_torque_Nm(robot, joint) * draws.uniform(0.02, 0.1)
     gap = (joint, lambda _, torque, __: size * np.clip(torque[:, joint] / closing, -1.0, 1.0))
     return added(robot, "gears", gap), {"half_play": size}
@@ -323,10 +310,8 @@ def lost_motion(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> 
 def hysteresis(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
     """Friction that remembers, theta = -h z, with z by the Bouc-Wen model over a torque tau_h; see `wound`.
 
-    Friction holds back: an arm that came in the sense s stays behind its drive, z = s with all of its friction wound up. Each
-    change of the load then moves z along a loop that depends on the order of loads and not on their speed. h / tau_h must be
-    less than the gear's compliance, or the arm would recede from a push. The catalogue's half width is counted along the
-    approach, and friction is against it.
+    An arm that came in the sense s stays behind its drive, z = s with all of its friction wound up; the catalogue counts the
+    half width along the approach. h / tau_h must be less than the gear's compliance, or the arm would recede from a push.
     """
     over = usual_torque_Nm(robot, joint) * draws.uniform(2.0, 6.0)
 
@@ -367,26 +352,9 @@ def wound(z: np.ndarray, change: np.ndarray) -> np.ndarray:
 kind("force_scale", "1", 0.02, nowhere, largest=0.1)(
     lambda robot, size, draws: (changed(robot, "cell", scale=1.0 / (1.0 + size) - 1.0), {"scale": size})
 )
-
-
-@kind("force_misalignment", "rad", 0.02, nowhere)
-def force_misalignment(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
-    turn = size * direction(draws)
-    return wrong_cell(robot, "turn", draws, named("about_", turn), turn_rad=tuple(turn))
-
-
-@kind("force_bias", "N", 20.0, nowhere, scale=(0.0, 1.0))
-def force_bias(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
-    """What is felt beyond what is shown is minus the bias of the display."""
-    felt = size * direction(draws)
-    return wrong_cell(robot, "bias", draws, named("along_", felt), bias_N=tuple(-felt))
-
-
-@kind("application_point", "m", 0.02, nowhere)
-def application_point(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
-    shift = size * direction(draws)
-    return wrong_cell(robot, "shift", draws, named("shift_", shift), shift_m=tuple(shift))
-
+kind("force_misalignment", "rad", 0.02, nowhere)(partial(wrong_cell, "turn_rad", "about_"))
+kind("force_bias", "N", 20.0, nowhere, scale=(0.0, 1.0))(partial(wrong_cell, "bias_N", "along_"))
+kind("application_point", "m", 0.02, nowhere)(partial(wrong_cell, "shift_m", "shift_"))
 
 # Drift
 
@@ -461,11 +429,7 @@ def two_angles(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> A
 
 @kind(OUTSIDE + "cable_transmission", "rad/(N m)", 1e-7, joints_from(2), scale=(1.0, 0.0))
 def cable_transmission(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """Cables from the motor over the joint before: theta = s (tau (1 + f q / pi) + tau_o / 2).
-
-    They yield to the tension of their joint as their free length, which falls or grows by a share f as it winds, and to that of
-    the joint o behind it, whose pulley they pass.
-    """
+    """Cables of a length that changes as they wind, over the next pulley: theta = s (tau (1 + f q / pi) + tau_o / 2)."""
     winding = draws.uniform(0.4, 0.8) * sign(draws)
 
     def turn(done: Schedule, torque: np.ndarray, _: np.ndarray) -> np.ndarray:

@@ -1,8 +1,7 @@
 """An arm as a MuJoCo model [1], and where it comes to rest.
 
 Each drive is a commanded hinge and, in series, a hinge that springs; foot, bearings and flange spring too, and elastic links
-are Timoshenko beams [2] lumped into segments. Kinematics and the forces on all coordinates are MuJoCo's; what a spring yields
-under its force is the plant's own law, so the model itself has no joint stiffness.
+are Timoshenko beams [2] lumped into segments. Kinematics and forces are MuJoCo's; what springs yield is the plant's own law.
 
 [1] Todorov, E., Erez, T. and Tassa, Y., MuJoCo: a physics engine for model-based control, IEEE/RSJ International Conference on
     Intelligent Robots and Systems, 2012.

@@ -20,6 +20,8 @@ _EACH_APPROACH, _EACH_POSE = 11, 13
 # Of one axis, so that the whole is 0.3 mrad and 0.2 mm in the mean square.
 _TILT_RAD, _SHIFT_M = 3e-4 / np.sqrt(3.0), 2e-4 / np.sqrt(3.0)
 _PULLS, _SETTLED_N = 40, 1e-9
+# Largest share by which a gear of a specimen is softer or stiffer than the robot file says.
+_SPREAD = 0.15
 
 
 def stream(seed: int, purpose: str) -> np.random.Generator:
@@ -241,14 +243,12 @@ class PhysicalRobot:
     pose_rad: tuple[float, ...] = ()
 
 
-def specimen(arm: Arm, seed: int, spread: float = 0.15, weighs: bool = True, off_line_m: float = 0.0) -> PhysicalRobot:
-    """One faultless robot of a series: other gears than the robot file says, and other weights.
+def specimen(arm: Arm, seed: int, weighs: bool = True, off_line_m: float = 0.0) -> PhysicalRobot:
+    """One faultless robot of a series: other gears than the robot file says, and other weights, or none that it feels.
 
-    `spread`: largest share by which a gear is softer or stiffer, evenly drawn. `weighs`: False: an arm whose controller takes
-    care of its weight. `off_line_m`: by how much centres of mass lie off the lines of their links at most, across each, beyond
-    what is declared.
+    `off_line_m`: by how much centres of mass lie off the lines of their links at most, across each, beyond what is declared.
     """
-    compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - spread, 1.0 + spread, arm.joints)
+    compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - _SPREAD, 1.0 + _SPREAD, arm.joints)
     masses = true_masses(arm.masses, stream(seed, "weights")) if weighs else ()
     if off_line_m:
         masses = off_the_line(masses, arm, off_line_m, stream(seed, "centres off the line"))

@@ -1,14 +1,9 @@
 """How large a defect is to the eye of a tracker, and how large it must be to have a given non-centrality.
 
 With d the change that a defect makes in the measurements, noise free, of the poses that are not held out, in standard
-deviations, the raw non-centrality is |d|^2: the signal before anything has absorbed it. What the declared model cannot absorb
-by other compliances X of its joints (and, where the frame is unknown, by a motion of the frame) and by other weights V,
-declared with a standard deviation each, is
-
-    min over b, w of |d - X b - V w|^2 + |w|^2,
-
-V in its standard deviations: what a test can find where the weights are known so well and no better. The weights come in as
-prior information of mixed estimation [1] does.
+deviations, the raw non-centrality is |d|^2. What the declared model cannot absorb by other compliances X of its joints (and,
+where the frame is unknown, by a motion of the frame) and by other weights V, in standard deviations of their declarations, is
+min over b, w of |d - X b - V w|^2 + |w|^2: the weights come in as prior information of mixed estimation [1] does.
 
 [1] Theil, H. and Goldberger, A. S., On pure and mixed statistical estimation in economics, International Economic Review 2,
     1961.
@@ -47,8 +42,8 @@ class Signal:
 class Yardstick:
     """The faultless robot at a schedule, to which defective ones are compared.
 
-    `targets`: which measuring points are read; all by default. `orientation`: whether orientations are read too. `free_frame`:
-    whether the analysis fits the tracker's frame. `declared`: weights as they are declared to the analysis.
+    `targets`: which measuring points are read; all by default. `free_frame`: whether the analysis fits the tracker's frame.
+    `declared`: weights as they are declared to the analysis.
     """
 
     def __init__(
@@ -56,11 +51,10 @@ class Yardstick:
         robot: PhysicalRobot,
         schedule: Schedule,
         targets: Iterable[int] | None = None,
-        orientation: bool = True,
         free_frame: bool = False,
         declared: Sequence[LinkMass] = (),
     ) -> None:
-        self.robot, self.schedule, self.orientation = robot, schedule, orientation
+        self.robot, self.schedule = robot, schedule
         self.targets = list(range(len(robot.arm.points)) if targets is None else targets)
         machine, rest = at_rest(robot, schedule)
         self._start = rest.coordinates[:, machine.gear]
@@ -112,9 +106,8 @@ class Yardstick:
         """Changes (S, targets, 6) as the analysis counts them: in standard deviations, of the poses that are not held out."""
         tracker = self.robot.tracker
         metres = apart[..., :3] / tracker.sigma_at(self.poses[0])[:, self.targets, None]
-        radians = apart[..., 3:] / tracker.sigma_rad
-        kept = np.concatenate([metres, radians], axis=-1) if self.orientation else metres
-        return kept[self.schedule.training].ravel()
+        counted = np.concatenate([metres, apart[..., 3:] / tracker.sigma_rad], axis=-1)
+        return counted[self.schedule.training].ravel()
 
     def _with_left(self, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         seen = self._flat(apart)
