@@ -65,10 +65,9 @@ _IMPLAUSIBLE = 3.0
 class Case:
     """One case, from which its campaign and its ground truth follow.
 
-    `key`: what it is; sealed. `group`: such as "none", "single", "pair" or "moved". `robot`: robot file in config/robots.
-    `robots`: `PROOF` or `TUNED`. `effects`: keys of `KINDS`. `levels`: non-centrality of each effect alone, on the poses that
-    are not held out, after the compliances and the weights have absorbed theirs; of one mechanism at several joints that of all
-    together. `setting`: its name, and `changes`, what is other than usual in it, as in the plan.
+    `key`: what it is; sealed. `robot`: robot file in config/robots. `robots`: `PROOF` or `TUNED`. `effects`: keys of `KINDS`.
+    `levels`: non-centrality of each effect alone, after absorption; of one mechanism at several joints that of all together.
+    `setting`: its name, and `changes`, what is other than usual in it, as in the plan.
     """
 
     key: str
@@ -190,10 +189,7 @@ def _drawn_pair(plan: Plan, seed: int, robot: str, level: float | str, number: i
 
 
 def defects_of(case: Case, robot: PhysicalRobot, yardstick: Yardstick) -> list[Sized]:
-    """The defects of a case at the sizes that give their non-centralities.
-
-    `robot`: faultless; `yardstick`: of it. Returns (Defect, dict): each with its size as in the ground truth: target, quantity,
-    signal, which draw. Of one mechanism at several joints each has its own signal; the target is that of all together.
+    """The defects of a case at the sizes that give their non-centralities, each with its size as in the ground truth.
 
     Where a location has no size of the wanted non-centrality at which the arm finds rest, or one beyond three times the
     plausible, the next one is drawn; of eight that are all implausible the least is taken. Where none has a size at all, as

@@ -1,10 +1,8 @@
 """The loop closed on the plant: a robot with a hidden defect is measured, diagnosed, commanded by the result, measured again.
 
-Each wanted pose is commanded five times: as the robot file has the arm, by a calibration of the geometry alone, by the declared
-model (geometry and springs), by the model that the diagnosis found, and by the plant itself, whose equilibrium is inverted by
-Newton's method as `compensation` inverts a model. What the last leaves is the floor: noise of the tracker and repeatability.
-Nobody's model has seen any of these poses. Beside it stands what is stated of the corrected robot's accuracy, and whether the
-plant keeps it.
+Each wanted pose, which nobody's model has seen, is commanded five times: as the robot file has the arm, by a calibration of the
+geometry alone, by the declared model (geometry and springs), by the model that the diagnosis found, and by the plant itself,
+which leaves noise and repeatability. Beside it stands what is stated of the corrected robot's accuracy.
 """
 
 from __future__ import annotations
@@ -249,10 +247,9 @@ def _moved(made: Measured, commands: np.ndarray, seed: int) -> dict[str, Any]:
 
 
 def stated_accuracy(robot_file: Path, effect: str, seed: int, frame: str) -> list[dict[str, Any]]:
-    """For each of `STATED_OF` what is predicted, bounded and decided of one corrected robot's error, and what it is.
+    """For each of `STATED_OF` what is predicted, bounded and decided of one corrected robot's error, and what the plant's is.
 
-    True errors are those of the plant at corrected targets, without the tracker's noise: in the base's frame where the campaign
-    knew it, else after the best rigid placement over the random poses.
+    In the base's frame where the campaign knew it, else after the best rigid placement over the random poses.
     """
     made = measure(robot_file, effect, seed, frame)
     plant, wanted, operating = made.plant, made.wanted, OperatingConditions(made.wanted.wrench)

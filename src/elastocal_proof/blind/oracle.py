@@ -1,16 +1,13 @@
 """The oracle and the limit: what the same fit does when it is given the effects, and what the best analyst finds.
 
-The oracle has the measurements, the noise and the held-out poses of the diagnosis, and is given which effects there are and at
-which joints, so that what it does better is worth what the search for the effect has cost. It gets the effect by its name in
-the catalogue, not the plant's law; nor which variant of it (axes, by time or by temperature): of these it takes the one that
-the residual of the declared model speaks for.
+The oracle has all that the diagnosis has, and is given which effects of the catalogue there are and at which joints; of their
+variants (axes, by time or by temperature) it takes the one that the residual of the declared model speaks for.
 
 The best analyst knows the plant's laws, how often each mechanism occurs, and how large it is. Of each mechanism at each
 location some defects are drawn as the plant draws them. With S (M, m) what their measurements show after absorption, each of
-the non-centrality of the case, an unknown defect of that kind is taken for a random vector of the second moments S S'/m: the
-residual is then normal with covariance I + S S'/m, and the most probable mechanism is the Bayes rule of linear Gaussian models
-[1]. An alarm is the likelihood-ratio test of the average over all of them, which no test exceeds on average [2], with its null
-distribution simulated.
+the non-centrality of the case, the residual under an unknown defect of that kind is taken for normal with covariance
+I + S S'/m, and the most probable mechanism is the Bayes rule of linear Gaussian models [1]. An alarm is the likelihood-ratio
+test of the average over all of them, which no test exceeds on average [2], with its null distribution simulated.
 
 [1] Bishop, C. M., Pattern Recognition and Machine Learning, chapter 3, Springer, 2006.
 [2] Lehmann, E. L. and Romano, J. P., Testing Statistical Hypotheses, section 3.8, Springer, 2005.

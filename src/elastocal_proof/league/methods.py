@@ -126,9 +126,8 @@ def entered(
 ) -> tuple[dict[str, np.ndarray], Any]:
     """Columns (M,) of what a method, fitted to the poses of a case, predicts of held-out ones, and the regression's setting.
 
-    A regression is tuned by the same kind of split that judges, within the training poses, see `remainder.corrected`. Poses of
-    another campaign have their frames and targets fitted to them, whatever the method. A standard deviation that a method does
-    not state is not a number.
+    A regression is tuned within the training poses by the same kind of split that judges, see `remainder.corrected`; frames and
+    targets of another campaign are fitted to it, whatever the method. What a method does not state is not a number.
     """
     seen, setting, std = held_out.observations, None, None
     if method.regression is None:
@@ -161,8 +160,7 @@ def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray |
     """Columns of the mechanisms table (K,) of one fold; none where the data are at fault.
 
     The share of a mechanism is the sum of squares that it displaces the measurements by, beyond what geometry and frames take
-    up, over that of the residual which these leave; all in units of the noise. Mechanisms that resemble each other share, so
-    shares need not add up to that of all together.
+    up, over that of the residual which these leave, in units of the noise. Mechanisms that resemble each other share it.
     """
     mechanisms: Mapping[str, float] = {}
     shares: list[float] = []
