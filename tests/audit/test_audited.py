@@ -29,7 +29,8 @@ def test_a_sample_is_drawn_by_the_name_of_the_file(run):
 
 @pytest.mark.parametrize(("found", "holds"), [(1.0 + 0.9e-9, True), (1.0 + 1.1e-9, False), (np.nan, False), (np.inf, False)])
 def test_a_difference_is_measured_by_the_largest_expected_value(found, holds):
-    assert compare("c", "b", [found, 0.5], [1.0, 0.5]).holds is holds
+    told = compare("c", "b", [found, 0.5], [1.0, 0.5])
+    assert told.holds is holds and (told.note == "") is holds
     # Equal values hold even where nothing is allowed.
     assert compare("c", "b", [found, np.nan, np.inf], [found, np.nan, np.inf], 0.0).holds
 

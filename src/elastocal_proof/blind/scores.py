@@ -257,7 +257,7 @@ def intervals_of(plan: Plan, truth: Document, verdict: Document) -> list[dict[st
         for effect in verdict["effects"]:
             if effect["name"] == defect["effect"]:
                 values += _comparable(defect, effect)
-    head = {"robots": robots_of(plan, case), "truth": " + ".join(case["effects"]) or NONE}
+    head: dict[str, Any] = {"robots": robots_of(plan, case), "truth": " + ".join(case["effects"]) or NONE}
     head |= {"foreign": any(effect.startswith(OUTSIDE) for effect in case["effects"])}
     head |= {"level": max(case["levels"], default=0.0)}
     return [

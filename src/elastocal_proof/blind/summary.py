@@ -141,7 +141,13 @@ def _bootstrapped(
     value = float(statistic(*samples)) if len(samples[0]) else np.nan
     low = high = np.nan
     if len(samples[0]) > 1 and np.isfinite(value):
-        how = {"n_resamples": _RESAMPLES, "batch": _SEVERAL_AT_ONCE, "vectorized": True, "paired": True, "rng": draws}
+        how: dict[str, Any] = {
+            "n_resamples": _RESAMPLES,
+            "batch": _SEVERAL_AT_ONCE,
+            "vectorized": True,
+            "paired": True,
+            "rng": draws,
+        }
         low, high = bootstrap(samples, statistic, method="percentile", **how).confidence_interval
     return {"hits": None, "cases": len(samples[0]), "rate": value, "low": float(low), "high": float(high)}
 

@@ -168,7 +168,7 @@ def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray |
         mechanisms, best, problem = evidence.conclusion.mechanisms, evidence.conclusion.best, evidence.linearized.problem
         explained = squares_explained(problem, evidence.posterior.models[best.model]) if best.named else {}
         shares = [explained.get(name, 0.0) / float(problem.statistics.squares[0]) for name in mechanisms]
-    columns = {"fold": np.full(len(mechanisms), fold), "mechanism": [*mechanisms]}
+    columns: dict[str, np.ndarray | list[str]] = {"fold": np.full(len(mechanisms), fold), "mechanism": [*mechanisms]}
     return columns | {"probability": np.array([*mechanisms.values()], float), "share": np.array(shares, float)}
 
 

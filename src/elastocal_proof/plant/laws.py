@@ -38,9 +38,10 @@ _KNOCKED_S = (700.0, 2000.0)
 _HISTORY_STEPS = 48
 
 
-def added(robot: PhysicalRobot, part: str, *laws: tuple[Any, Callable[..., np.ndarray]]) -> PhysicalRobot:
+def added(robot: PhysicalRobot, part: str, *laws: tuple[int | str, Callable[..., np.ndarray]]) -> PhysicalRobot:
     """With further laws of "drives", "gears" or "springs"."""
-    return replace(robot, **{part: (*getattr(robot, part), *laws)})
+    changes: dict[str, Any] = {part: (*getattr(robot, part), *laws)}
+    return replace(robot, **changes)
 
 
 def changed(robot: PhysicalRobot, part: str, **changes: Any) -> PhysicalRobot:

@@ -282,12 +282,12 @@ def machine_of(arm: Arm, structure: Structure) -> Machine:
     at = {model.joint(j).name: int(model.jnt_qposadr[j]) for j in range(model.njnt)}
     drive, gear = (np.array([at[f"{name}{j + 1}"] for j in range(arm.joints)]) for name in ("drive", "gear"))
     springs, sites = {name: at[name] for name in tree.compliance}, np.array([model.site(name).id for name in arm.points])
-    compliance = np.zeros(model.nq)
-    compliance[[*springs.values()]] = [*tree.compliance.values()]
+    yields = np.zeros(model.nq)
+    yields[[*springs.values()]] = [*tree.compliance.values()]
     # A body behind a drive is placed by the stretch before it.
     behind_drive = np.array([model.body(number).name.startswith("arm") for number in range(model.nbody)], int)
     within = behind_drive.cumsum()
-    return Machine(model, drive, gear, springs, compliance, sites, within - behind_drive, within[model.site_bodyid])
+    return Machine(model, drive, gear, springs, yields, sites, within - behind_drive, within[model.site_bodyid])
 
 
 class Equilibrium(NamedTuple):

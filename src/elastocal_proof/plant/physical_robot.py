@@ -236,7 +236,7 @@ class PhysicalRobot:
     drives: tuple[tuple[int, DriveLaw], ...] = ()
     springs: tuple[tuple[str, SpringLaw], ...] = ()
     expansion_per_K: float = 0.0
-    gradient_per_K: tuple[float, ...] = (0.0, 0.0)
+    gradient_per_K: tuple[float, float] = (0.0, 0.0)
     cell: LoadCell = field(default_factory=LoadCell)
     tracker: Tracker = field(default_factory=Tracker)
     repeatability_rad: tuple[float, ...] = ()
